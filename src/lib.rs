@@ -1,0 +1,23 @@
+//! The fingertip controller's core: one frame of a 10 x 10 tactile array in, one motor duty out.
+//!
+//! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
+//! Nothing here knows hardware, allocates, panics or uses floating point after configuration, so the same code runs on
+//! the host, under an emulator and on the microcontroller, and gives the same bits.
+#![no_std]
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod units;
+
+pub mod scan;
+
+pub mod frame;
+
+pub mod params;
+
+pub mod pipeline;
+
+pub mod safety;

@@ -1,0 +1,140 @@
+//! Everything a user may set: the fingertip, the array, the motor and the limits, with their ranges.
+//!
+//! Stored and sent as integers in the unit that the field's name ends with, so a record is exact on the bus, in flash
+//! and in a file. [`Params::check`] is the one gate; what it lets through cannot make the loop fail.
+
+/// A parameter out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ParamError {
+    /// The field of [`Params`].
+    pub name: &'static str,
+    /// What was asked for.
+    pub value: i32,
+    /// The least value allowed.
+    pub min: i32,
+    /// The largest value allowed.
+    pub max: i32,
+}
+
+macro_rules! params {
+    ($($(#[$doc:meta])* $name:ident = $default:literal in $min:literal ..= $max:literal;)*) => {
+        /// The stored parameters, in the units that their names end with.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub struct Params { $($(#[$doc])* pub $name: i32,)* }
+
+        impl Params {
+            /// How many there are.
+            pub const COUNT: usize = [$(stringify!($name)),*].len();
+
+            /// The parameters of the reference finger, described in `docs/board.md`.
+            pub const DEFAULT: Self = Self { $($name: $default,)* };
+
+            /// Refuses the first parameter that is out of its range.
+            ///
+            /// # Errors
+            /// Names the parameter, its value and its range.
+            pub const fn check(&self) -> Result<(), ParamError> {
+                $(if self.$name < $min || self.$name > $max {
+                    return Err(ParamError { name: stringify!($name), value: self.$name, min: $min, max: $max });
+                })*
+                Ok(())
+            }
+
+            /// The values in the order of their definition, for storage.
+            pub const fn to_array(&self) -> [i32; Self::COUNT] { [$(self.$name),*] }
+
+            /// The inverse of [`Params::to_array`]; unchecked.
+            pub const fn from_array(values: &[i32; Self::COUNT]) -> Self {
+                let [$($name),*] = *values;
+                Self { $($name),* }
+            }
+
+            /// Name, default, least and largest value of each, in order.
+            pub const RANGES: [(&'static str, i32, i32, i32); Self::COUNT] =
+                [$((stringify!($name), $default, $min, $max)),*];
+        }
+    };
+}
+
+params! {
+    /// Radius a of the hemispherical tip.
+    tip_radius_um = 10_000 in 4_000..=16_000;
+    /// Young's modulus Y of the tip.
+    modulus_pa = 250_000 in 20_000..=2_000_000;
+    /// Distance from taxel to taxel.
+    pitch_um = 1_500 in 500..=4_000;
+    /// Settle time of a row before its conversions.
+    settle_ns = 2_400 in 500..=100_000;
+    /// Sampling time of a conversion, in converter cycles: 3, 15, 28, 56, 84, 112, 144 or 480.
+    sample_cycles = 15 in 3..=480;
+    /// Converter codes for each kPa on a taxel, thousandths.
+    codes_per_kpa_milli = 24_000 in 1_000..=200_000;
+    /// Share of the row's voltage lost to the row driver's resistance for each code in the row's sum, parts per billion:
+    /// R_on / (R_f V_drive 4096 / V_ref).
+    row_sag_ppb_per_code = 1_667 in 0..=20_000;
+    /// A taxel that reads fewer codes than this above its column's undriven level is dead: the sensor's preload is gone.
+    dead_codes = 12 in 1..=1_000;
+    /// A column that reads more codes than this with no row driven shows a row that is stuck on.
+    undriven_max_codes = 700 in 0..=4_000;
+    /// More dead or saturated taxels than this are a fault.
+    bad_taxels_max = 8 in 0..=100;
+    /// Contact begins above this force.
+    contact_on_mn = 40 in 5..=2_000;
+    /// Contact ends below this force.
+    contact_off_mn = 15 in 1..=2_000;
+    /// Torque constant of the motor, uN m/A.
+    torque_constant_unm_per_a = 5_350 in 100..=200_000;
+    /// Terminal resistance of the motor and the bridge together.
+    resistance_mohm = 2_830 in 50..=200_000;
+    /// Inertia at the motor's shaft, rotor and gear, ug m^2 (1 g cm^2 is 100).
+    inertia_ug_m2 = 71 in 1..=20_000;
+    /// Coulomb friction at the motor's shaft, uN m.
+    friction_unm = 120 in 0..=20_000;
+    /// Motor angle for tip travel, thousandths of rad/mm: gear ratio over the drum's or crank's radius.
+    reduction_mrad_per_mm = 3_583 in 100..=50_000;
+    /// Quadrature counts for one turn of the motor.
+    encoder_counts_per_turn = 1_600 in 16..=65_536;
+    /// Largest voltage at the motor.
+    voltage_max_mv = 6_000 in 500..=48_000;
+    /// Largest current, by the motor's model.
+    current_max_ma = 2_000 in 20..=20_000;
+    /// Largest speed of the tip.
+    speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
+    /// Speed of the approach and of the release.
+    approach_um_per_s = 30_000 in 500..=200_000;
+    /// How far the tip may travel from where torque was enabled.
+    travel_max_um = 20_000 in 100..=100_000;
+    /// How far the tip backs off after contact is lost on release.
+    clearance_um = 1_000 in 0..=20_000;
+    /// Over-force: above this the motor is stopped.
+    force_fault_mn = 9_000 in 100..=200_000;
+    /// Goals are cut to this.
+    force_max_mn = 7_000 in 50..=150_000;
+    /// Below this supply the motor is stopped.
+    supply_min_mv = 5_000 in 1_000..=48_000;
+    /// Above this supply the motor is stopped.
+    supply_max_mv = 8_500 in 2_000..=60_000;
+}
+
+impl Default for Params {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_pass_and_each_bound_is_enforced() {
+        assert_eq!(Params::DEFAULT.check(), Ok(()));
+        for (place, (name, _, min, max)) in Params::RANGES.into_iter().enumerate() {
+            for value in [min - 1, max + 1] {
+                let mut values = Params::DEFAULT.to_array();
+                values[place] = value;
+                assert_eq!(Params::from_array(&values).check(), Err(ParamError { name, value, min, max }));
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! The frame budget: settle, sampling and conversion of every row, in one place.
+
+use crate::frame::{BANK_COLUMNS, SLOTS};
+
+/// Ticks of the scan timer in a second (TIM8 at 168 MHz).
+pub const TIMER_HZ: u32 = 168_000_000;
+/// Scan timer ticks in a cycle of the converter's clock (21 MHz).
+pub const TICKS_PER_ADC_CYCLE: u32 = 8;
+/// Converter cycles for a 12-bit conversion, after sampling.
+pub const CONVERSION_CYCLES: u32 = 12;
+/// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
+pub const TRIGGER_CYCLES: u32 = 5;
+
+/// How a scan is timed. Row `n` is driven for [`ScanTiming::slot_ticks`]; its conversions start after
+/// [`ScanTiming::settle_ticks`] and end before the next row.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ScanTiming {
+    /// From the row's edge to the trigger of its conversions, scan timer ticks.
+    pub settle_ticks: u16,
+    /// From row to row, scan timer ticks.
+    pub slot_ticks: u16,
+    /// How long each column is sampled, converter cycles.
+    pub sample_cycles: u16,
+}
+
+/// Why a scan cannot be timed so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScanError {
+    /// The converter has no such sampling time: 3, 15, 28, 56, 84, 112, 144 and 480 cycles are to be had.
+    SampleCycles(u16),
+    /// The slot exceeds the timer's 16 bits: `ticks` of at most 65535.
+    SlotTooLong {
+        /// What the settle time and the conversions add up to.
+        ticks: u32,
+    },
+}
+
+impl ScanTiming {
+    /// A settle time of 2.4 us and 15 cycles of sampling: 10 kHz.
+    pub const DEFAULT_SETTLE_NS: u32 = 2_400;
+    /// 15 cycles at 21 MHz settle a source of up to 10 kOhm to half a code (RM0390 and DS10693, table "ADC accuracy").
+    pub const DEFAULT_SAMPLE_CYCLES: u16 = 15;
+
+    /// The tightest scan that gives each row `settle_ns` before its conversions.
+    ///
+    /// # Errors
+    /// A sampling time that the converter lacks, or a slot beyond the timer's range.
+    pub const fn new(settle_ns: u32, sample_cycles: u16) -> Result<Self, ScanError> {
+        if !matches!(sample_cycles, 3 | 15 | 28 | 56 | 84 | 112 | 144 | 480) {
+            return Err(ScanError::SampleCycles(sample_cycles));
+        }
+        let settle = (settle_ns as u64 * TIMER_HZ as u64).div_ceil(1_000_000_000);
+        let cycles = BANK_COLUMNS as u32 * (sample_cycles as u32 + CONVERSION_CYCLES) + TRIGGER_CYCLES;
+        let slot = settle + (cycles * TICKS_PER_ADC_CYCLE) as u64;
+        if slot > u16::MAX as u64 {
+            let ticks = if slot > u32::MAX as u64 { u32::MAX } else { slot as u32 };
+            return Err(ScanError::SlotTooLong { ticks });
+        }
+        Ok(Self { settle_ticks: settle as u16, slot_ticks: slot as u16, sample_cycles })
+    }
+
+    /// From frame to frame, scan timer ticks.
+    pub const fn frame_ticks(self) -> u32 {
+        self.slot_ticks as u32 * SLOTS as u32
+    }
+
+    /// From frame to frame, ns, rounded.
+    pub const fn frame_ns(self) -> u32 {
+        ((self.frame_ticks() as u64 * 1_000_000_000 + TIMER_HZ as u64 / 2) / TIMER_HZ as u64) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_scan_makes_ten_thousand_frames_a_second() {
+        let timing = ScanTiming::new(ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES).unwrap();
+        assert!((90_000..=100_000).contains(&timing.frame_ns()), "{} ns", timing.frame_ns());
+    }
+
+    #[test]
+    fn what_the_hardware_cannot_time_is_refused() {
+        assert_eq!(ScanTiming::new(2_000, 16), Err(ScanError::SampleCycles(16)));
+        assert!(matches!(ScanTiming::new(400_000, 15), Err(ScanError::SlotTooLong { .. })));
+        assert!(matches!(ScanTiming::new(u32::MAX, 15), Err(ScanError::SlotTooLong { .. })));
+    }
+}

@@ -20,4 +20,6 @@ pub mod params;
 
 pub mod pipeline;
 
+pub mod config;
+
 pub mod safety;

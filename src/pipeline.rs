@@ -62,3 +62,32 @@ pub struct Status {
     /// The duty that was returned.
     pub duty: Duty,
 }
+
+/// The loop's state between frames.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    status: Status,
+}
+
+impl Pipeline {
+    /// A pipeline in the mode off.
+    pub fn new(_config: &crate::config::Config) -> Self {
+        Self { status: Status::default() }
+    }
+
+    /// Replaces the configuration; the mode goes to off.
+    pub fn configure(&mut self, _config: &crate::config::Config) {}
+
+    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command.
+    pub fn step(&mut self, frame: &Frame, _sense: &Sense, _command: &Command) -> (Duty, Status) {
+        self.status.sequence = frame.sequence;
+        (Duty::ZERO, self.status)
+    }
+
+    /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
+    pub fn stop(&mut self, fault: Fault) -> Status {
+        self.status.mode = Mode::Fault;
+        self.status.fault.get_or_insert(fault);
+        self.status
+    }
+}

@@ -1,0 +1,116 @@
+//! What a taxel feels: the pressure averaged over its square.
+//!
+//! A square inside the contact is a smooth function's, so 3 x 3 Gauss points do. The rim bends the pressure, so a square
+//! that it crosses is cut into strips along y at every place where the rim meets a side or turns, each strip into chords
+//! that end on the rim: on each piece the pressure is smooth again.
+
+use super::setup::{Setup, Tip};
+use super::tip::Flattened;
+use fingertip::frame::{COLUMNS, ROWS};
+
+/// Gauss-Legendre nodes and weights on -1..1, 3 points: 0 and sqrt(3/5); 5/9, 8/9, 5/9.
+const GAUSS3: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+    (0.0, 0.888_888_888_888_888_8),
+    (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+];
+
+/// A rectangle from the contact's centre, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Left and right side.
+    pub x_mm: [f64; 2],
+    /// Lower and upper side.
+    pub y_mm: [f64; 2],
+}
+
+impl Cell {
+    /// The square of a taxel.
+    pub fn of(setup: &Setup, row: usize, column: usize) -> Self {
+        let pitch = setup.array.pitch_mm;
+        let left = (column as f64 - 0.5 * COLUMNS as f64) * pitch - setup.wall.centre_x_mm;
+        let low = (row as f64 - 0.5 * ROWS as f64) * pitch - setup.wall.centre_y_mm;
+        Self { x_mm: [left, left + pitch], y_mm: [low, low + pitch] }
+    }
+
+    /// Mean pressure on it.
+    pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
+        let rim2 = tip.contact_radius2_mm2();
+        let near2 = nearest(self.x_mm).powi2() + nearest(self.y_mm).powi2();
+        if near2 >= rim2 {
+            return 0.0;
+        }
+        let far2 = farthest(self.x_mm).powi2() + farthest(self.y_mm).powi2();
+        let integral = if far2 <= rim2 {
+            gauss(self.y_mm, |y| gauss(self.x_mm, |x| tip.pressure_kpa(x * x + y * y)))
+        } else {
+            self.cut_by_rim(tip, rim2)
+        };
+        integral / ((self.x_mm[1] - self.x_mm[0]) * (self.y_mm[1] - self.y_mm[0]))
+    }
+
+    fn cut_by_rim(&self, tip: &Flattened, rim2: f64) -> f64 {
+        let rim = rim2.sqrt();
+        let chord = |y: f64| {
+            let half = (rim2 - y * y).max(0.0).sqrt();
+            let ends = [self.x_mm[0].max(-half), self.x_mm[1].min(half)];
+            if ends[0] < ends[1] { gauss(ends, |x| tip.pressure_kpa(x * x + y * y)) } else { 0.0 }
+        };
+        let meets = self.x_mm.map(|x| (rim2 - x * x).max(0.0).sqrt());
+        let (low, high) = (meets[0].min(meets[1]), meets[0].max(meets[1]));
+        let mut cuts = [self.y_mm[0], -rim, -high, -low, low, high, rim, self.y_mm[1]];
+        for cut in &mut cuts {
+            *cut = cut.clamp(self.y_mm[0], self.y_mm[1]);
+        }
+        cuts.windows(2).map(|strip| if strip[0] < strip[1] { gauss([strip[0], strip[1]], chord) } else { 0.0 }).sum()
+    }
+}
+
+/// Integral over an interval.
+fn gauss(over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (over[0] + over[1]), 0.5 * (over[1] - over[0]));
+    half * GAUSS3.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
+}
+
+/// The place of an interval that is nearest to 0.
+fn nearest(over: [f64; 2]) -> f64 {
+    over[0].max(0.0) + over[1].min(0.0)
+}
+
+/// The end of an interval that is farthest from 0, without its sign.
+fn farthest(over: [f64; 2]) -> f64 {
+    over[1].max(-over[0])
+}
+
+trait Square {
+    fn powi2(self) -> f64;
+}
+
+impl Square for f64 {
+    fn powi2(self) -> f64 {
+        self * self
+    }
+}
+
+/// The rows worked out for one indentation; they are forgotten when it or the setup changes.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    key: [u64; 6],
+    rows: [Option<[f64; COLUMNS]>; ROWS],
+}
+
+impl Rows {
+    /// The mean pressures of a row's taxels.
+    pub fn row_kpa(&mut self, setup: &Setup, indentation_mm: f64, row: usize) -> [f64; COLUMNS] {
+        let Tip { radius_mm, modulus_kpa } = setup.tip;
+        let (x, y, pitch) = (setup.wall.centre_x_mm, setup.wall.centre_y_mm, setup.array.pitch_mm);
+        let key = [indentation_mm.max(0.0), radius_mm, modulus_kpa, x, y, pitch].map(f64::to_bits);
+        if key != self.key {
+            *self = Self { key, ..Self::default() };
+        }
+        *self.rows[row].get_or_insert_with(|| {
+            let tip = setup.tip.flattened(indentation_mm);
+            core::array::from_fn(|column| Cell::of(setup, row, column).mean_kpa(&tip))
+        })
+    }
+}

@@ -1,0 +1,164 @@
+//! What the simulated board is made of: plain data, in the units that the names end with.
+
+use serde::{Deserialize, Serialize};
+
+/// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Setup {
+    /// The soft fingertip.
+    pub tip: Tip,
+    /// Where the object is.
+    pub wall: Wall,
+    /// The tactile array and its amplifiers.
+    pub array: Array,
+    /// The motor.
+    pub motor: Motor,
+    /// From the motor's shaft to the tip.
+    pub transmission: Transmission,
+    /// What feeds the bridge.
+    pub supply: Supply,
+}
+
+/// The hemispherical fingertip of Park, Kim and Hirai (2003).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Tip {
+    /// Radius a.
+    pub radius_mm: f64,
+    /// Young's modulus Y.
+    pub modulus_kpa: f64,
+}
+
+impl Default for Tip {
+    fn default() -> Self {
+        Self { radius_mm: 10.0, modulus_kpa: 250.0 }
+    }
+}
+
+/// A rigid plane in the tip's way, and where the tip meets the array.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wall {
+    /// Travel at which the tip touches.
+    pub distance_mm: f64,
+    /// Contact centre from the array's middle, along the columns.
+    pub centre_x_mm: f64,
+    /// Contact centre from the array's middle, along the rows.
+    pub centre_y_mm: f64,
+}
+
+impl Default for Wall {
+    fn default() -> Self {
+        Self { distance_mm: 5.0, centre_x_mm: 0.0, centre_y_mm: 0.0 }
+    }
+}
+
+/// A resistive array read at zero potential: one row driven, each column into a transimpedance amplifier.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Array {
+    /// Distance from taxel to taxel; the taxels are squares that touch.
+    pub pitch_mm: f64,
+    /// Conductance of a taxel without pressure (its preload), G_0.
+    pub preload_siemens: f64,
+    /// Conductance that a kPa adds, alpha.
+    pub siemens_per_kpa: f64,
+    /// Conductance of a shorted taxel.
+    pub short_siemens: f64,
+    /// Row switch and trace, R_on.
+    pub row_ohm: f64,
+    /// Feedback resistor of the column amplifiers, R_f.
+    pub feedback_ohm: f64,
+    /// The columns' virtual ground, V_g; rows that are not driven sit there too.
+    pub ground_v: f64,
+    /// How far below it a driven row sits, V_drive.
+    pub drive_v: f64,
+    /// Highest voltage of an amplifier and reference of the converter.
+    pub reference_v: f64,
+    /// Time constant with which a column settles after a row's edge.
+    pub settle_tau_s: f64,
+    /// From the edge to the sample, for whole frames taken at one instant.
+    pub sample_after_s: f64,
+}
+
+impl Array {
+    /// Codes of a 12-bit converter.
+    pub const CODES: f64 = 4096.0;
+    /// K = R_f V_drive 4096 / V_ref of the reference finger, codes Ohm.
+    const CODES_OHM: f64 = 1.8e7;
+}
+
+impl Default for Array {
+    fn default() -> Self {
+        let (drive_v, reference_v) = (0.3, 3.3);
+        Self {
+            pitch_mm: 1.5,
+            preload_siemens: 40.0 / Self::CODES_OHM,
+            siemens_per_kpa: 24.0 / Self::CODES_OHM,
+            short_siemens: 0.1,
+            row_ohm: 30.0,
+            feedback_ohm: Self::CODES_OHM * reference_v / (Self::CODES * drive_v),
+            ground_v: 0.3,
+            drive_v,
+            reference_v,
+            settle_tau_s: 0.2e-6,
+            sample_after_s: 2.4e-6,
+        }
+    }
+}
+
+/// A brushed motor with its encoder. The defaults are the data sheet of the FAULHABER 1331 T 006 SR with an IE2-400.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motor {
+    /// Terminal resistance.
+    pub resistance_ohm: f64,
+    /// Torque constant; also the back-EMF constant in V s/rad.
+    pub torque_nm_per_a: f64,
+    /// Inertia at the shaft.
+    pub inertia_kg_m2: f64,
+    /// Friction torque, independent of speed.
+    pub friction_nm: f64,
+    /// Quadrature counts for one turn.
+    pub encoder_counts_per_turn: f64,
+}
+
+impl Default for Motor {
+    fn default() -> Self {
+        Self {
+            resistance_ohm: 2.83,
+            torque_nm_per_a: 5.35e-3,
+            inertia_kg_m2: 0.71e-7,
+            friction_nm: 0.12e-3,
+            encoder_counts_per_turn: 1600.0,
+        }
+    }
+}
+
+/// Gearhead, drum and tendon, rigid and without play.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Transmission {
+    /// Motor turns for one turn of the drum.
+    pub ratio: f64,
+    /// Radius on which the tendon winds.
+    pub drum_radius_mm: f64,
+    /// Share of the torque that arrives when the motor drives the load.
+    pub efficiency: f64,
+}
+
+impl Default for Transmission {
+    fn default() -> Self {
+        Self { ratio: 43.0, drum_radius_mm: 12.0, efficiency: 0.7 }
+    }
+}
+
+/// An ideal source behind a resistance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Supply {
+    /// Voltage without load.
+    pub source_v: f64,
+    /// Resistance of source, wires and connectors.
+    pub source_ohm: f64,
+}
+
+impl Default for Supply {
+    fn default() -> Self {
+        Self { source_v: 6.0, source_ohm: 0.1 }
+    }
+}

@@ -1,0 +1,177 @@
+//! The soft fingertip's model, whole, in fixed point.
+//!
+//! A hemisphere of radius `a` and Young's modulus `Y` is pressed by `d` (the paper's `d0`) against a rigid plane. Park,
+//! Kim and Hirai, "Development of a soft-fingertip and its modeling based on force distribution", ICRA 2003, see it as
+//! a bundle of independent columns along the normal; the equation numbers in this module are theirs. `docs/model.md`
+//! says how each formula is arranged so that no digits are lost, and how far each result can be off.
+//!
+//! A [`Tip`] is made once, with a typed error for a radius or a modulus out of range. Everything after that is total: an
+//! input outside the domain counts as the nearest one inside.
+//!
+//! ```
+//! use fingertip::model::Tip;
+//! use fingertip::units::{Kilopascals, Millimetres};
+//!
+//! let tip = Tip::new(Millimetres::from_bits(10 << 24), Kilopascals::from_bits(250 << 16)).unwrap();
+//! let force = tip.force(Millimetres::from_bits(2 << 24));
+//! assert_eq!(force.0.to_string(), "3.14159"); // pi 0.25 N/mm^2 (2 mm)^2
+//! assert_eq!(tip.contact_radius(Millimetres::from_bits(2 << 24)), Millimetres::from_bits(6 << 24));
+//! ```
+
+mod arith;
+
+use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
+use arith::{Gain, root, square};
+
+/// The smallest tip radius a.
+pub const RADIUS_MIN: Millimetres = Millimetres::from_bits(4 << 24);
+/// The largest tip radius a.
+pub const RADIUS_MAX: Millimetres = Millimetres::from_bits(16 << 24);
+/// The smallest Young's modulus Y.
+pub const MODULUS_MIN: Kilopascals = Kilopascals::from_bits(20 << 16);
+/// The largest Young's modulus Y.
+pub const MODULUS_MAX: Kilopascals = Kilopascals::from_bits(2_000 << 16);
+
+/// pi times 2^98.
+const PI_Q98: u128 = 0xc_90fd_aa22_168c_234c_4c66_28b8;
+/// 1/pi times 2^110.
+const INVERSE_PI_Q110: u128 = 0x145f_306d_c9c8_82a5_3f84_eafa_3ea7;
+
+/// A tip that the model does not cover.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TipError {
+    /// The radius a is out of [`RADIUS_MIN`] to [`RADIUS_MAX`].
+    Radius(Millimetres),
+    /// The modulus Y is out of [`MODULUS_MIN`] to [`MODULUS_MAX`].
+    Modulus(Kilopascals),
+}
+
+impl core::fmt::Display for TipError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Radius(value) => {
+                write!(f, "tip radius of {} mm: {} to {} mm are covered", value.0, RADIUS_MIN.0, RADIUS_MAX.0)
+            }
+            Self::Modulus(value) => {
+                write!(f, "Young's modulus of {} kPa: {} to {} kPa are covered", value.0, MODULUS_MIN.0, MODULUS_MAX.0)
+            }
+        }
+    }
+}
+
+impl core::error::Error for TipError {}
+
+/// A fingertip: its radius and modulus, and the constants that follow from them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tip {
+    radius: Millimetres,
+    modulus: Kilopascals,
+    depth_max: Millimetres,
+    force_max: Newtons,
+    /// Newtons from a squared length in Q48: pi Y.
+    force_gain: Gain,
+    /// Four times the squared length in Q48 from newtons: 4/(pi Y).
+    area_gain: Gain,
+    /// Newtons a millimetre from millimetres: 2 pi Y.
+    stiffness_gain: Gain,
+}
+
+impl Tip {
+    /// A tip of the given radius a and Young's modulus Y.
+    ///
+    /// All division and all arithmetic beyond 64 bits happens here.
+    ///
+    /// # Errors
+    /// The radius or the modulus is out of its range; the error holds the value and prints the range.
+    pub fn new(radius: Millimetres, modulus: Kilopascals) -> Result<Self, TipError> {
+        if radius < RADIUS_MIN || radius > RADIUS_MAX {
+            return Err(TipError::Radius(radius));
+        }
+        if modulus < MODULUS_MIN || modulus > MODULUS_MAX {
+            return Err(TipError::Modulus(modulus));
+        }
+        let modulus_bits = u128::from(modulus.to_bits().unsigned_abs());
+        // 1 kPa is 1/1000 N/mm^2. The modulus counts 2^-16 kPa and a squared length 2^-48 mm^2; force, modulus and
+        // stiffness have the same 16 bits after the point, which cancel.
+        let pi_y_q98 = (PI_Q98 * modulus_bits + 500) / 1000;
+        let inverse_pi_y_q110 = (INVERSE_PI_Q110 * 1000 + modulus_bits / 2) / modulus_bits;
+        let depth_max_bits = (i64::from(radius.to_bits()) * 19 + 19) / 20;
+        let mut tip = Self {
+            radius,
+            modulus,
+            depth_max: Millimetres::from_bits(depth_max_bits as i32),
+            force_max: Newtons::ZERO,
+            force_gain: Gain::new(pi_y_q98, 98 + 48),
+            area_gain: Gain::new(inverse_pi_y_q110, 110 - 48 - 2),
+            stiffness_gain: Gain::new(pi_y_q98, 98 + 24 - 1),
+        };
+        tip.force_max = tip.force(tip.depth_max);
+        Ok(tip)
+    }
+
+    /// The radius a.
+    pub const fn radius(&self) -> Millimetres {
+        self.radius
+    }
+
+    /// Young's modulus Y.
+    pub const fn modulus(&self) -> Kilopascals {
+        self.modulus
+    }
+
+    /// The deepest indentation that the model covers: 0.95 a, rounded up to a representable length.
+    pub const fn depth_max(&self) -> Millimetres {
+        self.depth_max
+    }
+
+    /// The force at [`Tip::depth_max`].
+    pub const fn force_max(&self) -> Newtons {
+        self.force_max
+    }
+
+    /// Total force at an indentation, `F = pi Y d^2` (eq. 14).
+    ///
+    /// Non-decreasing in `d`. `d` counts as within 0 to [`Tip::depth_max`].
+    pub fn force(&self, d: Millimetres) -> Newtons {
+        self.force_of_area(square(self.depth(d)))
+    }
+
+    /// Indentation at a total force, `d = sqrt(F/(pi Y))`.
+    ///
+    /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of force
+    /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
+    pub fn indentation(&self, force: Newtons) -> Millimetres {
+        let force_bits = force.clamp(Newtons::ZERO, self.force_max).to_bits().unsigned_abs();
+        let twice = self.area_gain.floor(u64::from(force_bits)).isqrt();
+        Millimetres::from_bits(twice.div_ceil(2) as i32).min(self.depth_max)
+    }
+
+    /// Radius of the contact, `r_c = sqrt(d (2a - d))` (eq. 5, 6).
+    ///
+    /// Correctly rounded for every input. `d` counts as within 0 to [`Tip::depth_max`].
+    pub fn contact_radius(&self, d: Millimetres) -> Millimetres {
+        Millimetres::from_bits(root(self.contact_square(self.depth(d))) as i32)
+    }
+
+    /// Stiffness at an indentation, `k = dF/dd = 2 pi Y d`.
+    ///
+    /// `d` counts as within 0 to [`Tip::depth_max`].
+    pub fn stiffness(&self, d: Millimetres) -> NewtonsPerMillimetre {
+        NewtonsPerMillimetre::from_bits(self.stiffness_gain.round(u64::from(self.depth(d))) as i32)
+    }
+
+    /// `pi Y` times a squared length in Q48.
+    fn force_of_area(&self, square_q48: u64) -> Newtons {
+        Newtons::from_bits(self.force_gain.round(square_q48) as i32)
+    }
+
+    /// The indentation within its domain, in units of the last place.
+    fn depth(&self, d: Millimetres) -> u32 {
+        d.clamp(Millimetres::ZERO, self.depth_max).to_bits().unsigned_abs()
+    }
+
+    /// `r_c^2 = d (2a - d)` in Q48, exact.
+    fn contact_square(&self, depth: u32) -> u64 {
+        u64::from(depth) * u64::from(2 * self.radius.to_bits().unsigned_abs() - depth)
+    }
+}

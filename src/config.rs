@@ -1,21 +1,209 @@
 //! Parameters, turned once into the numbers that the loop works with.
+//!
+//! This is the only place with floating point: single precision, and only + - * /, so the host and the target agree to
+//! the bit. The formulas and their reasons stand in `docs/control.md`.
 
+use crate::model::Tip;
 use crate::params::{ParamError, Params};
+use crate::scan::{ScanError, ScanTiming};
+use crate::units::{Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
+use fixed::types::{I8F24, I16F16};
+
+/// Bandwidth of the speed loop in frames: k_v = 1 / (8 T). The duty acts a frame after the encoder was read and half a frame on average through the
+/// hold, 1.5 T in all, so the loop keeps 79 degrees of phase at its crossover.
+const SPEED_GAIN_FRAMES: f32 = 8.0;
+/// The position's slope is this much slower than the speed loop, so that they do not interact: k = k_v / 4.
+const POSITION_TO_SPEED: f32 = 4.0;
+/// Poles of the observer, in frames: its slowest answer is 2.5 times faster than the speed loop it serves.
+const OBSERVER_FRAMES: f32 = 3.0;
+
+/// Why parameters were refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// One is out of its range.
+    Param(ParamError),
+    /// The scan cannot be timed so.
+    Scan(ScanError),
+    /// Two contradict each other: the first must be below the second.
+    Order(&'static str, &'static str),
+}
 
 /// What the loop derives from [`Params`].
 #[derive(Clone, Debug)]
 pub struct Config {
     /// The parameters it was made from.
     pub params: Params,
+    /// How the scan is timed.
+    pub timing: ScanTiming,
+    /// The fingertip's model.
+    pub tip: Tip,
+
+    /// See [`Params::row_sag_ppb_per_code`], as a share in Q32.
+    pub sag_q32: u32,
+    /// See [`Params::dead_codes`].
+    pub dead_codes: u16,
+    /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
+    pub newtons_per_sum_q48: i64,
+    /// Pressure in Pa for a sixteenth of a corrected code, Q32.
+    pub pascals_per_sum_q32: i64,
+    /// Half of the pitch.
+    pub half_pitch: Millimetres,
+    /// See [`Params::contact_on_mn`].
+    pub contact_on: Newtons,
+    /// See [`Params::contact_off_mn`].
+    pub contact_off: Newtons,
+
+    /// Frame time in s, Q40.
+    pub frame_s_q40: i64,
+    /// Tip travel for an encoder count in mm, Q40.
+    pub mm_per_count_q40: i64,
+    /// l1 (Q32), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
+    pub observer_gains: [i64; 3],
+    /// k_v in 1/s.
+    pub speed_gain_per_s: i32,
+    /// k in 1/s.
+    pub position_gain_per_s: i32,
+    /// 1 / (2 k) in s, Q32.
+    pub half_over_slope_q32: i64,
+    /// 1 / (2 k^2) in s^2, Q40.
+    pub half_over_slope2_q40: i64,
+    /// c in 1/s, Q8.
+    pub damping_q8_per_s: i64,
+    /// g V_max, Q8 mm/s^2.
+    pub voltage_limit: i64,
+    /// g R i_max, Q8 mm/s^2.
+    pub current_limit: i64,
+    /// Largest change of g V in a frame, Q8 mm/s^2.
+    pub slew_limit: i64,
+    /// g in mm/s^2 for a mV, Q16.
+    pub acceleration_per_mv_q16: i64,
+    /// 1 / g in mV for a mm/s^2, Q32.
+    pub mv_per_acceleration_q32: i64,
+    /// See [`Params::speed_max_um_per_s`].
+    pub speed_max: MillimetresPerSecond,
+    /// See [`Params::approach_um_per_s`].
+    pub approach: MillimetresPerSecond,
+    /// See [`Params::travel_max_um`].
+    pub travel_max: Millimetres,
+    /// See [`Params::clearance_um`].
+    pub clearance: Millimetres,
+    /// See [`Params::force_fault_mn`].
+    pub force_fault: Newtons,
+    /// See [`Params::force_max_mn`].
+    pub force_max: Newtons,
 }
 
 impl Config {
     /// Checks the parameters and derives the loop's constants.
     ///
     /// # Errors
-    /// Names the parameter, its value and its range.
-    pub fn new(params: &Params) -> Result<Self, ParamError> {
-        params.check()?;
-        Ok(Self { params: *params })
+    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each other.
+    pub fn new(params: &Params) -> Result<Self, ConfigError> {
+        params.check().map_err(ConfigError::Param)?;
+        let p = params;
+        for (low, high, names) in [
+            (p.contact_off_mn, p.contact_on_mn, ("contact_off_mn", "contact_on_mn")),
+            (p.force_max_mn, p.force_fault_mn, ("force_max_mn", "force_fault_mn")),
+            (p.supply_min_mv, p.supply_max_mv, ("supply_min_mv", "supply_max_mv")),
+        ] {
+            if low >= high {
+                return Err(ConfigError::Order(names.0, names.1));
+            }
+        }
+        let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16).map_err(ConfigError::Scan)?;
+        let tip = tip(p)?;
+
+        let frame_s = timing.frame_ns() as f32 * 1e-9;
+        let travel_rad_per_m = p.reduction_mrad_per_mm as f32;
+        let inertia = p.inertia_ug_m2 as f32 * 1e-9;
+        let torque_constant = p.torque_constant_unm_per_a as f32 * 1e-6;
+        let resistance = p.resistance_mohm as f32 * 1e-3;
+        // g = k_t N / (R m) with m = J N^2, in mm/s^2 for a V; c = k_t^2 N^2 / (R m).
+        let g = torque_constant / (resistance * inertia * travel_rad_per_m) * 1e3;
+        let c = torque_constant * torque_constant / (resistance * inertia);
+
+        let speed_gain = 1.0 / (SPEED_GAIN_FRAMES * frame_s);
+        let slope = speed_gain / POSITION_TO_SPEED;
+        // A pole at the rate w, by the bilinear transform.
+        let half_angle = 0.5 / OBSERVER_FRAMES;
+        let beta = (1.0 - half_angle) / (1.0 + half_angle);
+        let gap = 1.0 - beta;
+
+        let pitch_mm = p.pitch_um as f32 * 1e-3;
+        let codes_per_kpa = p.codes_per_kpa_milli as f32 * 1e-3;
+        let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
+        let turn_rad = 2.0 * core::f32::consts::PI;
+        let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
+        Ok(Self {
+            params: *p,
+            timing,
+            tip,
+            sag_q32: (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u32,
+            dead_codes: p.dead_codes as u16,
+            newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
+            pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
+            half_pitch: millimetres(p.pitch_um / 2),
+            contact_on: newtons(p.contact_on_mn),
+            contact_off: newtons(p.contact_off_mn),
+            frame_s_q40: wide(frame_s * exp2(40)),
+            mm_per_count_q40: wide(mm_per_count * exp2(40)),
+            observer_gains: [
+                wide((1.0 - beta * beta * beta) * exp2(32)),
+                wide(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
+                wide(gap * gap * gap / (frame_s * frame_s)),
+            ],
+            speed_gain_per_s: speed_gain as i32,
+            position_gain_per_s: slope as i32,
+            half_over_slope_q32: wide(0.5 / slope * exp2(32)),
+            half_over_slope2_q40: wide(0.5 / (slope * slope) * exp2(40)),
+            damping_q8_per_s: wide(c * exp2(8)),
+            voltage_limit: wide(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8)),
+            current_limit: wide(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8)),
+            slew_limit: wide(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
+            mv_per_acceleration_q32: wide(1e3 / g * exp2(32)),
+            speed_max: speed(p.speed_max_um_per_s),
+            approach: speed(p.approach_um_per_s),
+            travel_max: millimetres(p.travel_max_um),
+            clearance: millimetres(p.clearance_um),
+            force_fault: newtons(p.force_fault_mn),
+            force_max: newtons(p.force_max_mn),
+        })
     }
+}
+
+fn tip(p: &Params) -> Result<Tip, ConfigError> {
+    let modulus = Kilopascals(I16F16::from_bits(thousandths(p.modulus_pa, 16)));
+    Tip::new(millimetres(p.tip_radius_um), modulus).map_err(|_| {
+        let (name, value) = ("tip_radius_um", p.tip_radius_um);
+        ConfigError::Param(ParamError { name, value, min: 4_000, max: 16_000 })
+    })
+}
+
+/// 2^n, exactly.
+const fn exp2(n: u32) -> f32 {
+    (1u64 << n) as f32
+}
+
+/// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
+fn wide(value: f32) -> i64 {
+    value.clamp(-4e18, 4e18) as i64
+}
+
+/// `value / 1000` in units of 2^-bits, rounded.
+const fn thousandths(value: i32, bits: u32) -> i32 {
+    ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
+}
+
+fn millimetres(um: i32) -> Millimetres {
+    Millimetres(I8F24::from_bits(thousandths(um, 24)))
+}
+
+/// A force in N from mN, rounded.
+pub fn newtons(mn: i32) -> Newtons {
+    Newtons(I16F16::from_bits(thousandths(mn, 16)))
+}
+
+fn speed(um_per_s: i32) -> MillimetresPerSecond {
+    MillimetresPerSecond(I16F16::from_bits(thousandths(um_per_s, 16)))
 }

@@ -12,14 +12,22 @@ extern crate std;
 
 pub mod units;
 
+pub mod params;
+
+pub mod config;
+
 pub mod scan;
 
 pub mod frame;
 
-pub mod params;
+pub mod pressure;
 
-pub mod pipeline;
+pub mod contact;
 
-pub mod config;
+pub mod model;
+
+pub mod control;
 
 pub mod safety;
+
+pub mod pipeline;

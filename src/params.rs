@@ -82,6 +82,8 @@ params! {
     contact_on_mn = 40 in 5..=2_000;
     /// Contact ends below this force.
     contact_off_mn = 15 in 1..=2_000;
+    /// Whether the baseline follows drift while there is no contact: 1 yes, 0 no.
+    baseline_follows = 1 in 0..=1;
     /// Torque constant of the motor, uN m/A.
     torque_constant_unm_per_a = 5_350 in 100..=200_000;
     /// Terminal resistance of the motor and the bridge together.
@@ -98,6 +100,8 @@ params! {
     voltage_max_mv = 6_000 in 500..=48_000;
     /// Largest current, by the motor's model.
     current_max_ma = 2_000 in 20..=20_000;
+    /// Largest change of the motor's voltage in a millisecond.
+    voltage_slew_mv_per_ms = 60_000 in 100..=1_000_000;
     /// Largest speed of the tip.
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
     /// Speed of the approach and of the release.

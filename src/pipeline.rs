@@ -1,6 +1,13 @@
 //! One frame's way from codes to duty.
 
+use crate::config::Config;
+use crate::contact;
+use crate::control::SpeedLoop;
+use crate::control::goal::Goal;
+use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
+use crate::pressure::Array;
+use crate::safety::monitor::{Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 
@@ -66,28 +73,164 @@ pub struct Status {
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
+    config: Config,
+    array: Array,
+    motion: SpeedLoop,
+    monitor: Monitor,
+    goal: Goal,
     status: Status,
+    tared: bool,
+    tare_request: u8,
+    clear_request: u8,
 }
 
 impl Pipeline {
     /// A pipeline in the mode off.
-    pub fn new(_config: &crate::config::Config) -> Self {
-        Self { status: Status::default() }
+    pub fn new(config: &Config) -> Self {
+        Self {
+            config: config.clone(),
+            array: Array::new(),
+            motion: SpeedLoop::new(),
+            monitor: Monitor::default(),
+            goal: Goal::default(),
+            status: Status::default(),
+            tared: false,
+            tare_request: 0,
+            clear_request: 0,
+        }
     }
 
-    /// Replaces the configuration; the mode goes to off.
-    pub fn configure(&mut self, _config: &crate::config::Config) {}
-
-    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command.
-    pub fn step(&mut self, frame: &Frame, _sense: &Sense, _command: &Command) -> (Duty, Status) {
-        self.status.sequence = frame.sequence;
-        (Duty::ZERO, self.status)
+    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays.
+    pub fn configure(&mut self, config: &Config) {
+        self.config = config.clone();
+        if self.status.mode != Mode::Fault {
+            self.status.mode = Mode::Off;
+        }
     }
 
     /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
     pub fn stop(&mut self, fault: Fault) -> Status {
         self.status.mode = Mode::Fault;
         self.status.fault.get_or_insert(fault);
+        self.status.duty = self.motion.coast();
         self.status
+    }
+
+    /// The array's last picture and its calibration.
+    pub fn array(&self) -> &Array {
+        &self.array
+    }
+
+    /// The configuration in force.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command.
+    pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
+        let mut limits = self.count_frames(frame.sequence);
+
+        // What the array feels.
+        let picture = self.array.read(frame, &self.config);
+        let contact = contact::from_sums(picture, &self.config);
+        if picture.bad_count > 0 {
+            limits.set(Limits::TAXELS);
+        }
+
+        // What the finger does.
+        self.motion.observe(sense.encoder, &self.config);
+
+        // Whether that is sound.
+        let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
+        if !matches!(self.status.mode, Mode::Off | Mode::Fault) {
+            if let Some(fault) = self.monitor.check(&view, &self.config) {
+                self.status.mode = Mode::Fault;
+                self.status.fault = Some(fault);
+            }
+        }
+
+        // What to do about it.
+        let mode = self.next_mode(command, &contact, sense);
+        self.status.mode = mode;
+        let duty = match mode {
+            Mode::Off | Mode::Tare | Mode::Fault => self.motion.coast(),
+            Mode::Approach | Mode::Force | Mode::Release => {
+                let reference = self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits);
+                self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
+            }
+        };
+        if !self.tared {
+            limits.set(Limits::NOT_TARED);
+        }
+
+        self.status.limits = limits;
+        self.status.contact = contact;
+        self.status.travel = self.motion.observer.travel;
+        self.status.speed = self.motion.observer.speed;
+        self.status.duty = duty;
+        (duty, self.status)
+    }
+
+    /// Counts missed frames from the gap in the sequence.
+    fn count_frames(&mut self, sequence: u32) -> Limits {
+        let mut limits = Limits::default();
+        let missed = sequence.wrapping_sub(self.status.sequence).wrapping_sub(1);
+        if self.status.sequence != 0 && missed != 0 {
+            self.status.missed_frames = self.status.missed_frames.wrapping_add(missed);
+            limits.set(Limits::FRAME_MISSED);
+        }
+        self.status.sequence = sequence;
+        limits
+    }
+
+    /// The mode table of [`crate::safety`], with what each change of mode prepares.
+    fn next_mode(&mut self, command: &Command, contact: &Contact, sense: &Sense) -> Mode {
+        let tare_asked = command.tare_request != self.tare_request;
+        let clear_asked = command.clear_request != self.clear_request;
+        self.tare_request = command.tare_request;
+        self.clear_request = command.clear_request;
+
+        let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
+        match self.status.mode {
+            Mode::Fault if clear_asked && !command.torque => {
+                self.status.fault = None;
+                Mode::Off
+            }
+            Mode::Fault => Mode::Fault,
+            Mode::Tare => {
+                self.tared = self.array.continue_tare();
+                if self.tared { Mode::Off } else { Mode::Tare }
+            }
+            Mode::Off if tare_asked => {
+                self.array.start_tare();
+                self.tared = false;
+                Mode::Tare
+            }
+            Mode::Off if command.torque && self.tared => {
+                self.motion.observer = Observer::zeroed_at(sense.encoder);
+                self.goal.start();
+                let view = View { picture: self.array.picture(), contact, sense, motion: &self.motion, command };
+                self.monitor.restart(&view);
+                wanted
+            }
+            _ if !command.torque => {
+                self.follow_drift(contact);
+                Mode::Off
+            }
+            Mode::Off => Mode::Off,
+            Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => Mode::Force,
+            Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => Mode::Force,
+            Mode::Approach | Mode::Force | Mode::Release => {
+                self.follow_drift(contact);
+                wanted
+            }
+        }
+    }
+
+    /// Lets the baseline follow drift where nothing is touched.
+    fn follow_drift(&mut self, contact: &Contact) {
+        if self.tared && self.config.params.baseline_follows != 0 && contact.force < self.config.contact_off {
+            self.array.follow_drift();
+        }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! | mode | bridge | leaves when |
 //! | --- | --- | --- |
-//! | 0 off | outputs low, motor coasts | torque is enabled: approach (goal > 0), release (goal = 0); a tare is asked for: tare |
+//! | 0 off | outputs low, motor coasts | torque is enabled on a tared array: approach (goal > 0), release (goal = 0); a tare is asked for: tare |
 //! | 1 tare | outputs low | enough frames are averaged: off |
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
@@ -11,6 +11,8 @@
 //!
 //! Torque off leads to off from every mode but fault. A fault (stop) is latched until it is cleared; a limit (what holds the loop
 //! back just now) comes and goes by itself. The numbers are stable: hosts may store them.
+
+pub mod monitor;
 
 /// What the controller is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -84,6 +86,8 @@ impl Limits {
     pub const NOT_TARED: u16 = 1 << 6;
     /// A frame was missed since the last step.
     pub const FRAME_MISSED: u16 = 1 << 7;
+    /// The voltage's slew limit holds it back.
+    pub const SLEW: u16 = 1 << 8;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

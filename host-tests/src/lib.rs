@@ -3,3 +3,4 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod plant;
+pub mod native;

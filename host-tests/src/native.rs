@@ -1,0 +1,89 @@
+//! The same core on the host, closed over the plant: fast, and without a microcontroller in between.
+
+use crate::plant::{Bridge, Setup, World};
+use fingertip::config::Config;
+use fingertip::frame::{Frame, SLOTS, Sense};
+use fingertip::pipeline::{Command, Pipeline, Status};
+use fingertip::units::Duty;
+
+/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
+const DUTY_DELAY_SLOTS: usize = 3;
+
+/// A board with the core running on it.
+pub struct Native {
+    /// The world around the controller.
+    pub world: World,
+    /// The controller.
+    pub pipeline: Pipeline,
+    /// What the host asks.
+    pub command: Command,
+    /// The last frame scanned.
+    pub frame: Frame,
+    /// What was sensed beside it.
+    pub sense: Sense,
+    slot_s: f64,
+    frames: u64,
+    bridge: Bridge,
+    next: Bridge,
+}
+
+impl Native {
+    /// At rest, the bridge off.
+    pub fn new(setup: &Setup, config: &Config) -> Self {
+        Self {
+            world: World::new(setup),
+            pipeline: Pipeline::new(config),
+            command: Command::default(),
+            frame: Frame::EMPTY,
+            sense: Sense::default(),
+            slot_s: f64::from(config.timing.frame_ticks()) / f64::from(fingertip::scan::TIMER_HZ) / SLOTS as f64,
+            frames: 0,
+            bridge: Bridge::Coast,
+            next: Bridge::Coast,
+        }
+    }
+
+    /// Virtual time, s.
+    pub fn time_s(&self) -> f64 {
+        self.frames as f64 * self.slot_s * SLOTS as f64
+    }
+
+    /// Scans one frame, row by row while the world moves on, and takes one control step.
+    pub fn step(&mut self) -> Status {
+        for slot in 0..SLOTS {
+            if slot == DUTY_DELAY_SLOTS {
+                self.bridge = self.next;
+            }
+            self.world.advance(self.slot_s, self.bridge);
+            for (column, code) in self.world.slot_codes(slot).into_iter().enumerate() {
+                self.frame.set_code(slot, column, code);
+            }
+        }
+        self.frames += 1;
+        self.frame.sequence = self.frames as u32;
+        self.sense = self.world.sense(0);
+        let (duty, status) = self.pipeline.step(&self.frame, &self.sense, &self.command);
+        self.next = bridge(duty, status);
+        status
+    }
+
+    /// Tares, then enables torque with no goal.
+    pub fn tare_and_enable(&mut self) {
+        self.command.tare_request = self.command.tare_request.wrapping_add(1);
+        for _ in 0..fingertip::pressure::TARE_FRAMES + 2 {
+            self.step();
+        }
+        self.command.torque = true;
+    }
+}
+
+/// What a duty means at the bridge: a mode that does not drive leaves it open.
+pub fn bridge(duty: Duty, status: Status) -> Bridge {
+    use fingertip::safety::Mode;
+    match status.mode {
+        Mode::Off | Mode::Tare | Mode::Fault => Bridge::Coast,
+        Mode::Approach | Mode::Force | Mode::Release => {
+            Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) }
+        }
+    }
+}

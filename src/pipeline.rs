@@ -143,7 +143,7 @@ impl Pipeline {
         // Whether that is sound.
         let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
         if !matches!(self.status.mode, Mode::Off | Mode::Fault) {
-            if let Some(fault) = self.monitor.check(&view, &self.config) {
+            if let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
                 self.status.mode = Mode::Fault;
                 self.status.fault = Some(fault);
             }
@@ -155,7 +155,8 @@ impl Pipeline {
         let duty = match mode {
             Mode::Off | Mode::Tare | Mode::Fault => self.motion.coast(),
             Mode::Approach | Mode::Force | Mode::Release => {
-                let reference = self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits);
+                let reference =
+                    self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits);
                 self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
             }
         };

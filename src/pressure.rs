@@ -129,7 +129,8 @@ impl Array {
             weight += 2;
         }
         picture.bad_count = picture.bad.iter().map(|bad| bad.count_ones() as u8).sum();
-        picture.moment_x = columns.iter().zip((1 - COLUMNS as i32..).step_by(2)).map(|(sum, weight)| sum * weight).sum();
+        picture.moment_x =
+            columns.iter().zip((1 - COLUMNS as i32..).step_by(2)).map(|(sum, weight)| sum * weight).sum();
         picture
     }
 
@@ -192,9 +193,9 @@ fn live_columns(
     dead_codes: u16,
 ) -> u16 {
     let codes = codes_a.iter().chain(codes_b).zip(net);
-    codes.enumerate().fold(0, |live, (place, (code, net))| {
-        live | u16::from(*code < SATURATED && *net >= dead_codes) << place
-    })
+    codes
+        .enumerate()
+        .fold(0, |live, (place, (code, net))| live | u16::from(*code < SATURATED && *net >= dead_codes) << place)
 }
 
 /// 1 / (1 - rho N) in Q16, at most 2: a row that loses half its voltage is broken, not sagging.

@@ -29,8 +29,7 @@ impl Drive {
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     pub fn apply(&mut self, wanted: i64, back_emf: i64, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         let slewed = wanted.clamp(self.voltage - config.slew_limit, self.voltage + config.slew_limit);
-        let within_current =
-            slewed.clamp(back_emf - config.current_limit, back_emf + config.current_limit);
+        let within_current = slewed.clamp(back_emf - config.current_limit, back_emf + config.current_limit);
         // g V per mV (Q16) times mV, to Q8.
         let supply_limit = (i64::from(supply_mv) * config.acceleration_per_mv_q16) >> 8;
         let voltage_limit = config.voltage_limit.min(supply_limit);

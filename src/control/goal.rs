@@ -50,7 +50,8 @@ impl Goal {
         if mode != Mode::Release && motion.observer.travel >= config.travel_max {
             limits.set(Limits::TRAVEL);
             let stay = Millimetres(config.travel_max.0.saturating_sub(motion.observer.travel.0));
-            return Reference::towards(stay, motion.observer.speed, motion.brake(stay, config), config).limited(config.approach);
+            return Reference::towards(stay, motion.observer.speed, motion.brake(stay, config), config)
+                .limited(config.approach);
         }
         limited
     }
@@ -80,11 +81,7 @@ fn way_to_goal(
     }
     let wanted = config.tip.indentation(goal.min(config.force_max));
     let sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
-    if contact.force >= config.contact_off {
-        Millimetres(wanted.0.saturating_sub(sensed))
-    } else {
-        wanted
-    }
+    if contact.force >= config.contact_off { Millimetres(wanted.0.saturating_sub(sensed)) } else { wanted }
 }
 
 /// How far the tip moved since the middle of the scan: half a frame.

@@ -54,18 +54,22 @@ impl Monitor {
         };
     }
 
-    /// The first fault that this frame shows, the most direct evidence first.
-    pub fn check(&mut self, view: &View, config: &Config) -> Option<Fault> {
+    /// The first fault that this frame shows, the most direct evidence first. While the bridge is off for a tare, only what the
+    /// frame itself shows counts.
+    pub fn check(&mut self, view: &View, driven: bool, config: &Config) -> Option<Fault> {
         let p = &config.params;
         let faults = [
             (Fault::Bridge, view.sense.bridge_fault),
             (Fault::RowStuck, i32::from(view.picture.undriven_max) > p.undriven_max_codes),
             (Fault::ArrayBroken, i32::from(view.picture.bad_count) > p.bad_taxels_max),
-            (Fault::OverForce, view.contact.force > config.force_fault),
+            (Fault::OverForce, driven && view.contact.force > config.force_fault),
             (Fault::BusSilent, bus_silent(view)),
         ];
         let direct = faults.iter().find(|(_, found)| *found).map(|(fault, _)| *fault);
-        direct.or_else(|| self.supply(view, config)).or_else(|| self.motion(view, config))
+        if direct.is_some() || !driven {
+            return direct;
+        }
+        self.supply(view, config).or_else(|| self.motion(view, config))
     }
 
     fn supply(&mut self, view: &View, config: &Config) -> Option<Fault> {

@@ -2,5 +2,6 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
-pub mod plant;
 pub mod native;
+pub mod optimal;
+pub mod plant;

@@ -2,7 +2,7 @@
 //!
 //! A square inside the contact is a smooth function's, so 3 x 3 Gauss points do. The rim bends the pressure, so a square
 //! that it crosses is cut into strips along y at every place where the rim meets a side or turns, each strip into chords
-//! that end on the rim: on each piece the pressure is smooth again.
+//! that end on the rim. Along a chord the pressure is smooth; across, it ends like (r_c - y)^1.5, which takes 5 points.
 
 use super::setup::{Setup, Tip};
 use super::tip::Flattened;
@@ -13,6 +13,15 @@ const GAUSS3: [(f64, f64); 3] = [
     (-0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
     (0.0, 0.888_888_888_888_888_8),
     (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+];
+
+/// The same with 5 points.
+const GAUSS5: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_08),
 ];
 
 /// A rectangle from the contact's centre, mm.
@@ -42,7 +51,7 @@ impl Cell {
         }
         let far2 = farthest(self.x_mm).powi2() + farthest(self.y_mm).powi2();
         let integral = if far2 <= rim2 {
-            gauss(self.y_mm, |y| gauss(self.x_mm, |x| tip.pressure_kpa(x * x + y * y)))
+            gauss(&GAUSS3, self.y_mm, |y| gauss(&GAUSS3, self.x_mm, |x| tip.pressure_kpa(x * x + y * y)))
         } else {
             self.cut_by_rim(tip, rim2)
         };
@@ -54,7 +63,7 @@ impl Cell {
         let chord = |y: f64| {
             let half = (rim2 - y * y).max(0.0).sqrt();
             let ends = [self.x_mm[0].max(-half), self.x_mm[1].min(half)];
-            if ends[0] < ends[1] { gauss(ends, |x| tip.pressure_kpa(x * x + y * y)) } else { 0.0 }
+            if ends[0] < ends[1] { gauss(&GAUSS3, ends, |x| tip.pressure_kpa(x * x + y * y)) } else { 0.0 }
         };
         let meets = self.x_mm.map(|x| (rim2 - x * x).max(0.0).sqrt());
         let (low, high) = (meets[0].min(meets[1]), meets[0].max(meets[1]));
@@ -62,14 +71,16 @@ impl Cell {
         for cut in &mut cuts {
             *cut = cut.clamp(self.y_mm[0], self.y_mm[1]);
         }
-        cuts.windows(2).map(|strip| if strip[0] < strip[1] { gauss([strip[0], strip[1]], chord) } else { 0.0 }).sum()
+        cuts.windows(2)
+            .map(|strip| if strip[0] < strip[1] { gauss(&GAUSS5, [strip[0], strip[1]], chord) } else { 0.0 })
+            .sum()
     }
 }
 
 /// Integral over an interval.
-fn gauss(over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+fn gauss(rule: &[(f64, f64)], over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (over[0] + over[1]), 0.5 * (over[1] - over[0]));
-    half * GAUSS3.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
+    half * rule.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
 }
 
 /// The place of an interval that is nearest to 0.

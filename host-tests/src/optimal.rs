@@ -1,0 +1,173 @@
+//! The least time in which the motor can move the tip from rest to rest: the bound that a force step is judged by.
+//!
+//! The drive gives the most that voltage and current limits allow, then brakes with the most, and switches once. For a
+//! shaft with friction against a load that depends on the place that is the time-optimal profile. The switch instant is
+//! found by bisection (shooting) on the plant's own equations of motion, [`crate::plant::drive`].
+
+use crate::plant::drive::{Dynamics, Shaft, Source};
+use crate::plant::setup::Setup;
+
+/// Step of the shooting; its error is of second order.
+const STEP_S: f64 = 20e-6;
+/// A motion that takes longer counts as impossible.
+const LONGEST_S: f64 = 10.0;
+/// Halvings of the interval of switch instants: it ends 10^12 times narrower, far below a step.
+const HALVINGS: usize = 40;
+/// The motion ends this close to its target; farther off, no switch instant makes it stop there.
+const END_MM: f64 = 1e-6;
+
+/// The time-optimal profile.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Profile {
+    /// When full drive turns into full brake.
+    pub switch_s: f64,
+    /// When the tip is at rest.
+    pub total_s: f64,
+    /// Where it then is.
+    pub end_mm: f64,
+}
+
+/// The motor cannot get there within its limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unreachable {
+    /// Where it would start.
+    pub from_mm: f64,
+    /// Where it was to go.
+    pub to_mm: f64,
+    /// What keeps it.
+    pub reason: Reason,
+}
+
+/// What keeps the motor from a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// Full drive comes to rest, or creeps for more than 10 s, before it: allow more voltage or current.
+    TooWeak,
+    /// Full brake does not stop the motion.
+    RunsAway,
+}
+
+impl core::fmt::Display for Unreachable {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let why = match self.reason {
+            Reason::TooWeak => "full drive stops short of it: allow more voltage or current",
+            Reason::RunsAway => "full brake does not stop there",
+        };
+        write!(f, "no way from {} mm to {} mm of indentation: {why}", self.from_mm, self.to_mm)
+    }
+}
+
+impl core::error::Error for Unreachable {}
+
+/// Least time from rest at one indentation to rest at another; see [`profile`].
+///
+/// # Errors
+/// The limits do not allow the motion at all.
+pub fn minimum_time_s(
+    setup: &Setup,
+    d_from_mm: f64,
+    d_to_mm: f64,
+    voltage_limit: f64,
+    current_limit: f64,
+) -> Result<f64, Unreachable> {
+    profile(setup, d_from_mm, d_to_mm, voltage_limit, current_limit).map(|profile| profile.total_s)
+}
+
+/// The time-optimal motion from rest at one indentation to rest at another.
+///
+/// `voltage_limit` is the bridge's mean voltage before the supply sags; more than the supply has counts as all of it.
+///
+/// # Errors
+/// The limits do not allow the motion at all.
+pub fn profile(
+    setup: &Setup,
+    d_from_mm: f64,
+    d_to_mm: f64,
+    voltage_limit: f64,
+    current_limit: f64,
+) -> Result<Profile, Unreachable> {
+    let fail = |reason| Unreachable { from_mm: d_from_mm, to_mm: d_to_mm, reason };
+    if d_from_mm == d_to_mm {
+        return Ok(Profile { switch_s: 0.0, total_s: 0.0, end_mm: d_to_mm });
+    }
+    let shooting = Shooting::new(setup, d_from_mm, d_to_mm, voltage_limit, current_limit);
+    let (mut short_s, mut long_s) = (0.0, STEP_S);
+    while !shooting.shoot(long_s).map_err(fail)?.far_enough {
+        short_s = long_s;
+        long_s *= 2.0;
+        if long_s > LONGEST_S {
+            return Err(fail(Reason::TooWeak));
+        }
+    }
+    for _ in 0..HALVINGS {
+        let middle_s = 0.5 * (short_s + long_s);
+        if shooting.shoot(middle_s).map_err(fail)?.far_enough {
+            long_s = middle_s;
+        } else {
+            short_s = middle_s;
+        }
+    }
+    let hit = shooting.shoot(short_s).map_err(fail)?;
+    let end_mm = shooting.dynamics.travel_mm(hit.end_rad) - setup.wall.distance_mm;
+    if (end_mm - d_to_mm).abs() > END_MM {
+        return Err(fail(Reason::RunsAway));
+    }
+    Ok(Profile { switch_s: short_s, total_s: hit.total_s, end_mm })
+}
+
+struct Shooting {
+    dynamics: Dynamics,
+    drive: Source,
+    from_rad: f64,
+    to_rad: f64,
+}
+
+struct Hit {
+    end_rad: f64,
+    total_s: f64,
+    far_enough: bool,
+}
+
+impl Shooting {
+    fn new(setup: &Setup, d_from_mm: f64, d_to_mm: f64, voltage_limit: f64, current_limit: f64) -> Self {
+        let dynamics = Dynamics::new(setup);
+        let supply = &setup.supply;
+        let duty = (voltage_limit / supply.source_v).min(1.0);
+        let drive = Source {
+            volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
+            ohms: setup.motor.resistance_ohm + duty * duty * supply.source_ohm,
+            limit_a: current_limit,
+        };
+        let angle_rad = |d_mm: f64| dynamics.angle_rad(setup.wall.distance_mm + d_mm);
+        Self { dynamics, drive, from_rad: angle_rad(d_from_mm), to_rad: angle_rad(d_to_mm) }
+    }
+
+    /// Drives until `switch_s`, brakes to rest.
+    fn shoot(&self, switch_s: f64) -> Result<Hit, Reason> {
+        let mut shaft = Shaft { angle_rad: self.from_rad, speed_rad_per_s: 0.0 };
+        let mut time_s = 0.0;
+        while time_s < switch_s && !self.passed(&shaft) {
+            let step_s = STEP_S.min(switch_s - time_s);
+            let (next, taken_s) = self.dynamics.advance_to_rest(shaft, step_s, &self.drive);
+            if taken_s < step_s {
+                return Err(Reason::TooWeak);
+            }
+            shaft = next;
+            time_s += step_s;
+        }
+        let brake = Source { volts: -self.drive.volts, ..self.drive };
+        while shaft.speed_rad_per_s != 0.0 && !self.passed(&shaft) {
+            let (next, taken_s) = self.dynamics.advance_to_rest(shaft, STEP_S, &brake);
+            shaft = next;
+            time_s += taken_s;
+            if time_s > 2.0 * LONGEST_S {
+                return Err(Reason::RunsAway);
+            }
+        }
+        Ok(Hit { end_rad: shaft.angle_rad, total_s: time_s, far_enough: self.passed(&shaft) })
+    }
+
+    fn passed(&self, shaft: &Shaft) -> bool {
+        (shaft.angle_rad - self.to_rad) * self.drive.volts >= 0.0
+    }
+}

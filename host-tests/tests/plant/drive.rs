@@ -1,0 +1,233 @@
+//! The motor against its data sheet, friction, energy, and the order of the step.
+
+use super::{STEP_S, free, pressed, run};
+use host_tests::plant::{Bridge, Setup, World};
+use proptest::prelude::*;
+
+const FULL: Bridge = Bridge::Driven { duty: 1.0 };
+const RPM: f64 = 60.0 / std::f64::consts::TAU;
+
+/// A stiff supply, as on the motor's test bench.
+fn bench(mut setup: Setup) -> Setup {
+    setup.supply.source_ohm = 0.0;
+    setup
+}
+
+#[test]
+fn no_load_speed_and_current_are_the_data_sheets() {
+    let mut world = World::new(&bench(free()));
+    run(&mut world, 0.2, FULL);
+    let rpm = world.shaft().speed_rad_per_s * RPM;
+    assert!((10_550.0..10_650.0).contains(&rpm), "{rpm} rpm for 10,600");
+    let current = world.current_a();
+    assert!((0.0215..0.0225).contains(&current), "{current} A for 0.0220");
+}
+
+#[test]
+fn stall_torque_and_time_constant_are_the_data_sheets() {
+    let setup = bench(free());
+    let mut world = World::new(&setup);
+    let end = {
+        let mut world = world.clone();
+        run(&mut world, 0.2, FULL);
+        world.shaft().speed_rad_per_s
+    };
+    world.advance(0.0, FULL);
+    let torque = (world.current_a() * setup.motor.torque_nm_per_a - setup.motor.friction_nm) * 1e3;
+    assert!((11.15..11.25).contains(&torque), "{torque} mNm for 11.20");
+    let mut time_s = 0.0;
+    while world.shaft().speed_rad_per_s < end * (1.0 - (-1.0f64).exp()) {
+        world.advance(STEP_S, FULL);
+        time_s += STEP_S;
+    }
+    assert!((6.9e-3..7.1e-3).contains(&time_s), "{time_s} s for 7 ms");
+}
+
+#[test]
+fn the_gear_presses_with_its_efficiency_and_gives_back_less() {
+    // Pressing slowly, the motor's net torque times the ratio over the drum, times 0.7, arrives.
+    let duty = 0.2;
+    let mut world = pressed(0.0);
+    run(&mut world, 1.0, Bridge::Driven { duty });
+    assert_eq!(world.speed_mm_per_s(), 0.0);
+    let setup = world.setup().clone();
+    let motor_nm = world.current_a() * setup.motor.torque_nm_per_a - setup.motor.friction_nm;
+    let ideal_n = motor_nm * setup.transmission.ratio / (setup.transmission.drum_radius_mm * 1e-3);
+    // The tip overshoots the balance and then sticks, so more than 0.7, and less than its back-driving counterpart.
+    let share = world.force_n() / ideal_n;
+    assert!((0.7..1.0 / (2.0 - 1.0 / 0.7)).contains(&share), "{share}");
+}
+
+#[test]
+fn friction_holds_inside_its_band_and_not_outside() {
+    for d in [0.0, 0.5, 1.0, 2.0, 3.0] {
+        let world = pressed(d);
+        let setup = world.setup().clone();
+        let arm_m = setup.transmission.drum_radius_mm * 1e-3 / setup.transmission.ratio;
+        let load = world.force_n() * arm_m;
+        let band = setup.motor.friction_nm + load * (1.0 / setup.transmission.efficiency - 1.0);
+        for (torque, holds) in [
+            (load + 0.99 * band, true),
+            (load - 0.99 * band, true),
+            (load + 1.01 * band, false),
+            (load - 1.01 * band, false),
+        ] {
+            // u V / (R + u^2 R_s) = i, to first order in the small sag, then refined.
+            let current = torque / setup.motor.torque_nm_per_a;
+            let mut duty = 0.0;
+            for _ in 0..20 {
+                let ohms = setup.motor.resistance_ohm + duty * duty * setup.supply.source_ohm;
+                duty = current * ohms / setup.supply.source_v;
+            }
+            let mut world = world.clone();
+            let angle = world.shaft().angle_rad;
+            run(&mut world, 0.01, Bridge::Driven { duty });
+            assert_eq!(world.shaft().angle_rad == angle, holds, "d {d} mm, {torque} N m");
+        }
+    }
+}
+
+#[test]
+fn coasting_gives_back_force_only_against_friction() {
+    // Above 0.12 mNm / (0.279 mm (2 - 1/0.7)) = 0.75 N the tip pushes itself out, below it stays.
+    let mut held = pressed(0.95);
+    let before = held.force_n();
+    run(&mut held, 0.2, Bridge::Coast);
+    assert_eq!(held.force_n(), before);
+    let mut released = pressed(2.0);
+    run(&mut released, 0.2, Bridge::Coast);
+    assert!(released.force_n() < 0.8, "{} N", released.force_n());
+    assert_eq!(released.speed_mm_per_s(), 0.0);
+}
+
+fn energy_j(world: &World) -> f64 {
+    let setup = world.setup();
+    let d = world.indentation_mm();
+    let tip = setup.tip.force_per_mm2() * d * d * d / 3.0 * 1e-3;
+    let shaft = world.shaft().speed_rad_per_s;
+    tip + 0.5 * setup.motor.inertia_kg_m2 * shaft * shaft
+}
+
+#[test]
+fn without_friction_a_coasting_motor_keeps_its_energy() {
+    let mut setup = Setup::default();
+    setup.motor.friction_nm = 0.0;
+    setup.transmission.efficiency = 1.0;
+    let mut world = World::new(&setup);
+    world.place(setup.wall.distance_mm + 3.0);
+    let start = energy_j(&world);
+    for _ in 0..100_000 {
+        world.advance(STEP_S, Bridge::Coast);
+        assert!((energy_j(&world) / start - 1.0).abs() < 1e-10);
+        if world.travel_mm() < 0.0 {
+            break;
+        }
+    }
+    assert!(world.travel_mm() < 0.0, "the tip must have been thrown out");
+}
+
+proptest! {
+    #[test]
+    fn coasting_and_braking_never_create_energy(
+        d in 0.0..4.0f64, kick_s in 0.0..0.02f64, duty in -1.0..1.0f64, step_s in 1e-6..1e-3f64, brake: bool,
+    ) {
+        let mut world = pressed(d);
+        run(&mut world, kick_s, Bridge::Driven { duty });
+        let bridge = if brake { Bridge::Driven { duty: 0.0 } } else { Bridge::Coast };
+        let mut before = energy_j(&world);
+        let start = before;
+        for _ in 0..200 {
+            world.advance(step_s, bridge);
+            let now = energy_j(&world);
+            prop_assert!(now <= before + 1e-12 * start, "{now} after {before}");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn a_snapshot_restores_every_bit(d in 0.0..4.0f64, duty in -1.0..1.0f64) {
+        let mut world = pressed(d);
+        run(&mut world, 1e-3, Bridge::Driven { duty });
+        world.pressure_kpa(5, 5);
+        let bytes = postcard::to_stdvec(&world).unwrap();
+        let mut restored: World = postcard::from_bytes(&bytes).unwrap();
+        prop_assert_eq!(&postcard::to_stdvec(&restored).unwrap(), &bytes);
+        for _ in 0..100 {
+            for side in [&mut world, &mut restored] {
+                side.advance(STEP_S, Bridge::Driven { duty: -duty });
+            }
+            prop_assert_eq!(world.shaft(), restored.shaft());
+            prop_assert_eq!(world.slot_codes(5), restored.slot_codes(5));
+        }
+    }
+}
+
+/// Into the wall at speed, back out, to rest and forth again: contact, friction's reversal and the stick are all met.
+fn scenario(step_s: f64, until_s: f64) -> f64 {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.5;
+    let mut world = World::new(&setup);
+    let steps = (until_s / step_s).round() as usize;
+    for n in 0..steps {
+        // The bridge changes at 16 ms and 32 ms, whole steps of every length tried.
+        let duty = match (n as f64 + 0.5) * step_s {
+            t if t < 0.016 => 0.6,
+            t if t < 0.032 => -0.5,
+            _ => 0.4,
+        };
+        world.advance(step_s, Bridge::Driven { duty });
+    }
+    world.travel_mm()
+}
+
+#[test]
+fn halving_the_step_quarters_the_error() {
+    for until_s in [0.016, 0.032, 0.048] {
+        let truth = scenario(0.25e-6, until_s);
+        let errors = [160e-6, 80e-6, 40e-6, 20e-6, 10e-6].map(|step_s| (scenario(step_s, until_s) - truth).abs());
+        // Averaged over four halvings.
+        let gain = (errors[0] / errors[4]).powf(0.25);
+        assert!((3.7..4.3).contains(&gain), "{gain} a halving at {until_s} s: {errors:?}");
+        assert!(errors[4] < 1e-6, "{:e} mm at 10 us", errors[4]);
+    }
+}
+
+#[test]
+fn the_encoder_counts_down_to_the_lower_edge() {
+    let mut world = World::new(&free());
+    let counts_per_mm = 1600.0 * 43.0 / (std::f64::consts::TAU * 12.0);
+    for travel in [0.0, 0.4 / counts_per_mm, 1.6 / counts_per_mm, 3.0, -0.4 / counts_per_mm, -2.0] {
+        world.place(travel);
+        assert_eq!(world.encoder_counts(), (travel * counts_per_mm).floor() as i32, "at {travel} mm");
+    }
+}
+
+#[test]
+fn a_frozen_encoder_stands_still_and_catches_up() {
+    let mut world = World::new(&free());
+    run(&mut world, 0.01, FULL);
+    let before = world.encoder_counts();
+    world.faults.encoder_frozen = true;
+    run(&mut world, 0.01, FULL);
+    assert_eq!(world.encoder_counts(), before);
+    world.faults.encoder_frozen = false;
+    run(&mut world, STEP_S, FULL);
+    assert!(world.encoder_counts() > before + 100);
+}
+
+#[test]
+fn the_supply_sags_by_the_share_of_the_current_that_it_gives() {
+    let mut world = World::new(&free());
+    for duty in [1.0, -1.0, 0.5] {
+        world.place(0.0);
+        world.advance(0.0, Bridge::Driven { duty });
+        let current = duty * 6.0 / (2.83 + duty * duty * 0.1);
+        assert!((world.current_a() - current).abs() < 1e-12);
+        assert!((world.supply_v() - (6.0 - 0.1 * duty * current)).abs() < 1e-12);
+    }
+    world.faults.supply_drop_v = 2.0;
+    world.advance(0.0, Bridge::Coast);
+    assert_eq!(world.supply_v(), 4.0);
+    assert_eq!(world.sense(3).supply_mv, 4_000);
+    assert_eq!(world.sense(3).bus_silent_ms, 3);
+}

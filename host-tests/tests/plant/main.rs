@@ -1,0 +1,32 @@
+//! The simulated board against the paper, the data sheet and closed forms.
+
+mod cells;
+mod drive;
+mod electrics;
+mod optimal;
+
+use host_tests::plant::{Bridge, Setup, World};
+
+/// The step that the tests vouch for.
+const STEP_S: f64 = 10e-6;
+
+/// The reference finger with the wall out of reach.
+fn free() -> Setup {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 1e9;
+    setup
+}
+
+/// The reference finger pressed in this far, at rest.
+fn pressed(d_mm: f64) -> World {
+    let mut world = World::new(&Setup::default());
+    world.place(world.setup().wall.distance_mm + d_mm);
+    world
+}
+
+/// Holds the bridge for a time.
+fn run(world: &mut World, seconds: f64, bridge: Bridge) {
+    for _ in 0..(seconds / STEP_S).round() as usize {
+        world.advance(STEP_S, bridge);
+    }
+}

@@ -9,13 +9,14 @@ use crate::scan::{ScanError, ScanTiming};
 use crate::units::{Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I8F24, I16F16};
 
-/// Bandwidth of the speed loop in frames: k_v = 1 / (8 T). The duty acts a frame after the encoder was read and half a frame on average through the
-/// hold, 1.5 T in all, so the loop keeps 79 degrees of phase at its crossover.
-const SPEED_GAIN_FRAMES: f32 = 8.0;
-/// The position's slope is this much slower than the speed loop, so that they do not interact: k = k_v / 4.
-const POSITION_TO_SPEED: f32 = 4.0;
-/// Poles of the observer, in frames: its slowest answer is 2.5 times faster than the speed loop it serves.
-const OBSERVER_FRAMES: f32 = 3.0;
+/// Bandwidth of the speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the encoder was
+/// read and half a frame later on average through the hold; with a whole frame of reserve that is 1.5 T or 17 degrees at the crossover.
+const SPEED_GAIN_FRAMES: f32 = 5.0;
+/// The position's slope k is this much slower than the speed loop: k = k_v / 3. The feed-forward a_ref puts the poles of the
+/// linear zone at exactly -k_v and -k, so they need no further distance.
+const POSITION_TO_SPEED: f32 = 3.0;
+/// Poles of the observer, in frames: 1 / (2 T), 2.5 times faster than the speed loop that it serves.
+const OBSERVER_FRAMES: f32 = 2.0;
 
 /// Why parameters were refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -37,7 +37,8 @@ impl Goal {
             _ => {
                 self.hold = None;
                 let limit = if mode == Mode::Force { config.speed_max } else { config.approach };
-                (way_to_goal(goal, contact, motion, config, limits), limit)
+                let way = way_to_goal(goal, contact, motion, config, limits);
+                (within_travel(way, motion, config, limits), limit)
             }
         };
         let touching = contact.force >= config.contact_off;
@@ -46,12 +47,6 @@ impl Goal {
         let limited = reference.limited(speed_max);
         if limited != reference {
             limits.set(Limits::SPEED);
-        }
-        if mode != Mode::Release && motion.observer.travel >= config.travel_max {
-            limits.set(Limits::TRAVEL);
-            let stay = Millimetres(config.travel_max.0.saturating_sub(motion.observer.travel.0));
-            return Reference::towards(stay, motion.observer.speed, motion.brake(stay, config), config)
-                .limited(config.approach);
         }
         limited
     }
@@ -82,6 +77,15 @@ fn way_to_goal(
     let wanted = config.tip.indentation(goal.min(config.force_max));
     let sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
     if contact.force >= config.contact_off { Millimetres(wanted.0.saturating_sub(sensed)) } else { wanted }
+}
+
+/// No further than to the end of the travel.
+fn within_travel(way: Millimetres, motion: &SpeedLoop, config: &Config, limits: &mut Limits) -> Millimetres {
+    let left = Millimetres(config.travel_max.0.saturating_sub(motion.observer.travel.0));
+    if left < way {
+        limits.set(Limits::TRAVEL);
+    }
+    way.min(left)
 }
 
 /// How far the tip moved since the middle of the scan: half a frame.

@@ -1,0 +1,179 @@
+//! Each fault natively: found in time, latched, and cleared only with torque off.
+
+use fingertip::config::{Config, newtons};
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::safety::{Fault, Limits, Mode};
+use host_tests::native::Native;
+use host_tests::plant::{Row, Setup, Taxel};
+
+fn holding(goal_mn: i32) -> Native {
+    let config = Config::new(&Params::DEFAULT).unwrap();
+    let mut board = Native::new(&Setup::default(), &config);
+    board.tare_and_enable();
+    board.command.goal = newtons(goal_mn);
+    for _ in 0..5_000 {
+        board.step();
+    }
+    assert_eq!(board.step().mode, Mode::Force);
+    board
+}
+
+/// Steps until a fault; the number of frames that took.
+fn frames_to_fault(board: &mut Native, at_most: u32) -> (u32, Status) {
+    for frames in 1..=at_most {
+        let status = board.step();
+        if status.mode == Mode::Fault {
+            assert_eq!(status.duty.0, 0);
+            return (frames, status);
+        }
+    }
+    panic!("no fault in {at_most} frames");
+}
+
+fn expect(board: &mut Native, fault: Fault, at_most: u32) {
+    let (frames, status) = frames_to_fault(board, at_most);
+    assert_eq!(status.fault, Some(fault), "after {frames} frames");
+}
+
+#[test]
+fn a_row_stuck_low_or_high() {
+    for state in [Row::StuckLow, Row::StuckHigh] {
+        let mut board = holding(1_000);
+        board.world.faults.array.rows[4] = state;
+        let (_, status) = frames_to_fault(&mut board, 2);
+        assert!(matches!(status.fault, Some(Fault::ArrayBroken | Fault::RowStuck)), "{:?}", status.fault);
+    }
+}
+
+#[test]
+fn all_taxels_saturated() {
+    let mut board = holding(1_000);
+    board.world.faults.array.saturated = true;
+    let (_, status) = frames_to_fault(&mut board, 2);
+    assert!(matches!(status.fault, Some(Fault::ArrayBroken | Fault::RowStuck)), "{:?}", status.fault);
+}
+
+#[test]
+fn twelve_taxels_dead_or_shorted() {
+    for state in [Taxel::Dead, Taxel::Shorted] {
+        let mut board = holding(1_000);
+        for place in 0..12 {
+            board.world.faults.array.taxels[place * 7 / 10][place * 7 % 10] = state;
+        }
+        expect(&mut board, Fault::ArrayBroken, 2);
+    }
+}
+
+#[test]
+fn a_few_bad_taxels_are_a_limit() {
+    let mut board = holding(1_000);
+    board.world.faults.array.taxels[0][0] = Taxel::Dead;
+    let status = board.step();
+    assert!(status.limits.has(Limits::TAXELS));
+    assert_eq!((status.mode, status.contact.bad_taxels), (Mode::Force, 1));
+}
+
+#[test]
+fn an_encoder_that_stands_still() {
+    let mut board = holding(1_000);
+    board.world.faults.encoder_frozen = true;
+    board.command.goal = newtons(4_000);
+    expect(&mut board, Fault::EncoderFrozen, 200);
+    assert!(board.world.force_n() < 9.0);
+
+    let config = Config::new(&Params::DEFAULT).unwrap();
+    let mut board = Native::new(&Setup::default(), &config);
+    board.tare_and_enable();
+    board.world.faults.encoder_frozen = true;
+    board.command.goal = newtons(1_000);
+    expect(&mut board, Fault::EncoderFrozen, 100);
+    assert!(board.world.travel_mm() < 2.0, "{} mm", board.world.travel_mm());
+}
+
+#[test]
+fn an_array_that_stands_still() {
+    let mut board = holding(1_000);
+    // The frames repeat while the motor moves.
+    let frozen = board.frame;
+    let mut sense = board.sense;
+    let mut command = board.command;
+    command.goal = newtons(3_000);
+    let mut fault = None;
+    for n in 1..500 {
+        sense.encoder += 5;
+        let frame = fingertip::frame::Frame { sequence: frozen.sequence + n, ..frozen };
+        fault = board.pipeline.step(&frame, &sense, &command).1.fault;
+        if fault.is_some() {
+            break;
+        }
+    }
+    assert_eq!(fault, Some(Fault::ArrayFrozen));
+}
+
+#[test]
+fn too_much_force() {
+    let mut board = holding(5_000);
+    board.world.setup_mut().wall.distance_mm -= 1.5;
+    expect(&mut board, Fault::OverForce, 2);
+}
+
+#[test]
+fn a_silent_bus() {
+    let mut board = holding(1_000);
+    let mut sense = board.sense;
+    let mut command = board.command;
+    command.bus_watchdog_ms = 40;
+    for (silent_ms, expected) in [(39, None), (40, Some(Fault::BusSilent))] {
+        sense.bus_silent_ms = silent_ms;
+        let frame = fingertip::frame::Frame { sequence: board.frame.sequence + 1, ..board.frame };
+        assert_eq!(board.pipeline.step(&frame, &sense, &command).1.fault, expected);
+    }
+}
+
+#[test]
+fn a_supply_that_sags() {
+    let mut board = holding(1_000);
+    board.world.faults.supply_drop_v = 2.0;
+    expect(&mut board, Fault::SupplyLow, 10);
+}
+
+#[test]
+fn a_fault_stays_until_it_is_cleared_with_torque_off() {
+    let mut board = holding(1_000);
+    board.world.faults.supply_drop_v = 2.0;
+    expect(&mut board, Fault::SupplyLow, 10);
+    board.world.faults.supply_drop_v = 0.0;
+    board.command.clear_request += 1;
+    assert_eq!(board.step().mode, Mode::Fault, "torque is still on");
+    board.command.torque = false;
+    assert_eq!(board.step().mode, Mode::Fault, "the request came with torque on");
+    board.command.clear_request += 1;
+    let status = board.step();
+    assert_eq!((status.mode, status.fault), (Mode::Off, None));
+    board.command.torque = true;
+    assert_eq!(board.step().mode, Mode::Approach);
+}
+
+#[test]
+fn torque_waits_for_a_tare() {
+    let config = Config::new(&Params::DEFAULT).unwrap();
+    let mut board = Native::new(&Setup::default(), &config);
+    board.command.torque = true;
+    board.command.goal = newtons(1_000);
+    for _ in 0..100 {
+        let status = board.step();
+        assert_eq!(status.mode, Mode::Off);
+        assert!(status.limits.has(Limits::NOT_TARED));
+    }
+}
+
+#[test]
+fn missed_frames_are_counted() {
+    let mut board = holding(1_000);
+    let mut frame = board.frame;
+    frame.sequence = frame.sequence.wrapping_add(4);
+    let (_, status) = board.pipeline.step(&frame, &board.sense, &board.command);
+    assert_eq!(status.missed_frames, 3);
+    assert!(status.limits.has(Limits::FRAME_MISSED));
+}

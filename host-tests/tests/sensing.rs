@@ -1,0 +1,164 @@
+//! Codes to contact: the plant's electrical model against what the core reads back.
+
+use fingertip::config::Config;
+use fingertip::contact::from_sums;
+use fingertip::frame::{Frame, ROWS, SLOTS};
+use fingertip::params::Params;
+use fingertip::pipeline::Contact;
+use fingertip::pressure::{Array, TARE_FRAMES};
+use host_tests::plant::{Setup, World};
+
+struct Bench {
+    world: World,
+    array: Array,
+    config: Config,
+    frame: Frame,
+}
+
+impl Bench {
+    fn new(setup: &Setup) -> Self {
+        let config = Config::new(&Params::DEFAULT).unwrap();
+        let mut bench = Self { world: World::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
+        bench.tare();
+        bench
+    }
+
+    fn tare(&mut self) {
+        self.array.start_tare();
+        for _ in 0..TARE_FRAMES {
+            self.read();
+            self.array.continue_tare();
+        }
+    }
+
+    fn read(&mut self) -> Contact {
+        self.world.fill_frame(&mut self.frame);
+        from_sums(self.array.read(&self.frame, &self.config), &self.config)
+    }
+
+    fn press(&mut self, indentation_mm: f64) -> Contact {
+        self.world.place(self.world.setup().wall.distance_mm + indentation_mm);
+        self.read()
+    }
+}
+
+#[test]
+fn the_sum_of_the_taxels_is_the_force() {
+    let mut bench = Bench::new(&Setup::default());
+    for step in 2..=28 {
+        let contact = bench.press(f64::from(step) * 0.1);
+        let truth = bench.world.force_n();
+        let sensed: f64 = contact.force.0.to_num();
+        assert!((sensed - truth).abs() <= 0.002 * truth + 0.003, "{truth} N read as {sensed} N");
+        let depth: f64 = contact.indentation.0.to_num();
+        assert!((depth - bench.world.indentation_mm()).abs() < 0.005, "{depth} mm");
+    }
+}
+
+#[test]
+fn the_sag_of_the_driven_row_is_taken_out() {
+    let setup = Setup::default();
+    let mut bench = Bench::new(&setup);
+    let with = bench.press(2.5);
+    bench.config.sag_q32 = 0;
+    bench.world.place(0.0);
+    bench.tare();
+    let without = bench.press(2.5);
+    let truth = bench.world.force_n();
+    let lost = 1.0 - without.force.0.to_num::<f64>() / truth;
+    assert!((0.003..0.05).contains(&lost), "the sag matters: {lost}");
+    assert!((with.force.0.to_num::<f64>() / truth - 1.0).abs() < 0.002);
+}
+
+#[test]
+fn the_centre_follows_the_contact() {
+    for (x, y) in [(0.0, 0.0), (1.0, -0.5), (-1.2, 0.9), (0.75, 0.75)] {
+        let mut setup = Setup::default();
+        setup.wall.centre_x_mm = x;
+        setup.wall.centre_y_mm = y;
+        let contact = Bench::new(&setup).press(1.5);
+        let read = (contact.centre_x.0.to_num::<f64>(), contact.centre_y.0.to_num::<f64>());
+        assert!((read.0 - x).abs() < 0.02 && (read.1 - y).abs() < 0.02, "({x}, {y}) read as {read:?}");
+    }
+}
+
+#[test]
+fn without_force_the_centre_is_the_middle() {
+    let contact = Bench::new(&Setup::default()).read();
+    assert_eq!((contact.force.to_bits(), contact.centre_x.to_bits(), contact.centre_y.to_bits()), (0, 0, 0));
+}
+
+#[test]
+fn dead_and_saturated_taxels_are_counted_and_left_out() {
+    let mut bench = Bench::new(&Setup::default());
+    bench.press(1.0);
+    bench.frame.set_code(4, 4, 0);
+    bench.frame.set_code(5, 7, 4095);
+    let picture = bench.array.read(&bench.frame, &bench.config);
+    assert_eq!(picture.bad_count, 2);
+    assert_eq!((picture.taxels[4][4], picture.taxels[5][7]), (0, 0));
+    assert_eq!((picture.bad[4], picture.bad[5]), (1 << 4, 1 << 7));
+}
+
+#[test]
+fn a_row_that_is_never_driven_is_ten_dead_taxels() {
+    let mut bench = Bench::new(&Setup::default());
+    for column in 0..10 {
+        let undriven = bench.frame.code(ROWS, column);
+        bench.frame.set_code(3, column, undriven);
+    }
+    assert_eq!(bench.array.read(&bench.frame, &bench.config).bad_count, 10);
+}
+
+#[test]
+fn the_undriven_slot_takes_out_a_common_offset() {
+    let mut bench = Bench::new(&Setup::default());
+    let before = bench.press(1.0);
+    for slot in 0..SLOTS {
+        for column in 0..10 {
+            let code = bench.frame.code(slot, column);
+            bench.frame.set_code(slot, column, code + 25);
+        }
+    }
+    assert_eq!(from_sums(bench.array.read(&bench.frame, &bench.config), &bench.config), before);
+}
+
+#[test]
+fn the_baseline_follows_drift_only_when_told() {
+    let mut bench = Bench::new(&Setup::default());
+    bench.read();
+    for column in 0..10 {
+        for row in 0..ROWS {
+            let code = bench.frame.code(row, column);
+            bench.frame.set_code(row, column, code + 2);
+        }
+    }
+    let drifted = bench.array.read(&bench.frame, &bench.config).sum;
+    assert!((3_100..3_300).contains(&drifted), "100 taxels, 2 codes, 16ths: {drifted}");
+    // One time constant of the baseline, 1024 visits to each row.
+    for _ in 0..10_240 {
+        bench.array.read(&bench.frame, &bench.config);
+        bench.array.follow_drift();
+    }
+    let left = f64::from(bench.array.read(&bench.frame, &bench.config).sum) / f64::from(drifted);
+    assert!((0.33..0.42).contains(&left), "1/e is left, not {left}");
+}
+
+#[test]
+fn any_frame_is_taken() {
+    let mut bench = Bench::new(&Setup::default());
+    for pattern in [0, 0xffff, 4095, 4089, 1, 0x1000] {
+        for alternate in [pattern, 0, 4095] {
+            let mut frame = Frame::EMPTY;
+            for slot in 0..SLOTS {
+                for column in 0..10 {
+                    frame.set_code(slot, column, if (slot + column) % 2 == 0 { pattern } else { alternate });
+                }
+            }
+            let contact = from_sums(bench.array.read(&frame, &bench.config), &bench.config);
+            assert!(contact.force.to_bits() >= 0);
+            bench.array.continue_tare();
+            bench.array.follow_drift();
+        }
+    }
+}

@@ -127,6 +127,8 @@ fn without_friction_a_coasting_motor_keeps_its_energy() {
 }
 
 proptest! {
+    #![proptest_config(super::cases(256))]
+
     #[test]
     fn coasting_and_braking_never_create_energy(
         d in 0.0..4.0f64, kick_s in 0.0..0.02f64, duty in -1.0..1.0f64, step_s in 1e-6..1e-3f64, brake: bool,

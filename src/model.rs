@@ -18,7 +18,19 @@
 //! assert_eq!(tip.contact_radius(Millimetres::from_bits(2 << 24)), Millimetres::from_bits(6 << 24));
 //! ```
 
+mod angle;
 mod arith;
+mod friction;
+mod geometry;
+mod particle;
+mod pressure;
+mod relaxation;
+mod tilt;
+
+pub use friction::LimitSurface;
+pub use particle::{force_on, pressure_of, strain_of};
+pub use relaxation::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
+pub use tilt::{Displacement, Load};
 
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
 use arith::{Gain, root, square};
@@ -74,6 +86,8 @@ pub struct Tip {
     area_gain: Gain,
     /// Newtons a millimetre from millimetres: 2 pi Y.
     stiffness_gain: Gain,
+    /// Four times the squared stiffness from newtons: 16 pi Y.
+    square_gain: Gain,
 }
 
 impl Tip {
@@ -104,6 +118,7 @@ impl Tip {
             force_gain: Gain::new(pi_y_q98, 98 + 48),
             area_gain: Gain::new(inverse_pi_y_q110, 110 - 48 - 2),
             stiffness_gain: Gain::new(pi_y_q98, 98 + 24 - 1),
+            square_gain: Gain::new(pi_y_q98, 98 - 4),
         };
         tip.force_max = tip.force(tip.depth_max);
         Ok(tip)

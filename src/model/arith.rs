@@ -23,7 +23,12 @@ impl Gain {
 
     /// The product with `x`, rounded to nearest. For gains below 1/2.
     pub(super) const fn round(self, x: u64) -> u64 {
-        let shift = self.shift - 64;
+        self.round_short(x, 0)
+    }
+
+    /// The same without the last `drop` bits of the product.
+    pub(super) const fn round_short(self, x: u64, drop: u32) -> u64 {
+        let shift = self.shift - 64 + drop;
         (mul_high(x, self.mantissa) + (1 << shift >> 1)) >> shift
     }
 

@@ -1,0 +1,141 @@
+//! Pressure over the contact and what sums it: equations 12 to 16, figure 7.
+
+use core::num::NonZeroU16;
+
+use super::Tip;
+use super::arith::{mul_high, root, square};
+use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre, Strain};
+
+/// A quotient below 1: `significand * 2^-shift` with a relative error below 2^-30.
+struct Quotient {
+    significand: u64,
+    shift: u32,
+}
+
+impl Quotient {
+    const ZERO: Self = Self { significand: 0, shift: 64 };
+
+    /// `numerator / denominator`, where `numerator < denominator < 2^63`.
+    fn new(numerator: u64, denominator: u64) -> Self {
+        let (up, down) = (numerator.leading_zeros(), denominator.leading_zeros());
+        if up >= 64 || down >= 64 {
+            return Self::ZERO;
+        }
+        let divisor = ((denominator << down) >> 31).div_ceil(2);
+        Self { significand: (numerator << up) / divisor, shift: 32 + up - down }
+    }
+
+    /// With 31 to 60 bits after the point, rounded down.
+    const fn floor(&self, bits: u32) -> u64 {
+        if self.shift > bits {
+            self.significand >> (self.shift - bits)
+        } else {
+            self.significand << (bits - self.shift)
+        }
+    }
+
+    /// The product with `factor` below 2^30, rounded to nearest.
+    fn scale(&self, factor: u64) -> u64 {
+        if self.shift > 63 { 0 } else { ((factor * self.significand) >> (self.shift - 1)).div_ceil(2) }
+    }
+}
+
+impl Tip {
+    /// Strain of the column at `r`, compression positive: `e = dL/L` (eq. 10, 15, 16).
+    pub fn strain(&self, r: Millimetres, d: Millimetres) -> Strain {
+        let strain = self.strain_at_square(square(self.distance(r)), self.depth(d));
+        Strain::from_bits(strain.floor(31).div_ceil(2) as i32)
+    }
+
+    /// Pressure at a distance `r` from the contact's centre: `p = Y dL/L` (eq. 13, 15, 16); 0 from the rim on.
+    ///
+    /// With `L = sqrt(a^2 - r^2)`, `dL = L - (a - d)` cancels at the rim and at small `d`. Here `dL/L` is
+    /// `(r_c^2 - r^2) / (L^2 + L (a - d))`: the numerator and `L^2` are exact integers, and nothing is subtracted after a
+    /// rounding. Non-increasing in `r`.
+    pub fn pressure(&self, r: Millimetres, d: Millimetres) -> Kilopascals {
+        let strain = self.strain_at_square(square(self.distance(r)), self.depth(d));
+        Kilopascals::from_bits(strain.scale(self.modulus_bits()) as i32)
+    }
+
+    /// Pressure at the contact's centre, `p(0) = Y d / a`. Correctly rounded.
+    pub fn peak_pressure(&self, d: Millimetres) -> Kilopascals {
+        Kilopascals::from_bits(divide(self.modulus_bits() * u64::from(self.depth(d)), self.radius_bits().into()) as i32)
+    }
+
+    /// Force over contact area, `F / (pi r_c^2) = Y d / (2a - d)`. Correctly rounded.
+    pub fn mean_pressure(&self, d: Millimetres) -> Kilopascals {
+        let depth = self.depth(d);
+        let denominator = u64::from(2 * self.radius_bits() - depth);
+        Kilopascals::from_bits(divide(self.modulus_bits() * u64::from(depth), denominator) as i32)
+    }
+
+    /// Indentation from the pressure at the contact's centre, `d = a p(0) / Y`. Correctly rounded.
+    ///
+    /// The pressure counts as within 0 to that of [`Tip::depth_max`].
+    pub fn indentation_from_peak(&self, peak: Kilopascals) -> Millimetres {
+        let peak = peak.clamp(Kilopascals::ZERO, self.modulus()).to_bits().unsigned_abs();
+        let bits = divide(u64::from(self.radius_bits()) * u64::from(peak), self.modulus_bits());
+        Millimetres::from_bits(bits as i32).min(self.depth_max())
+    }
+
+    /// Indentation from the contact radius, `d = a - sqrt(a^2 - r_c^2)`. Correctly rounded.
+    ///
+    /// In floating point this cancels and is written `r_c^2 / (a + sqrt(a^2 - r_c^2))`; here the difference under the root
+    /// is exact, the root is the nearest multiple of the unit and a is a multiple of it, so nothing is lost.
+    /// The radius counts as within 0 to that of [`Tip::depth_max`].
+    pub fn indentation_from_radius(&self, contact_radius: Millimetres) -> Millimetres {
+        let distance = self.distance(contact_radius.max(Millimetres::ZERO));
+        let length = root(square(self.radius_bits()) - square(distance));
+        Millimetres::from_bits((self.radius_bits() - length) as i32).min(self.depth_max())
+    }
+
+    /// Stiffness at a total force, `k = 2 sqrt(pi Y F)`.
+    ///
+    /// `F` counts as within 0 to [`Tip::force_max`].
+    pub fn stiffness_at_force(&self, force: Newtons) -> NewtonsPerMillimetre {
+        let force_bits = u64::from(force.clamp(Newtons::ZERO, self.force_max()).to_bits().unsigned_abs());
+        NewtonsPerMillimetre::from_bits(self.square_gain.floor(force_bits).isqrt().div_ceil(2) as i32)
+    }
+
+    /// Total force by quadrature over rings: `F = integral of p dS` (eq. 14), the sum that the closed form
+    /// [`Tip::force`] stands for.
+    ///
+    /// In `u = r^2` the area element is `pi du` and the pressure is smooth up to the rim, so the midpoint rule over rings of
+    /// equal area converges with the square of their number.
+    pub fn force_by_rings(&self, d: Millimetres, rings: NonZeroU16) -> Newtons {
+        let depth = self.depth(d);
+        let contact_square = self.contact_square(depth);
+        let rings = u64::from(rings.get());
+        let (whole, rest) = (contact_square / (2 * rings), contact_square % (2 * rings));
+        let sum_q48: u64 = (0..rings)
+            .map(|ring| {
+                let middle = 2 * ring + 1;
+                self.strain_at_square(whole * middle + rest * middle / (2 * rings), depth).floor(48)
+            })
+            .sum();
+        self.force_of_area(mul_high(contact_square << 8, sum_q48 / rings << 8))
+    }
+
+    /// The strain where `r^2` is `square_q48`.
+    fn strain_at_square(&self, square_q48: u64, depth: u32) -> Quotient {
+        let contact_square = self.contact_square(depth);
+        if square_q48 >= contact_square {
+            return Quotient::ZERO;
+        }
+        let length_square = square(self.radius_bits()) - square_q48;
+        let spare = length_square.leading_zeros() / 2;
+        let length = (length_square << (2 * spare)).isqrt();
+        let cross = (length * u64::from(self.rest(depth))) >> spare;
+        Quotient::new(contact_square - square_q48, length_square + cross)
+    }
+
+    /// The modulus in units of the last place.
+    pub(super) fn modulus_bits(&self) -> u64 {
+        u64::from(self.modulus().to_bits().unsigned_abs())
+    }
+}
+
+/// A quotient rounded to nearest.
+const fn divide(numerator: u64, denominator: u64) -> u64 {
+    (numerator + denominator / 2) / denominator
+}

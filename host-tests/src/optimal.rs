@@ -135,7 +135,7 @@ impl Shooting {
         let duty = (voltage_limit / supply.source_v).min(1.0);
         let drive = Source {
             volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
-            ohms: setup.motor.resistance_ohm + duty * duty * supply.source_ohm,
+            ohms: supply.circuit_ohm(&setup.motor, duty),
             limit_a: current_limit,
         };
         let angle_rad = |d_mm: f64| dynamics.angle_rad(setup.wall.distance_mm + d_mm);

@@ -238,13 +238,12 @@ impl World {
         }
     }
 
-    /// The supply gives the share u of the motor's current, so the bridge shows the motor u^2 of its resistance.
     fn source(&self) -> Source {
         match self.bridge {
             Bridge::Coast => Source::OPEN,
             Bridge::Driven { .. } => {
                 let duty = self.duty();
-                let ohms = self.setup.motor.resistance_ohm + duty * duty * self.setup.supply.source_ohm;
+                let ohms = self.setup.supply.circuit_ohm(&self.setup.motor, duty);
                 Source { volts: duty * self.source_v(), ohms, limit_a: f64::INFINITY }
             }
         }

@@ -148,17 +148,27 @@ impl Default for Transmission {
     }
 }
 
-/// An ideal source behind a resistance.
+/// An ideal source behind a resistance, and the bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Supply {
     /// Voltage without load.
     pub source_v: f64,
     /// Resistance of source, wires and connectors.
     pub source_ohm: f64,
+    /// Resistance of the bridge's two switches in the motor's path; 0 where the motor's resistance includes it.
+    pub bridge_ohm: f64,
+}
+
+impl Supply {
+    /// Resistance of a motor's whole circuit at a duty: the source gives the share u of the current at the share u of
+    /// the time, so the motor sees u^2 of its resistance.
+    pub fn circuit_ohm(&self, motor: &Motor, duty: f64) -> f64 {
+        motor.resistance_ohm + self.bridge_ohm + duty * duty * self.source_ohm
+    }
 }
 
 impl Default for Supply {
     fn default() -> Self {
-        Self { source_v: 6.0, source_ohm: 0.1 }
+        Self { source_v: 6.0, source_ohm: 0.1, bridge_ohm: 0.0 }
     }
 }

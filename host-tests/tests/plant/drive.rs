@@ -227,6 +227,9 @@ fn the_supply_sags_by_the_share_of_the_current_that_it_gives() {
         assert!((world.current_a() - current).abs() < 1e-12);
         assert!((world.supply_v() - (6.0 - 0.1 * duty * current)).abs() < 1e-12);
     }
+    world.setup_mut().supply.bridge_ohm = 0.7;
+    world.advance(0.0, Bridge::Driven { duty: 0.5 });
+    assert!((world.current_a() - 3.0 / (2.83 + 0.7 + 0.025)).abs() < 1e-12);
     world.faults.supply_drop_v = 2.0;
     world.advance(0.0, Bridge::Coast);
     assert_eq!(world.supply_v(), 4.0);

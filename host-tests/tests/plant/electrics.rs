@@ -102,6 +102,16 @@ fn a_frame_holds_every_slot() {
 }
 
 #[test]
+fn a_slot_sampled_at_its_edge_still_shows_the_slot_before() {
+    let mut world = pressed(1.0);
+    let settled: Vec<_> = (0..SLOTS).map(|slot| world.slot_codes(slot)).collect();
+    world.setup_mut().array.sample_after_s = 0.0;
+    for slot in 0..SLOTS {
+        assert_eq!(world.slot_codes(slot), settled[(slot + SLOTS - 1) % SLOTS]);
+    }
+}
+
+#[test]
 fn defects_show_where_they_are() {
     let mut sound = pressed(1.0);
     let code = |world: &mut World, row, column| f64::from(world.code(row, column));

@@ -31,3 +31,7 @@ pub mod control;
 pub mod safety;
 
 pub mod pipeline;
+
+pub mod link;
+
+pub mod store;

@@ -17,10 +17,10 @@ pub struct ParamError {
 }
 
 macro_rules! params {
-    ($($(#[$doc:meta])* $name:ident = $default:literal in $min:literal ..= $max:literal;)*) => {
+    ($($(#[doc = $doc:literal])+ $name:ident = $default:literal in $min:literal ..= $max:literal;)*) => {
         /// The stored parameters, in the units that their names end with.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub struct Params { $($(#[$doc])* pub $name: i32,)* }
+        pub struct Params { $($(#[doc = $doc])+ pub $name: i32,)* }
 
         impl Params {
             /// How many there are.
@@ -52,6 +52,9 @@ macro_rules! params {
             /// Name, default, least and largest value of each, in order.
             pub const RANGES: [(&'static str, i32, i32, i32); Self::COUNT] =
                 [$((stringify!($name), $default, $min, $max)),*];
+
+            /// What each says in its documentation, in order.
+            pub const DOCS: [&'static str; Self::COUNT] = [$(concat!($($doc),+)),*];
         }
     };
 }

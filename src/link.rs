@@ -1,0 +1,38 @@
+//! The bus: DYNAMIXEL Protocol 2.0, device side, without input or output of its own.
+//!
+//! ```text
+//! bytes -> receiver -> packet -> server -> table -> settings -> command, record, actions for the firmware
+//! bytes <- sender   <- reply  <-   "    <-   "   <- snapshot of the loop
+//! ```
+//! The firmware feeds received bytes to a [`Server`] together with a [`Snapshot`] of the loop, sends the reply,
+//! passes [`Server::command`] on to the loop and carries out [`Server::take_actions`].
+//!
+//! What happens where, beyond the protocol's own rules:
+//!
+//! | subject | rule |
+//! | --- | --- |
+//! | write | all or nothing; covers whole registers: a partial one is a length error |
+//! | read | any bytes, as long as each belongs to a register: access error otherwise; 1 to 256 bytes: length error otherwise |
+//! | stored registers | written with torque off only; kept over a reset only once `save_parameters` was written |
+//! | value beyond another register's limit, parameters that contradict each other | limit error |
+//! | fault | torque enable and goal force go to 0; torque enable is refused (result error) until the fault is cleared |
+//! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and goal force and torque enable are refused (access error) until 0 is written to it |
+//! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
+//! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
+//! | broadcast Ping | answered after 14 byte times for each lower ID |
+//! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
+
+pub mod crc;
+pub mod packet;
+pub mod receiver;
+pub mod sender;
+pub mod server;
+pub mod settings;
+pub mod snapshot;
+pub mod table;
+mod turn;
+
+pub use sender::{REPLY_MAX, Reply};
+pub use server::Server;
+pub use settings::{Actions, Settings};
+pub use snapshot::{Crash, CrashCause, ResetCause, Snapshot};

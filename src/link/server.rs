@@ -1,0 +1,189 @@
+//! The device on the bus: packets in, replies out, and what they ask of the loop and the firmware.
+
+mod answer;
+mod execute;
+
+use heapless::Vec;
+
+use crate::pipeline::Command;
+use crate::safety::Fault;
+use crate::store::Record;
+use crate::units::Newtons;
+
+use super::packet::StatusError;
+use super::receiver::{Event, Receiver};
+use super::sender::Reply;
+use super::settings::{Actions, Saved, Settings};
+use super::snapshot::Snapshot;
+use super::turn::Turn;
+
+/// The longest Reg Write: all parameters at once.
+pub const REG_WRITE_MAX: usize = 160;
+
+/// Counts of what went wrong on the bus since reset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Good instruction packets for this device, broadcasts included; wraps.
+    pub good_packets: u32,
+    /// Runs of bytes that were no packet, or only the beginning of one; holds at its top.
+    pub framing: u16,
+    refused: [u16; 7],
+}
+
+impl Counters {
+    /// How often an instruction was refused for this reason, damaged packets for other devices included; holds at its top.
+    pub fn refused(&self, error: StatusError) -> u16 {
+        self.refused.get(error as usize - 1).copied().unwrap_or(0)
+    }
+
+    fn count(&mut self, error: StatusError) {
+        if let Some(count) = self.refused.get_mut(error as usize - 1) {
+            *count = count.saturating_add(1);
+        }
+    }
+}
+
+/// A write that waits for its Action.
+#[derive(Clone, Debug)]
+struct Registered {
+    address: u16,
+    data: Vec<u8, REG_WRITE_MAX>,
+}
+
+/// What the device knows.
+#[derive(Clone, Debug)]
+pub(super) struct State {
+    pub settings: Settings,
+    pub counters: Counters,
+    registered: Option<Registered>,
+    actions: Actions,
+    turn: Turn,
+    /// The fault that the last snapshot told of.
+    fault: Option<Fault>,
+    reply_delay_us: u32,
+}
+
+/// The device on the bus.
+///
+/// ```
+/// # use fingertip::{frame::{Frame, TAXELS}, link::{Reply, Server, Snapshot}, pipeline::Status, store::Record};
+/// let mut server = Server::new(Record::DEFAULT);
+/// let zeros = [0; TAXELS];
+/// let snapshot = Snapshot {
+///     status: Status::default(), supply_mv: 6000, tick_ms: 0, loop_time_us: 0, loop_time_max_us: 0,
+///     reset_cause: Default::default(), crash: Default::default(),
+///     pressures_10pa: &zeros, frame: &Frame::EMPTY, tare_codes: &zeros,
+/// };
+/// let mut reply = Reply::new();
+/// let mut received: &[u8] = &[0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4E];
+/// while !received.is_empty() {
+///     let taken = server.feed(received, &snapshot, &mut reply);
+///     received = &received[taken..];
+///     if !reply.is_empty() {
+///         // Wait for server.reply_delay_us(), then send the reply.
+///     }
+///     // Carry out server.take_actions(), pass server.command() on to the loop.
+/// }
+/// assert_eq!(reply[4..9], [1, 7, 0, 0x55, 0]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Server {
+    receiver: Receiver,
+    state: State,
+}
+
+impl Server {
+    /// A device with these stored settings, torque off.
+    pub fn new(record: Record) -> Self {
+        let state = State {
+            settings: Settings::new(record),
+            counters: Counters::default(),
+            registered: None,
+            actions: Actions::default(),
+            turn: Turn::None,
+            fault: None,
+            reply_delay_us: 0,
+        };
+        Self { receiver: Receiver::new(), state }
+    }
+
+    /// Takes bytes up to the end of the first packet that is answered, and returns how many it took.
+    ///
+    /// `reply` is cleared first; where it is not empty afterwards, send it after [`Server::reply_delay_us`] and feed the rest.
+    /// Do not feed what this device itself sends.
+    pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) -> usize {
+        reply.clear();
+        self.observe(snapshot.status.fault);
+        for (place, &byte) in bytes.iter().enumerate() {
+            self.state.listen(byte, snapshot, reply);
+            match self.receiver.push(byte) {
+                Some(Event::Packet) => self.state.packet(self.receiver.packet(), snapshot, reply),
+                Some(Event::BadCrc) => self.state.damaged(self.receiver.packet(), reply),
+                Some(Event::Framing) => self.state.counters.framing = self.state.counters.framing.saturating_add(1),
+                None => {}
+            }
+            if !reply.is_empty() {
+                return place + 1;
+            }
+        }
+        bytes.len()
+    }
+
+    /// How long to wait between the packet's last byte and the reply's first.
+    pub fn reply_delay_us(&self) -> u32 {
+        self.state.reply_delay_us
+    }
+
+    /// What the host asks of the loop.
+    pub fn command(&self) -> Command {
+        self.state.settings.command
+    }
+
+    /// All that the host may change.
+    pub fn settings(&self) -> &Settings {
+        &self.state.settings
+    }
+
+    /// What went wrong on the bus.
+    pub fn counters(&self) -> &Counters {
+        &self.state.counters
+    }
+
+    /// Changes with every good instruction packet for this device: what the bus watchdog watches.
+    pub fn good_packets(&self) -> u32 {
+        self.state.counters.good_packets
+    }
+
+    /// What the firmware is asked to do, once.
+    pub fn take_actions(&mut self) -> Actions {
+        core::mem::take(&mut self.state.actions)
+    }
+
+    /// How a save went.
+    pub fn note_saved(&mut self, succeeded: bool) {
+        self.state.settings.saved = if succeeded { Saved::Same } else { Saved::Failed };
+    }
+
+    /// A fault turns torque off and lets go; a silent bus also trips the watchdog's register.
+    ///
+    /// [`Server::feed`] does this with its snapshot; the firmware may do it earlier.
+    pub fn observe(&mut self, fault: Option<Fault>) {
+        let settings = &mut self.state.settings;
+        if fault.is_some() {
+            settings.command.torque = false;
+            settings.command.goal = Newtons::ZERO;
+        }
+        if fault != self.state.fault && fault == Some(Fault::BusSilent) {
+            settings.watchdog_tripped = true;
+            settings.command.bus_watchdog_ms = 0;
+        }
+        self.state.fault = fault;
+    }
+}
+
+impl State {
+    /// Whether a Reg Write waits.
+    pub fn registered(&self) -> bool {
+        self.registered.is_some()
+    }
+}

@@ -1,0 +1,96 @@
+//! What the host may change, and what it may ask the firmware to do.
+
+use crate::config::{Config, ConfigError};
+use crate::pipeline::Command;
+use crate::store::Record;
+use crate::units::Newtons;
+
+use super::packet::StatusError;
+
+/// The bus speeds that the clocks allow, by the protocol's code (APB1 runs at 42 MHz: 4 and 4.5 Mbaud are 4 % off).
+pub const BAUD_RATES: [u32; 6] = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000];
+
+/// Everything that a write can change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// What outlives a reset once it is saved.
+    pub record: Record,
+    /// What the loop is asked for.
+    pub command: Command,
+    /// 0: only Ping is answered; 1: reads too; 2: everything.
+    pub status_return_level: u8,
+    /// The bus watchdog has tripped and was not reset.
+    pub watchdog_tripped: bool,
+    /// How the record stands to the flash.
+    pub saved: Saved,
+}
+
+/// How the stored registers stand to the flash. The numbers are stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Saved {
+    /// Flash holds the same, or both hold the defaults.
+    Same = 0,
+    /// Changed since the last save.
+    Changed = 1,
+    /// The last save failed.
+    Failed = 2,
+}
+
+/// What a packet asks the firmware to do once the reply is sent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Actions {
+    /// Reset the microcontroller.
+    pub reboot: bool,
+    /// Write [`Settings::record`] to flash, and say how it went with [`super::Server::note_saved`].
+    pub save: bool,
+    /// The parameters changed: make a new configuration.
+    pub configure: bool,
+    /// The bus speed changed.
+    pub baud: bool,
+}
+
+impl Settings {
+    /// The settings after a reset.
+    pub fn new(record: Record) -> Self {
+        Self {
+            record,
+            command: Command::default(),
+            status_return_level: 2,
+            watchdog_tripped: false,
+            saved: Saved::Same,
+        }
+    }
+
+    /// The bus speed in baud.
+    pub fn baud(&self) -> u32 {
+        BAUD_RATES.get(usize::from(self.record.baud_code)).copied().unwrap_or(BAUD_RATES[1])
+    }
+
+    /// The pause before a reply.
+    pub fn return_delay_us(&self) -> u32 {
+        u32::from(self.record.return_delay_2us) * 2
+    }
+
+    /// Refuses what no register's own range can catch.
+    ///
+    /// # Errors
+    /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force.
+    pub(super) fn check(&self, params_changed: bool) -> Result<(), StatusError> {
+        if params_changed {
+            Config::new(&self.record.params).map_err(|error| match error {
+                ConfigError::Param(_) => StatusError::Range,
+                ConfigError::Scan(_) | ConfigError::Order(..) => StatusError::Limit,
+            })?;
+        }
+        if goal_mn(self.command.goal) > self.record.params.force_max_mn {
+            return Err(StatusError::Limit);
+        }
+        Ok(())
+    }
+}
+
+/// A force in mN, rounded.
+pub(super) fn goal_mn(force: Newtons) -> i32 {
+    super::table::thousandths(force.to_bits(), 16)
+}

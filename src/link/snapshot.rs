@@ -1,0 +1,94 @@
+//! What the bus may read of the running controller, gathered by the firmware.
+
+use crate::frame::{Frame, TAXELS};
+use crate::pipeline::Status;
+use crate::safety::Fault;
+
+/// A picture of the controller at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Snapshot<'a> {
+    /// What the last step reported.
+    pub status: Status,
+    /// The bridge's supply.
+    pub supply_mv: u16,
+    /// Time since reset; wraps.
+    pub tick_ms: u32,
+    /// From a frame's last conversion to the new duty, last time.
+    pub loop_time_us: u16,
+    /// The longest of those since reset.
+    pub loop_time_max_us: u16,
+    /// Why the microcontroller started.
+    pub reset_cause: ResetCause,
+    /// The last crash on record.
+    pub crash: Crash,
+    /// Pressure on each taxel in units of 10 Pa, row by row.
+    pub pressures_10pa: &'a [u16; TAXELS],
+    /// The frame that the status was made from.
+    pub frame: &'a Frame,
+    /// The zero of each taxel in converter codes, row by row.
+    pub tare_codes: &'a [u16; TAXELS],
+}
+
+/// Why the microcontroller started. The numbers are stable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ResetCause {
+    /// Not known.
+    #[default]
+    Unknown = 0,
+    /// The supply came up.
+    PowerOn = 1,
+    /// The supply dipped.
+    BrownOut = 2,
+    /// The reset pin.
+    Pin = 3,
+    /// The firmware itself: a Reboot instruction, or the end of a crash.
+    Software = 4,
+    /// The independent watchdog: the control task missed its deadline.
+    Watchdog = 5,
+    /// The window watchdog or a low-power fault.
+    Other = 6,
+}
+
+/// How the firmware ended. The numbers are stable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum CrashCause {
+    /// It did not.
+    #[default]
+    None = 0,
+    /// A panic.
+    Panic = 1,
+    /// A hard fault.
+    HardFault = 2,
+    /// It hung until the watchdog's reset.
+    Hang = 3,
+}
+
+/// The crash record, which survives a reset.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Crash {
+    /// How the last one happened.
+    pub cause: CrashCause,
+    /// Line of the source where it panicked, 0 where that is not known.
+    pub line: u16,
+    /// How many since power-on.
+    pub count: u32,
+    /// Program counter at the fault or the panic, 0 where that is not known.
+    pub pc: u32,
+}
+
+/// The hardware error status (register 70): the X-series bits where the meaning is the same, 6 and 7 of our own.
+pub fn hardware_error(fault: Option<Fault>) -> u8 {
+    match fault {
+        None => 0,
+        Some(Fault::SupplyLow | Fault::SupplyHigh) => 1 << 0,
+        Some(Fault::EncoderFrozen) => 1 << 3,
+        Some(Fault::Bridge) => 1 << 4,
+        Some(Fault::OverForce) => 1 << 5,
+        Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen) => 1 << 6,
+        Some(Fault::LostFrames | Fault::BusSilent | Fault::BrokenParameters | Fault::MissedDeadline | Fault::Crash) => {
+            1 << 7
+        }
+    }
+}

@@ -1,0 +1,260 @@
+//! The control table: every register defined once, for the device and for its documentation.
+//!
+//! [`registers`] holds the definition. From it come the addresses as constants ([`address`]), reading and writing here, and
+//! [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading sends a register's bytes straight into the reply.
+
+mod registers;
+
+use crate::params::Params;
+use crate::pipeline::Contact;
+
+use super::packet::StatusError;
+use super::server::{Counters, State};
+use super::settings::{Actions, Settings};
+use super::snapshot::Snapshot;
+
+pub use registers::{REGISTERS, address};
+
+/// The longest read.
+pub const READ_MAX: u16 = 256;
+
+/// Who may write a register, and when.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Nobody.
+    ReadOnly,
+    /// The host, at any time.
+    ReadWrite,
+    /// The host, while torque is off.
+    TorqueOff,
+    /// The host, while torque is off; kept in flash once `save_parameters` was written.
+    Stored,
+}
+
+/// How a register's bytes make a number, little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// 8 bits.
+    U8,
+    /// 8 bits, two's complement.
+    I8,
+    /// 16 bits.
+    U16,
+    /// 16 bits, two's complement.
+    I16,
+    /// 32 bits.
+    U32,
+    /// 32 bits, two's complement.
+    I32,
+}
+
+impl Kind {
+    /// Bytes on the bus.
+    pub const fn width(self) -> u16 {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 => 4,
+        }
+    }
+
+    /// The number that `bytes` make, or none where there are not enough of them.
+    fn decode(self, bytes: &[u8]) -> Option<i64> {
+        Some(match self {
+            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+        })
+    }
+}
+
+/// A register as its documentation has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// The constant in [`address`], or the field of [`Params`].
+    pub name: &'static str,
+    /// Of its first byte.
+    pub address: u16,
+    /// How its bytes make a number.
+    pub kind: Kind,
+    /// How many numbers stand side by side: 1, but for the pictures of the array.
+    pub count: u16,
+    /// Who may write it.
+    pub access: Access,
+    /// Physical unit; empty where it is a plain number.
+    pub unit: &'static str,
+    /// What a step of the number means, in that unit: the resolution.
+    pub scale: u16,
+    /// The least value.
+    pub min: i64,
+    /// The largest value.
+    pub max: i64,
+    /// After a factory reset where it is stored, after a reset where it can be written.
+    pub default: Option<i64>,
+    /// What it means.
+    pub doc: &'static str,
+}
+
+impl Register {
+    /// Bytes on the bus.
+    pub const fn bytes(&self) -> u16 {
+        self.kind.width() * self.count
+    }
+}
+
+/// The part of a [`Register`] that the device needs.
+#[derive(Clone, Copy, Debug)]
+struct Cell {
+    address: u16,
+    count: u16,
+    kind: Kind,
+    access: Access,
+}
+
+impl Cell {
+    fn bytes(&self) -> u16 {
+        self.kind.width() * self.count
+    }
+
+    /// The cell that a byte belongs to.
+    fn at(address: u16) -> Result<Self, StatusError> {
+        if let Some(param) = param_place(address) {
+            let address = address::PARAMS + 4 * param as u16;
+            return Ok(Self { address, count: 1, kind: Kind::I32, access: Access::Stored });
+        }
+        let holds = |cell: &&Self| address.checked_sub(cell.address).is_some_and(|offset| offset < cell.bytes());
+        registers::CELLS.iter().find(holds).copied().ok_or(StatusError::Access)
+    }
+}
+
+/// What a read sees.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub state: &'a State,
+    pub snapshot: &'a Snapshot<'a>,
+}
+
+impl<'a> View<'a> {
+    fn settings(&self) -> &'a Settings {
+        &self.state.settings
+    }
+
+    fn contact(&self) -> &'a Contact {
+        &self.snapshot.status.contact
+    }
+
+    fn refused(&self, error: StatusError) -> u32 {
+        u32::from(self.state.counters.refused(error))
+    }
+
+    fn counters(&self) -> &'a Counters {
+        &self.state.counters
+    }
+}
+
+/// What a write works on: a copy, which replaces the original once the whole write is found good.
+pub(super) struct Staged {
+    pub settings: Settings,
+    pub actions: Actions,
+    /// The loop is stopped by a fault.
+    pub faulted: bool,
+}
+
+/// Refuses a read that is too long, or that touches a byte without a register.
+pub(super) fn check_read(address: u16, length: u16) -> Result<(), StatusError> {
+    if !(1..=READ_MAX).contains(&length) {
+        return Err(StatusError::Length);
+    }
+    let end = address.checked_add(length).ok_or(StatusError::Access)?;
+    let mut at = address;
+    while at < end {
+        let cell = Cell::at(at)?;
+        at = cell.address + cell.bytes();
+    }
+    Ok(())
+}
+
+/// Sends the bytes of a read that [`check_read`] let through.
+pub(super) fn read(view: View<'_>, address: u16, length: u16, mut put: impl FnMut(u8)) {
+    let end = address.saturating_add(length);
+    let mut at = address;
+    while at < end {
+        let Ok(cell) = Cell::at(at) else { return };
+        let stop = end.min(cell.address + cell.bytes());
+        let width = cell.kind.width();
+        while at < stop {
+            let offset = at - cell.address;
+            let (element, skip) = match width {
+                1 => (offset, 0),
+                2 => (offset / 2, offset % 2),
+                _ => (offset / 4, offset % 4),
+            };
+            let value = match param_place(cell.address) {
+                Some(place) => view.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32),
+                None => registers::get(view, cell.address, usize::from(element)),
+            };
+            let bytes = value.to_le_bytes();
+            let take = usize::from(skip)..usize::from(width.min(skip + (stop - at)));
+            for &byte in bytes.get(take).unwrap_or_default() {
+                put(byte);
+                at += 1;
+            }
+        }
+    }
+}
+
+/// Writes whole registers side by side into the staged copy.
+///
+/// # Errors
+/// What is wrong with the first register that is refused; the copy is then of no use.
+pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<(), StatusError> {
+    if data.is_empty() {
+        return Err(StatusError::Length);
+    }
+    let torque = staged.settings.command.torque;
+    let params = staged.settings.record.params;
+    let mut at = address;
+    let mut rest = data;
+    while !rest.is_empty() {
+        let cell = Cell::at(at)?;
+        match cell.access {
+            Access::ReadOnly => return Err(StatusError::Access),
+            Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
+            _ => {}
+        }
+        if at != cell.address {
+            return Err(StatusError::Length);
+        }
+        let value = cell.kind.decode(rest).ok_or(StatusError::Length)?;
+        match param_place(at) {
+            Some(place) => write_param(&mut staged.settings.record.params, place, value),
+            None => registers::set(staged, at, value)?,
+        }
+        rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
+        at = at.saturating_add(cell.bytes());
+    }
+    staged.settings.check(staged.settings.record.params != params)
+}
+
+/// Which parameter a byte belongs to.
+fn param_place(at: u16) -> Option<usize> {
+    let place = usize::from(at.checked_sub(address::PARAMS)?) / 4;
+    (place < Params::COUNT).then_some(place)
+}
+
+fn write_param(params: &mut Params, place: usize, value: i64) {
+    let mut values = params.to_array();
+    if let Some(slot) = values.get_mut(place) {
+        *slot = value as i32;
+    }
+    *params = Params::from_array(&values);
+}
+
+/// A fixed-point number in thousandths, rounded.
+pub(super) const fn thousandths(value: i32, fraction_bits: u32) -> i32 {
+    let scaled = value as i64 * 1000;
+    ((scaled + (1 << (fraction_bits - 1))) >> fraction_bits) as i32
+}

@@ -1,0 +1,361 @@
+//! The definition itself: one entry for each register, in the order of the addresses.
+//!
+//! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the documentation
+//! above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each.
+//!
+//! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
+
+use crate::config::newtons;
+use crate::frame::{COLUMNS, ROWS, SLOTS, TAXELS};
+use crate::link::packet::StatusError;
+use crate::link::settings::{Settings, goal_mn};
+use crate::link::snapshot::hardware_error;
+use crate::params::Params;
+use crate::store::Record;
+use crate::units::Duty;
+
+use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
+
+/// Model number: the letters FT.
+const MODEL: u16 = u16::from_le_bytes(*b"FT");
+/// Counts changes of the control table that a host must know of.
+const TABLE_VERSION: u32 = 1;
+/// The bus watchdog's unit.
+const WATCHDOG_MS: u16 = 20;
+/// Ten times the major and once the minor number of the version.
+const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
+
+macro_rules! count {
+    () => {
+        1
+    };
+    ($count:expr) => {
+        $count as u16
+    };
+}
+
+macro_rules! optional {
+    () => {
+        None
+    };
+    ($value:expr) => {
+        Some($value as i64)
+    };
+}
+
+macro_rules! control_table {
+    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
+       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?, $get:expr $(, $set:expr)?;)*) => {
+        /// Where each register begins.
+        pub mod address {
+            $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
+            /// The parameters, in the order of [`crate::params::Params`], 4 bytes each.
+            pub const PARAMS: u16 = 512;
+        }
+
+        const FIXED: &[Register] = &[$(Register {
+            name: stringify!($name),
+            address: $address,
+            kind: Kind::$kind,
+            count: count!($($count)?),
+            access: Access::$access,
+            unit: $unit,
+            scale: $scale,
+            min: $min,
+            max: $max,
+            default: optional!($($default)?),
+            doc: concat!($($doc),+),
+        }),*];
+
+        pub(super) static CELLS: [Cell; FIXED.len()] = [
+            $(Cell { address: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
+        ];
+
+        /// The value of an element, as its low bytes; 0 where there is no such register.
+        pub(super) fn get(view: View<'_>, address: u16, element: usize) -> u32 {
+            match address {
+                $($address => {
+                    let get: fn(View<'_>, usize) -> u32 = $get;
+                    get(view, element)
+                })*
+                _ => 0,
+            }
+        }
+
+        /// Sets a register that can be written.
+        pub(super) fn set(staged: &mut Staged, address: u16, value: i64) -> Result<(), StatusError> {
+            match address {
+                $($($address => {
+                    if !($min..=$max).contains(&value) {
+                        return Err(StatusError::Range);
+                    }
+                    let set: fn(&mut Staged, i64) -> Result<(), StatusError> = $set;
+                    set(staged, value)
+                })?)*
+                _ => Err(StatusError::Access),
+            }
+        }
+    };
+}
+
+control_table! {
+    /// Model number: the letters FT.
+    0 MODEL_NUMBER: U16 ReadOnly, "" * 1, 21_574 to 21_574,
+        |_, _| u32::from(MODEL);
+    /// Rows (bits 0 to 7) and columns (8 to 15) of the array, version of this table (16 to 31).
+    2 MODEL_INFORMATION: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |_, _| ROWS as u32 | (COLUMNS as u32) << 8 | TABLE_VERSION << 16;
+    /// Version of the firmware: 10 times the major and once the minor number.
+    6 FIRMWARE_VERSION: U8 ReadOnly, "" * 1, 0 to 255,
+        |_, _| u32::from(FIRMWARE_VERSION);
+    /// Address on the bus.
+    7 ID: U8 Stored, "" * 1, 0 to 252 = Record::DEFAULT.id,
+        |view, _| u32::from(view.settings().record.id),
+        |staged, value| { staged.settings.record.id = value as u8; Ok(()) };
+    /// Bus speed: 9600, 57600, 115200 baud, 1, 2, 3 Mbaud. Changes after the reply.
+    8 BAUD_RATE: U8 Stored, "" * 1, 0 to 5 = Record::DEFAULT.baud_code,
+        |view, _| u32::from(view.settings().record.baud_code),
+        |staged, value| { staged.settings.record.baud_code = value as u8; Ok(()) };
+    /// Pause before a reply.
+    9 RETURN_DELAY_TIME: U8 Stored, "us" * 2, 0 to 254 = Record::DEFAULT.return_delay_2us,
+        |view, _| u32::from(view.settings().record.return_delay_2us),
+        |staged, value| { staged.settings.record.return_delay_2us = value as u8; Ok(()) };
+    /// 1 lets the bridge be driven. Goes to 0 on a fault.
+    64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
+        |view, _| u32::from(view.settings().command.torque),
+        set_torque;
+    /// What is answered: 0 only Ping, 1 also reads, 2 everything.
+    68 STATUS_RETURN_LEVEL: U8 ReadWrite, "" * 1, 0 to 2 = 2,
+        |view, _| u32::from(view.settings().status_return_level),
+        |staged, value| { staged.settings.status_return_level = value as u8; Ok(()) };
+    /// 1 while a Reg Write waits for its Action.
+    69 REGISTERED_INSTRUCTION: U8 ReadOnly, "" * 1, 0 to 1,
+        |view, _| u32::from(view.state.registered());
+    /// Why the motor was stopped, by bit: 0 supply, 3 encoder, 4 bridge, 5 over-force, 6 array, 7 controller or bus; the number is in fault.
+    70 HARDWARE_ERROR_STATUS: U8 ReadOnly, "" * 1, 0 to 255,
+        |view, _| u32::from(hardware_error(view.snapshot.status.fault));
+    /// The motor is stopped when the bus is silent for longer; 0 is off. Reads -1 once it tripped, until 0 is written; until then goal force and torque enable are refused.
+    98 BUS_WATCHDOG: I8 ReadWrite, "ms" * 20, 0 to 127 = 0,
+        |view, _| watchdog(view.settings()) as u32,
+        set_watchdog;
+    /// Milliseconds since reset; wraps after 32767.
+    120 REALTIME_TICK: U16 ReadOnly, "ms" * 1, 0 to 0x7FFF,
+        |view, _| view.snapshot.tick_ms & 0x7FFF;
+    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error. Goes to 0 on a fault.
+    256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
+        |view, _| goal_mn(view.settings().command.goal) as u32,
+        set_goal;
+    /// 1 measures the zero of every taxel; nothing may touch the tip. Reads 0.
+    260 TARE: U8 TorqueOff, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        |staged, value| { bump(&mut staged.settings.command.tare_request, value); Ok(()) };
+    /// 1 clears the fault. Reads 0.
+    261 CLEAR_FAULT: U8 ReadWrite, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        |staged, value| { bump(&mut staged.settings.command.clear_request, value); Ok(()) };
+    /// 1 writes the stored registers to flash. Reads 0.
+    262 SAVE_PARAMETERS: U8 TorqueOff, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        |staged, value| { staged.actions.save |= value != 0; Ok(()) };
+    /// How the stored registers stand to the flash: 0 the same, 1 changed since, 2 the last save failed.
+    263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
+        |view, _| view.settings().saved as u32;
+    /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault.
+    264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 5,
+        |view, _| view.snapshot.status.mode as u32;
+    /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5 encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12 missed deadline, 13 crash.
+    265 FAULT: U8 ReadOnly, "" * 1, 0 to 13,
+        |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
+    /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7 frame missed, 8 slew.
+    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FF,
+        |view, _| u32::from(view.snapshot.status.limits.0);
+    /// Total normal force.
+    268 PRESENT_FORCE_MN: I32 ReadOnly, "mN" * 1, -32_768_000 to 32_768_000,
+        |view, _| thousandths(view.contact().force.to_bits(), 16) as u32;
+    /// Indentation of the tip, from the force by the model.
+    272 INDENTATION_UM: I32 ReadOnly, "um" * 1, 0 to 16_000,
+        |view, _| thousandths(view.contact().indentation.to_bits(), 24) as u32;
+    /// Centre of pressure along the columns, from the array's middle.
+    276 CENTRE_X_UM: I32 ReadOnly, "um" * 1, -20_000 to 20_000,
+        |view, _| thousandths(view.contact().centre_x.to_bits(), 24) as u32;
+    /// Centre of pressure along the rows, from the array's middle.
+    280 CENTRE_Y_UM: I32 ReadOnly, "um" * 1, -20_000 to 20_000,
+        |view, _| thousandths(view.contact().centre_y.to_bits(), 24) as u32;
+    /// Contact radius, by the model.
+    284 CONTACT_RADIUS_UM: I32 ReadOnly, "um" * 1, 0 to 16_000,
+        |view, _| thousandths(view.contact().radius.to_bits(), 24) as u32;
+    /// Highest taxel pressure.
+    288 PEAK_PRESSURE_PA: U32 ReadOnly, "Pa" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.contact().peak_pa;
+    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
+    292 CONFIDENCE: U8 ReadOnly, "1/255" * 1, 0 to 255,
+        |view, _| u32::from(view.contact().confidence);
+    /// Taxels left out because they are dead or saturated.
+    293 BAD_TAXELS: U8 ReadOnly, "" * 1, 0 to 100,
+        |view, _| u32::from(view.contact().bad_taxels);
+    /// Share of the supply at the motor; positive presses the tip into the object.
+    294 DUTY_PERMILLE: I16 ReadOnly, "permille" * 1, -1000 to 1000,
+        |view, _| permille(view.snapshot.status.duty) as u32;
+    /// Tip travel since torque was enabled.
+    296 TRAVEL_UM: I32 ReadOnly, "um" * 1, -128_000 to 128_000,
+        |view, _| thousandths(view.snapshot.status.travel.to_bits(), 24) as u32;
+    /// Tip speed.
+    300 SPEED_UM_PER_S: I32 ReadOnly, "um/s" * 1, -32_768_000 to 32_768_000,
+        |view, _| thousandths(view.snapshot.status.speed.to_bits(), 16) as u32;
+    /// The frame that this state was made from; counts missed frames too, wraps.
+    304 FRAME_COUNTER: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.status.sequence;
+    /// Frames missed since reset; wraps.
+    308 MISSED_FRAMES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.status.missed_frames;
+    /// The bridge's supply.
+    312 SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.supply_mv);
+    /// From a frame's last conversion to the new duty, last time.
+    314 LOOP_TIME_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.loop_time_us);
+    /// The longest loop time since reset.
+    316 LOOP_TIME_MAX_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.loop_time_max_us);
+    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6 other.
+    318 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
+        |view, _| view.snapshot.reset_cause as u32;
+    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang.
+    319 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 3,
+        |view, _| view.snapshot.crash.cause as u32;
+    /// Crashes since power-on.
+    320 CRASH_COUNT: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.crash.count;
+    /// Program counter at the last crash; 0 where it is not known.
+    324 CRASH_PC: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.crash.pc;
+    /// Line of the source where it panicked; 0 where it is not known.
+    328 CRASH_LINE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.crash.line);
+    /// Refused with the result error.
+    330 RESULT_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Result);
+    /// Refused with the instruction error.
+    332 INSTRUCTION_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Instruction);
+    /// Packets with a bad CRC, also those for other devices.
+    334 CRC_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Crc);
+    /// Refused with the range error.
+    336 RANGE_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Range);
+    /// Refused with the length error.
+    338 LENGTH_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Length);
+    /// Refused with the limit error.
+    340 LIMIT_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Limit);
+    /// Refused with the access error.
+    342 ACCESS_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| view.refused(StatusError::Access);
+    /// Runs of bytes that were no packet, or only the beginning of one. Like all error counters it holds at its top and starts at 0 after a reset.
+    344 FRAMING_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.counters().framing);
+    /// Good instruction packets for this device, broadcasts included; wraps.
+    346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.counters().good_packets;
+    /// Pressure on each taxel, row by row.
+    768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
+        |view, place| element(view.snapshot.pressures_10pa, place);
+    /// Converter codes of the last frame, row by row; the last ten are the columns with no row driven.
+    1024 RAW_CODES: U16[SLOTS * COLUMNS] ReadOnly, "" * 1, 0 to 4095,
+        |view, place| u32::from(view.snapshot.frame.code(place / COLUMNS, place % COLUMNS));
+    /// Zero of each taxel in converter codes, row by row.
+    1280 TARE_CODES: U16[TAXELS] ReadOnly, "" * 1, 0 to 4095,
+        |view, place| element(view.snapshot.tare_codes, place);
+}
+
+/// Every register, in the order of the addresses.
+pub const REGISTERS: &[Register] = &all();
+
+const fn all() -> [Register; FIXED.len() + Params::COUNT] {
+    let mut all = [FIXED[0]; FIXED.len() + Params::COUNT];
+    let (mut to, mut fixed, mut place) = (0, 0, 0);
+    while to < all.len() {
+        let params_next = fixed == FIXED.len() || FIXED[fixed].address > address::PARAMS;
+        if params_next && place < Params::COUNT {
+            let (name, default, min, max) = Params::RANGES[place];
+            all[to] = Register {
+                name,
+                address: address::PARAMS + 4 * place as u16,
+                kind: Kind::I32,
+                count: 1,
+                access: Access::Stored,
+                unit: "",
+                scale: 1,
+                min: min as i64,
+                max: max as i64,
+                default: Some(default as i64),
+                doc: Params::DOCS[place],
+            };
+            place += 1;
+        } else {
+            all[to] = FIXED[fixed];
+            fixed += 1;
+        }
+        to += 1;
+    }
+    all
+}
+
+fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    let on = value != 0;
+    if on && staged.settings.watchdog_tripped {
+        return Err(StatusError::Access);
+    }
+    if on && staged.faulted {
+        return Err(StatusError::Result);
+    }
+    staged.settings.command.torque = on;
+    Ok(())
+}
+
+fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if staged.settings.watchdog_tripped {
+        return Err(StatusError::Access);
+    }
+    staged.settings.command.goal = newtons(value as i32);
+    Ok(())
+}
+
+fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if staged.settings.watchdog_tripped && value != 0 {
+        return Err(StatusError::Access);
+    }
+    staged.settings.watchdog_tripped = false;
+    staged.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
+    Ok(())
+}
+
+fn watchdog(settings: &Settings) -> i32 {
+    if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
+}
+
+/// Makes a request: a change of the number.
+fn bump(request: &mut u8, value: i64) {
+    *request = request.wrapping_add(u8::from(value != 0));
+}
+
+fn element(values: &[u16], place: usize) -> u32 {
+    values.get(place).map_or(0, |&value| u32::from(value))
+}
+
+/// Thousandths of the whole supply, rounded.
+fn permille(duty: Duty) -> i32 {
+    let full = i32::from(Duty::FULL);
+    let duty = i32::from(duty.0);
+    (duty * 1000 + duty.signum() * (full / 2)) / full
+}
+
+/// A number of at most two digits.
+const fn number(digits: &str) -> u8 {
+    match u8::from_str_radix(digits, 10) {
+        Ok(number) => number,
+        Err(_) => 0,
+    }
+}

@@ -1,0 +1,159 @@
+//! Parameters in flash: a record, and a sector to which records are appended.
+//!
+//! | bytes | content |
+//! | --- | --- |
+//! | 0 to 3 | magic "FTIP" |
+//! | 4, 5 | layout version |
+//! | 6, 7 | number of parameters |
+//! | 8, 9, 10, 11 | ID, baud code, return delay, 0 |
+//! | 12 to 12 + 4 n | parameters in the order of [`Params`], 32 bits each |
+//! | then 4 | CRC-32 (ISO-HDLC) of all before |
+//!
+//! All little-endian; FF up to the next multiple of 16. The newest record is the last that is not blank. A write cut short
+//! fails the CRC: it is reported, not skipped, because the values that the user saved are not the ones before it.
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+
+use crate::link::packet::ID_MAX;
+use crate::link::settings::BAUD_RATES;
+use crate::params::{ParamError, Params};
+
+const MAGIC: [u8; 4] = *b"FTIP";
+const LAYOUT: u16 = 1;
+const HEADER_BYTES: usize = 12;
+const CRC_PLACE: usize = HEADER_BYTES + 4 * Params::COUNT;
+/// What flash reads after an erase.
+const BLANK: u8 = 0xFF;
+static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// From record to record in the sector.
+pub const SLOT_BYTES: usize = (CRC_PLACE + 4).next_multiple_of(16);
+
+/// What outlives a reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// Address on the bus, 0 to 252.
+    pub id: u8,
+    /// Bus speed by the protocol's code: [`BAUD_RATES`].
+    pub baud_code: u8,
+    /// Pause before a reply, in units of 2 us.
+    pub return_delay_2us: u8,
+    /// The parameters.
+    pub params: Params,
+}
+
+impl Record {
+    /// What a blank flash stands for: ID 1, 1 Mbaud, 500 us.
+    pub const DEFAULT: Self = Self { id: 1, baud_code: 3, return_delay_2us: 250, params: Params::DEFAULT };
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// Why the newest record was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StoreError {
+    /// Where in the sector it begins.
+    pub offset: usize,
+    /// What is wrong with it.
+    pub damage: Damage,
+}
+
+/// What is wrong with a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Damage {
+    /// It does not begin like a record, or its CRC is wrong: the write was cut short, or the flash lost bits.
+    Torn,
+    /// It was written by a firmware with another layout.
+    Layout {
+        /// The layout's version.
+        version: u16,
+        /// The number of parameters.
+        count: u16,
+    },
+    /// The ID, the baud code or the return delay is out of its range.
+    Bus,
+    /// A parameter is out of its range.
+    Param(ParamError),
+}
+
+/// A record as it is written to flash.
+pub fn encode(record: &Record) -> [u8; SLOT_BYTES] {
+    let mut slot = [BLANK; SLOT_BYTES];
+    let head = [record.id, record.baud_code, record.return_delay_2us, 0];
+    let bytes = (MAGIC.into_iter())
+        .chain(LAYOUT.to_le_bytes())
+        .chain((Params::COUNT as u16).to_le_bytes())
+        .chain(head)
+        .chain(record.params.to_array().into_iter().flat_map(i32::to_le_bytes));
+    for (place, byte) in slot.iter_mut().zip(bytes) {
+        *place = byte;
+    }
+    if let Some((body, rest)) = slot.split_at_mut_checked(CRC_PLACE) {
+        for (place, byte) in rest.iter_mut().zip(CRC.checksum(body).to_le_bytes()) {
+            *place = byte;
+        }
+    }
+    slot
+}
+
+/// The newest record of a sector, or none where it is blank.
+///
+/// # Errors
+/// The newest record is damaged. [`newest_whole`] has the one before it.
+pub fn latest(sector: &[u8]) -> Result<Option<Record>, StoreError> {
+    let Some((place, slot)) = used(sector).next() else { return Ok(None) };
+    decode(slot).map(Some).map_err(|damage| StoreError { offset: place * SLOT_BYTES, damage })
+}
+
+/// The newest record that is whole, skipping damaged ones: good for the ID and the bus speed under which the fault is read.
+pub fn newest_whole(sector: &[u8]) -> Option<Record> {
+    used(sector).find_map(|(_, slot)| decode(slot).ok())
+}
+
+/// Where the next record goes; none where the sector is full and must be erased first.
+pub fn next_offset(sector: &[u8]) -> Option<usize> {
+    let next = used(sector).next().map_or(0, |(place, _)| (place + 1) * SLOT_BYTES);
+    (next + SLOT_BYTES <= sector.len()).then_some(next)
+}
+
+/// The slots from the newest record back to the oldest, with their places.
+fn used(sector: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    sector.chunks_exact(SLOT_BYTES).enumerate().rev().skip_while(|(_, slot)| is_blank(slot))
+}
+
+fn is_blank(slot: &[u8]) -> bool {
+    slot.iter().all(|&byte| byte == BLANK)
+}
+
+fn decode(slot: &[u8]) -> Result<Record, Damage> {
+    let (body, tail) = slot.split_at_checked(CRC_PLACE).ok_or(Damage::Torn)?;
+    let (magic, rest) = body.split_first_chunk::<4>().ok_or(Damage::Torn)?;
+    let (layout, rest) = rest.split_first_chunk::<2>().ok_or(Damage::Torn)?;
+    let (count, rest) = rest.split_first_chunk::<2>().ok_or(Damage::Torn)?;
+    let (head, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Torn)?;
+    if *magic != MAGIC {
+        return Err(Damage::Torn);
+    }
+    let (version, count) = (u16::from_le_bytes(*layout), u16::from_le_bytes(*count));
+    if (version, count) != (LAYOUT, Params::COUNT as u16) {
+        return Err(Damage::Layout { version, count });
+    }
+    if tail.first_chunk() != Some(&CRC.checksum(body).to_le_bytes()) {
+        return Err(Damage::Torn);
+    }
+    let [id, baud_code, return_delay_2us, _] = *head;
+    if id > ID_MAX || usize::from(baud_code) >= BAUD_RATES.len() || return_delay_2us == u8::MAX {
+        return Err(Damage::Bus);
+    }
+    let mut values = [0; Params::COUNT];
+    for (value, bytes) in values.iter_mut().zip(rest.as_chunks::<4>().0) {
+        *value = i32::from_le_bytes(*bytes);
+    }
+    let params = Params::from_array(&values);
+    params.check().map_err(Damage::Param)?;
+    Ok(Record { id, baud_code, return_delay_2us, params })
+}

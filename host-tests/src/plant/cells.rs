@@ -45,11 +45,11 @@ impl Cell {
     /// Mean pressure on it.
     pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
         let rim2 = tip.contact_radius2_mm2();
-        let near2 = nearest(self.x_mm).powi2() + nearest(self.y_mm).powi2();
+        let near2 = square(nearest(self.x_mm)) + square(nearest(self.y_mm));
         if near2 >= rim2 {
             return 0.0;
         }
-        let far2 = farthest(self.x_mm).powi2() + farthest(self.y_mm).powi2();
+        let far2 = square(farthest(self.x_mm)) + square(farthest(self.y_mm));
         let integral = if far2 <= rim2 {
             gauss(&GAUSS3, self.y_mm, |y| gauss(&GAUSS3, self.x_mm, |x| tip.pressure_kpa(x * x + y * y)))
         } else {
@@ -93,14 +93,8 @@ fn farthest(over: [f64; 2]) -> f64 {
     over[1].max(-over[0])
 }
 
-trait Square {
-    fn powi2(self) -> f64;
-}
-
-impl Square for f64 {
-    fn powi2(self) -> f64 {
-        self * self
-    }
+fn square(x: f64) -> f64 {
+    x * x
 }
 
 /// The rows worked out for one indentation; they are forgotten when it or the setup changes.

@@ -1,4 +1,5 @@
-//! The soft fingertip on a rigid plane: Park, Kim and Hirai, "Development of hemisphere-shaped soft fingertip", ICRA 2003.
+//! The soft fingertip on a rigid plane: Park, Kim and Hirai, "Development of a Soft-fingertip and Its Modeling Based on
+//! Force Distribution", ICRA 2003.
 
 use super::setup::Tip;
 use core::f64::consts::PI;

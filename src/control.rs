@@ -83,7 +83,7 @@ impl SpeedLoop {
         let disturbance = i64::from(self.observer.disturbance.to_bits());
         let helping = if way >= Millimetres::ZERO { -disturbance } else { disturbance };
         let motor = config.current_limit.min(config.voltage_limit);
-        let whole = (motor + helping).clamp(motor / 4, 2 * motor);
+        let whole = (motor + helping).max(motor / 4).min(2 * motor);
         MillimetresPerSecond2::from_bits(((whole * BRAKE_SHARE_Q8) >> 8).min(BRAKE_MAX) as i32)
     }
 

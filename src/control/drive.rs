@@ -28,12 +28,12 @@ impl Drive {
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     pub fn apply(&mut self, wanted: i64, back_emf: i64, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        let slewed = wanted.clamp(self.voltage - config.slew_limit, self.voltage + config.slew_limit);
-        let within_current = slewed.clamp(back_emf - config.current_limit, back_emf + config.current_limit);
+        let slewed = near(wanted, self.voltage, config.slew_limit);
+        let within_current = near(slewed, back_emf, config.current_limit);
         // g V per mV (Q16) times mV, to Q8.
         let supply_limit = (i64::from(supply_mv) * config.acceleration_per_mv_q16) >> 8;
         let voltage_limit = config.voltage_limit.min(supply_limit);
-        let applied = within_current.clamp(-voltage_limit, voltage_limit);
+        let applied = near(within_current, 0, voltage_limit);
         if slewed != wanted {
             limits.set(Limits::SLEW);
         }
@@ -47,6 +47,12 @@ impl Drive {
         self.net = applied - back_emf;
         duty(applied, supply_mv, config)
     }
+}
+
+/// The value nearest to `value` that is no further than `reach` from `middle`. (`clamp` would have to prove that the
+/// bounds are in order.)
+fn near(value: i64, middle: i64, reach: i64) -> i64 {
+    value.max(middle - reach).min(middle + reach)
 }
 
 /// V / V_supply by one 32-bit division; g V in Q8, V = g V / g.

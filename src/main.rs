@@ -1,14 +1,152 @@
-//! The flash image.
+//! The flash image: sets the board up, then leaves it to the tasks; see `docs/firmware.md`.
 #![no_std]
 #![no_main]
+
+mod board;
+
+use board::bridge::Bridge;
+use board::control::{self, Control};
+use board::crash::Boot;
+use board::encoder::Encoder;
+use board::flash::Store;
+use board::scan::Scan;
+use board::supply::Supply;
+use board::{bus, clocks, crash, guard, host, watch};
+use defmt::{Debug2Format, error, info, unwrap, warn};
 use defmt_rtt as _;
-use embassy_stm32 as _;
-#[panic_handler]
-fn p(_: &core::panic::PanicInfo) -> ! {
-    loop {}
+use embassy_executor::{InterruptExecutor, Spawner};
+use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::interrupt;
+use embassy_stm32::wdg::IndependentWatchdog;
+use fingertip::config::Config;
+use fingertip::link::Settings;
+use fingertip::params::Params;
+use fingertip::pipeline::Pipeline;
+use fingertip::safety::Fault;
+use fingertip::store::Record;
+
+/// Runs control above everything but the scan and the guard.
+static CONTROL: InterruptExecutor = InterruptExecutor::new();
+
+#[embassy_stm32::interrupt]
+fn SPI3() {
+    // SAFETY: this is the executor's vector, and it is unmasked only by `start`.
+    unsafe { CONTROL.on_interrupt() }
 }
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    defmt::info!("x");
-    loop {}
+
+#[embassy_executor::main]
+async fn main(spawner: Spawner) {
+    let boot = crash::boot();
+    let p = embassy_stm32::init(clocks::config());
+    let bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
+    clocks::accelerate_flash();
+    clocks::freeze_when_halted();
+    board::set_priorities();
+    log_boot(boot);
+
+    let mut store = Store::new(p.FLASH);
+    let Stored { record, config, broken } = load(&mut store);
+
+    let mut pipeline = Pipeline::new(&config);
+    if broken {
+        pipeline.stop(Fault::BrokenParameters);
+    }
+    if boot.crashed {
+        pipeline.stop(Fault::Crash);
+    }
+
+    guard::start(p.TIM5);
+    let rows = [
+        p.PB0.into(),
+        p.PB1.into(),
+        p.PB2.into(),
+        p.PB3.into(),
+        p.PB4.into(),
+        p.PB5.into(),
+        p.PB6.into(),
+        p.PB7.into(),
+        p.PB8.into(),
+        p.PB9.into(),
+    ];
+    let columns = [
+        p.PA1.into(),
+        p.PA4.into(),
+        p.PA6.into(),
+        p.PA7.into(),
+        p.PC5.into(),
+        p.PC0.into(),
+        p.PC1.into(),
+        p.PC2.into(),
+        p.PC3.into(),
+        p.PC4.into(),
+    ];
+    let control = Control {
+        scan: Scan::new(p.TIM8, p.ADC1, p.ADC2, p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2, rows, columns),
+        bridge,
+        encoder: Encoder::new(p.TIM3, p.PC6, p.PC7),
+        supply: Supply::new(p.ADC3, p.PA0),
+        watchdog: IndependentWatchdog::new(p.IWDG, control::WATCHDOG_US),
+        pipeline,
+    };
+    let bus_parts = bus::Parts {
+        usart: p.USART2,
+        tx: p.PA2,
+        rx: p.PA3,
+        transmit_enable: p.PC8,
+        tx_dma: p.DMA1_CH6,
+        rx_dma: p.DMA1_CH5,
+    };
+    let bus = unwrap!(bus::Bus::new(bus_parts, Settings::new(record).baud()));
+    let led = Output::new(p.PA5, Level::Low, Speed::Low);
+
+    spawner.spawn(host::run(bus, store, record, config, boot).unwrap());
+    spawner.spawn(watch::run(led).unwrap());
+    CONTROL.start(interrupt::SPI3).spawn(control::run(control).unwrap());
+}
+
+/// What the flash holds, and whether it is damaged.
+struct Stored {
+    record: Record,
+    config: Config,
+    broken: bool,
+}
+
+/// Damaged parameters are replaced by the defaults; the ID and the bus speed of an older record stay, so that the fault can
+/// be read on the bus.
+fn load(store: &mut Store) -> Stored {
+    let record = match store.latest() {
+        Ok(record) => record.unwrap_or_default(),
+        Err(cause) => {
+            error!("stored parameters: {}", Debug2Format(&cause));
+            return Stored::broken(store.newest_whole().unwrap_or_default());
+        }
+    };
+    match store.make_room(&record) {
+        Ok(false) => {}
+        Ok(true) => info!("parameter sector was full: erased, newest record kept"),
+        Err(cause) => error!("parameter sector: {}", cause),
+    }
+    match Config::new(&record.params) {
+        Ok(config) => Stored { record, config, broken: false },
+        Err(cause) => {
+            error!("stored parameters: {}", Debug2Format(&cause));
+            Stored::broken(record)
+        }
+    }
+}
+
+impl Stored {
+    fn broken(record: Record) -> Self {
+        let record = Record { params: Params::DEFAULT, ..record };
+        // The defaults make a configuration: a test of the core holds that.
+        let config = unwrap!(Config::new(&record.params).ok());
+        Self { record, config, broken: true }
+    }
+}
+
+fn log_boot(boot: Boot) {
+    info!("fingertip {}, reset by {}", env!("CARGO_PKG_VERSION"), Debug2Format(&boot.reset));
+    if boot.crashed {
+        warn!("the last run crashed: {}", Debug2Format(&boot.crash));
+    }
 }

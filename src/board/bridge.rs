@@ -1,0 +1,158 @@
+//! The H-bridge: TIM1 makes its two inputs, PC9 wakes it, PB12 breaks it.
+//!
+//! | state | nSLEEP | main output enable | IN1, IN2 |
+//! | --- | --- | --- | --- |
+//! | safe | low | off | low, low: coast |
+//! | ready | high | off | low, low: coast |
+//! | driving | high | on | slow decay: one input high, the other low for the share of the duty |
+
+use embassy_stm32::gpio::{Pull, Speed};
+use embassy_stm32::pac::timer::regs::SrAdv;
+use embassy_stm32::pac::timer::vals::{Bkp, Ocm, Ossi, Ossr};
+use embassy_stm32::peripherals::{PA8, PA9, PB12, PC9, TIM1};
+use embassy_stm32::{Peri, pac, rcc};
+use fingertip::safety::Mode;
+use fingertip::units::Duty;
+
+use super::{guard, pins};
+
+/// 168 MHz / 6720 = 25 kHz.
+const PERIOD_TICKS: u16 = 6_720;
+/// The driver wants 1 ms from nSLEEP to its first output; nFAULT means nothing before.
+const WAKE_TICKS: u32 = guard::HZ / 1_000;
+const TIM1_FUNCTION: u8 = 1;
+const NSLEEP: usize = 9;
+const NFAULT: usize = 12;
+
+/// Cuts the bridge: outputs low, driver asleep. Callable from anywhere, at any time, any number of times.
+pub fn make_safe() {
+    pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+    pac::GPIOC.bsrr().write(|w| w.set_br(NSLEEP, true));
+}
+
+/// Whether the hardware says that the bridge is cut.
+pub fn is_safe() -> bool {
+    !pac::TIM1.bdtr().read().moe() && pac::GPIOC.odr().read().odr(NSLEEP) == pac::gpio::vals::Odr::LOW
+}
+
+/// The bridge's inputs.
+pub struct Bridge {
+    /// When nSLEEP went high, while it is high.
+    woken: Option<u32>,
+    ready: bool,
+    driving: bool,
+}
+
+impl Bridge {
+    /// Outputs low, driver asleep, break armed.
+    pub fn new(
+        _timer: Peri<'static, TIM1>,
+        in1: Peri<'static, PA8>,
+        in2: Peri<'static, PA9>,
+        nfault: Peri<'static, PB12>,
+        nsleep: Peri<'static, PC9>,
+    ) -> Self {
+        pins::low_output(nsleep, Speed::Low);
+        rcc::enable_and_reset::<TIM1>();
+        let timer = pac::TIM1;
+        timer.arr().write(|w| w.set_arr(PERIOD_TICKS - 1));
+        timer.cr1().modify(|w| w.set_arpe(true));
+        timer.ccmr_output(0).modify(|w| {
+            for channel in 0..2 {
+                w.set_ocm(channel, Ocm::PWM_MODE1);
+                w.set_ocpe(channel, true);
+            }
+        });
+        timer.ccer().modify(|w| {
+            w.set_cce(0, true);
+            w.set_cce(1, true);
+        });
+        // Off means driven low (OSSI with idle levels of 0), and only software turns the outputs on (AOE stays 0).
+        timer.bdtr().write(|w| {
+            w.set_ossi(Ossi::IDLE_LEVEL);
+            w.set_ossr(Ossr::IDLE_LEVEL);
+            w.set_bkp(0, Bkp::ACTIVE_LOW);
+            w.set_bke(0, true);
+        });
+        timer.egr().write(|w| w.set_ug(true));
+        timer.cr1().modify(|w| w.set_cen(true));
+        pins::timer_input(nfault, TIM1_FUNCTION, Pull::Up);
+        pins::timer_output(in1, TIM1_FUNCTION);
+        pins::timer_output(in2, TIM1_FUNCTION);
+        Self { woken: None, ready: false, driving: false }
+    }
+
+    /// Follows the mode: asleep in fault, awake in off and tare, driven by `duty` in the others.
+    pub fn apply(&mut self, mode: Mode, duty: Duty) {
+        match mode {
+            Mode::Fault => self.sleep(),
+            Mode::Off | Mode::Tare => {
+                self.coast();
+                self.wake();
+            }
+            Mode::Approach | Mode::Force | Mode::Release => {
+                self.wake();
+                if self.ready {
+                    self.drive(duty);
+                }
+            }
+        }
+        // The guard may have cut the bridge between these lines; what it cut stays cut.
+        if guard::tripped() {
+            self.sleep();
+        }
+    }
+
+    /// Cuts the bridge and remembers it.
+    pub fn sleep(&mut self) {
+        make_safe();
+        *self = Self { woken: None, ready: false, driving: false };
+    }
+
+    /// Whether an awake driver reports a fault, or the hardware cut an output that should be on.
+    pub fn fault(&self) -> bool {
+        let reported = pac::GPIOB.idr().read().idr(NFAULT) == pac::gpio::vals::Idr::LOW;
+        (self.ready && reported) || (self.driving && !pac::TIM1.bdtr().read().moe())
+    }
+
+    fn wake(&mut self) {
+        let now = guard::now();
+        match self.woken {
+            None => {
+                pac::GPIOC.bsrr().write(|w| w.set_bs(NSLEEP, true));
+                self.woken = Some(now);
+            }
+            Some(woken) if !self.ready => self.ready = now.wrapping_sub(woken) >= WAKE_TICKS,
+            Some(_) => {}
+        }
+    }
+
+    fn coast(&mut self) {
+        if self.driving {
+            pac::TIM1.bdtr().modify(|w| w.set_moe(false));
+            self.driving = false;
+        }
+    }
+
+    fn drive(&mut self, duty: Duty) {
+        let low = ticks_low(duty);
+        let (in1, in2) = if duty < Duty::ZERO { (low, 0) } else { (0, low) };
+        pac::TIM1.ccr(0).write(|w| w.set_ccr(PERIOD_TICKS - in1));
+        pac::TIM1.ccr(1).write(|w| w.set_ccr(PERIOD_TICKS - in2));
+        if !self.driving {
+            // The compare values are preloaded: bring them in before the outputs come on. Forget an old break.
+            pac::TIM1.egr().write(|w| w.set_ug(true));
+            let mut cleared = SrAdv(u32::MAX);
+            cleared.set_bif(0, false);
+            pac::TIM1.sr().write_value(cleared);
+            pac::TIM1.bdtr().modify(|w| w.set_moe(true));
+            self.driving = true;
+        }
+    }
+}
+
+/// The share of the period for which one input is low, ticks, rounded.
+fn ticks_low(duty: Duty) -> u16 {
+    let share = u32::from(duty.0.unsigned_abs().min(Duty::FULL.unsigned_abs()));
+    ((share * u32::from(PERIOD_TICKS) + (1 << 14)) >> 15) as u16
+}

@@ -1,0 +1,40 @@
+//! The clock tree: 168 MHz from the ST-LINK's 8 MHz.
+
+use embassy_stm32::Config;
+use embassy_stm32::interrupt::Priority;
+use embassy_stm32::pac;
+use embassy_stm32::rcc::{
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
+};
+use embassy_stm32::time::Hertz;
+
+/// HSE 8 MHz / 4 x 168 / 2 = 168 MHz for the core; APB1 at 42 MHz, APB2 at 84 MHz.
+pub fn config() -> Config {
+    let mut config = Config::default();
+    config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
+    config.rcc.pll_src = PllSource::HSE;
+    config.rcc.pll =
+        Some(Pll { prediv: PllPreDiv::DIV4, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
+    config.rcc.sys = Sysclk::PLL1_P;
+    config.rcc.ahb_pre = AHBPrescaler::DIV1;
+    config.rcc.apb1_pre = APBPrescaler::DIV4;
+    config.rcc.apb2_pre = APBPrescaler::DIV2;
+    config.dma_interrupt_priority = Priority::P6;
+    config
+}
+
+/// Halting the core in a debugger stops the watchdog and the bridge's timer; the latter lets go of the outputs.
+pub fn freeze_when_halted() {
+    pac::DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
+    pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+}
+
+/// Turns on the flash accelerator: instruction cache, data cache and prefetch, which the reset and embassy leave off.
+/// Without it every fetch would wait for the flash, five cycles a line.
+pub fn accelerate_flash() {
+    pac::FLASH.acr().modify(|w| {
+        w.set_icen(true);
+        w.set_dcen(true);
+        w.set_prften(true);
+    });
+}

@@ -1,0 +1,222 @@
+//! The control task: one turn a frame, on an executor that only the guard and the scan interrupt.
+//!
+//! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
+
+use core::sync::atomic::Ordering;
+
+use embassy_stm32::peripherals::IWDG;
+use embassy_stm32::wdg::IndependentWatchdog;
+use fingertip::frame::{Frame, Sense};
+use fingertip::pipeline::{Command, Pipeline};
+use fingertip::safety::{Fault, Mode};
+use fingertip::units::Duty;
+
+use super::bridge::{self, Bridge};
+use super::encoder::Encoder;
+use super::exchange::{COMMAND, CONFIG, DETAIL, DETAIL_READY, DETAIL_WANTED, PACKETS, REPORT, Report};
+use super::guard;
+use super::scan::{Completed, Scan, WAKE};
+use super::supply::Supply;
+
+/// The watchdog's time by its nominal clock; 8 to 23 ms over the clock's tolerance.
+pub const WATCHDOG_US: u32 = 12_000;
+/// The first frame may come this many frame times after the start, before the guard trips.
+const FRAMES_TO_START: u32 = 4;
+const TICKS_PER_MS: u32 = guard::HZ / 1_000;
+
+/// Everything that control owns.
+pub struct Control {
+    /// The array's scan.
+    pub scan: Scan,
+    /// The motor's bridge.
+    pub bridge: Bridge,
+    /// The motor's encoder.
+    pub encoder: Encoder,
+    /// The bridge's supply.
+    pub supply: Supply,
+    /// Fed here and nowhere else.
+    pub watchdog: IndependentWatchdog<'static, IWDG>,
+    /// The core.
+    pub pipeline: Pipeline,
+}
+
+/// Runs for ever.
+#[embassy_executor::task]
+pub async fn run(control: Control) {
+    let mut state = State::new(control);
+    state.start();
+    loop {
+        WAKE.wait().await;
+        state.turn();
+    }
+}
+
+struct State {
+    parts: Control,
+    frame: Frame,
+    seen: u32,
+    discard_next: bool,
+    report: Report,
+    bus: BusClock,
+    clear_seen: u8,
+}
+
+impl State {
+    fn new(parts: Control) -> Self {
+        Self {
+            parts,
+            frame: Frame::EMPTY,
+            seen: 0,
+            discard_next: true,
+            report: Report::default(),
+            bus: BusClock::new(),
+            clear_seen: 0,
+        }
+    }
+
+    fn start(&mut self) {
+        self.parts.watchdog.unleash();
+        self.restart_scan();
+    }
+
+    fn turn(&mut self) {
+        if guard::take_trip() {
+            self.without_frames();
+        }
+        let newest = super::scan::newest();
+        if newest.sequence == self.seen {
+            return;
+        }
+        self.seen = newest.sequence;
+        if core::mem::take(&mut self.discard_next) {
+            return;
+        }
+        // A frame that is not whole counts as missed: the guard runs on.
+        if self.parts.scan.copy(newest, &mut self.frame) {
+            self.step(newest);
+        }
+    }
+
+    fn step(&mut self, completed: Completed) {
+        let parts = &mut self.parts;
+        let command = COMMAND.get();
+        let sense = Sense {
+            encoder: parts.encoder.read(),
+            supply_mv: parts.supply.read_mv(),
+            bus_silent_ms: self.bus.silent_ms(),
+            bridge_fault: parts.bridge.fault(),
+        };
+        let (duty, status) = parts.pipeline.step(&self.frame, &sense, &command);
+        parts.bridge.apply(status.mode, duty);
+
+        let frame_ticks = guard::frame_ticks(parts.pipeline.config().timing);
+        let loop_ticks = guard::now().wrapping_sub(completed.stamp);
+        self.report = Report {
+            status,
+            supply_mv: sense.supply_mv,
+            loop_ticks,
+            loop_ticks_max: self.report.loop_ticks_max.max(loop_ticks),
+        };
+        // A quarter of the frame's time is left for the tasks below this one.
+        if loop_ticks <= frame_ticks / 4 * 3 {
+            guard::restart(completed.stamp, frame_ticks);
+            parts.watchdog.pet();
+        } else {
+            self.stop(Fault::MissedDeadline);
+        }
+        self.clear_seen = command.clear_request;
+        self.publish();
+        self.configure();
+    }
+
+    /// The guard cut the bridge: latches the fault, and starts the scan anew once that is cleared.
+    ///
+    /// The watchdog guards against firmware that hangs. Here it does not: it has seen the fault, and it feeds the watchdog
+    /// only after reading back that the bridge is cut, so that the fault can be read on the bus.
+    fn without_frames(&mut self) {
+        self.stop(Fault::LostFrames);
+        self.parts.encoder.read();
+        let Command { torque, clear_request, .. } = COMMAND.get();
+        self.publish();
+        if clear_request != self.clear_seen && !torque {
+            self.clear_seen = clear_request;
+            self.restart_scan();
+        }
+        if bridge::is_safe() {
+            self.parts.watchdog.pet();
+        }
+    }
+
+    fn stop(&mut self, fault: Fault) {
+        self.parts.bridge.sleep();
+        self.report.status = self.parts.pipeline.stop(fault);
+    }
+
+    fn restart_scan(&mut self) {
+        let timing = self.parts.pipeline.config().timing;
+        self.discard_next = true;
+        self.parts.scan.start(timing);
+        self.seen = super::scan::newest().sequence;
+        guard::restart(guard::now(), FRAMES_TO_START * guard::frame_ticks(timing));
+    }
+
+    fn publish(&mut self) {
+        REPORT.set(self.report);
+        if DETAIL_WANTED.swap(false, Ordering::Relaxed) {
+            let (array, frame) = (self.parts.pipeline.array(), &self.frame);
+            DETAIL.fill(|detail| {
+                detail.frame = *frame;
+                detail.taxels = array.picture().taxels;
+                for (place, tare) in detail.tare.iter_mut().zip(array.tare()) {
+                    *place = tare;
+                }
+            });
+            DETAIL_READY.signal(());
+        }
+    }
+
+    /// Takes a new configuration; the bridge is off meanwhile, and the scan starts anew where its timing changed.
+    fn configure(&mut self) {
+        let pipeline = &mut self.parts.pipeline;
+        let timing = pipeline.config().timing;
+        let taken = CONFIG.take(|config| config.take().map(|config| pipeline.configure(&config)));
+        if taken.is_some() {
+            let now = pipeline.config().timing;
+            self.parts.bridge.apply(Mode::Off, Duty::ZERO);
+            if now != timing {
+                self.restart_scan();
+            }
+        }
+    }
+}
+
+/// How long the bus has been silent, measured where a hanging link cannot stop the clock.
+struct BusClock {
+    packets: u32,
+    last: u32,
+    part_ticks: u32,
+    silent_ms: u16,
+}
+
+impl BusClock {
+    const fn new() -> Self {
+        Self { packets: 0, last: 0, part_ticks: 0, silent_ms: 0 }
+    }
+
+    fn silent_ms(&mut self) -> u16 {
+        let now = guard::now();
+        self.part_ticks += now.wrapping_sub(self.last);
+        self.last = now;
+        let packets = PACKETS.load(Ordering::Relaxed);
+        if packets != self.packets {
+            self.packets = packets;
+            self.part_ticks = 0;
+            self.silent_ms = 0;
+        }
+        while self.part_ticks >= TICKS_PER_MS {
+            self.part_ticks -= TICKS_PER_MS;
+            self.silent_ms = self.silent_ms.saturating_add(1);
+        }
+        self.silent_ms
+    }
+}

@@ -1,0 +1,108 @@
+//! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the other.
+
+use core::cell::{Cell, UnsafeCell};
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+use embassy_sync::blocking_mutex::Mutex;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+use fingertip::config::Config;
+use fingertip::frame::{COLUMNS, Frame, ROWS, TAXELS};
+use fingertip::pipeline::{Command, Status};
+
+/// What control reports after every step, and after every trip of the guard.
+#[derive(Clone, Copy, Default)]
+pub struct Report {
+    /// The pipeline's own report.
+    pub status: Status,
+    /// The bridge's supply.
+    pub supply_mv: u16,
+    /// From the frame's end to the new duty, stopwatch ticks.
+    pub loop_ticks: u32,
+    /// The longest of those.
+    pub loop_ticks_max: u32,
+}
+
+/// What control copies out on request: too much for every frame.
+pub struct Detail {
+    /// The frame that the newest report was made from.
+    pub frame: Frame,
+    /// Sixteenths of a corrected code above tare.
+    pub taxels: [[i32; COLUMNS]; ROWS],
+    /// Sixteenths of a corrected code.
+    pub tare: [i32; TAXELS],
+}
+
+/// The newest report.
+pub static REPORT: Shared<Report> = Shared::new();
+/// What the host wants.
+pub static COMMAND: Shared<Command> = Shared::new();
+/// Valid packets heard; only its changes count.
+pub static PACKETS: AtomicU32 = AtomicU32::new(0);
+/// A new configuration for control.
+pub static CONFIG: Mailbox<Option<Config>> = Mailbox::new(None);
+/// Set by the link for control to fill [`DETAIL`].
+pub static DETAIL_WANTED: AtomicBool = AtomicBool::new(false);
+/// Raised when [`DETAIL`] is filled.
+pub static DETAIL_READY: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+/// The last detail asked for.
+pub static DETAIL: Mailbox<Detail> =
+    Mailbox::new(Detail { frame: Frame::EMPTY, taxels: [[0; COLUMNS]; ROWS], tare: [0; TAXELS] });
+
+/// A small value that is read and replaced as a whole.
+pub struct Shared<T>(Mutex<CriticalSectionRawMutex, Cell<Option<T>>>);
+
+impl<T: Copy + Default> Shared<T> {
+    const fn new() -> Self {
+        Self(Mutex::new(Cell::new(None)))
+    }
+
+    /// The newest value; the default before the first.
+    pub fn get(&self) -> T {
+        self.0.lock(Cell::get).unwrap_or_default()
+    }
+
+    /// Replaces the value.
+    pub fn set(&self, value: T) {
+        self.0.lock(|cell| cell.set(Some(value)));
+    }
+}
+
+/// Room for one large value that is filled and emptied in turns; whoever comes out of turn is told so and never waits.
+///
+/// Interrupts stay on while the value is copied.
+pub struct Mailbox<T> {
+    state: AtomicU8,
+    value: UnsafeCell<T>,
+}
+
+const EMPTY: u8 = 0;
+const FULL: u8 = 1;
+const BUSY: u8 = 2;
+
+// SAFETY: the value is reached only between winning the state (EMPTY or FULL to BUSY) and giving it up, so by one at a time.
+unsafe impl<T: Send> Sync for Mailbox<T> {}
+
+impl<T> Mailbox<T> {
+    const fn new(value: T) -> Self {
+        Self { state: AtomicU8::new(EMPTY), value: UnsafeCell::new(value) }
+    }
+
+    /// Fills the value where the box is empty; false where it is not.
+    pub fn fill(&self, write: impl FnOnce(&mut T)) -> bool {
+        self.turn(EMPTY, FULL, write).is_some()
+    }
+
+    /// Empties the box where it is full.
+    pub fn take<R>(&self, read: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.turn(FULL, EMPTY, read)
+    }
+
+    fn turn<R>(&self, from: u8, to: u8, act: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.state.compare_exchange(from, BUSY, Ordering::Acquire, Ordering::Relaxed).ok()?;
+        // SAFETY: the exchange above was won, so nobody else reaches the value until the store below.
+        let result = act(unsafe { &mut *self.value.get() });
+        self.state.store(to, Ordering::Release);
+        Some(result)
+    }
+}

@@ -1,0 +1,78 @@
+//! The frame guard, and the stopwatch that it hangs on: TIM5 runs freely, its compare 1 is the guard's deadline.
+//!
+//! Every valid frame moves the deadline to one and a half frame times after that frame's end. When it passes, the
+//! interrupt of the highest priority cuts the bridge, tells the control task, and sets the next deadline, so that control
+//! runs on (without frames) and can see to the bridge, the watchdog and the scan's restart.
+
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+
+use embassy_stm32::interrupt;
+use embassy_stm32::interrupt::InterruptExt;
+use embassy_stm32::pac::timer::regs::SrGp16;
+use embassy_stm32::peripherals::TIM5;
+use embassy_stm32::{Peri, pac, rcc};
+use fingertip::scan::{ScanTiming, TIMER_HZ};
+
+use super::{bridge, scan};
+
+/// Ticks of the stopwatch in a second.
+pub const HZ: u32 = 84_000_000;
+
+const COMPARE_1: usize = 0;
+
+static TRIPPED: AtomicBool = AtomicBool::new(false);
+static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
+
+/// A frame's time in ticks of the stopwatch.
+pub const fn frame_ticks(timing: ScanTiming) -> u32 {
+    timing.frame_ticks() / (TIMER_HZ / HZ)
+}
+
+/// Starts the stopwatch; the guard waits for [`restart`].
+pub fn start(_timer: Peri<'static, TIM5>) {
+    rcc::enable_and_reset::<TIM5>();
+    pac::TIM5.arr().write_value(u32::MAX);
+    pac::TIM5.cr1().modify(|w| w.set_cen(true));
+    // SAFETY: the handler below touches only statics and registers that are its own or written whole, and its priority
+    // is set.
+    unsafe { interrupt::TIM5.enable() };
+}
+
+/// The stopwatch; wraps after 51 s.
+pub fn now() -> u32 {
+    pac::TIM5.cnt().read()
+}
+
+/// Lets one and a half frames of `frame_ticks` pass from the instant `from` before the guard trips.
+pub fn restart(from: u32, frame_ticks: u32) {
+    let period = frame_ticks + frame_ticks / 2;
+    PERIOD.store(period, Ordering::Relaxed);
+    pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
+    pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, true));
+    if now().wrapping_sub(from) >= period {
+        // Too late: the counter has passed the new deadline already and would meet it only after a wrap.
+        pac::TIM5.egr().write(|w| w.set_ccg(COMPARE_1, true));
+    }
+}
+
+/// Whether the guard has tripped since [`take_trip`].
+pub fn tripped() -> bool {
+    TRIPPED.load(Ordering::Acquire)
+}
+
+/// Whether the guard has tripped; forgets it.
+pub fn take_trip() -> bool {
+    TRIPPED.swap(false, Ordering::AcqRel)
+}
+
+#[embassy_stm32::interrupt]
+fn TIM5() {
+    bridge::make_safe();
+    TRIPPED.store(true, Ordering::Release);
+    // Flags of the status register are cleared by writing 0 and left alone by writing 1.
+    let mut cleared = SrGp16(u32::MAX);
+    cleared.set_ccif(COMPARE_1, false);
+    pac::TIM5.sr().write_value(cleared);
+    pac::TIM5.ccr(COMPARE_1).write_value(now().wrapping_add(PERIOD.load(Ordering::Relaxed)));
+    scan::WAKE.signal(());
+}

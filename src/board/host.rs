@@ -1,0 +1,200 @@
+//! The link task: bytes from the bus to the server, its replies back, and what it asks of the firmware.
+
+use core::sync::atomic::Ordering;
+
+use defmt::{Debug2Format, error, info, warn};
+use embassy_time::{Duration, Instant, Timer, with_timeout};
+use fingertip::config::Config;
+use fingertip::frame::{Frame, TAXELS};
+use fingertip::link::{Actions, Reply, Server, Snapshot};
+use fingertip::params::Params;
+use fingertip::safety::Mode;
+use fingertip::store::Record;
+
+use super::bus::Bus;
+use super::crash::{self, Boot};
+use super::exchange::{COMMAND, CONFIG, DETAIL, DETAIL_READY, DETAIL_WANTED, Detail, PACKETS, REPORT};
+use super::flash::Store;
+use super::guard;
+
+/// Control answers within a frame and a half, even while frames are lost: at most this for the slowest scan.
+const DETAIL_TIMEOUT: Duration = Duration::from_millis(3);
+const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
+/// Fractional bits of a corrected code.
+const CODE_BITS: u32 = fingertip::pressure::CODE_BITS;
+
+/// Runs for ever.
+#[embassy_executor::task]
+pub async fn run(bus: Bus, store: Store, record: Record, config: Config, boot: Boot) {
+    Host { bus, store, boot, server: Server::new(record), pictures: Pictures::new(&config), line_good: true }
+        .run()
+        .await
+}
+
+struct Host {
+    bus: Bus,
+    store: Store,
+    boot: Boot,
+    server: Server,
+    pictures: Pictures,
+    line_good: bool,
+}
+
+impl Host {
+    async fn run(&mut self) {
+        let mut received = [0; 256];
+        let mut reply = Reply::new();
+        loop {
+            match self.bus.receive(&mut received).await {
+                Ok(count) => {
+                    self.line_good = true;
+                    self.answer(received.get(..count).unwrap_or_default(), &mut reply).await;
+                }
+                Err(cause) => {
+                    // The first of a row: a line at the wrong speed would fill the log.
+                    if core::mem::take(&mut self.line_good) {
+                        warn!("bus: {}", cause);
+                    }
+                }
+            }
+        }
+    }
+
+    async fn answer(&mut self, mut bytes: &[u8], reply: &mut Reply) {
+        let received = Instant::now();
+        self.pictures.renew().await;
+        while !bytes.is_empty() {
+            let snapshot = self.pictures.snapshot(self.boot);
+            let taken = self.server.feed(bytes, &snapshot, reply);
+            bytes = bytes.get(taken..).unwrap_or_default();
+            COMMAND.set(self.server.command());
+            PACKETS.store(self.server.good_packets(), Ordering::Relaxed);
+            if !reply.is_empty() {
+                Timer::at(received + Duration::from_micros(self.server.reply_delay_us().into())).await;
+                if let Err(cause) = self.bus.send(reply).await {
+                    warn!("bus, sending: {}", cause);
+                }
+            }
+            let actions = self.server.take_actions();
+            self.carry_out(actions);
+        }
+    }
+
+    fn carry_out(&mut self, actions: Actions) {
+        let settings = *self.server.settings();
+        if actions.configure {
+            self.configure(&settings.record.params);
+        }
+        if actions.save {
+            let saved = self.save(&settings.record);
+            self.server.note_saved(saved);
+        }
+        if actions.baud {
+            info!("bus at {} baud", settings.baud());
+            if let Err(cause) = self.bus.set_baud(settings.baud()) {
+                error!("bus speed: {}", cause);
+            }
+        }
+        if actions.reboot {
+            crash::reboot();
+        }
+    }
+
+    /// Hands a new configuration to control; the newest counts where control has not yet taken the one before.
+    fn configure(&mut self, params: &Params) {
+        match Config::new(params) {
+            Ok(config) => {
+                self.pictures.scale(&config);
+                CONFIG.take(|waiting| *waiting = None);
+                CONFIG.fill(|place| *place = Some(config));
+            }
+            Err(cause) => error!("parameters: {}", Debug2Format(&cause)),
+        }
+    }
+
+    /// Writes to flash, which makes the core wait: never while the motor is driven.
+    fn save(&mut self, record: &Record) -> bool {
+        if !matches!(REPORT.get().status.mode, Mode::Off | Mode::Fault) {
+            warn!("parameters not saved: the motor is driven or a tare is under way");
+            return false;
+        }
+        match self.store.save(record) {
+            Ok(()) => {
+                info!("parameters saved");
+                true
+            }
+            Err(cause) => {
+                error!("parameters not saved: {}", cause);
+                false
+            }
+        }
+    }
+}
+
+/// The array's details in the units of the bus.
+struct Pictures {
+    pascals_per_sum_q32: i64,
+    pressures_10pa: [u16; TAXELS],
+    tare_codes: [u16; TAXELS],
+    frame: Frame,
+}
+
+impl Pictures {
+    fn new(config: &Config) -> Self {
+        Self {
+            pascals_per_sum_q32: config.pascals_per_sum_q32,
+            pressures_10pa: [0; TAXELS],
+            tare_codes: [0; TAXELS],
+            frame: Frame::EMPTY,
+        }
+    }
+
+    fn scale(&mut self, config: &Config) {
+        self.pascals_per_sum_q32 = config.pascals_per_sum_q32;
+    }
+
+    /// Asks control for the newest frame's details; keeps the old ones where it does not answer.
+    async fn renew(&mut self) {
+        DETAIL_READY.reset();
+        DETAIL_WANTED.store(true, Ordering::Relaxed);
+        if with_timeout(DETAIL_TIMEOUT, DETAIL_READY.wait()).await.is_ok() {
+            DETAIL.take(|detail| self.convert(detail));
+        }
+    }
+
+    fn convert(&mut self, detail: &Detail) {
+        self.frame = detail.frame;
+        for (place, taxel) in self.pressures_10pa.iter_mut().zip(detail.taxels.as_flattened()) {
+            let pascals = (i64::from(*taxel) * self.pascals_per_sum_q32) >> 32;
+            *place = saturate(((pascals + 5) / 10) as i32);
+        }
+        for (place, tare) in self.tare_codes.iter_mut().zip(detail.tare) {
+            *place = saturate((tare + (1 << (CODE_BITS - 1))) >> CODE_BITS);
+        }
+    }
+
+    fn snapshot(&self, boot: Boot) -> Snapshot<'_> {
+        let report = REPORT.get();
+        Snapshot {
+            status: report.status,
+            supply_mv: report.supply_mv,
+            tick_ms: Instant::now().as_millis() as u32,
+            loop_time_us: microseconds(report.loop_ticks),
+            loop_time_max_us: microseconds(report.loop_ticks_max),
+            reset_cause: boot.reset,
+            crash: boot.crash,
+            pressures_10pa: &self.pressures_10pa,
+            frame: &self.frame,
+            tare_codes: &self.tare_codes,
+        }
+    }
+}
+
+/// Rounded up: a high-water mark must not look better than it is.
+fn microseconds(ticks: u32) -> u16 {
+    u16::try_from(ticks.div_ceil(TICKS_PER_US)).unwrap_or(u16::MAX)
+}
+
+fn saturate(value: i32) -> u16 {
+    value.clamp(0, i32::from(u16::MAX)) as u16
+}

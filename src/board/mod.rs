@@ -1,0 +1,36 @@
+//! The one place with pins, DMA, triggers, vectors and unsafe code; `docs/board.md` is its contract.
+
+use embassy_stm32::interrupt::{self, InterruptExt, Priority};
+
+pub mod bridge;
+pub mod bus;
+pub mod clocks;
+pub mod control;
+pub mod converter;
+pub mod crash;
+pub mod encoder;
+pub mod exchange;
+pub mod flash;
+pub mod guard;
+pub mod host;
+pub mod pins;
+pub mod scan;
+pub mod supply;
+pub mod watch;
+
+/// Sets every priority of the table in `docs/board.md`; embassy leaves most of them at the highest.
+///
+/// Comes after `embassy_stm32::init`, which sets those of the time driver and of all DMA streams itself.
+pub fn set_priorities() {
+    for (interrupt, priority) in [
+        (interrupt::TIM5, Priority::P0),
+        (interrupt::DMA2_STREAM2, Priority::P1),
+        (interrupt::SPI3, Priority::P2),
+        (interrupt::TIM2, Priority::P5),
+        (interrupt::USART2, Priority::P6),
+        (interrupt::DMA1_STREAM5, Priority::P6),
+        (interrupt::DMA1_STREAM6, Priority::P6),
+    ] {
+        interrupt.set_priority(priority);
+    }
+}

@@ -1,0 +1,46 @@
+//! Pins that the hardware drives by itself: set once, kept for good.
+
+use embassy_stm32::Peri;
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pin, Pull, Speed};
+
+/// Rows 0 to 9, none driven. The scan moves them through the port's set/reset register.
+pub fn rows(pins: [Peri<'static, AnyPin>; 10]) {
+    for pin in pins {
+        low_output(pin, Speed::VeryHigh);
+    }
+}
+
+/// Inputs of the converters.
+pub fn analog<const N: usize>(pins: [Peri<'static, AnyPin>; N]) {
+    for pin in pins {
+        let mut pin = Flex::new(pin);
+        pin.set_as_analog();
+        keep(pin);
+    }
+}
+
+/// A timer's input.
+pub fn timer_input(pin: Peri<'static, impl Pin>, function: u8, pull: Pull) {
+    alternate(pin, function, AfType::input(pull));
+}
+
+/// A timer's output, pulled down while the timer leaves it.
+pub fn timer_output(pin: Peri<'static, impl Pin>, function: u8) {
+    alternate(pin, function, AfType::output_pull(OutputType::PushPull, Speed::High, Pull::Down));
+}
+
+/// An output that starts low and is then set through its port.
+pub fn low_output(pin: Peri<'static, impl Pin>, speed: Speed) {
+    core::mem::forget(Output::new(pin, Level::Low, speed));
+}
+
+fn alternate(pin: Peri<'static, impl Pin>, function: u8, kind: AfType) {
+    let mut pin = Flex::new(pin);
+    pin.set_as_af_unchecked(function, kind);
+    keep(pin);
+}
+
+/// Dropping a pin would disconnect it.
+fn keep(pin: Flex<'static>) {
+    core::mem::forget(pin);
+}

@@ -1,0 +1,36 @@
+//! Looks at control's reports now and then: the LED, and the log of what changed.
+
+use defmt::{Debug2Format, info, warn};
+use embassy_stm32::gpio::Output;
+use embassy_time::Timer;
+use fingertip::safety::Mode;
+
+use super::exchange::{COMMAND, REPORT};
+
+const PERIOD_MS: u64 = 20;
+/// 5 Hz.
+const BLINK_PERIODS: u32 = 5;
+
+/// On with torque, fast blink on fault, off otherwise.
+#[embassy_executor::task]
+pub async fn run(mut led: Output<'static>) {
+    let mut last = (Mode::Off, None);
+    let mut missed_frames = 0;
+    for period in 0u32.. {
+        let status = REPORT.get().status;
+        if (status.mode, status.fault) != last {
+            last = (status.mode, status.fault);
+            match status.fault {
+                Some(fault) => warn!("fault {} {}", fault as u8, Debug2Format(&fault)),
+                None => info!("mode {}", Debug2Format(&status.mode)),
+            }
+        }
+        if status.missed_frames != missed_frames {
+            missed_frames = status.missed_frames;
+            warn!("{} frames missed", missed_frames);
+        }
+        let on = if status.mode == Mode::Fault { period / BLINK_PERIODS % 2 == 0 } else { COMMAND.get().torque };
+        led.set_level(on.into());
+        Timer::after_millis(PERIOD_MS).await;
+    }
+}

@@ -53,7 +53,7 @@ impl Reference {
 
     /// The same, held to speeds up to `limit`; beyond it there is no curve to stay on.
     pub fn limited(self, limit: MillimetresPerSecond) -> Self {
-        let held = self.speed.clamp(MillimetresPerSecond::from_bits(-limit.to_bits()), limit);
+        let held = self.speed.max(MillimetresPerSecond::from_bits(limit.to_bits().saturating_neg())).min(limit);
         if held == self.speed { self } else { Self { speed: held, acceleration: MillimetresPerSecond2::ZERO } }
     }
 }

@@ -156,7 +156,7 @@ impl Tip {
     /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of force
     /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
     pub fn indentation(&self, force: Newtons) -> Millimetres {
-        let force_bits = force.clamp(Newtons::ZERO, self.force_max).to_bits().unsigned_abs();
+        let force_bits = force.max(Newtons::ZERO).min(self.force_max).to_bits().unsigned_abs();
         let twice = self.area_gain.floor(u64::from(force_bits)).isqrt();
         Millimetres::from_bits(twice.div_ceil(2) as i32).min(self.depth_max)
     }
@@ -182,7 +182,7 @@ impl Tip {
 
     /// The indentation within its domain, in units of the last place.
     fn depth(&self, d: Millimetres) -> u32 {
-        d.clamp(Millimetres::ZERO, self.depth_max).to_bits().unsigned_abs()
+        d.max(Millimetres::ZERO).min(self.depth_max).to_bits().unsigned_abs()
     }
 
     /// `r_c^2 = d (2a - d)` in Q48, exact.

@@ -48,7 +48,7 @@ impl Tip {
     ///
     /// `r` counts as within 0 to the contact radius.
     pub fn touching_angle(&self, r: Millimetres, d: Millimetres) -> Radians {
-        let distance = r.clamp(Millimetres::ZERO, self.contact_radius(d)).to_bits().unsigned_abs();
+        let distance = r.max(Millimetres::ZERO).min(self.contact_radius(d)).to_bits().unsigned_abs();
         let angle_q30 = angle_of(distance, self.rest(self.depth(d)));
         Radians::from_bits((angle_q30 >> 5).div_ceil(2) as i32).min(self.touching_angle_max(d))
     }
@@ -93,7 +93,7 @@ impl Tip {
 
     /// Sine and cosine of a touching angle in Q31; the cosine is at least 1/21.
     fn sine_cosine(&self, theta: Radians, d: Millimetres) -> (u64, u64) {
-        let theta = theta.clamp(Radians::ZERO, self.touching_angle_max(d)).to_bits().unsigned_abs();
+        let theta = theta.max(Radians::ZERO).min(self.touching_angle_max(d)).to_bits().unsigned_abs();
         let (sine, cosine) = sine_cosine(theta);
         (u64::from(sine), u64::from(cosine.max(COSINE_MIN)))
     }

@@ -73,7 +73,7 @@ impl Tip {
     ///
     /// The pressure counts as within 0 to that of [`Tip::depth_max`].
     pub fn indentation_from_peak(&self, peak: Kilopascals) -> Millimetres {
-        let peak = peak.clamp(Kilopascals::ZERO, self.modulus()).to_bits().unsigned_abs();
+        let peak = peak.max(Kilopascals::ZERO).min(self.modulus()).to_bits().unsigned_abs();
         let bits = divide(u64::from(self.radius_bits()) * u64::from(peak), self.modulus_bits());
         Millimetres::from_bits(bits as i32).min(self.depth_max())
     }
@@ -93,7 +93,7 @@ impl Tip {
     ///
     /// `F` counts as within 0 to [`Tip::force_max`].
     pub fn stiffness_at_force(&self, force: Newtons) -> NewtonsPerMillimetre {
-        let force_bits = u64::from(force.clamp(Newtons::ZERO, self.force_max()).to_bits().unsigned_abs());
+        let force_bits = u64::from(force.max(Newtons::ZERO).min(self.force_max()).to_bits().unsigned_abs());
         NewtonsPerMillimetre::from_bits(self.square_gain.floor(force_bits).isqrt().div_ceil(2) as i32)
     }
 

@@ -90,7 +90,7 @@ params! {
     /// Torque constant of the motor, uN m/A.
     torque_constant_unm_per_a = 5_350 in 100..=200_000;
     /// Terminal resistance of the motor and the bridge together.
-    resistance_mohm = 2_830 in 50..=200_000;
+    resistance_mohm = 3_530 in 50..=200_000;
     /// Inertia at the motor's shaft, rotor and gear, ug m^2 (1 g cm^2 is 100).
     inertia_ug_m2 = 71 in 1..=20_000;
     /// Coulomb friction at the motor's shaft, uN m.

@@ -169,6 +169,6 @@ impl Supply {
 
 impl Default for Supply {
     fn default() -> Self {
-        Self { source_v: 6.0, source_ohm: 0.1, bridge_ohm: 0.0 }
+        Self { source_v: 6.0, source_ohm: 0.1, bridge_ohm: 0.7 }
     }
 }

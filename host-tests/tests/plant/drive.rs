@@ -7,9 +7,10 @@ use proptest::prelude::*;
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };
 const RPM: f64 = 60.0 / std::f64::consts::TAU;
 
-/// A stiff supply, as on the motor's test bench.
+/// A stiff supply and no bridge, as on the motor's test bench.
 fn bench(mut setup: Setup) -> Setup {
     setup.supply.source_ohm = 0.0;
+    setup.supply.bridge_ohm = 0.0;
     setup
 }
 
@@ -80,7 +81,7 @@ fn friction_holds_inside_its_band_and_not_outside() {
             let current = torque / setup.motor.torque_nm_per_a;
             let mut duty = 0.0;
             for _ in 0..20 {
-                let ohms = setup.motor.resistance_ohm + duty * duty * setup.supply.source_ohm;
+                let ohms = setup.supply.circuit_ohm(&setup.motor, duty);
                 duty = current * ohms / setup.supply.source_v;
             }
             let mut world = world.clone();
@@ -227,13 +228,13 @@ fn the_supply_sags_by_the_share_of_the_current_that_it_gives() {
     for duty in [1.0, -1.0, 0.5] {
         world.place(0.0);
         world.advance(0.0, Bridge::Driven { duty });
-        let current = duty * 6.0 / (2.83 + duty * duty * 0.1);
+        let current = duty * 6.0 / (2.83 + 0.7 + duty * duty * 0.1);
         assert!((world.current_a() - current).abs() < 1e-12);
         assert!((world.supply_v() - (6.0 - 0.1 * duty * current)).abs() < 1e-12);
     }
-    world.setup_mut().supply.bridge_ohm = 0.7;
+    world.setup_mut().supply.bridge_ohm = 0.0;
     world.advance(0.0, Bridge::Driven { duty: 0.5 });
-    assert!((world.current_a() - 3.0 / (2.83 + 0.7 + 0.025)).abs() < 1e-12);
+    assert!((world.current_a() - 3.0 / (2.83 + 0.025)).abs() < 1e-12);
     world.faults.supply_drop_v = 2.0;
     world.advance(0.0, Bridge::Coast);
     assert_eq!(world.supply_v(), 4.0);

@@ -48,6 +48,7 @@ fn friction_helps_the_brake() {
 fn a_motor_on_a_voltage_follows_its_exponential() {
     let mut setup = double_integrator();
     setup.supply.source_v = 6.0;
+    setup.supply.bridge_ohm = 0.0;
     let motor = setup.motor;
     let tau = motor.resistance_ohm * motor.inertia_kg_m2 / motor.torque_nm_per_a.powi(2);
     let top = 6.0 / motor.torque_nm_per_a * setup.transmission.drum_radius_mm / setup.transmission.ratio;

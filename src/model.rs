@@ -29,7 +29,7 @@ mod tilt;
 
 pub use friction::LimitSurface;
 pub use particle::{force_on, pressure_of, strain_of};
-pub use relaxation::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
+pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 pub use tilt::{Displacement, Load};
 
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};

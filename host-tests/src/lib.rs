@@ -2,6 +2,12 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod control_table;
+pub mod heatmap;
+pub mod metrics;
 pub mod native;
 pub mod optimal;
 pub mod plant;
+pub mod plot;
+pub mod prove;
+pub mod stimulus;

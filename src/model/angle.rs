@@ -3,6 +3,8 @@
 //! Each series alternates in sign with falling coefficients, so that every intermediate value of its nested form is
 //! positive and below 1: one 32 by 32 multiply and one subtraction a term.
 
+use super::arith::quotient;
+
 /// pi/2 in Q1.31.
 const HALF_PI_Q31: u64 = 3_373_259_426;
 
@@ -52,8 +54,8 @@ pub(super) fn angle_of(y: u32, x: u32) -> u32 {
         return 0;
     }
     let (small, large) = if y <= x { (y, x) } else { (x, y) };
-    let quotient = ((u64::from(small) << 32) / u64::from(large)).min(u64::from(u32::MAX));
-    let angle_q32 = u64::from(arc_tangent(quotient as u32));
+    let tangent = quotient(u64::from(small) << 32, large.into()).min(u32::MAX.into());
+    let angle_q32 = u64::from(arc_tangent(tangent as u32));
     let folded_q32 = if y <= x { angle_q32 } else { 2 * HALF_PI_Q31 - angle_q32 };
     (folded_q32 >> 1).div_ceil(2) as u32
 }

@@ -47,6 +47,19 @@ pub(super) const fn mul_high(x: u64, y: u64) -> u64 {
     x1 * y1 + (middle >> 32) + (other >> 32)
 }
 
+/// A quotient rounded down; 0 when the denominator is, which no caller's is: so it has no panic to prove absent.
+pub(super) const fn quotient(numerator: u64, denominator: u64) -> u64 {
+    match numerator.checked_div(denominator) {
+        Some(quotient) => quotient,
+        None => 0,
+    }
+}
+
+/// A quotient rounded to nearest.
+pub(super) const fn nearest_quotient(numerator: u64, denominator: u64) -> u64 {
+    quotient(numerator + denominator / 2, denominator)
+}
+
 /// The square of a length in Q24, in Q48.
 pub(super) const fn square(x: u32) -> u64 {
     x as u64 * x as u64

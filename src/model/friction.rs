@@ -11,7 +11,7 @@
 //! which goes from 8/15 for a shallow contact to 0.655 at 0.95 a (a uniform pressure has 2/3, Hertz 0.589).
 
 use super::Tip;
-use super::arith::{root, square};
+use super::arith::{quotient, root, square};
 use crate::units::{Millimetres, NewtonMillimetres, Newtons, Ratio};
 
 /// `g` in powers of `d/a`, Q0.32: Chebyshev fit on 0 to 0.951, off by less than 4e-10. The formula itself cancels at small
@@ -62,7 +62,7 @@ impl Tip {
 
     /// The shape factor in Q32.
     fn shape(&self, depth: u32) -> u64 {
-        let share_q32 = ((u64::from(depth) << 32) / u64::from(self.radius_bits())) as i64;
+        let share_q32 = quotient(u64::from(depth) << 32, self.radius_bits().into()) as i64;
         SHAPE.iter().rev().fold(0, |sum, coefficient| coefficient + ((sum * (share_q32 >> 1)) >> 31)).unsigned_abs()
     }
 }
@@ -85,7 +85,7 @@ fn share(load: i32, limit: i32) -> u64 {
     let load = u64::from(load.unsigned_abs());
     match u64::from(limit.unsigned_abs()) {
         0 => load * SHARE_MAX,
-        limit => (load << 24) / limit,
+        limit => quotient(load << 24, limit),
     }
     .min(SHARE_MAX)
 }

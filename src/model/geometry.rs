@@ -5,7 +5,7 @@
 
 use super::Tip;
 use super::angle::{angle_of, arc_tangent, sine_cosine};
-use super::arith::{root, square};
+use super::arith::{nearest_quotient, quotient, root, square};
 use crate::units::{Millimetres, MillimetresPerRadian, Radians, SquareMillimetres};
 
 /// Below the cosine of every touching angle, in Q31: it is 1/20 at the deepest indentation.
@@ -38,8 +38,8 @@ impl Tip {
             return Radians::ZERO;
         }
         let shift = depth.leading_zeros();
-        let quotient = (depth << shift) / (2 * u64::from(self.radius_bits()) - depth);
-        let tangent_q32 = (quotient << (64 - shift)).isqrt() as u32;
+        let ratio = quotient(depth << shift, 2 * u64::from(self.radius_bits()) - depth);
+        let tangent_q32 = (ratio << (64 - shift)).isqrt() as u32;
         // Twice the arc tangent in Q32 is the arc tangent in Q31: 7 bits more than wanted.
         Radians::from_bits((arc_tangent(tangent_q32) >> 6).div_ceil(2) as i32)
     }
@@ -59,7 +59,7 @@ impl Tip {
     /// [`Tip::touching_angle_max`].
     pub fn distance_at(&self, theta: Radians, d: Millimetres) -> Millimetres {
         let (sine, cosine) = self.sine_cosine(theta, d);
-        let bits = (u64::from(self.rest(self.depth(d))) * sine + cosine / 2) / cosine;
+        let bits = nearest_quotient(u64::from(self.rest(self.depth(d))) * sine, cosine);
         Millimetres::from_bits(bits as i32).min(self.contact_radius(d))
     }
 
@@ -76,7 +76,7 @@ impl Tip {
     /// How fast the distance grows with the touching angle: `dr/dtheta = (a - d) / cos^2(theta)` (eq. 7).
     pub fn distance_slope(&self, theta: Radians, d: Millimetres) -> MillimetresPerRadian {
         let (_, cosine) = self.sine_cosine(theta, d);
-        let slope_q24 = (((u64::from(self.rest(self.depth(d))) << 31) / cosine) << 31) / cosine;
+        let slope_q24 = quotient(quotient(u64::from(self.rest(self.depth(d))) << 31, cosine) << 31, cosine);
         MillimetresPerRadian::from_bits((slope_q24 >> 7).div_ceil(2) as i32)
     }
 
@@ -86,8 +86,8 @@ impl Tip {
     pub fn area_density(&self, theta: Radians, d: Millimetres) -> SquareMillimetres {
         let (sine, cosine) = self.sine_cosine(theta, d);
         let rest = u64::from(self.rest(self.depth(d)));
-        let slope_q24 = (((rest << 31) / cosine) << 31) / cosine;
-        let distance_q27 = ((rest * sine) << 3) / cosine;
+        let slope_q24 = quotient(quotient(rest << 31, cosine) << 31, cosine);
+        let distance_q27 = quotient((rest * sine) << 3, cosine);
         SquareMillimetres::from_bits(((slope_q24 * distance_q27) >> 34).div_ceil(2) as i32)
     }
 

@@ -11,7 +11,7 @@ use crate::units::{Kilopascals, Millimetres, Newtons, SquareMillimetres, Strain}
 /// Without an area it is 0.
 pub fn pressure_of(force: Newtons, area: SquareMillimetres) -> Kilopascals {
     // 1 N/mm^2 is 1000 kPa.
-    let numerator = i64::from(force.to_bits()) * 1000 << 16;
+    let numerator = (i64::from(force.to_bits()) * 1000) << 16;
     Kilopascals::from_bits(saturate(divide(numerator.into(), area.to_bits().into())))
 }
 

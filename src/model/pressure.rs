@@ -1,9 +1,9 @@
 //! Pressure over the contact and what sums it: equations 12 to 16, figure 7.
 
-use core::num::NonZeroU16;
+use core::num::{NonZeroU16, NonZeroU64};
 
 use super::Tip;
-use super::arith::{mul_high, root, square};
+use super::arith::{mul_high, nearest_quotient, quotient, root, square};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre, Strain};
 
 /// A quotient below 1: `significand * 2^-shift` with a relative error below 2^-30.
@@ -22,7 +22,7 @@ impl Quotient {
             return Self::ZERO;
         }
         let divisor = ((denominator << down) >> 31).div_ceil(2);
-        Self { significand: (numerator << up) / divisor, shift: 32 + up - down }
+        Self { significand: quotient(numerator << up, divisor), shift: 32 + up - down }
     }
 
     /// With 31 to 60 bits after the point, rounded down.
@@ -59,14 +59,17 @@ impl Tip {
 
     /// Pressure at the contact's centre, `p(0) = Y d / a`. Correctly rounded.
     pub fn peak_pressure(&self, d: Millimetres) -> Kilopascals {
-        Kilopascals::from_bits(divide(self.modulus_bits() * u64::from(self.depth(d)), self.radius_bits().into()) as i32)
+        Kilopascals::from_bits(nearest_quotient(
+            self.modulus_bits() * u64::from(self.depth(d)),
+            self.radius_bits().into(),
+        ) as i32)
     }
 
     /// Force over contact area, `F / (pi r_c^2) = Y d / (2a - d)`. Correctly rounded.
     pub fn mean_pressure(&self, d: Millimetres) -> Kilopascals {
         let depth = self.depth(d);
         let denominator = u64::from(2 * self.radius_bits() - depth);
-        Kilopascals::from_bits(divide(self.modulus_bits() * u64::from(depth), denominator) as i32)
+        Kilopascals::from_bits(nearest_quotient(self.modulus_bits() * u64::from(depth), denominator) as i32)
     }
 
     /// Indentation from the pressure at the contact's centre, `d = a p(0) / Y`. Correctly rounded.
@@ -74,7 +77,7 @@ impl Tip {
     /// The pressure counts as within 0 to that of [`Tip::depth_max`].
     pub fn indentation_from_peak(&self, peak: Kilopascals) -> Millimetres {
         let peak = peak.max(Kilopascals::ZERO).min(self.modulus()).to_bits().unsigned_abs();
-        let bits = divide(u64::from(self.radius_bits()) * u64::from(peak), self.modulus_bits());
+        let bits = nearest_quotient(u64::from(self.radius_bits()) * u64::from(peak), self.modulus_bits());
         Millimetres::from_bits(bits as i32).min(self.depth_max())
     }
 
@@ -105,15 +108,16 @@ impl Tip {
     pub fn force_by_rings(&self, d: Millimetres, rings: NonZeroU16) -> Newtons {
         let depth = self.depth(d);
         let contact_square = self.contact_square(depth);
-        let rings = u64::from(rings.get());
-        let (whole, rest) = (contact_square / (2 * rings), contact_square % (2 * rings));
-        let sum_q48: u64 = (0..rings)
+        let rings = NonZeroU64::from(rings);
+        let halves = rings.saturating_mul(NonZeroU64::MIN.saturating_add(1));
+        let (whole, rest) = (contact_square / halves, contact_square % halves);
+        let sum_q48: u64 = (0..rings.get())
             .map(|ring| {
                 let middle = 2 * ring + 1;
-                self.strain_at_square(whole * middle + rest * middle / (2 * rings), depth).floor(48)
+                self.strain_at_square(whole * middle + rest * middle / halves, depth).floor(48)
             })
             .sum();
-        self.force_of_area(mul_high(contact_square << 8, sum_q48 / rings << 8))
+        self.force_of_area(mul_high(contact_square << 8, (sum_q48 / rings) << 8))
     }
 
     /// The strain where `r^2` is `square_q48`.
@@ -133,9 +137,4 @@ impl Tip {
     pub(super) fn modulus_bits(&self) -> u64 {
         u64::from(self.modulus().to_bits().unsigned_abs())
     }
-}
-
-/// A quotient rounded to nearest.
-const fn divide(numerator: u64, denominator: u64) -> u64 {
-    (numerator + denominator / 2) / denominator
 }

@@ -85,7 +85,7 @@ impl Tip {
     fn pose(&self, displacement: Displacement) -> Pose {
         let normal = i64::from(self.depth(displacement.normal));
         let reach = self.radius().to_bits() / 2;
-        let shift = i64::from(displacement.shift.to_bits().clamp(-reach, reach));
+        let shift = i64::from(displacement.shift.to_bits().max(-reach).min(reach));
         let tilt = displacement.tilt.to_bits().clamp(-1 << 24, 1 << 24);
         let (sine, cosine) = sine_cosine(tilt.unsigned_abs());
         // The cosine of 1 rad is 0.54.

@@ -1,0 +1,99 @@
+//! Proves the model's error bounds over whole input ranges; `--quick` takes a thousandth of the inputs.
+//!
+//! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
+
+use std::io::{self, Write};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use host_tests::prove::domain::reference_tip;
+use host_tests::prove::tally::Tally;
+use host_tests::prove::{beyond, exhaustive, oracle, random};
+
+fn main() -> ExitCode {
+    let quick = match std::env::args().nth(1).as_deref() {
+        None => false,
+        Some("--quick") => true,
+        Some(other) => {
+            eprintln!("unknown argument {other}: --quick or none");
+            return ExitCode::FAILURE;
+        }
+    };
+    let share = if quick { 1_000 } else { 1 };
+    let mut report = Report { started: Instant::now(), inputs: 0, broken: 0 };
+    let tip = reference_tip();
+    let reach = |bits: i32| bits as u64 / share + 1;
+
+    report.section("every input of the reference tip (a = 10 mm, Y = 250 kPa), by integers", |progress| {
+        let mut all = exhaustive::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
+        all.extend(exhaustive::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
+        all.extend(exhaustive::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
+        all.extend(exhaustive::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
+        all
+    });
+    report.section("grid of the reference tip, by integers", |progress| {
+        exhaustive::pressures(&tip, 4_000 / share, 2_500, progress).to_vec()
+    });
+    report.section("grid of the reference tip, in arbitrary precision", |progress| {
+        random::touching_angles(&tip, 1_000_000 / share, progress).to_vec()
+    });
+    report.section("boundaries of the domain, in arbitrary precision and by integers", |progress| {
+        random::boundaries(progress).to_vec()
+    });
+    report.section("random points of the domain, in arbitrary precision and by integers", |progress| {
+        random::points(0..10_000_000 / share, progress).to_vec()
+    });
+    report.section("the rest of the model at random points, in arbitrary precision", |progress| {
+        let points = 0..1_000_000 / share;
+        let mut all = beyond::geometry(points.clone(), progress).to_vec();
+        all.extend(beyond::tilt(points.clone(), progress));
+        all.extend(beyond::friction(points, progress));
+        all.extend(beyond::relaxation(0..1_000_000 / share / 1_000, progress));
+        all
+    });
+    match oracle::check() {
+        Ok(tallies) => report.section("oracle/park2003.csv", |_| tallies.to_vec()),
+        Err(error) => {
+            eprintln!("{}: {error}", oracle::path().display());
+            report.broken += 1;
+        }
+    }
+    report.end()
+}
+
+struct Report {
+    started: Instant,
+    inputs: u64,
+    broken: u64,
+}
+
+impl Report {
+    fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
+        println!("{title}");
+        let shown = Mutex::new(Instant::now());
+        let progress = |done: u64, of: u64| {
+            if let Ok(mut shown) = shown.try_lock()
+                && shown.elapsed() > Duration::from_millis(500)
+            {
+                *shown = Instant::now();
+                eprint!("\r  {done} of {of}   ");
+                // Progress is a courtesy; a closed terminal is no reason to stop.
+                let _ = io::stderr().flush();
+            }
+        };
+        let tallies = judge(&progress);
+        eprint!("\r");
+        for tally in &tallies {
+            println!("  {tally}");
+            self.inputs += tally.inputs;
+            self.broken += u64::from(!tally.holds());
+        }
+    }
+
+    fn end(&self) -> ExitCode {
+        let seconds = self.started.elapsed().as_secs();
+        println!("{} results judged in {seconds} s; {} bounds broken", self.inputs, self.broken);
+        if self.broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    }
+}

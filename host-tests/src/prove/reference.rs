@@ -1,0 +1,131 @@
+//! The model in arbitrary precision, by the `dashu-float` crate: the judge of what has no exact form.
+//!
+//! Formulas are the textbook ones, not those of the core: with 96 bits nothing cancels that matters.
+
+use std::sync::LazyLock;
+
+use dashu_float::FBig;
+use dashu_float::round::mode::HalfEven;
+use fingertip::model::Tip;
+
+/// A number with [`PRECISION`] significant bits.
+pub type Real = FBig<HalfEven, 2>;
+
+/// Significant bits; the results judged have at most 31.
+pub const PRECISION: usize = 96;
+
+static PI: LazyLock<Real> = LazyLock::new(|| Real::pi(PRECISION));
+
+/// The value of a fixed-point number.
+pub fn real(bits: i32, fraction_bits: isize) -> Real {
+    Real::from_parts(bits.into(), -fraction_bits).with_precision(PRECISION).value()
+}
+
+/// A result less its exact value, in units of the result's last place.
+pub fn error_ulp(bits: i32, fraction_bits: isize, exact: &Real) -> f64 {
+    let difference = real(bits, fraction_bits) - exact;
+    difference.to_f64().value() * 2_f64.powi(fraction_bits as i32)
+}
+
+/// A tip with its radius in mm and its modulus in N/mm^2.
+pub struct Reference {
+    a: Real,
+    y: Real,
+    one: Real,
+}
+
+impl Reference {
+    /// The same tip.
+    pub fn new(tip: &Tip) -> Self {
+        let one = real(1, 0);
+        Self { a: real(tip.radius().to_bits(), 24), y: real(tip.modulus().to_bits(), 16) / real(1000, 0), one }
+    }
+
+    /// `F = pi Y d^2` (eq. 14).
+    pub fn force(&self, d: &Real) -> Real {
+        &*PI * &self.y * d * d
+    }
+
+    /// `d = sqrt(F / (pi Y))`.
+    pub fn indentation(&self, force: &Real) -> Real {
+        (force / (&*PI * &self.y)).sqrt()
+    }
+
+    /// `r_c = sqrt(a^2 - (a - d)^2)` (eq. 5, 6).
+    pub fn contact_radius(&self, d: &Real) -> Real {
+        let rest = &self.a - d;
+        (&self.a * &self.a - &rest * &rest).sqrt()
+    }
+
+    /// `k = 2 pi Y d`.
+    pub fn stiffness(&self, d: &Real) -> Real {
+        &*PI * &self.y * d * real(2, 0)
+    }
+
+    /// `p = Y (L - (a - d)) / L` in kPa, 0 from the rim on (eq. 13, 15, 16).
+    pub fn pressure(&self, r: &Real, d: &Real) -> Real {
+        self.strain(r, d) * &self.y * real(1000, 0)
+    }
+
+    /// `dL/L`, 0 from the rim on (eq. 10).
+    pub fn strain(&self, r: &Real, d: &Real) -> Real {
+        if r >= &self.a {
+            return real(0, 0);
+        }
+        let length = (&self.a * &self.a - r * r).sqrt();
+        let compression = &length - (&self.a - d);
+        if compression > real(0, 0) { compression / length } else { real(0, 0) }
+    }
+
+    /// `theta_max = atan(r_c / (a - d))` (eq. 5).
+    pub fn touching_angle_max(&self, d: &Real) -> Real {
+        (self.contact_radius(d) / (&self.a - d)).atan()
+    }
+
+    /// `theta = atan(r / (a - d))` (eq. 6).
+    pub fn touching_angle(&self, r: &Real, d: &Real) -> Real {
+        (r / (&self.a - d)).atan()
+    }
+
+    /// `(a - d) tan(theta)` (eq. 6).
+    pub fn distance_at(&self, theta: &Real, d: &Real) -> Real {
+        (&self.a - d) * theta.tan()
+    }
+
+    /// `(a - d) / cos^2(theta)` (eq. 7).
+    pub fn distance_slope(&self, theta: &Real, d: &Real) -> Real {
+        let cosine = theta.cos();
+        (&self.a - d) / (&cosine * &cosine)
+    }
+
+    /// `(a - d)^2 sin(theta) / cos^3(theta)` (eq. 8).
+    pub fn area_density(&self, theta: &Real, d: &Real) -> Real {
+        self.distance_at(theta, d) * self.distance_slope(theta, d)
+    }
+
+    /// Normal force, tangential force, moment and energy at a displacement.
+    pub fn load(&self, d: &Real, s: &Real, t: &Real) -> [Real; 4] {
+        let (sine, cosine) = (t.sin(), t.cos());
+        let tangent = sine / &cosine;
+        let stretch = &self.one / (&cosine * &cosine);
+        let pi_y = &*PI * &self.y;
+        let (two, three) = (real(2, 0), real(3, 0));
+        [
+            &pi_y * (d * d * &stretch + &two * d * s * &tangent + s * s),
+            &pi_y * (d * d * &tangent + &two * d * s),
+            &pi_y * (&two * d * d * d * &tangent * &stretch / &three + d * d * s * &stretch),
+            &pi_y * (d * d * d * &stretch / &three + d * d * s * &tangent + d * s * s),
+        ]
+    }
+
+    /// `m_max / (mu N r_c)` for this pressure profile.
+    pub fn friction_shape(&self, d: &Real) -> Real {
+        let c = (&self.a - d) / &self.a;
+        let s = self.contact_radius(d) / &self.a;
+        let angle = self.touching_angle_max(d);
+        let two = real(2, 0);
+        let bracket = &s * &s * &s / real(3, 0) - &c * (angle - &s * &c) / &two;
+        let versine = &self.one - &c;
+        two * bracket / (&versine * &versine * s)
+    }
+}

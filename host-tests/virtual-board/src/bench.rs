@@ -1,0 +1,164 @@
+//! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
+
+use crate::board::FingerBoard;
+use crate::front_end::{FrontEnd, Shared};
+use crate::image::Firmware;
+use crate::log::{Log, LogLine};
+use crate::measure::{BridgeEdge, Latency};
+use crate::trace::{Record, Trace};
+use crate::wire::TimedByte;
+use crate::error::Error;
+use host_tests::plant::Bridge;
+use rigless::emulator::{Access, AccessKind, Host, Stop};
+use rigless::session::Session;
+use rigless::snapshot::{self, Reader, Store, Writer};
+use rigless::soc::stm32f427::generated::{GPIOC, TIM1};
+use rigless::time::VirtualNanos;
+
+/// The world's step.
+pub const STEP_NS: u64 = 10_000;
+/// How often the log is read out.
+const LOG_NS: u64 = 1_000_000;
+/// TIM1's registers behind which the duty stands, as offsets: CCR1 and CCR2.
+const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
+
+/// All that is not the board, and that a snapshot keeps.
+#[derive(Debug)]
+pub struct Bench {
+    /// The next instant of the world's grid; all stops that are the bench's own lie on it.
+    pub next_ns: u64,
+    /// The world and the converters' inputs.
+    pub front_end: Shared,
+    /// The run's digest.
+    pub trace: Trace,
+    /// From frame to duty.
+    pub latency: Latency,
+    /// When the bridge went on and off.
+    pub bridge_edges: Vec<BridgeEdge>,
+    /// The image's log.
+    pub log: Log,
+    /// What the image has sent and nobody took yet.
+    pub received: Vec<TimedByte>,
+    /// The core is held until the next reset.
+    pub core_held: bool,
+    world_ns: u64,
+    bridge: Bridge,
+    encoder: i32,
+    resets: usize,
+}
+
+impl Bench {
+    /// At time 0.
+    ///
+    /// # Errors
+    /// The image's log cannot be decoded.
+    pub fn new(front_end: Shared, image: &Firmware) -> Result<Self, Error> {
+        Ok(Self {
+            next_ns: STEP_NS,
+            front_end,
+            trace: Trace::default(),
+            latency: Latency::default(),
+            bridge_edges: Vec::new(),
+            log: Log::new(image)?,
+            received: Vec::new(),
+            core_held: false,
+            world_ns: 0,
+            bridge: Bridge::Coast,
+            encoder: 0,
+            resets: 0,
+        })
+    }
+
+    /// The core touched a register.
+    pub fn accessed(&mut self, board: &mut FingerBoard, access: &Access) {
+        if access.kind != AccessKind::Write {
+            return;
+        }
+        let at_ns = access.virtual_time.0;
+        if let Some(offset) = access.address.checked_sub(TIM1.base).filter(|offset| *offset < 0x400) {
+            self.trace.add(at_ns, Record::Pwm(offset as u16, access.value as u32));
+            if DUTY_REGISTERS.contains(&offset) {
+                let frame_end_ns = self.front_end.lock().counts.frame_end_ns;
+                self.latency.duty_written(at_ns, frame_end_ns);
+            }
+            self.watch_bridge(board, at_ns);
+        } else if access.address.wrapping_sub(GPIOC.base) < 0x400 {
+            self.watch_bridge(board, at_ns);
+        }
+    }
+
+    /// Brings the world to an instant under the bridge as it was, then looks at the bridge anew.
+    pub fn watch_bridge(&mut self, board: &mut FingerBoard, at_ns: u64) {
+        let bridge = board.bridge();
+        if bridge == self.bridge {
+            return;
+        }
+        self.advance_world(at_ns);
+        let on = |bridge| matches!(bridge, Bridge::Driven { .. });
+        if on(bridge) != on(self.bridge) {
+            self.bridge_edges.push(BridgeEdge { at_ns, on: on(bridge) });
+            self.trace.add(at_ns, Record::Bridge(on(bridge)));
+        }
+        self.bridge = bridge;
+    }
+
+    fn advance_world(&mut self, to_ns: u64) {
+        if to_ns > self.world_ns {
+            self.front_end.lock().world.advance((to_ns - self.world_ns) as f64 * 1e-9, self.bridge);
+            self.world_ns = to_ns;
+        }
+    }
+
+    /// An instant of the grid was reached.
+    pub fn step(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) {
+        let now_ns = self.next_ns;
+        let board = session.board_mut();
+        self.watch_bridge(board, now_ns);
+        self.advance_world(now_ns);
+        let counts = self.front_end.lock().world.encoder_counts();
+        if counts != self.encoder {
+            board.part.turn_encoder(stop.at, counts.wrapping_sub(self.encoder));
+            self.encoder = counts;
+        }
+        for byte in board.wire().take_received() {
+            self.trace.add(byte.at_ns, Record::Sent(byte.byte));
+            self.received.push(byte);
+        }
+        if session.resets().len() != self.resets {
+            self.resets = session.resets().len();
+            self.log.restart();
+            if std::mem::take(&mut self.core_held) {
+                host.hold(false);
+            }
+        }
+        if now_ns.is_multiple_of(LOG_NS) {
+            self.log.drain(now_ns, host);
+        }
+    }
+
+    /// The instant of the grid to stop at next.
+    pub fn next(&mut self) -> VirtualNanos {
+        self.next_ns += STEP_NS;
+        VirtualNanos(self.next_ns)
+    }
+}
+
+impl Store for Bench {
+    fn store(&self, to: &mut Writer) -> Result<(), snapshot::Error> {
+        let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, .. } = self;
+        let Self { world_ns, bridge, encoder, resets, .. } = self;
+        to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held))?;
+        to.put(&(world_ns, bridge, encoder, resets))?;
+        to.put(&*front_end.lock())
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), snapshot::Error> {
+        let log: (Vec<u8>, Vec<LogLine>);
+        (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held) =
+            from.take()?;
+        self.log.set_state(log.0, log.1);
+        (self.world_ns, self.bridge, self.encoder, self.resets) = from.take()?;
+        *self.front_end.lock() = from.take::<FrontEnd>()?;
+        Ok(())
+    }
+}

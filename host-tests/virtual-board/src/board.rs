@@ -1,0 +1,126 @@
+//! The board: the microcontroller, its clock, its supply and what its pins lead to.
+
+use crate::front_end::Shared;
+use crate::part::Part;
+use crate::wire::Wire;
+use host_tests::plant::Bridge;
+use rigless::device::Level;
+use rigless::emulator::CoreSpec;
+use rigless::machine::armv7m::{Core, Fpu, MpuRegions, Variant};
+use rigless::machine::{Board, Target};
+use rigless::mcu::{Mcu, Operate};
+use rigless::snapshot::store;
+use rigless::soc::Error;
+use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
+use rigless::soc::stm32f427::peripherals::tim::Channel;
+use std::num::{NonZeroU32, NonZeroU64};
+
+/// The clock that the ST-LINK feeds to PH0.
+const HSE_HZ: u64 = 8_000_000;
+/// The microcontroller's supply.
+const VDD_MV: u32 = 3_300;
+/// The core's clock.
+const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
+/// Its SysTick runs at an eighth.
+const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("a divider divides");
+/// USART2 in the part's list.
+pub const BUS_PORT: usize = 1;
+const TIM1: usize = 0;
+const PORT_A: usize = 0;
+const PORT_C: usize = 2;
+/// TIM1's alternate function on PA8 and PA9.
+const TIM1_FUNCTION: u8 = 1;
+
+/// The microcontroller on its board.
+#[derive(Debug)]
+pub struct FingerBoard {
+    /// The microcontroller.
+    pub part: Part,
+    instructions_per_second: NonZeroU64,
+}
+
+store!(FingerBoard { values: [], parts: [part], built: [instructions_per_second] });
+
+impl FingerBoard {
+    /// Powered, with nothing run. The core retires a flat number of instructions a second.
+    ///
+    /// # Errors
+    /// The part's description does not fit this crate: another release of `rigless`.
+    pub fn new(front_end: Shared, instructions_per_second: NonZeroU64) -> Result<Self, Error> {
+        let mut part = Part::new(front_end)?;
+        part.chip.rcc.attach_crystals(HSE_HZ, 0);
+        part.chip.set_supply(VDD_MV);
+        part.chip.usart[BUS_PORT].attach(Wire::default());
+        Ok(Self { part, instructions_per_second })
+    }
+
+    /// The host's end of the bus.
+    pub fn wire(&mut self) -> &mut Wire {
+        self.part.chip.usart[BUS_PORT].chip_mut().expect("the wire was attached when the board was made")
+    }
+
+    /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it coasts.
+    pub fn bridge(&mut self) -> Bridge {
+        if level(&mut self.part, PORT_C, 9) == Level::Low {
+            return Bridge::Coast;
+        }
+        let (in1, in2) = (self.high_share(1, 8), self.high_share(2, 9));
+        if in1 == 0.0 && in2 == 0.0 { Bridge::Coast } else { Bridge::Driven { duty: in1 - in2 } }
+    }
+
+    /// The share of the time that a bridge input is high; low when its pin is not the timer's (pulled down outside).
+    fn high_share(&mut self, channel: u8, pin: u8) -> f64 {
+        let pin = Pin::new(pin).expect("ports have 16 pins");
+        let (_, registers) = self.part.chip.port(PORT_A);
+        if Gpio::function(pin, registers) != Some(TIM1_FUNCTION) {
+            return 0.0;
+        }
+        let channel = Channel::new(channel).expect("timers have channels 1 and 2");
+        let (timer, registers) = self.part.chip.advanced_timer(TIM1);
+        match timer.pulse(channel, registers) {
+            Some(pulse) => pulse.width.0 as f64 / pulse.period.0 as f64,
+            None if timer.output(channel, registers) == Some(Level::High) => 1.0,
+            None => 0.0,
+        }
+    }
+}
+
+fn level(part: &mut Part, port: usize, pin: u8) -> Level {
+    let (port, registers) = part.chip.port(port);
+    port.level(Pin::new(pin).expect("ports have 16 pins"), registers)
+}
+
+impl Board for FingerBoard {
+    fn name(&self) -> &'static str {
+        "fingertip"
+    }
+
+    fn target_names(&self) -> Vec<&'static str> {
+        vec!["stm32"]
+    }
+
+    fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        (target == 0).then_some(&mut self.part)
+    }
+
+    fn targets(&mut self) -> Vec<Target<'_>> {
+        let core = self.core();
+        vec![Target::new("stm32", &mut self.part, core)]
+    }
+}
+
+impl FingerBoard {
+    fn core(&self) -> CoreSpec {
+        let lines = u32::from(self.part.cpu().interrupt_lines);
+        Core {
+            variant: Variant::M4,
+            clock_hz: CORE_HZ,
+            interrupt_lines: NonZeroU32::new(lines).expect("the part has interrupts"),
+            priority_bits: 4,
+            refclk_divider: REFCLK_DIVIDER,
+            instructions_per_second: self.instructions_per_second,
+            boot: "flash",
+        }
+        .spec_with_parts(&rigless::cpu::armv7m::windows(self.part.bus()), Fpu::FpV4Sp, MpuRegions::Eight)
+    }
+}

@@ -1,0 +1,297 @@
+//! The converters with what the crate's own lack: the external trigger, two of them at once, and the array at their
+//! inputs.
+//!
+//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, the
+//! words wait in order, and the DMA request stands until all are fetched. Nothing that the image can see depends on the
+//! words in between, and 110 conversions a frame cost 22 events. Not modelled: injected group, continuous and
+//! discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
+
+use crate::front_end::Shared;
+use crate::scan_timer::COMPARE_1;
+use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
+use rigless::snapshot::store;
+use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sqr1, sqr2, sqr3, sr};
+use rigless::soc::stm32f427::generated::ADC2;
+use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
+use rigless::soc::{FieldSpec, Layout, Width};
+use rigless::time::{EventId, VirtualNanos};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// `SMPx`, RM0090 13.13.4, in converter cycles.
+const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
+/// Cycles of a 12-bit conversion after sampling, 13.7.
+const CONVERSION_CYCLES: u64 = 12;
+/// `EXTSEL` of TIM8_CC1, 13.13.3.
+const TIM8_CC1: u64 = 13;
+/// The interrupt line of the converters, table 70.
+const GLOBAL: usize = 0;
+/// The row drives' port, and how many of its pins are rows.
+const ROW_PORT: (&str, usize) = ("GPIOB", 10);
+
+const SEQUENCE: [(Register, &FieldSpec); 16] = [
+    (Register::Sqr3, sqr3::SQ1),
+    (Register::Sqr3, sqr3::SQ2),
+    (Register::Sqr3, sqr3::SQ3),
+    (Register::Sqr3, sqr3::SQ4),
+    (Register::Sqr3, sqr3::SQ5),
+    (Register::Sqr3, sqr3::SQ6),
+    (Register::Sqr2, sqr2::SQ7),
+    (Register::Sqr2, sqr2::SQ8),
+    (Register::Sqr2, sqr2::SQ9),
+    (Register::Sqr2, sqr2::SQ10),
+    (Register::Sqr2, sqr2::SQ11),
+    (Register::Sqr2, sqr2::SQ12),
+    (Register::Sqr1, sqr1::SQ13),
+    (Register::Sqr1, sqr1::SQ14),
+    (Register::Sqr1, sqr1::SQ15),
+    (Register::Sqr1, sqr1::SQ16),
+];
+
+/// Conversions under way, all of them over at the event.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+struct Running {
+    event: EventId,
+    begun_ns: u64,
+    ranks: usize,
+}
+
+/// ADC1, ADC2 or ADC3.
+#[derive(Debug)]
+pub struct Converter {
+    nth: usize,
+    front_end: Shared,
+    clock_hz: u64,
+    status: u64,
+    running: Option<Running>,
+    rank: usize,
+    waiting: VecDeque<u16>,
+    request: Level,
+    interrupt: Level,
+}
+
+store!(Converter {
+    values: [clock_hz, status, running, rank, waiting, request, interrupt],
+    parts: [],
+    built: [nth, front_end],
+});
+
+impl Converter {
+    /// Out of reset, its inputs on a front end.
+    pub fn new(nth: usize, front_end: Shared, clock_hz: u64) -> Self {
+        Self {
+            nth,
+            front_end,
+            clock_hz,
+            status: 0,
+            running: None,
+            rank: 0,
+            waiting: VecDeque::new(),
+            request: Level::Low,
+            interrupt: Level::Low,
+        }
+    }
+
+    fn length(registers: &RegisterFile) -> usize {
+        if cr1::SCAN.is_set(registers.get(Register::Cr1)) {
+            sqr1::L.get(registers.get(Register::Sqr1)) as usize + 1
+        } else {
+            1
+        }
+    }
+
+    fn input(registers: &RegisterFile, rank: usize) -> usize {
+        let (register, field) = SEQUENCE[rank % SEQUENCE.len()];
+        field.get(registers.get(register)) as usize
+    }
+
+    fn sampling_cycles(registers: &RegisterFile, input: usize) -> u64 {
+        let (register, place) = if input < 10 { (Register::Smpr2, input) } else { (Register::Smpr1, input - 10) };
+        SAMPLING_CYCLES[(registers.get(register) >> (3 * place) & 0b111) as usize]
+    }
+
+    fn after(&self, begun_ns: u64, cycles: u64) -> u64 {
+        begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
+    }
+
+    fn begin(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+        let control = registers.get(Register::Cr2);
+        if !cr2::ADON.is_set(control) || self.running.is_some() || sr::OVR.is_set(self.status) || self.clock_hz == 0 {
+            return;
+        }
+        let by_dma = cr2::DMA.is_set(control);
+        if !self.waiting.is_empty() && by_dma {
+            self.status = sr::OVR.set(self.status, 1);
+            return;
+        }
+        let length = Self::length(registers);
+        if self.rank >= length {
+            self.rank = 0;
+        }
+        let ranks = if by_dma { length - self.rank } else { 1 };
+        let cycles: u64 = (self.rank..self.rank + ranks)
+            .map(|rank| Self::sampling_cycles(registers, Self::input(registers, rank)) + CONVERSION_CYCLES)
+            .sum();
+        let begun_ns = context.now().0;
+        let event = context.schedule(VirtualNanos(self.after(begun_ns, cycles)));
+        self.status = sr::STRT.set(self.status, 1);
+        self.running = Some(Running { event, begun_ns, ranks });
+    }
+
+    fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let (mut cycles, mut samples) = (0, Vec::with_capacity(running.ranks));
+        for rank in self.rank..self.rank + running.ranks {
+            let input = Self::input(registers, rank);
+            cycles += Self::sampling_cycles(registers, input);
+            samples.push((input, self.after(running.begun_ns, cycles)));
+            cycles += CONVERSION_CYCLES;
+        }
+        let mut words = Vec::with_capacity(samples.len());
+        let mut front_end = self.front_end.lock();
+        front_end.convert(self.nth, &samples, &mut words);
+        self.rank += running.ranks;
+        let complete = self.rank >= Self::length(registers);
+        if complete && self.nth == 1 {
+            front_end.sequence_done(context.now().0);
+        }
+        drop(front_end);
+        let control = registers.get(Register::Cr2);
+        if !cr2::DMA.is_set(control) {
+            self.waiting.clear();
+        }
+        self.waiting.extend(words);
+        self.show_front(registers);
+        if complete || cr2::EOCS.is_set(control) {
+            self.status = sr::EOC.set(self.status, 1);
+        }
+        if !complete {
+            self.begin(registers, context);
+        }
+    }
+
+    fn show_front(&self, registers: &mut RegisterFile) {
+        if let Some(word) = self.waiting.front() {
+            registers.set(Register::Dr, u64::from(*word));
+        }
+    }
+
+    fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        registers.set(Register::Sr, self.status);
+        let by_dma = cr2::DMA.is_set(registers.get(Register::Cr2)) && !sr::OVR.is_set(self.status);
+        let request = Level::from(by_dma && !self.waiting.is_empty());
+        if request != self.request {
+            self.request = request;
+            context.request(DMA_REQUEST, request);
+        }
+        let enables = registers.get(Register::Cr1);
+        let interrupt = Level::from(
+            cr1::EOCIE.is_set(enables) && sr::EOC.is_set(self.status)
+                || cr1::OVRIE.is_set(enables) && sr::OVR.is_set(self.status),
+        );
+        if interrupt != self.interrupt {
+            self.interrupt = interrupt;
+            context.interrupt(GLOBAL, interrupt);
+        }
+    }
+
+    fn triggered(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let control = registers.get(Register::Cr2);
+        if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
+            self.begin(registers, context);
+            self.refresh(registers, context);
+        }
+    }
+
+    fn write_cr2(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let value = registers.get(Register::Cr2);
+        if cr2::CONT.is_set(value) || cr2::JSWSTART.is_set(value) || cr2::ALIGN.is_set(value) {
+            context.tell("CR2", "continuous mode, injected group and left alignment are not modelled");
+        }
+        if cr2::EXTEN.get(value) > 1 || cr2::EXTEN.get(value) == 1 && cr2::EXTSEL.get(value) != TIM8_CC1 {
+            context.tell("CR2", "of the external triggers only the rising edge of TIM8_CC1 is modelled");
+        }
+        registers.set(Register::Cr2, cr2::SWSTART.set(value, 0));
+        if !cr2::ADON.is_set(value) {
+            (self.running, self.rank) = (None, 0);
+            self.waiting.clear();
+        } else if cr2::SWSTART.is_set(value) {
+            self.begin(registers, context);
+        }
+    }
+}
+
+impl Device for Converter {
+    type Register = Register;
+
+    fn on_clock(&mut self, hz: u64, _registers: &mut RegisterFile, _context: &mut DeviceContext<'_>) {
+        self.clock_hz = hz;
+    }
+
+    /// The part's description sends requests to the first converter only, so this one hands the trigger on: as a write
+    /// to the second's data register, which is read-only and means nothing else there.
+    fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
+            self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
+        } else if change.instance == "TIM8" && change.request == COMPARE_1 {
+            let mut front_end = self.front_end.lock();
+            if front_end.trigger_cut {
+                return;
+            }
+            front_end.counts.triggers += 1;
+            drop(front_end);
+            self.triggered(registers, context);
+            if self.nth == 0 {
+                context.write_to(ADC2.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
+            }
+        }
+    }
+
+    fn read(
+        &mut self,
+        register: Register,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        if register != Register::Dr {
+            return None;
+        }
+        let value = registers.get(Register::Dr);
+        self.status = sr::EOC.set(self.status, 0);
+        self.waiting.pop_front();
+        self.show_front(registers);
+        self.refresh(registers, context);
+        Some(value)
+    }
+
+    fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        match register {
+            Register::Sr => self.status &= value,
+            Register::Cr2 => self.write_cr2(registers, context),
+            Register::Dr => return self.triggered(registers, context),
+            Register::Cr1 => {
+                let control = registers.get(Register::Cr1);
+                if cr1::RES.get(control) != 0 || cr1::DISCEN.is_set(control) || cr1::AWDEN.is_set(control) {
+                    context.tell("CR1", "resolutions but 12 bits, discontinuous mode and watchdog are not modelled");
+                }
+            }
+            _ => {}
+        }
+        self.refresh(registers, context);
+    }
+
+    fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if let Some(running) = self.running.take_if(|running| running.event == event) {
+            self.finish(running, registers, context);
+            self.refresh(registers, context);
+        }
+    }
+
+    fn reset(&mut self) {
+        *self = Self::new(self.nth, self.front_end.clone(), self.clock_hz);
+    }
+
+    fn reset_line(&mut self, _registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        context.lower_requests(&[self.request]);
+        self.reset();
+    }
+}

@@ -1,0 +1,55 @@
+//! What can go wrong around a run.
+
+use std::path::PathBuf;
+
+/// A run could not start or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The image could not be read.
+    #[error("cannot read the image {}: {source}; build it first (cargo xtask build)", path.display())]
+    ReadImage {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is not an image for the board.
+    #[error("{} is not an image for the board: {why}", path.display())]
+    NotAnImage {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: String,
+    },
+    /// The emulated part does not fit this crate.
+    #[error("the emulated part cannot be put together: {0}")]
+    Part(#[from] rigless::soc::Error),
+    /// The emulator stopped.
+    #[error("the emulator stopped at {at_ns} ns: {why}")]
+    Emulator {
+        /// The last instant that the run is known to have reached.
+        at_ns: u64,
+        /// What it said.
+        why: String,
+    },
+    /// A snapshot could not be taken or read.
+    #[error("snapshot: {0}")]
+    Snapshot(#[from] rigless::snapshot::Error),
+    /// A snapshot could not be written.
+    #[error("cannot write the snapshot {}: {source}", path.display())]
+    WriteSnapshot {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A fault could not be injected.
+    #[error("cannot inject the fault: {0}")]
+    Fault(String),
+    /// The client's pseudo-terminal failed.
+    #[error("the bus client's pseudo-terminal: {0}")]
+    Client(#[from] std::io::Error),
+    /// The run touched what the emulator lacks and the allow-list does not name.
+    #[error("emulator gaps that are not on the allow-list:\n{0}")]
+    Gaps(String),
+}

@@ -1,0 +1,126 @@
+//! The converters' inputs: rows in, column voltages out.
+
+use host_tests::plant::{World, readout::decay};
+use serde::{Deserialize, Serialize};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Rows of the array, as a port's lowest bits.
+const ROWS: usize = 10;
+/// Converter inputs of columns 0 to 4, by converter.
+const COLUMN_INPUTS: [[usize; 5]; 2] = [[1, 4, 6, 7, 15], [10, 11, 12, 13, 14]];
+/// The third converter's input behind the supply's divider.
+const SUPPLY_INPUT: usize = 0;
+/// The supply's divider.
+const SUPPLY_RATIO: f64 = 11.0;
+/// Codes of the converter.
+const CODES: f64 = 4096.0;
+
+/// The rows' drive since an instant, and what the columns settle to under it.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Drive {
+    rows: u16,
+    since_ns: u64,
+}
+
+/// What the converters have done.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ScanCounts {
+    /// Words converted by the two scanning converters.
+    pub conversions: u64,
+    /// Scans of the array whose last slot was converted.
+    pub frames: u64,
+    /// When the last of these ended.
+    pub frame_end_ns: u64,
+    /// Triggers that reached the converters.
+    pub triggers: u64,
+}
+
+/// The board's analogue side, with the world behind it. Converters and stepping share it.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct FrontEnd {
+    /// What the fingertip touches and what moves it.
+    pub world: World,
+    /// The trigger line between timer and converters is cut.
+    pub trigger_cut: bool,
+    /// What the converters have done.
+    pub counts: ScanCounts,
+    /// Newest first: a sample just before an edge still sees what was before it.
+    drives: [Drive; 3],
+}
+
+/// The front end as the board and the stepping hold it.
+#[derive(Clone, Debug)]
+pub struct Shared(Arc<Mutex<FrontEnd>>);
+
+impl Shared {
+    /// A front end with no row driven.
+    pub fn new(world: World) -> Self {
+        let (trigger_cut, counts, drives) = (false, ScanCounts::default(), [Drive::default(); 3]);
+        Self(Arc::new(Mutex::new(FrontEnd { world, trigger_cut, counts, drives })))
+    }
+
+    /// The front end; everything runs on one thread at a time, so nobody waits.
+    pub fn lock(&self) -> MutexGuard<'_, FrontEnd> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl FrontEnd {
+    /// A row's pin changed.
+    pub fn drive_row(&mut self, row: usize, high: bool, at_ns: u64) {
+        let bit = 1 << row;
+        let rows = if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit };
+        if self.drives[0].since_ns != at_ns {
+            self.drives.rotate_right(1);
+        }
+        self.drives[0] = Drive { rows, since_ns: at_ns };
+    }
+
+    /// The part was reset: its pins let go of the rows.
+    pub fn release_rows(&mut self, at_ns: u64) {
+        for row in 0..ROWS {
+            self.drive_row(row, false, at_ns);
+        }
+    }
+
+    /// The words that a converter makes of its inputs sampled at these instants.
+    pub fn convert(&mut self, converter: usize, samples: &[(usize, u64)], words: &mut Vec<u16>) {
+        if converter < COLUMN_INPUTS.len() {
+            self.counts.conversions += samples.len() as u64;
+        }
+        let reference_v = self.world.setup().array.reference_v;
+        let mut settled: Option<(usize, [f64; 10], [f64; 10])> = None;
+        for &(input, at_ns) in samples {
+            let volts = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
+                Some(Some(place)) => {
+                    let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
+                    let (drive, before) = (self.drives[newest], self.drives[(newest + 1).min(2)]);
+                    let (_, end, start) = *match settled {
+                        Some(ref known) if known.0 == newest => known,
+                        _ => settled.insert((newest, self.settled(drive.rows), self.settled(before.rows))),
+                    };
+                    let column = converter * COLUMN_INPUTS[0].len() + place;
+                    let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
+                    let left = decay(since_s / self.world.setup().array.settle_tau_s);
+                    end[column] + left * (start[column] - end[column])
+                }
+                None if input == SUPPLY_INPUT => self.world.supply_v() / SUPPLY_RATIO,
+                _ => 0.0,
+            };
+            words.push((volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16);
+        }
+    }
+
+    /// A scanning converter's sequence is complete: with no row driven after one was, so is the frame.
+    pub fn sequence_done(&mut self, at_ns: u64) {
+        if self.drives[0].rows == 0 && self.drives[1].rows != 0 {
+            self.counts.frames += 1;
+            self.counts.frame_end_ns = at_ns;
+        }
+    }
+
+    fn settled(&mut self, rows: u16) -> [f64; 10] {
+        let driven: [bool; ROWS] = std::array::from_fn(|row| rows >> row & 1 == 1);
+        self.world.settled_volts(&driven)
+    }
+}

@@ -1,0 +1,177 @@
+//! The STM32F427 of `rigless` with what the image needs beyond it.
+//!
+//! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
+//! - The converters take external triggers and read the fingertip's array.
+
+use crate::board::BUS_PORT;
+use crate::converter::Converter;
+use crate::front_end::Shared;
+use crate::scan_timer::ScanTimer;
+use rigless::device::{Device, ErasedDevice, Level, ResetCause};
+use rigless::mcu::Mcu;
+use rigless::snapshot::store;
+use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::peripherals::dma::{Dma, Wire};
+use rigless::soc::stm32f427::peripherals::gpio::Pin;
+use rigless::soc::stm32f427::peripherals::tim::{Channel, UPDATE_REQUEST};
+use rigless::soc::stm32f427::peripherals::{CONTROLLERS, CONVERTERS};
+use rigless::soc::{Bus, Error};
+use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+
+/// What the buses run at out of reset: the internal oscillator.
+const RESET_HZ: u64 = 16_000_000;
+/// DMA2 in the part's list of controllers.
+const DMA2: usize = 1;
+/// TIM3 in the part's list of timers, and TIM1 in that of the advanced ones.
+const TIM3: usize = 1;
+const TIM1: usize = 0;
+
+/// The part's own requests and TIM8's.
+static DMA2_REQUESTS: LazyLock<Vec<Wire>> = LazyLock::new(|| {
+    let mut wires = CONTROLLERS[DMA2].wiring.to_vec();
+    wires.push(Wire { instance: "TIM8", request: UPDATE_REQUEST, channel: 7, streams: &[1] });
+    wires
+});
+
+/// The levels that the board holds on pins, through every reset of the part.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Inputs {
+    /// Where the encoder stands in its cycle of four.
+    pub quarter: u8,
+    /// nFAULT of the bridge.
+    pub bridge_well: bool,
+}
+
+/// The microcontroller.
+#[derive(Debug)]
+pub struct Part {
+    /// All that the crate's part has; its own converters and TIM8 are not used.
+    pub chip: Stm32f427,
+    converters: [Converter; 3],
+    scan_timer: ScanTimer,
+    inputs: Inputs,
+    front_end: Shared,
+    converter_slots: [usize; 3],
+    scan_timer_slot: usize,
+}
+
+store!(Part {
+    values: [inputs],
+    parts: [chip, converters, scan_timer],
+    built: [front_end, converter_slots, scan_timer_slot],
+});
+
+impl Part {
+    /// Out of power-on, the converters on a front end.
+    ///
+    /// # Errors
+    /// The part's description lacks an instance: another release of the crate.
+    pub fn new(front_end: Shared) -> Result<Self, Error> {
+        let mut chip = Stm32f427::new()?;
+        let mut converter_slots = [0; 3];
+        for (slot, name) in converter_slots.iter_mut().zip(CONVERTERS) {
+            *slot = chip.bus().slot(name)?;
+        }
+        let scan_timer_slot = chip.bus().slot("TIM8")?;
+        chip.dma[DMA2] = Self::dma2();
+        let mut part = Self {
+            chip,
+            converters: Self::converters(&front_end),
+            scan_timer: ScanTimer::new(RESET_HZ),
+            inputs: Inputs { quarter: 0, bridge_well: true },
+            front_end,
+            converter_slots,
+            scan_timer_slot,
+        };
+        part.drive_inputs(VirtualNanos(0));
+        Ok(part)
+    }
+
+    fn dma2() -> Dma {
+        Dma::new(&DMA2_REQUESTS, CONTROLLERS[DMA2].last_data, CONTROLLERS[DMA2].reaches_memory)
+    }
+
+    fn converters(front_end: &Shared) -> [Converter; 3] {
+        std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
+    }
+
+    /// Moves the encoder by quarter cycles, positive forward.
+    pub fn turn_encoder(&mut self, at: VirtualNanos, quarters: i32) {
+        for _ in 0..quarters.unsigned_abs() {
+            let step = if quarters > 0 { 1 } else { 3 };
+            self.inputs.quarter = (self.inputs.quarter + step) % 4;
+            self.drive_encoder(at);
+        }
+    }
+
+    /// Sets the bridge's nFAULT: the pin and the timer's break behind it.
+    pub fn set_bridge_well(&mut self, at: VirtualNanos, well: bool) {
+        self.inputs.bridge_well = well;
+        let level = Level::from(well);
+        self.hold_pin(at, 1, 12, level);
+        self.chip.drive_advanced_timer(at, TIM1, |timer, registers, context| {
+            timer.drive_break(level, registers, context);
+        });
+    }
+
+    fn drive_encoder(&mut self, at: VirtualNanos) {
+        let (a, b) = [(false, false), (true, false), (true, true), (false, true)][usize::from(self.inputs.quarter)];
+        self.chip.drive_timer(at, TIM3, |timer, registers, context| {
+            for (number, level) in [(1, a), (2, b)] {
+                let channel = Channel::new(number).expect("timers have channels 1 and 2");
+                timer.drive_input(channel, Level::from(level), registers, context);
+            }
+        });
+    }
+
+    fn drive_inputs(&mut self, at: VirtualNanos) {
+        self.set_bridge_well(at, self.inputs.bridge_well);
+        self.drive_encoder(at);
+        // nSLEEP is pulled down outside; the bus idles high.
+        self.hold_pin(at, 2, 9, Level::Low);
+        self.hold_pin(at, 0, 3, Level::High);
+    }
+
+    fn hold_pin(&mut self, at: VirtualNanos, port: usize, pin: u8, level: Level) {
+        self.chip.drive_port(at, port, |port, registers, context| {
+            port.drive(Pin::new(pin).expect("ports have 16 pins"), Some(level), registers, context);
+        });
+    }
+}
+
+impl Mcu for Part {
+    fn bus(&self) -> &Bus {
+        self.chip.bus()
+    }
+
+    fn bus_mut(&mut self) -> &mut Bus {
+        self.chip.bus_mut()
+    }
+
+    fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
+        self.chip.reset(at, cause);
+        self.chip.dma[DMA2] = Self::dma2();
+        self.converters = Self::converters(&self.front_end);
+        self.scan_timer = ScanTimer::new(RESET_HZ);
+        self.front_end.lock().release_rows(at.0);
+        self.drive_inputs(at);
+    }
+
+    fn poll(&mut self, now: VirtualNanos) {
+        // Of all models only the bus has something outside, and stops come often.
+        self.chip.drive_serial_port(now, BUS_PORT, |port, registers, context| port.poll(registers, context));
+    }
+
+    fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
+        let own: &mut dyn ErasedDevice = if slot == self.scan_timer_slot {
+            &mut self.scan_timer
+        } else if let Some(nth) = self.converter_slots.iter().position(|own| *own == slot) {
+            &mut self.converters[nth]
+        } else {
+            return self.chip.split(slot);
+        };
+        (self.chip.bus_mut(), Some(own))
+    }
+}

@@ -1,0 +1,235 @@
+//! The rig: an image on the board, run piece by piece from outside.
+//!
+//! The emulator owns its loop, so it runs on a thread of its own and hands over at instants of the world's grid. What is
+//! asked of it there happens between two instructions; nothing runs while nobody asks. The same calls give the same run.
+
+use crate::bench::{Bench, STEP_NS};
+use crate::board::FingerBoard;
+use crate::error::Error;
+use crate::front_end::{Shared, ScanCounts};
+use crate::image::Firmware;
+use crate::stand::{Hall, Stand};
+use host_tests::plant::World;
+use rigless::emulator::{self, Start};
+use rigless::image::Image;
+use rigless::session::Session;
+use rigless::snapshot::Snapshot;
+use rigless::time::VirtualNanos;
+use std::num::NonZeroU64;
+use std::path::Path;
+use std::sync::mpsc;
+use std::thread::JoinHandle;
+
+/// What a run may be told beforehand.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Instructions that the core retires in a second, flat: 125 million is a CPI of 1.34 at 168 MHz, what the
+    /// cycle estimate of the control step comes to.
+    pub instructions_per_second: NonZeroU64,
+    /// Bytes that stand in memory beside the image, at their addresses: a parameter sector for example.
+    pub presets: Vec<(u64, Vec<u8>)>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
+            presets: Vec::new(),
+        }
+    }
+}
+
+type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
+
+/// What the rig asks of the emulator's thread.
+pub(crate) enum Order {
+    /// Run to an instant of the grid.
+    Run(u64),
+    /// Do this where the run stands.
+    Do(Job),
+}
+
+/// A run.
+#[derive(Debug)]
+pub struct Rig {
+    image: Firmware,
+    orders: Option<mpsc::Sender<Order>>,
+    reached: mpsc::Receiver<u64>,
+    thread: Option<JoinHandle<Result<(), Error>>>,
+    now_ns: u64,
+}
+
+impl Rig {
+    /// A board with an image and a world, a step after power-on.
+    ///
+    /// # Errors
+    /// The image cannot be read or placed.
+    pub fn new(image: &Path, world: World, options: &Options) -> Result<Self, Error> {
+        Self::start(image, world, options, None)
+    }
+
+    /// The board as a snapshot kept it: the same image and options, at the instant at which it was taken.
+    ///
+    /// # Errors
+    /// As [`Rig::new`], or the snapshot is of something else.
+    pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
+        let world = World::new(&host_tests::plant::Setup::default());
+        Self::start(image, world, options, Some(Snapshot::read(snapshot)?))
+    }
+
+    fn start(path: &Path, world: World, options: &Options, kept: Option<Snapshot>) -> Result<Self, Error> {
+        let image = Firmware::read(path)?;
+        let images = images(&image, options)?;
+        let front_end = Shared::new(world);
+        let board = FingerBoard::new(front_end.clone(), options.instructions_per_second)?;
+        let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
+        let mut bench = Bench::new(front_end, &image)?;
+        let (orders, ordered) = mpsc::channel();
+        let (reaching, reached) = mpsc::channel();
+        let resume =
+            kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
+        let hall = Hall::new(bench, ordered, reaching, digest(&images));
+        let thread = std::thread::Builder::new().name("board".into()).spawn(move || {
+            let mut start = Start::new(&images);
+            start.resume = resume.as_ref();
+            emulator::run(session, &start, hall).map(drop).map_err(failure(0))
+        })?;
+        let mut rig = Self { image, orders: Some(orders), reached, thread: Some(thread), now_ns: 0 };
+        rig.await_reached()?;
+        Ok(rig)
+    }
+
+    /// The image.
+    pub fn image(&self) -> &Firmware {
+        &self.image
+    }
+
+    /// Where the run stands, virtual ns since power-on.
+    pub fn now_ns(&self) -> u64 {
+        self.now_ns
+    }
+
+    /// Runs to an instant, rounded up to the world's grid; an instant already past is where the run stands.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn run_until_ns(&mut self, until_ns: u64) -> Result<(), Error> {
+        if until_ns <= self.now_ns {
+            return Ok(());
+        }
+        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))?;
+        self.await_reached()
+    }
+
+    /// Runs on for some ms.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
+        self.run_until_ns(self.now_ns + ms * 1_000_000)
+    }
+
+    /// Does something where the run stands, between two instructions.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn with<T, F>(&mut self, job: F) -> Result<T, Error>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut Stand<'_>) -> T + Send + 'static,
+    {
+        let (answer, answered) = mpsc::channel();
+        self.order(Order::Do(Box::new(move |stand| {
+            // The rig waits for the answer, so it is taken.
+            let _ = answer.send(job(stand));
+        })))?;
+        answered.recv().map_err(|_| self.broken())
+    }
+
+    /// The world, to look at or to change.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn world<T, F>(&mut self, job: F) -> Result<T, Error>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut World) -> T + Send + 'static,
+    {
+        self.with(|stand| job(&mut stand.bench.front_end.lock().world))
+    }
+
+    /// What the converters have done.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn scan_counts(&mut self) -> Result<ScanCounts, Error> {
+        self.with(|stand| stand.bench.front_end.lock().counts)
+    }
+
+    /// The digest of every duty and every byte so far.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn trace_hash(&mut self) -> Result<String, Error> {
+        self.with(|stand| stand.bench.trace.hash())
+    }
+
+    /// Writes the run's whole state to a file.
+    ///
+    /// # Errors
+    /// The state cannot be kept just now, or the file cannot be written.
+    pub fn snapshot(&mut self, path: &Path) -> Result<(), Error> {
+        let file = self.with(|stand| stand.snapshot())??;
+        std::fs::write(path, file).map_err(|source| Error::WriteSnapshot { path: path.into(), source })
+    }
+
+    fn order(&mut self, order: Order) -> Result<(), Error> {
+        let sent = self.orders.as_ref().is_some_and(|orders| orders.send(order).is_ok());
+        if sent { Ok(()) } else { Err(self.broken()) }
+    }
+
+    fn await_reached(&mut self) -> Result<(), Error> {
+        self.now_ns = self.reached.recv().map_err(|_| self.broken())?;
+        Ok(())
+    }
+
+    fn broken(&mut self) -> Error {
+        let why = match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(Err(error))) => return error,
+            Some(Ok(Ok(()))) => "the image ended the run".to_owned(),
+            Some(Err(panic)) => panic.downcast::<String>().map_or_else(|_| "it panicked".to_owned(), |text| *text),
+            None => "it had stopped before".to_owned(),
+        };
+        Error::Emulator { at_ns: self.now_ns, why }
+    }
+}
+
+impl Drop for Rig {
+    fn drop(&mut self) {
+        self.orders = None;
+        if let Some(thread) = self.thread.take() {
+            // Its failure, if any, was reported to whoever asked last.
+            let _ = thread.join();
+        }
+    }
+}
+
+fn failure(at_ns: u64) -> impl Fn(emulator::Error) -> Error {
+    move |error| Error::Emulator { at_ns, why: error.to_string() }
+}
+
+fn digest(images: &[Image]) -> [u8; 32] {
+    rigless::image::digest(images, None)
+}
+
+fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
+    let read = |path: &Path, bytes: Vec<u8>, at| {
+        Image::new(path, bytes, at)
+            .map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
+    };
+    let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
+    for (address, bytes) in &options.presets {
+        images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
+    }
+    Ok(images)
+}

@@ -1,0 +1,113 @@
+//! A timer that tells the part what the crate's own keeps to itself: its first channel's edge, and that its update
+//! request was served.
+
+use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
+use rigless::snapshot::{Error, Reader, Store, Writer};
+use rigless::soc::RegisterSpec;
+use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim, UPDATE_REQUEST};
+use rigless::time::{EventId, VirtualNanos};
+use serde::{Deserialize, Serialize};
+
+/// The request output on which the rising edge of channel 1's reference is announced: beyond the timer's own.
+pub const COMPARE_1: usize = 32;
+
+const CHANNEL_1: Channel = Channel::new(1).expect("timers have a channel 1");
+
+/// TIM8 of the part.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(bound(deserialize = "'de: 'static"))]
+pub struct ScanTimer {
+    timer: Tim<Advanced>,
+    updates_served: u64,
+    reference: Level,
+}
+
+type Register = <Advanced as Family>::Register;
+
+impl ScanTimer {
+    /// Out of reset, on a clock.
+    pub fn new(clock_hz: u64) -> Self {
+        Self { timer: Tim::with_clock(clock_hz, Counter::Narrow), updates_served: 0, reference: Level::Low }
+    }
+
+    fn announce(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let reference = self.timer.reference(CHANNEL_1);
+        if reference != self.reference {
+            self.reference = reference;
+            if reference == Level::High {
+                context.request(COMPARE_1, Level::High);
+            }
+        }
+        let updates = self.timer.dma_requests().update;
+        if updates != self.updates_served {
+            // The controller moves one item for a request and does not touch the timer, so the request ends here.
+            self.updates_served = updates;
+            self.timer.acknowledge(UPDATE_REQUEST, registers, context);
+        }
+    }
+}
+
+impl Device for ScanTimer {
+    type Register = Register;
+
+    fn layout(&self) -> &'static [RegisterSpec] {
+        Device::layout(&self.timer)
+    }
+
+    fn read(
+        &mut self,
+        register: Register,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) -> Option<u64> {
+        let value = Device::read(&mut self.timer, register, registers, context);
+        self.announce(registers, context);
+        value
+    }
+
+    fn peek(&self, register: Register, registers: &RegisterFile, now: VirtualNanos) -> Option<u64> {
+        Device::peek(&self.timer, register, registers, now)
+    }
+
+    fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        Device::write(&mut self.timer, register, value, registers, context);
+        self.announce(registers, context);
+    }
+
+    fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        Device::on_event(&mut self.timer, event, registers, context);
+        self.announce(registers, context);
+    }
+
+    fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        Device::on_request(&mut self.timer, change, registers, context);
+    }
+
+    fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        Device::on_clock(&mut self.timer, hz, registers, context);
+        self.announce(registers, context);
+    }
+
+    fn reset(&mut self) {
+        Device::reset(&mut self.timer);
+        self.reference = Level::Low;
+        self.updates_served = self.timer.dma_requests().update;
+    }
+
+    fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        Device::reset_line(&mut self.timer, registers, context);
+        self.reference = Level::Low;
+        self.updates_served = self.timer.dma_requests().update;
+    }
+}
+
+impl Store for ScanTimer {
+    fn store(&self, to: &mut Writer) -> Result<(), Error> {
+        to.put(self)
+    }
+
+    fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        *self = from.take()?;
+        Ok(())
+    }
+}

@@ -1,0 +1,97 @@
+//! Where the emulator hands over: the driver that it calls, and what stands open at a halt.
+
+use crate::bench::Bench;
+use crate::board::FingerBoard;
+use crate::error::Error;
+use crate::rig::Order;
+use rigless::emulator::{Driver, Host, Settled, Stop};
+use rigless::session::Session;
+use rigless::time::VirtualNanos;
+use std::sync::mpsc::{Receiver, Sender};
+
+/// The run at a halt, between two instructions.
+pub struct Stand<'a> {
+    /// The board, its registers and the emulator's reports.
+    pub session: &'a mut Session<FingerBoard>,
+    /// The guest's memory and interrupt lines.
+    pub host: &'a mut dyn Host,
+    /// The instant.
+    pub stop: Stop,
+    /// All around the board.
+    pub bench: &'a mut Bench,
+    firmware: &'a [u8; 32],
+}
+
+impl Stand<'_> {
+    /// The run's whole state.
+    ///
+    /// # Errors
+    /// A reset is under way at this very instant.
+    pub fn snapshot(&mut self) -> Result<Vec<u8>, Error> {
+        Ok(rigless::snapshot::take(self.session, self.host, self.stop, self.firmware, self.bench)?.file)
+    }
+}
+
+/// Drives a run by orders.
+#[derive(Debug)]
+pub(crate) struct Hall {
+    bench: Bench,
+    orders: Receiver<Order>,
+    reached: Sender<u64>,
+    firmware: [u8; 32],
+    until_ns: u64,
+    begun: bool,
+}
+
+impl Hall {
+    pub(crate) fn new(bench: Bench, orders: Receiver<Order>, reached: Sender<u64>, firmware: [u8; 32]) -> Self {
+        let until_ns = bench.next_ns;
+        Self { bench, orders, reached, firmware, until_ns, begun: false }
+    }
+
+    /// Takes orders until one says to run on; false when nobody will order any more.
+    fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
+        let Self { bench, orders, reached, firmware, until_ns, begun } = self;
+        *begun = true;
+        if reached.send(bench.next_ns).is_err() {
+            return false;
+        }
+        while let Ok(order) = orders.recv() {
+            match order {
+                Order::Run(until) => {
+                    *until_ns = until;
+                    return true;
+                }
+                Order::Do(job) => job(&mut Stand { session, host, stop, bench, firmware }),
+            }
+        }
+        false
+    }
+}
+
+impl Driver<FingerBoard> for Hall {
+    fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
+        match settled {
+            Settled::Access { access, .. } => self.bench.accessed(session.board_mut(), &access),
+            // A run from a snapshot comes back first to where it was taken, inside that halt.
+            Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {
+                let next = if self.halt(session, stop, host) { self.bench.next() } else { stop.at };
+                session.run_until(next);
+            }
+            _ => {}
+        }
+    }
+
+    fn on_stop(
+        &mut self,
+        session: &mut Session<FingerBoard>,
+        stop: Stop,
+        host: &mut dyn Host,
+    ) -> Option<VirtualNanos> {
+        self.bench.step(session, stop, host);
+        if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
+            return None;
+        }
+        Some(self.bench.next())
+    }
+}

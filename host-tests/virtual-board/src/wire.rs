@@ -1,0 +1,60 @@
+//! The far end of the bus: what the host sends at its time, what the image sent and when.
+
+use rigless::chip::Timeline;
+use rigless::chip::uart::Peer;
+use rigless::snapshot::store;
+use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// A byte and the instant at which its stop bit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TimedByte {
+    /// Virtual time.
+    pub at_ns: u64,
+    /// What it was.
+    pub byte: u8,
+}
+
+/// The host's end of USART2. The port times each byte by its baud rate, both ways.
+#[derive(Debug, Default, Serialize, Deserialize)]
+pub struct Wire {
+    outgoing: VecDeque<(u64, u8)>,
+    handed_over: u64,
+    incoming: Vec<TimedByte>,
+}
+store!(Wire);
+
+impl Wire {
+    /// Queues bytes that start no earlier than an instant; each follows the one before it.
+    pub fn send(&mut self, from_ns: u64, bytes: &[u8]) {
+        self.outgoing.extend(bytes.iter().map(|byte| (from_ns, *byte)));
+    }
+
+    /// Bytes that have not started yet.
+    pub fn pending(&self) -> usize {
+        self.outgoing.len()
+    }
+
+    /// Bytes that have gone to the port since the run began.
+    pub fn handed_over(&self) -> u64 {
+        self.handed_over
+    }
+
+    /// Takes what the image has sent since the last time.
+    pub fn take_received(&mut self) -> Vec<TimedByte> {
+        std::mem::take(&mut self.incoming)
+    }
+}
+
+impl Peer for Wire {
+    fn receive(&mut self, word: u16, context: &mut Timeline<'_, '_>) {
+        self.incoming.push(TimedByte { at_ns: context.now().0, byte: (word & 0xff) as u8 });
+    }
+
+    fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {
+        let (_, byte) = self.outgoing.pop_front_if(|(from_ns, _)| *from_ns <= now.0)?;
+        self.handed_over += 1;
+        Some(u16::from(byte))
+    }
+}

@@ -35,7 +35,7 @@ pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
 fn centre(moment: i32, sum: i32, config: &Config) -> Millimetres {
     // Both are shifted alike so that the sum keeps 16 bits and the moment, at most nine times as large, 20.
     let shift = (32 - sum.leading_zeros()).saturating_sub(16);
-    let sum = (sum >> shift).max(1);
+    let sum = (sum >> shift).clamp(1, 0xffff);
     let moment = (moment >> shift).clamp(-9 * sum, 9 * sum);
     let half_pitches = (moment << RATIO_BITS) / sum;
     let bits = (i64::from(half_pitches) * i64::from(config.half_pitch.to_bits())) >> RATIO_BITS;

@@ -12,6 +12,8 @@ extern crate std;
 
 pub mod units;
 
+pub mod root;
+
 pub mod params;
 
 pub mod config;
@@ -31,6 +33,8 @@ pub mod control;
 pub mod safety;
 
 pub mod pipeline;
+
+pub mod record;
 
 pub mod link;
 

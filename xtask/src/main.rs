@@ -1,1 +1,87 @@
-fn main() {}
+//! The project's commands. `cargo xtask --help` lists them; each does its own set-up.
+
+mod apt;
+mod console;
+mod demo;
+mod docs;
+mod flash;
+mod image;
+mod lint;
+mod paths;
+mod proof;
+mod python;
+mod qemu;
+mod size;
+mod test;
+mod toolchain;
+
+use clap::{Parser, Subcommand};
+use console::Console;
+use toolchain::Choice;
+
+/// The fingertip's commands: watch it, test it, build it, flash it.
+///
+/// What a command needs it installs itself, saying what and why; once set up, everything works offline.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", version, arg_required_else_help = true)]
+struct Cli {
+    /// Where the firmware's compiler comes from: rustup's target, Debian's packages, or whichever works
+    #[arg(long, global = true, value_enum, default_value_t = Choice::Auto, env = "FINGERTIP_TOOLCHAIN")]
+    toolchain: Choice,
+
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Watch the flash image touch an object, hold the force and let go, on the virtual board
+    Demo(demo::Args),
+    /// Run every test: core, host, panic-free proof, QEMU, virtual board
+    Test(test::Args),
+    /// Build the flash image and print its path, size and SHA-256
+    Build,
+    /// Build the flash image and write it to a board with probe-rs
+    Flash(flash::Args),
+    /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
+    Qemu(qemu::Args),
+    /// Measure the flash image against its limits: flash, static RAM, share of each crate
+    Size,
+    /// Prove the control step free of panics and of floating-point calls
+    PanicFree,
+    /// Check format, lints, documentation and licences
+    Lint,
+    /// Write the generated files anew, or check that they are fresh
+    Docs(docs::Args),
+    /// Install everything that the other commands need, for use offline
+    Setup,
+}
+
+fn main() -> anyhow::Result<()> {
+    let cli = Cli::parse();
+    let console = &mut Console::terminal();
+    let toolchain = cli.toolchain;
+    match cli.command {
+        Command::Demo(args) => demo::run(&args, toolchain, console),
+        Command::Test(args) => test::run(&args, toolchain),
+        Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
+        Command::Flash(args) => flash::run(&args, toolchain, console),
+        Command::Qemu(args) => qemu::run(&args, toolchain, console),
+        Command::Size => size::run(toolchain, console),
+        Command::PanicFree => proof::run(toolchain, console),
+        Command::Lint => lint::run(toolchain),
+        Command::Docs(args) => docs::run(&args, console),
+        Command::Setup => setup(toolchain, console),
+    }
+}
+
+/// Everything that the commands install when they need it, at once.
+fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
+    toolchain::ensure(choice, console)?;
+    qemu::ensure(console)?;
+    python::ensure(console)?;
+    lint::ensure_deny(console)?;
+    console.run(console::cargo("fetch").arg("--locked"))?;
+    console.say("All set up: demo, test, build, qemu, size, lint and docs work offline now.");
+    Ok(())
+}

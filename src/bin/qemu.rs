@@ -1,0 +1,187 @@
+//! The core on an emulated Cortex-M4F: replays a recording and reports a digest of what came out, and instruction counts.
+//!
+//! Not for a board: it talks to the emulator by semihosting. The command line names the recording and, after a space, a
+//! failure to inject half way: `panic`, `hardfault` or `hang`. Each failure prints a line that begins with `FAILED:`
+//! and ends the emulator with an error.
+//!
+//! SysTick is stopwatch and watchdog in one: it starts anew before each step, and if it ever runs out, the step hangs.
+//! A loop of known length tells how many instructions a tick is, so the counts do not depend on the emulator's clocks.
+#![no_std]
+#![no_main]
+
+use core::fmt::Write;
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_semihosting::{debug, hio, nr, syscall};
+use embassy_executor::Spawner;
+use fingertip::config::Config;
+use fingertip::params::Params;
+use fingertip::pipeline::Pipeline;
+use fingertip::record::{Digest, MAGIC, Record};
+
+/// SysTick counts down from here, 24 bits.
+const TICKS_MAX: u32 = 0x00ff_ffff;
+/// Instructions of the loop that tells how long an instruction is.
+const LOOP_INSTRUCTIONS: u64 = 1_000_000;
+
+#[embassy_executor::main]
+async fn main(_spawner: Spawner) {
+    let Some(mut syst) = cortex_m::Peripherals::take().map(|peripherals| peripherals.SYST) else {
+        fail(format_args!("the peripherals are taken"))
+    };
+    syst.set_clock_source(SystClkSource::Core);
+    syst.set_reload(TICKS_MAX);
+    syst.clear_current();
+    syst.enable_interrupt();
+    syst.enable_counter();
+
+    let mut line = [0; 256];
+    let (name, failure) = command_line(&mut line);
+    let recording = Recording::open(name);
+    let mut count = [0; 4];
+    let mut magic = [0; MAGIC.len()];
+    recording.read(&mut magic);
+    if magic != MAGIC {
+        fail(format_args!("no recording of this version"))
+    }
+    recording.read(&mut count);
+    let count = u32::from_le_bytes(count);
+
+    let Ok(config) = Config::new(&Params::DEFAULT) else { fail(format_args!("the default parameters are refused")) };
+    let mut pipeline = Pipeline::new(&config);
+    let mut digest = Digest::new();
+    let loop_ticks = ticks(&mut syst, spin);
+    let empty_ticks = ticks(&mut syst, || {});
+    let (mut total, mut min, mut max) = (0, u32::MAX, 0);
+    for index in 0..count {
+        let mut bytes = [0; Record::BYTES];
+        recording.read(&mut bytes);
+        let Record { frame, sense, command } = Record::from_bytes(&bytes);
+        if index == count / 2 {
+            inject(failure);
+        }
+        let mut outcome = None;
+        let taken = ticks(&mut syst, || outcome = Some(pipeline.step(&frame, &sense, &command)));
+        if let Some((duty, status)) = outcome {
+            digest.add(duty, &status);
+        }
+        total += u64::from(taken);
+        min = min.min(taken);
+        max = max.max(taken);
+        embassy_futures::yield_now().await;
+    }
+
+    let instructions = |ticks: u64, runs: u64| {
+        let net = ticks.saturating_sub(runs * u64::from(empty_ticks));
+        net * LOOP_INSTRUCTIONS / u64::from(loop_ticks.max(1))
+    };
+    let total_instructions = instructions(total, u64::from(count));
+    say(format_args!("digest {:016x}", digest.value()));
+    say(format_args!("steps {count}"));
+    say(format_args!("instructions_total {total_instructions}"));
+    say(format_args!("instructions_mean {}", total_instructions / u64::from(count.max(1))));
+    say(format_args!("instructions_min {}", instructions(min.into(), 1)));
+    say(format_args!("instructions_max {}", instructions(max.into(), 1)));
+    say(format_args!("ticks_per_million_instructions {loop_ticks}"));
+    debug::exit(debug::EXIT_SUCCESS);
+}
+
+/// SysTick ticks that some work takes.
+fn ticks(syst: &mut SYST, work: impl FnOnce()) -> u32 {
+    syst.clear_current();
+    let start = SYST::get_current();
+    work();
+    start.wrapping_sub(SYST::get_current()) & TICKS_MAX
+}
+
+/// Takes [`LOOP_INSTRUCTIONS`], two a turn.
+fn spin() {
+    // SAFETY: counts a register of its own down to 0, and touches nothing else.
+    unsafe {
+        core::arch::asm!(
+            "2: subs {turns}, {turns}, #1",
+            "bne 2b",
+            turns = inout(reg) LOOP_INSTRUCTIONS as u32 / 2 => _,
+            options(nomem, nostack),
+        );
+    }
+}
+
+fn inject(failure: &[u8]) {
+    match failure {
+        b"panic" => panic!("injected"),
+        b"hardfault" => cortex_m::asm::udf(),
+        b"hang" => loop {
+            cortex_m::asm::nop();
+        },
+        b"" => {}
+        _ => fail(format_args!("no such failure to inject")),
+    }
+}
+
+/// The recording's name with a 0 at its end, and the failure to inject.
+fn command_line(line: &mut [u8; 256]) -> (&[u8], &[u8]) {
+    let mut request = [line.as_mut_ptr() as usize, line.len()];
+    // SAFETY: the request names a buffer and its length, both valid until the call returns.
+    let error = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, request.as_mut_ptr() as usize) };
+    let length = line.iter().position(|byte| *byte == 0);
+    let (Some(length), 0) = (length, error) else { fail(format_args!("no command line")) };
+    let split = line[..length].iter().position(|byte| *byte == b' ').unwrap_or(length);
+    line[split] = 0;
+    let (name, rest) = line.split_at(split + 1);
+    (name, rest.get(..length.saturating_sub(split + 1)).unwrap_or_default())
+}
+
+/// A file on the host.
+struct Recording {
+    handle: usize,
+}
+
+impl Recording {
+    fn open(name: &[u8]) -> Self {
+        // SAFETY: the name is a buffer that ends with a 0, which the length leaves out.
+        let handle = unsafe { syscall!(OPEN, name.as_ptr(), nr::open::R_BINARY, name.len() - 1) };
+        if handle == usize::MAX {
+            fail(format_args!("cannot open the recording"))
+        }
+        Self { handle }
+    }
+
+    fn read(&self, bytes: &mut [u8]) {
+        // SAFETY: the buffer is valid for its length, and the call returns when it is filled.
+        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) };
+        if missing != 0 {
+            fail(format_args!("the recording ends early"))
+        }
+    }
+}
+
+fn say(text: core::fmt::Arguments) {
+    if let Ok(mut host) = hio::hstdout() {
+        // Where the host is gone, nobody is left to tell.
+        let _ = host.write_fmt(text);
+        let _ = host.write_str("\n");
+    }
+}
+
+fn fail(what: core::fmt::Arguments) -> ! {
+    say(format_args!("FAILED: {what}"));
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    fail(format_args!("panic: {}", info.message()))
+}
+
+#[exception]
+unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
+    fail(format_args!("hard fault at {:#010x}", frame.pc()))
+}
+
+#[exception]
+fn SysTick() {
+    fail(format_args!("hang: a step took more than {TICKS_MAX} ticks"))
+}

@@ -1,0 +1,184 @@
+//! What goes into a step and what comes out of it, as bytes: recordings to replay, and a digest to compare runs.
+//!
+//! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
+
+use crate::frame::{Frame, SLOTS, Sense};
+use crate::pipeline::{Command, Contact, Status};
+use crate::units::{Duty, Newtons};
+use crc::{CRC_64_XZ, Crc, Table};
+
+/// The first bytes of a recording; the last one counts the versions of its layout.
+pub const MAGIC: [u8; 8] = *b"fingert\x01";
+
+/// The arguments of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    /// The frame.
+    pub frame: Frame,
+    /// What was sensed beside it.
+    pub sense: Sense,
+    /// What the host asked.
+    pub command: Command,
+}
+
+impl Record {
+    /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 9 + 9;
+
+    /// The fields in the order of their definition, little-endian.
+    pub fn to_bytes(&self) -> [u8; Self::BYTES] {
+        let Self { frame: Frame { banks, sequence }, sense, command } = self;
+        let mut bytes = [0; Self::BYTES];
+        let mut rest = &mut bytes[..];
+        let mut put = |value: &[u8]| {
+            if let Some((place, after)) = core::mem::take(&mut rest).split_at_mut_checked(value.len()) {
+                place.copy_from_slice(value);
+                rest = after;
+            }
+        };
+        banks.iter().flatten().flatten().for_each(|code| put(&code.to_le_bytes()));
+        put(&sequence.to_le_bytes());
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault } = sense;
+        put(&encoder.to_le_bytes());
+        put(&supply_mv.to_le_bytes());
+        put(&bus_silent_ms.to_le_bytes());
+        put(&[u8::from(*bridge_fault)]);
+        let Command { torque, goal, bus_watchdog_ms, tare_request, clear_request } = command;
+        put(&[u8::from(*torque)]);
+        put(&goal.to_bits().to_le_bytes());
+        put(&bus_watchdog_ms.to_le_bytes());
+        put(&[*tare_request, *clear_request]);
+        bytes
+    }
+
+    /// The inverse of [`Record::to_bytes`]; any byte but 0 is true.
+    pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Self {
+        let mut rest = &bytes[..];
+        let mut frame = Frame::EMPTY;
+        frame.banks.iter_mut().flatten().flatten().for_each(|code| *code = u16::from_le_bytes(take(&mut rest)));
+        frame.sequence = u32::from_le_bytes(take(&mut rest));
+        let sense = Sense {
+            encoder: i32::from_le_bytes(take(&mut rest)),
+            supply_mv: u16::from_le_bytes(take(&mut rest)),
+            bus_silent_ms: u16::from_le_bytes(take(&mut rest)),
+            bridge_fault: take(&mut rest) != [0],
+        };
+        let command = Command {
+            torque: take(&mut rest) != [0],
+            goal: Newtons::from_bits(i32::from_le_bytes(take(&mut rest))),
+            bus_watchdog_ms: u16::from_le_bytes(take(&mut rest)),
+            tare_request: u8::from_le_bytes(take(&mut rest)),
+            clear_request: u8::from_le_bytes(take(&mut rest)),
+        };
+        Self { frame, sense, command }
+    }
+}
+
+/// The next bytes; zeros beyond the end.
+fn take<const N: usize>(rest: &mut &[u8]) -> [u8; N] {
+    let (value, after) = rest.split_first_chunk().map_or(([0; N], &[][..]), |(value, after)| (*value, after));
+    *rest = after;
+    value
+}
+
+static CRC: Crc<u64, Table<1>> = Crc::<u64, Table<1>>::new(&CRC_64_XZ);
+
+/// CRC-64/XZ of every duty and every field of every status, in order: equal where two runs agree bit for bit.
+pub struct Digest(crc::Digest<'static, u64, Table<1>>);
+
+impl Digest {
+    /// Of nothing.
+    pub fn new() -> Self {
+        Self(CRC.digest())
+    }
+
+    /// Adds what a step returned.
+    pub fn add(&mut self, duty: Duty, status: &Status) {
+        // Taken apart field by field, so that a field cannot be forgotten.
+        let Status { sequence, missed_frames, mode, fault, limits, contact, travel, speed, duty: applied } = *status;
+        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, bad_taxels } = contact;
+        for word in [sequence, missed_frames, peak_pa] {
+            self.0.update(&word.to_le_bytes());
+        }
+        for length in [indentation, centre_x, centre_y, radius, travel] {
+            self.0.update(&length.to_bits().to_le_bytes());
+        }
+        self.0.update(&force.to_bits().to_le_bytes());
+        self.0.update(&speed.to_bits().to_le_bytes());
+        self.0.update(&limits.0.to_le_bytes());
+        self.0.update(&duty.0.to_le_bytes());
+        self.0.update(&applied.0.to_le_bytes());
+        self.0.update(&[mode as u8, fault.map_or(0, |fault| fault as u8), confidence, bad_taxels]);
+    }
+
+    /// The digest of what was added.
+    pub fn value(self) -> u64 {
+        self.0.finalize()
+    }
+}
+
+impl Default for Digest {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::safety::{Fault, Limits, Mode};
+    use crate::units::{Millimetres, MillimetresPerSecond};
+
+    #[test]
+    fn a_record_survives_the_way_to_bytes_and_back() {
+        let mut bytes = [0; Record::BYTES];
+        bytes.iter_mut().zip(1..=250).for_each(|(byte, value)| *byte = value);
+        let record = Record::from_bytes(&bytes);
+        assert_eq!(record.frame.code(0, 0), 0x0201);
+        assert_eq!(record.command.clear_request, 242);
+        let again = record.to_bytes();
+        assert_eq!(Record::from_bytes(&again), record);
+        // Bytes differ where a truth value was neither 0 nor 1, and nowhere else.
+        let differing = bytes.iter().zip(&again).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
+        assert!(differing.eq([232, 233]));
+    }
+
+    #[test]
+    fn every_field_of_a_status_counts() {
+        let digest = |duty, status: Status| {
+            let mut digest = Digest::new();
+            digest.add(duty, &status);
+            digest.value()
+        };
+        let zero = Status::default();
+        let with = |change: fn(&mut Status)| {
+            let mut status = zero;
+            change(&mut status);
+            digest(Duty::ZERO, status)
+        };
+        let mut values = std::vec![
+            digest(Duty::ZERO, zero),
+            digest(Duty(1), zero),
+            with(|status| status.sequence = 1),
+            with(|status| status.missed_frames = 1),
+            with(|status| status.mode = Mode::Force),
+            with(|status| status.fault = Some(Fault::LostFrames)),
+            with(|status| status.limits = Limits(1)),
+            with(|status| status.travel = Millimetres::from_bits(1)),
+            with(|status| status.speed = MillimetresPerSecond::from_bits(1)),
+            with(|status| status.duty = Duty(1)),
+            with(|status| status.contact.force = Newtons::from_bits(1)),
+            with(|status| status.contact.indentation = Millimetres::from_bits(1)),
+            with(|status| status.contact.centre_x = Millimetres::from_bits(1)),
+            with(|status| status.contact.centre_y = Millimetres::from_bits(1)),
+            with(|status| status.contact.radius = Millimetres::from_bits(1)),
+            with(|status| status.contact.peak_pa = 1),
+            with(|status| status.contact.confidence = 1),
+            with(|status| status.contact.bad_taxels = 1),
+        ];
+        let count = values.len();
+        values.sort_unstable();
+        values.dedup();
+        assert_eq!(values.len(), count);
+    }
+}

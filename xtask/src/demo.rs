@@ -1,0 +1,53 @@
+//! The demonstration: the flash image on the virtual board.
+
+use crate::{
+    console::{self, Console},
+    image,
+    toolchain::Choice,
+};
+use anyhow::Result;
+use std::{path::PathBuf, process::Command};
+
+/// Flags of `cargo xtask demo`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    cargo xtask demo\n  \
+    cargo xtask demo --json target/demo.json --out target/pictures\n  \
+    cargo xtask demo --serve    (then talk to it with any DYNAMIXEL client)")]
+pub struct Args {
+    /// Write the figures to this file, as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the pictures to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Keep the board alive behind a port for any DYNAMIXEL client
+    #[arg(long)]
+    serve: bool,
+}
+
+/// Builds the flash image and runs it on the virtual board.
+///
+/// # Errors
+/// The image does not build, or the demonstration misses what it must show.
+pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    let image = image::firmware(choice, console)?;
+    console.say(&image.summary());
+    let mut command = virtual_board("run");
+    command.args(["--quiet", "--"]).arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
+    for (flag, value) in [("--json", &args.json), ("--out", &args.out)] {
+        if let Some(path) = value {
+            command.arg(flag).arg(std::path::absolute(path)?);
+        }
+    }
+    console.run(&mut command)
+}
+
+/// `cargo <subcommand>` for the virtual board.
+///
+/// The emulator's crate asks for a newer compiler than it needs.
+pub fn virtual_board(subcommand: &str) -> Command {
+    let mut command = console::cargo(subcommand);
+    command.args(["--profile", "host", "--package", "virtual-board", "--ignore-rust-version"]);
+    command
+}

@@ -1,0 +1,108 @@
+//! Images for the microcontroller: built, and laid out as the bytes that the flash gets.
+
+use crate::{
+    console::Console,
+    paths,
+    toolchain::{self, Choice, Toolchain},
+};
+use anyhow::{Context, Result, bail};
+use object::{
+    LittleEndian,
+    elf::{FileHeader32, PT_LOAD},
+    read::elf::{ElfFile, ProgramHeader},
+};
+use sha2::{Digest, Sha256};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+/// What an erased byte of flash reads.
+const ERASED: u8 = 0xff;
+/// More than the largest part has: a larger span is a mistake in the linker script.
+const SPAN_MAX: usize = 2 << 20;
+
+/// An image, as linked and as flashed.
+pub struct Image {
+    /// The linked image, with symbols.
+    pub elf: PathBuf,
+    /// The flashable bytes, as a file beside it.
+    pub bin: PathBuf,
+    /// The flashable bytes.
+    pub bytes: Vec<u8>,
+    /// The address of the first byte.
+    pub base: u32,
+}
+
+impl Image {
+    /// Lays out the loadable segments of a linked image by their load addresses; gaps read as erased.
+    ///
+    /// # Errors
+    /// The file is missing, no image for the target, or loads nothing.
+    pub fn read(elf: &Path) -> Result<Self> {
+        let data = fs::read(elf).with_context(|| format!("cannot read the image {}", paths::shown(elf)))?;
+        let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
+            .with_context(|| format!("{} is no image for a 32-bit microcontroller", paths::shown(elf)))?;
+        let mut segments = Vec::new();
+        for header in file.elf_program_headers() {
+            if header.p_type(LittleEndian) == PT_LOAD && header.p_filesz(LittleEndian) > 0 {
+                let bytes = header.data(LittleEndian, &*data).ok().context("a segment lies outside the file")?;
+                segments.push((header.p_paddr(LittleEndian), bytes));
+            }
+        }
+        let base = segments.iter().map(|(start, _)| *start).min().context("the image loads nothing")?;
+        let mut bytes = Vec::new();
+        for (start, segment) in segments {
+            let (start, end) = ((start - base) as usize, (start - base) as usize + segment.len());
+            if end > SPAN_MAX {
+                bail!("{} loads to addresses {end:#x} bytes apart: no flash is that large", paths::shown(elf));
+            }
+            bytes.resize(bytes.len().max(end), ERASED);
+            bytes[start..end].copy_from_slice(segment);
+        }
+        Ok(Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base })
+    }
+
+    /// SHA-256 of the flashable bytes, in hexadecimal.
+    pub fn sha256(&self) -> String {
+        Sha256::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    /// Path, size and SHA-256, a line each.
+    pub fn summary(&self) -> String {
+        format!(
+            "image    {}\nflashed  {} bytes from {:#010x}\nsha-256  {}",
+            paths::shown(&self.elf),
+            self.bytes.len(),
+            self.base,
+            self.sha256()
+        )
+    }
+}
+
+/// Builds the flash image.
+///
+/// # Errors
+/// No compiler, or the firmware does not compile.
+pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
+    let toolchain = toolchain::ensure(choice, console)?;
+    let image = Image::read(&build(toolchain, "firmware", "firmware", console)?)?;
+    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
+    Ok(image)
+}
+
+/// Builds one of the images and returns where it lies.
+///
+/// # Errors
+/// It does not compile or link.
+pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
+    console.run(&mut build_command(toolchain, name, feature))?;
+    Ok(toolchain.images().join(name))
+}
+
+/// The command that builds one of the images.
+pub fn build_command(toolchain: Toolchain, name: &str, feature: &str) -> std::process::Command {
+    let mut command = toolchain.cargo("build");
+    command.args(["--release", "--package", "fingertip", "--bin", name, "--features", feature]);
+    command
+}

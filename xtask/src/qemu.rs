@@ -1,0 +1,60 @@
+//! The core on an emulated Cortex-M4F.
+
+use crate::{
+    apt,
+    console::{self, Console},
+    image, paths,
+    toolchain::{self, Choice},
+};
+use anyhow::Result;
+use std::path::PathBuf;
+
+const PROGRAM: &str = "qemu-system-arm";
+
+/// Flags of `cargo xtask qemu`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
+pub struct Args {
+    /// Make the image fail, to see it reported
+    #[arg(long, value_name = "FAILURE", value_parser = ["panic", "hardfault", "hang"])]
+    inject: Option<String>,
+}
+
+/// Runs the recorded stimulus on the emulator and on the host, and compares.
+///
+/// # Errors
+/// The image does not build, fails, hangs, or differs from the host.
+pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    let image = prepare(choice, console)?;
+    let mut command = console::cargo("run");
+    command.args(["--quiet", "--package", "host-tests", "--bin", "qemu-host", "--"]);
+    console.run(command.arg(image).arg(paths::target().join("stimulus")).args(&args.inject))
+}
+
+/// Runs the tests that need the emulator.
+///
+/// # Errors
+/// The image does not build, or a test fails.
+pub fn test(choice: Choice, console: &mut Console) -> Result<()> {
+    let image = prepare(choice, console)?;
+    let mut command = console::cargo("test");
+    command.args(["--package", "host-tests", "--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
+    console.run(&mut command)
+}
+
+/// Makes sure of the emulator.
+///
+/// # Errors
+/// It is missing and cannot be installed.
+pub fn ensure(console: &mut Console) -> Result<()> {
+    match paths::find_program(PROGRAM) {
+        Some(_) => Ok(()),
+        None => apt::ensure(&[PROGRAM], "running the core on an emulated Cortex-M4F", console),
+    }
+}
+
+fn prepare(choice: Choice, console: &mut Console) -> Result<PathBuf> {
+    ensure(console)?;
+    let toolchain = toolchain::ensure(choice, console)?;
+    image::build(toolchain, "qemu", "qemu", console)
+}

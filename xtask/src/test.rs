@@ -1,0 +1,43 @@
+//! Every test, a stage each.
+
+use crate::{
+    console::{self, Stages},
+    demo, image, proof, python, qemu,
+    size::Sizes,
+    toolchain::Choice,
+};
+use anyhow::{Context, Result};
+
+/// Flags of `cargo xtask test`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask test\n  cargo test    (core and host only, needs nothing but Rust)")]
+pub struct Args {}
+
+/// Runs all tests.
+///
+/// # Errors
+/// Names the stages that failed.
+pub fn run(_args: &Args, choice: Choice) -> Result<()> {
+    let mut stages = Stages::default();
+    stages.stage("core and host tests", |console| console.run(console::cargo("test").arg("--no-fail-fast")));
+    let image = stages.stage("flash image", |console| {
+        let image = image::firmware(choice, console)?;
+        console.say(&image.summary());
+        Ok(image)
+    });
+    let image = || image.as_ref().context("the flash image did not build; see above");
+    stages.stage("size of the flash image", |console| {
+        let sizes = Sizes::of(image()?)?;
+        console.say(&sizes.verdict());
+        sizes.check()
+    });
+    stages.stage("panic-free proof", |console| proof::run(choice, console));
+    stages.stage("emulated Cortex-M4F against this machine", |console| qemu::test(choice, console));
+    stages.stage("virtual board", |console| {
+        let python = python::ensure(console)?;
+        let mut command = demo::virtual_board("test");
+        command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
+        console.run(&mut command)
+    });
+    stages.finish("test")
+}

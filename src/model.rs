@@ -32,6 +32,7 @@ pub use particle::{force_on, pressure_of, strain_of};
 pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 pub use tilt::{Displacement, Load};
 
+use crate::root::floor_sqrt;
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
 use arith::{Gain, root, square};
 
@@ -157,7 +158,7 @@ impl Tip {
     /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
     pub fn indentation(&self, force: Newtons) -> Millimetres {
         let force_bits = force.max(Newtons::ZERO).min(self.force_max).to_bits().unsigned_abs();
-        let twice = self.area_gain.floor(u64::from(force_bits)).isqrt();
+        let twice = floor_sqrt(self.area_gain.floor(u64::from(force_bits)));
         Millimetres::from_bits(twice.div_ceil(2) as i32).min(self.depth_max)
     }
 

@@ -11,6 +11,7 @@
 //! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
 
 use crate::config::Config;
+use crate::root::floor_sqrt;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// What the speed loop is to follow.
@@ -40,7 +41,7 @@ impl Reference {
             ((way_bits * slope) >> 8, -((speed_bits * slope) >> 8))
         } else {
             // Q8 mm/s^2 times Q24 mm is Q32 mm^2/s^2; its root is Q16 mm/s.
-            let root = (2 * brake_bits * way_bits.abs()).unsigned_abs().isqrt() as i64;
+            let root = i64::from(floor_sqrt((2 * brake_bits * way_bits.abs()).unsigned_abs()));
             let magnitude = root - ((brake_bits * config.half_over_slope_q32) >> 24);
             let share = share_q12(speed_bits, root);
             (magnitude * way_bits.signum(), -((brake_bits * share) >> 12))

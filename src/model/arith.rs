@@ -1,5 +1,7 @@
 //! Integer arithmetic for the model: 32 and 64 bits only, except where a [`Gain`] is made.
 
+use crate::root::floor_sqrt;
+
 /// A positive constant with 64 significant bits: `mantissa * 2^-shift`, the top bit of the mantissa set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Gain {
@@ -67,5 +69,5 @@ pub(super) const fn square(x: u32) -> u64 {
 
 /// The square root of a Q48 number below 2^62, in Q24, rounded to nearest.
 pub(super) const fn root(square_q48: u64) -> u32 {
-    (4 * square_q48).isqrt().div_ceil(2) as u32
+    floor_sqrt(4 * square_q48).div_ceil(2)
 }

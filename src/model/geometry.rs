@@ -6,6 +6,7 @@
 use super::Tip;
 use super::angle::{angle_of, arc_tangent, sine_cosine};
 use super::arith::{nearest_quotient, quotient, root, square};
+use crate::root::floor_sqrt;
 use crate::units::{Millimetres, MillimetresPerRadian, Radians, SquareMillimetres};
 
 /// Below the cosine of every touching angle, in Q31: it is 1/20 at the deepest indentation.
@@ -39,7 +40,7 @@ impl Tip {
         }
         let shift = depth.leading_zeros();
         let ratio = quotient(depth << shift, 2 * u64::from(self.radius_bits()) - depth);
-        let tangent_q32 = (ratio << (64 - shift)).isqrt() as u32;
+        let tangent_q32 = floor_sqrt(ratio << (64 - shift));
         // Twice the arc tangent in Q32 is the arc tangent in Q31: 7 bits more than wanted.
         Radians::from_bits((arc_tangent(tangent_q32) >> 6).div_ceil(2) as i32)
     }

@@ -1,5 +1,6 @@
 //! Pressure over the contact and what sums it: equations 12 to 16, figure 7.
 
+use crate::root::floor_sqrt;
 use core::num::{NonZeroU16, NonZeroU64};
 
 use super::Tip;
@@ -97,7 +98,7 @@ impl Tip {
     /// `F` counts as within 0 to [`Tip::force_max`].
     pub fn stiffness_at_force(&self, force: Newtons) -> NewtonsPerMillimetre {
         let force_bits = u64::from(force.max(Newtons::ZERO).min(self.force_max()).to_bits().unsigned_abs());
-        NewtonsPerMillimetre::from_bits(self.square_gain.floor(force_bits).isqrt().div_ceil(2) as i32)
+        NewtonsPerMillimetre::from_bits(floor_sqrt(self.square_gain.floor(force_bits)).div_ceil(2) as i32)
     }
 
     /// Total force by quadrature over rings: `F = integral of p dS` (eq. 14), the sum that the closed form
@@ -128,7 +129,7 @@ impl Tip {
         }
         let length_square = square(self.radius_bits()) - square_q48;
         let spare = length_square.leading_zeros() / 2;
-        let length = (length_square << (2 * spare)).isqrt();
+        let length = u64::from(floor_sqrt(length_square << (2 * spare)));
         let cross = (length * u64::from(self.rest(depth))) >> spare;
         Quotient::new(contact_square - square_q48, length_square + cross)
     }

@@ -1,0 +1,48 @@
+//! Pictures of a run as SVG: charts over time and pressure maps. Readable in grey, and the same bytes for the same run.
+
+mod charts;
+mod maps;
+
+pub use charts::{Panel, overview, steps};
+pub use maps::{Map, maps};
+
+use plotters::prelude::*;
+
+/// A picture could not be drawn.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlotError(String);
+
+impl core::fmt::Display for PlotError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "cannot draw: {}", self.0)
+    }
+}
+
+impl core::error::Error for PlotError {}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+
+/// Any failure of the library, as ours.
+fn failed(error: impl core::fmt::Display) -> PlotError {
+    PlotError(error.to_string())
+}
+
+const FONT: &str = "sans-serif";
+const LABEL_PX: u32 = 13;
+const TITLE_PX: u32 = 15;
+/// Light to dark in equal steps of brightness.
+const INK: RGBColor = RGBColor(20, 40, 90);
+const GOAL_INK: RGBColor = RGBColor(200, 110, 0);
+const FAINT: RGBColor = RGBColor(225, 225, 225);
+
+/// Draws on a white picture of a size.
+fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {
+    let mut svg = String::new();
+    {
+        let area = SVGBackend::with_string(&mut svg, size_px).into_drawing_area();
+        area.fill(&WHITE).map_err(failed)?;
+        draw(&area)?;
+        area.present().map_err(failed)?;
+    }
+    Ok(svg)
+}

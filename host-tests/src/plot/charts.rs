@@ -1,0 +1,222 @@
+//! Charts over time: the whole run, and each change of the goal at a larger scale.
+
+use super::{Area, FAINT, FONT, GOAL_INK, INK, LABEL_PX, PlotError, TITLE_PX, failed, picture};
+use crate::metrics::Sample;
+use plotters::prelude::*;
+
+/// Points that a line has at most: two for each pixel of the widest chart.
+const POINTS_MAX: usize = 1_800;
+const WIDTH_PX: u32 = 900;
+
+/// A stretch of the run to look at more closely.
+#[derive(Clone, Debug)]
+pub struct Panel<'a> {
+    /// What happens.
+    pub title: String,
+    /// The samples.
+    pub samples: &'a [Sample],
+    /// The instant that counts as 0.
+    pub zero_s: f64,
+    /// How much before and after it is shown.
+    pub shown_ms: [f64; 2],
+    /// How long the motor needs at least, where that is known.
+    pub time_optimal_ms: Option<f64>,
+}
+
+/// Force against goal, indentation and duty over the whole run.
+///
+/// # Errors
+/// The trace is empty.
+pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
+    let end_s = trace.last().ok_or_else(|| PlotError("the trace is empty".into()))?.time_s;
+    picture((WIDTH_PX, 640), |area| {
+        let panels = area.split_evenly((3, 1));
+        let points = |value: fn(&Sample) -> f64| thinned(trace.iter().map(|s| (s.time_s, value(s))).collect());
+        let force = points(|s| s.true_force_n);
+        let goal = steps_of(trace, |s| (s.time_s, s.goal_n));
+        let top_n = top(force.iter().chain(&goal).map(|(_, n)| *n));
+        let frame =
+            |title, unit, low, high| Frame { title, x: "time, s", unit, x_range: [0.0, end_s], range: [low, high] };
+        frame("Contact force (solid) and goal (dashed)", "N", 0.0, top_n).draw(&panels[0], |chart| {
+            chart.dashed(&goal, GOAL_INK)?;
+            chart.solid(&force, INK)
+        })?;
+        let indentation = points(|s| s.indentation_mm);
+        let top_mm = top(indentation.iter().map(|(_, mm)| *mm));
+        frame("Indentation of the fingertip", "mm", 0.0, top_mm)
+            .draw(&panels[1], |chart| chart.solid(&indentation, INK))?;
+        let duty = points(|s| 100.0 * s.duty);
+        frame("Duty of the bridge", "%", -100.0, 100.0).draw(&panels[2], |chart| chart.solid(&duty, INK))
+    })
+}
+
+/// Each change of the goal at a larger scale, two panels side by side.
+///
+/// # Errors
+/// There is nothing to show.
+pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
+    if panels.iter().any(|panel| panel.samples.is_empty()) {
+        return Err(PlotError("a panel has no samples".into()));
+    }
+    let rows = panels.len().div_ceil(2);
+    picture((WIDTH_PX, 260 * rows as u32), |area| {
+        for (panel, area) in panels.iter().zip(area.split_evenly((rows, 2))) {
+            draw_panel(panel, &area)?;
+        }
+        Ok(())
+    })
+}
+
+fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
+    let [before_ms, after_ms] = panel.shown_ms;
+    let ms = |sample: &Sample| (sample.time_s - panel.zero_s) * 1e3;
+    let shown = |sample: &&Sample| (-before_ms..=after_ms).contains(&ms(sample));
+    let samples: Vec<Sample> = panel.samples.iter().filter(shown).copied().collect();
+    let force: Vec<_> = samples.iter().map(|s| (ms(s), s.true_force_n)).collect();
+    let sensed: Vec<_> = samples.iter().map(|s| (ms(s), s.sensed_force_n)).collect();
+    let goal = steps_of(&samples, |s| (ms(s), s.goal_n));
+    let high = top(force.iter().chain(&goal).map(|(_, n)| *n));
+    let frame =
+        Frame { title: &panel.title, x: "time, ms", unit: "N", x_range: [-before_ms, after_ms], range: [0.0, high] };
+    frame.draw(area, |chart| {
+        if let Some(optimal_ms) = panel.time_optimal_ms {
+            chart.upright(optimal_ms)?;
+        }
+        chart.dashed(&goal, GOAL_INK)?;
+        chart.dots(&sensed)?;
+        chart.solid(&force, INK)
+    })
+}
+
+struct Frame<'a> {
+    title: &'a str,
+    x: &'a str,
+    unit: &'a str,
+    x_range: [f64; 2],
+    range: [f64; 2],
+}
+
+type Points = [(f64, f64)];
+type Cartesian = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
+
+struct Chart<'a, 'b> {
+    context: ChartContext<'a, SVGBackend<'b>, Cartesian>,
+    range: [f64; 2],
+}
+
+impl Frame<'_> {
+    fn draw<'b>(
+        &self,
+        area: &Area<'b>,
+        draw: impl FnOnce(&mut Chart<'_, 'b>) -> Result<(), PlotError>,
+    ) -> Result<(), PlotError> {
+        let ([left, right], [low, high]) = (self.x_range, self.range);
+        let context = ChartBuilder::on(area)
+            .margin(8)
+            .margin_right(18)
+            .caption(self.title, (FONT, TITLE_PX))
+            .x_label_area_size(36)
+            .y_label_area_size(52)
+            .build_cartesian_2d(left..right, low..high)
+            .map_err(failed)?;
+        let mut chart = Chart { context, range: self.range };
+        chart
+            .context
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT)
+            .label_style((FONT, LABEL_PX))
+            .x_desc(self.x)
+            .y_desc(self.unit)
+            .y_labels(6)
+            .x_labels(10)
+            .draw()
+            .map_err(failed)?;
+        draw(&mut chart)
+    }
+}
+
+impl Chart<'_, '_> {
+    fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
+        let line = LineSeries::new(points.iter().copied(), ink.stroke_width(2));
+        self.context.draw_series(line).map(drop).map_err(failed)
+    }
+
+    fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
+        let line = DashedLineSeries::new(points.iter().copied(), 7, 4, ink.stroke_width(2));
+        self.context.draw_series(line).map(drop).map_err(failed)
+    }
+
+    /// Small dots, one for each value that differs from the one before.
+    fn dots(&mut self, points: &Points) -> Result<(), PlotError> {
+        let mut last = f64::NAN;
+        let fresh = points.iter().filter(|(_, value)| core::mem::replace(&mut last, *value) != *value);
+        let dots = fresh.map(|point| Circle::new(*point, 2, INK.stroke_width(1)));
+        self.context.draw_series(dots).map(drop).map_err(failed)
+    }
+
+    /// A dotted upright line.
+    fn upright(&mut self, x: f64) -> Result<(), PlotError> {
+        let [low, high] = self.range;
+        let line = DashedLineSeries::new([(x, low), (x, high)], 2, 3, BLACK.stroke_width(1));
+        self.context.draw_series(line).map(drop).map_err(failed)
+    }
+}
+
+/// The top of an axis: a little above the largest value.
+fn top(values: impl Iterator<Item = f64>) -> f64 {
+    1.08 * values.fold(0.1, f64::max)
+}
+
+/// The corners of a line of steps.
+fn steps_of(samples: &[Sample], point: impl Fn(&Sample) -> (f64, f64)) -> Vec<(f64, f64)> {
+    let mut corners: Vec<(f64, f64)> = samples.first().map(&point).into_iter().collect();
+    for pair in samples.windows(2) {
+        let ((_, before), (x, after)) = (point(&pair[0]), point(&pair[1]));
+        if before != after {
+            corners.extend([(x, before), (x, after)]);
+        }
+    }
+    corners.extend(samples.last().map(&point));
+    corners
+}
+
+/// The least and the largest of as many points as fall together, so that no spike is lost.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    if points.len() <= POINTS_MAX {
+        return points;
+    }
+    let extremes = |together: &[(f64, f64)]| {
+        let place = |wanted: fn(&(f64, f64), &(f64, f64)) -> bool| {
+            (1..together.len()).fold(0, |best, at| if wanted(&together[at], &together[best]) { at } else { best })
+        };
+        let (least, largest) = (place(|a, b| a.1 < b.1), place(|a, b| a.1 > b.1));
+        [together[least.min(largest)], together[least.max(largest)]]
+    };
+    points.chunks((2 * points.len()).div_ceil(POINTS_MAX)).flat_map(extremes).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thinning_keeps_every_spike_and_the_order() {
+        let mut points: Vec<_> = (0..100_000).map(|n| (f64::from(n), 1.0)).collect();
+        points[77_777].1 = 5.0;
+        points[12_345].1 = -5.0;
+        let thin = thinned(points);
+        assert!(thin.len() <= POINTS_MAX + 2);
+        assert!(thin.contains(&(77_777.0, 5.0)) && thin.contains(&(12_345.0, -5.0)));
+        assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
+    }
+
+    #[test]
+    fn steps_have_a_corner_before_and_after_each_change() {
+        let sample = |(time_s, goal_n)| Sample { time_s, goal_n, ..Sample::default() };
+        let samples = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 1.0), (4.0, 1.0)].map(sample);
+        let corners = steps_of(&samples, |s| (s.time_s, s.goal_n));
+        assert_eq!(corners, [(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (4.0, 1.0)]);
+        assert!(steps_of(&[], |s| (s.time_s, s.goal_n)).is_empty());
+    }
+}

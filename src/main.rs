@@ -6,13 +6,13 @@ mod board;
 
 use board::bridge::Bridge;
 use board::control::{self, Control};
-use board::crash::Boot;
 use board::encoder::Encoder;
 use board::flash::Store;
+use board::log::{log_boot, log_damage, log_refusal};
 use board::scan::Scan;
 use board::supply::Supply;
 use board::{bus, clocks, crash, guard, host, watch};
-use defmt::{Debug2Format, error, info, unwrap, warn};
+use defmt::{error, info, unwrap};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -99,9 +99,9 @@ async fn main(spawner: Spawner) {
     let bus = unwrap!(bus::Bus::new(bus_parts, Settings::new(record).baud()));
     let led = Output::new(p.PA5, Level::Low, Speed::Low);
 
-    spawner.spawn(host::run(bus, store, record, config, boot).unwrap());
-    spawner.spawn(watch::run(led).unwrap());
-    CONTROL.start(interrupt::SPI3).spawn(control::run(control).unwrap());
+    spawner.spawn(unwrap!(host::run(bus, store, record, config, boot).ok()));
+    spawner.spawn(unwrap!(watch::run(led).ok()));
+    CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
 
 /// What the flash holds, and whether it is damaged.
@@ -117,7 +117,7 @@ fn load(store: &mut Store) -> Stored {
     let record = match store.latest() {
         Ok(record) => record.unwrap_or_default(),
         Err(cause) => {
-            error!("stored parameters: {}", Debug2Format(&cause));
+            log_damage(cause);
             return Stored::broken(store.newest_whole().unwrap_or_default());
         }
     };
@@ -129,7 +129,7 @@ fn load(store: &mut Store) -> Stored {
     match Config::new(&record.params) {
         Ok(config) => Stored { record, config, broken: false },
         Err(cause) => {
-            error!("stored parameters: {}", Debug2Format(&cause));
+            log_refusal(cause);
             Stored::broken(record)
         }
     }
@@ -141,12 +141,5 @@ impl Stored {
         // The defaults make a configuration: a test of the core holds that.
         let config = unwrap!(Config::new(&record.params).ok());
         Self { record, config, broken: true }
-    }
-}
-
-fn log_boot(boot: Boot) {
-    info!("fingertip {}, reset by {}", env!("CARGO_PKG_VERSION"), Debug2Format(&boot.reset));
-    if boot.crashed {
-        warn!("the last run crashed: {}", Debug2Format(&boot.crash));
     }
 }

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::Ordering;
 
-use defmt::{Debug2Format, error, info, warn};
+use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use fingertip::config::Config;
 use fingertip::frame::{Frame, TAXELS};
@@ -16,6 +16,7 @@ use super::crash::{self, Boot};
 use super::exchange::{COMMAND, CONFIG, DETAIL, DETAIL_READY, DETAIL_WANTED, Detail, PACKETS, REPORT};
 use super::flash::Store;
 use super::guard;
+use super::log::log_refusal;
 
 /// Control answers within a frame and a half, even while frames are lost: at most this for the slowest scan.
 const DETAIL_TIMEOUT: Duration = Duration::from_millis(3);
@@ -108,7 +109,7 @@ impl Host {
                 CONFIG.take(|waiting| *waiting = None);
                 CONFIG.fill(|place| *place = Some(config));
             }
-            Err(cause) => error!("parameters: {}", Debug2Format(&cause)),
+            Err(cause) => log_refusal(cause),
         }
     }
 

@@ -13,6 +13,7 @@ pub mod exchange;
 pub mod flash;
 pub mod guard;
 pub mod host;
+pub mod log;
 pub mod pins;
 pub mod scan;
 pub mod supply;

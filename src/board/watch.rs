@@ -1,6 +1,6 @@
 //! Looks at control's reports now and then: the LED, and the log of what changed.
 
-use defmt::{Debug2Format, info, warn};
+use defmt::{info, warn};
 use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
 use fingertip::safety::Mode;
@@ -21,13 +21,13 @@ pub async fn run(mut led: Output<'static>) {
         if (status.mode, status.fault) != last {
             last = (status.mode, status.fault);
             match status.fault {
-                Some(fault) => warn!("fault {} {}", fault as u8, Debug2Format(&fault)),
-                None => info!("mode {}", Debug2Format(&status.mode)),
+                Some(fault) => warn!("fault {=u8}", fault as u8),
+                None => info!("mode {=u8}", status.mode as u8),
             }
         }
         if status.missed_frames != missed_frames {
             missed_frames = status.missed_frames;
-            warn!("{} frames missed", missed_frames);
+            warn!("{=u32} frames missed", missed_frames);
         }
         let on = if status.mode == Mode::Fault { period / BLINK_PERIODS % 2 == 0 } else { COMMAND.get().torque };
         led.set_level(on.into());

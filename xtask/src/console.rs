@@ -174,7 +174,7 @@ impl Stages {
                 Some(value)
             }
             Err(error) => {
-                println!("{}\n{error:?}", console.captured());
+                println!("{}\n{error:#}", console.captured());
                 println!("FAILED {seconds:7.1} s  {name}");
                 self.failed.push(name.into());
                 None

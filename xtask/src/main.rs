@@ -17,6 +17,7 @@ mod toolchain;
 
 use clap::{Parser, Subcommand};
 use console::Console;
+use std::process::ExitCode;
 use toolchain::Choice;
 
 /// The fingertip's commands: watch it, test it, build it, flash it.
@@ -57,20 +58,29 @@ enum Command {
     Setup,
 }
 
-fn main() -> anyhow::Result<()> {
-    let cli = Cli::parse();
+fn main() -> ExitCode {
+    match run(&Cli::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(cli: &Cli) -> anyhow::Result<()> {
     let console = &mut Console::terminal();
     let toolchain = cli.toolchain;
-    match cli.command {
-        Command::Demo(args) => demo::run(&args, toolchain, console),
-        Command::Test(args) => test::run(&args, toolchain),
+    match &cli.command {
+        Command::Demo(args) => demo::run(args, toolchain, console),
+        Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
-        Command::Flash(args) => flash::run(&args, toolchain, console),
-        Command::Qemu(args) => qemu::run(&args, toolchain, console),
+        Command::Flash(args) => flash::run(args, toolchain, console),
+        Command::Qemu(args) => qemu::run(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
         Command::PanicFree => proof::run(toolchain, console),
         Command::Lint => lint::run(toolchain),
-        Command::Docs(args) => docs::run(&args, console),
+        Command::Docs(args) => docs::run(args, console),
         Command::Setup => setup(toolchain, console),
     }
 }

@@ -1,0 +1,113 @@
+//! Runs the core's recording on the emulated Cortex-M4F and on this machine, and compares.
+//!
+//! `qemu-host IMAGE FOLDER [panic|hardfault|hang]`: the image, where to put the recording, a failure to inject.
+
+use host_tests::stimulus;
+use std::{
+    collections::BTreeMap,
+    env,
+    error::Error,
+    fs,
+    io::Read,
+    path::{Path, PathBuf},
+    process::{Command, ExitCode, Stdio},
+    sync::mpsc,
+    thread,
+    time::Duration,
+};
+
+const EMULATOR: &str = "qemu-system-arm";
+const RECORDING: &str = "stimulus.bin";
+/// The image's own watchdog ends a hang in virtual time. This one is for an image that cannot even do that.
+const WALL_LIMIT: Duration = Duration::from_secs(180);
+
+fn main() -> ExitCode {
+    let mut arguments = env::args_os().skip(1);
+    let (Some(image), Some(folder)) = (arguments.next(), arguments.next()) else {
+        eprintln!("usage: qemu-host IMAGE FOLDER [panic|hardfault|hang]");
+        return ExitCode::from(2);
+    };
+    let failure = arguments.next().and_then(|word| word.into_string().ok());
+    match compare(&PathBuf::from(image), &PathBuf::from(folder), failure.as_deref()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box<dyn Error>> {
+    let records = stimulus::records();
+    fs::create_dir_all(folder)?;
+    // Written aside and moved into place, so that two runs at once cannot read half a file.
+    let aside = folder.join(format!("{RECORDING}.{}", std::process::id()));
+    fs::write(&aside, stimulus::to_bytes(&records))?;
+    fs::rename(aside, folder.join(RECORDING))?;
+
+    let text = emulate(image, folder, failure)?;
+    let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
+    let figure = |name| report.get(name).copied().ok_or_else(|| format!("the image reported no {name}:\n{text}"));
+    let host = format!("{:016x}", stimulus::digest(&records));
+    let emulated = figure("digest")?;
+    println!("steps                  {}", figure("steps")?);
+    println!("digest, emulated       {emulated}");
+    println!("digest, this machine   {host}");
+    println!(
+        "instructions a step    {} mean, {} to {} (to +-{} of the emulator's clock)",
+        figure("instructions_mean")?,
+        figure("instructions_min")?,
+        figure("instructions_max")?,
+        resolution(figure("ticks_per_million_instructions")?)?
+    );
+    println!("instructions in all    {}", figure("instructions_total")?);
+    if figure("steps")? != records.len().to_string() || emulated != host {
+        return Err("FAILED: the emulated core and this machine differ".into());
+    }
+    println!("The emulated core gives the same bits as this machine.");
+    Ok(())
+}
+
+/// Instructions in a tick, rounded up.
+fn resolution(ticks_per_million: &str) -> Result<u64, Box<dyn Error>> {
+    Ok(1_000_000_u64.div_ceil(ticks_per_million.parse::<u64>()?.max(1)))
+}
+
+/// Runs the image to its end and returns what it wrote.
+fn emulate(image: &Path, folder: &Path, failure: Option<&str>) -> Result<String, Box<dyn Error>> {
+    let image = fs::canonicalize(image).map_err(|error| format!("the image {}: {error}", image.display()))?;
+    let words: Vec<_> = [RECORDING].into_iter().chain(failure).map(|word| format!(",arg={word}")).collect();
+    let mut child = Command::new(EMULATOR)
+        .current_dir(folder)
+        // An STM32F405; a board that QEMU 7 knows as well.
+        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"])
+        // An instruction takes 8 ns of virtual time: more than a tick of SysTick, so every one of them counts.
+        .args(["-icount", "shift=3,align=off,sleep=off", "-semihosting-config"])
+        .arg(format!("enable=on,target=native{}", words.concat()))
+        .arg("-kernel")
+        .arg(image)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| format!("cannot start {EMULATOR}: {error}; looked in PATH"))?;
+    let (sender, receiver) = mpsc::channel();
+    if let Some(mut stdout) = child.stdout.take() {
+        thread::spawn(move || {
+            let mut text = Vec::new();
+            // The pipe breaks when the emulator is killed; what came before still counts.
+            let _ = stdout.read_to_end(&mut text);
+            let _ = sender.send(String::from_utf8_lossy(&text).into_owned());
+        });
+    }
+    let Ok(text) = receiver.recv_timeout(WALL_LIMIT) else {
+        child.kill()?;
+        child.wait()?;
+        return Err(format!("FAILED: hang: the image did not end within {} s", WALL_LIMIT.as_secs()).into());
+    };
+    let status = child.wait()?;
+    match text.lines().find(|line| line.starts_with("FAILED:")) {
+        Some(line) => Err(line.into()),
+        None if !status.success() => Err(format!("FAILED: the emulator ended with {status}:\n{text}").into()),
+        None => Ok(text),
+    }
+}

@@ -1,0 +1,61 @@
+//! The core on an emulated Cortex-M4F. Needs QEMU and the image: `cargo xtask test` runs these tests.
+
+use std::env;
+use std::process::{Command, Output};
+
+/// Runs the comparison that `cargo xtask qemu` runs.
+fn qemu(failure: &[&str]) -> Output {
+    let image =
+        env::var_os("FINGERTIP_QEMU_IMAGE").expect("FINGERTIP_QEMU_IMAGE names the image; use cargo xtask test");
+    Command::new(env!("CARGO_BIN_EXE_qemu-host"))
+        .arg(image)
+        .arg(env!("CARGO_TARGET_TMPDIR"))
+        .args(failure)
+        .output()
+        .expect("the runner was built with this test")
+}
+
+fn assert_fails(failure: &str, with: &str) {
+    let output = qemu(&[failure]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "{failure} went unnoticed");
+    assert!(text.starts_with(with), "{failure}: {text}");
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn the_emulated_core_gives_the_same_bits() {
+    let output = qemu(&[]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("steps                  10000\n"), "{text}");
+    let mean = text.lines().find_map(|line| line.strip_prefix("instructions a step")?.split_whitespace().next());
+    let mean: u32 = mean.expect("a mean").parse().expect("a number");
+    // Two-sided: a step that does nothing would be quick too.
+    assert!((1_000..=8_000).contains(&mean), "{mean} instructions a step");
+    println!("{text}");
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn two_emulated_runs_agree_to_the_instruction() {
+    assert_eq!(qemu(&[]).stdout, qemu(&[]).stdout);
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn a_panic_fails() {
+    assert_fails("panic", "FAILED: panic: injected");
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn a_hard_fault_fails() {
+    assert_fails("hardfault", "FAILED: hard fault at 0x08");
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn a_hang_fails() {
+    assert_fails("hang", "FAILED: hang: a step took");
+}

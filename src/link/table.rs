@@ -4,6 +4,7 @@
 //! [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading sends a register's bytes straight into the reply.
 
 mod registers;
+mod values;
 
 use crate::params::Params;
 use crate::pipeline::Contact;

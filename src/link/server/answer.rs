@@ -13,9 +13,10 @@ use super::State;
 const _: () = assert!(8 + 2 + READ_MAX as usize + 2 <= REPLY_MAX);
 
 impl State {
-    /// Answers an instruction that returns no data, under the ID that it was sent to: a write may have changed it.
-    pub(super) fn answer(&mut self, id: u8, result: Result<(), StatusError>, reply: &mut Reply) {
-        if self.settings.status_return_level >= 2 {
+    /// Answers an instruction that returns no data, under the ID and the status return level that it found: it may have
+    /// changed them.
+    pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
+        if level >= 2 {
             self.reply_delay_us = self.settings.return_delay_us();
             Sender::status(reply, id, result.err(), self.fault.is_some()).finish();
         }
@@ -96,7 +97,7 @@ impl State {
     pub(super) fn damaged(&mut self, packet: Packet<'_>, reply: &mut Reply) {
         let error = self.counted(Err(StatusError::Crc));
         if packet.id == self.settings.record.id && packet.instruction != instruction::STATUS {
-            self.answer(packet.id, error, reply);
+            self.answer(packet.id, self.settings.status_return_level, error, reply);
         }
     }
 

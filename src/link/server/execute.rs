@@ -27,13 +27,14 @@ impl State {
             return;
         }
         self.counters.good_packets = self.counters.good_packets.wrapping_add(1);
+        let level = self.settings.status_return_level;
         if !packet.complete {
-            return self.conclude(packet, Err(StatusError::Length), reply);
+            return self.conclude(packet, level, Err(StatusError::Length), reply);
         }
         let params = packet.params;
         match packet.instruction {
             instruction::PING if params.is_empty() => self.ping(packet.id, snapshot, reply),
-            instruction::PING => self.conclude(packet, Err(StatusError::Length), reply),
+            instruction::PING => self.conclude(packet, level, Err(StatusError::Length), reply),
             instruction::READ if own => self.answer_read(request_only(params), snapshot, reply),
             instruction::READ => {}
             instruction::SYNC_READ if !own => self.sync_read(params, snapshot, reply),
@@ -41,16 +42,16 @@ impl State {
             instruction::BULK_READ if !own => self.bulk_read(params, snapshot, reply),
             _ => {
                 let result = self.change(packet, own);
-                self.conclude(packet, result, reply);
+                self.conclude(packet, level, result, reply);
             }
         }
     }
 
     /// Counts what went wrong, and answers where only this device was addressed.
-    fn conclude(&mut self, packet: Packet<'_>, result: Result<(), StatusError>, reply: &mut Reply) {
+    fn conclude(&mut self, packet: Packet<'_>, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
         let result = self.counted(result);
         if packet.id != BROADCAST {
-            self.answer(packet.id, result, reply);
+            self.answer(packet.id, level, result, reply);
         }
     }
 

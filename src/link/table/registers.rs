@@ -5,23 +5,20 @@
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 
-use crate::config::newtons;
 use crate::frame::{COLUMNS, ROWS, SLOTS, TAXELS};
 use crate::link::packet::StatusError;
-use crate::link::settings::{Settings, goal_mn};
+use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
 use crate::params::Params;
 use crate::store::Record;
-use crate::units::Duty;
 
+use super::values::{bump, element, permille, set_goal, set_torque, set_watchdog, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
 const MODEL: u16 = u16::from_le_bytes(*b"FT");
 /// Counts changes of the control table that a host must know of.
 const TABLE_VERSION: u32 = 1;
-/// The bus watchdog's unit.
-const WATCHDOG_MS: u16 = 20;
 /// Ten times the major and once the minor number of the version.
 const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
 
@@ -131,17 +128,20 @@ control_table! {
     /// 1 while a Reg Write waits for its Action.
     69 REGISTERED_INSTRUCTION: U8 ReadOnly, "" * 1, 0 to 1,
         |view, _| u32::from(view.state.registered());
-    /// Why the motor was stopped, by bit: 0 supply, 3 encoder, 4 bridge, 5 over-force, 6 array, 7 controller or bus; the number is in fault.
+    /// Why the motor was stopped, by bit: 0 supply, 3 encoder, 4 bridge, 5 over-force, 6 array, 7 controller or
+    /// bus; the number is in fault.
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, "" * 1, 0 to 255,
         |view, _| u32::from(hardware_error(view.snapshot.status.fault));
-    /// The motor is stopped when the bus is silent for longer; 0 is off. Reads -1 once it tripped, until 0 is written; until then goal force and torque enable are refused.
+    /// The motor is stopped when the bus is silent for longer; 0 is off. Reads -1 once it tripped, until 0 is
+    /// written; until then goal force and torque enable are refused.
     98 BUS_WATCHDOG: I8 ReadWrite, "ms" * 20, 0 to 127 = 0,
         |view, _| watchdog(view.settings()) as u32,
         set_watchdog;
     /// Milliseconds since reset; wraps after 32767.
     120 REALTIME_TICK: U16 ReadOnly, "ms" * 1, 0 to 0x7FFF,
         |view, _| view.snapshot.tick_ms & 0x7FFF;
-    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error. Goes to 0 on a fault.
+    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error. Goes to 0
+    /// on a fault.
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
@@ -163,10 +163,13 @@ control_table! {
     /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault.
     264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.status.mode as u32;
-    /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5 encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12 missed deadline, 13 crash.
+    /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
+    /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
+    /// missed deadline, 13 crash.
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 13,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
-    /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7 frame missed, 8 slew.
+    /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
+    /// frame missed, 8 slew.
     266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force.
@@ -217,7 +220,8 @@ control_table! {
     /// The longest loop time since reset.
     316 LOOP_TIME_MAX_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.loop_time_max_us);
-    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6 other.
+    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6
+    /// other.
     318 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
         |view, _| view.snapshot.reset_cause as u32;
     /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang.
@@ -253,7 +257,8 @@ control_table! {
     /// Refused with the access error.
     342 ACCESS_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| view.refused(StatusError::Access);
-    /// Runs of bytes that were no packet, or only the beginning of one. Like all error counters it holds at its top and starts at 0 after a reset.
+    /// Runs of bytes that were no packet, or only the beginning of one. Like all error counters it holds at its top
+    /// and starts at 0 after a reset.
     344 FRAMING_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.counters().framing);
     /// Good instruction packets for this device, broadcasts included; wraps.
@@ -301,55 +306,6 @@ const fn all() -> [Register; FIXED.len() + Params::COUNT] {
         to += 1;
     }
     all
-}
-
-fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
-    let on = value != 0;
-    if on && staged.settings.watchdog_tripped {
-        return Err(StatusError::Access);
-    }
-    if on && staged.faulted {
-        return Err(StatusError::Result);
-    }
-    staged.settings.command.torque = on;
-    Ok(())
-}
-
-fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
-    if staged.settings.watchdog_tripped {
-        return Err(StatusError::Access);
-    }
-    staged.settings.command.goal = newtons(value as i32);
-    Ok(())
-}
-
-fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
-    if staged.settings.watchdog_tripped && value != 0 {
-        return Err(StatusError::Access);
-    }
-    staged.settings.watchdog_tripped = false;
-    staged.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
-    Ok(())
-}
-
-fn watchdog(settings: &Settings) -> i32 {
-    if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
-}
-
-/// Makes a request: a change of the number.
-fn bump(request: &mut u8, value: i64) {
-    *request = request.wrapping_add(u8::from(value != 0));
-}
-
-fn element(values: &[u16], place: usize) -> u32 {
-    values.get(place).map_or(0, |&value| u32::from(value))
-}
-
-/// Thousandths of the whole supply, rounded.
-fn permille(duty: Duty) -> i32 {
-    let full = i32::from(Duty::FULL);
-    let duty = i32::from(duty.0);
-    (duty * 1000 + duty.signum() * (full / 2)) / full
 }
 
 /// A number of at most two digits.

@@ -1,0 +1,5 @@
+//! Prints `docs/control-table.md`.
+
+fn main() {
+    print!("{}", host_tests::control_table::markdown());
+}

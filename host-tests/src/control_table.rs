@@ -1,0 +1,131 @@
+//! Renders the control table's definition as `docs/control-table.md`.
+
+use fingertip::link::packet::StatusError;
+use fingertip::link::table::{Access, Kind, REGISTERS, READ_MAX, Register, address};
+use fingertip::params::Params;
+
+/// How this page is made anew.
+pub const COMMAND: &str = "cargo xtask docs";
+
+/// The page.
+pub fn markdown() -> String {
+    let mut page = String::new();
+    let state = address::PRESENT_MODE;
+    let state_bytes = address::LOOP_TIME_MAX_US + 2 - state;
+    page += &format!(
+        "# Control table\n\n\
+        Generated from `src/link/table/registers.rs` and `src/params.rs` by `{COMMAND}`: do not edit.\n\n\
+        DYNAMIXEL Protocol 2.0. Numbers are little-endian, signed ones two's complement. One Read of {state_bytes} bytes from \
+        {state} fetches the whole state of the loop, all from one frame. A read may take any bytes that belong to registers, \
+        1 to {READ_MAX} of them; a write covers whole registers, and either all of it happens or nothing.\n\n\
+        - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash once \
+        `save_parameters` was written.\n\
+        - **one is**: what a step of the number means, which is also its resolution.\n\n"
+    );
+    errors(&mut page);
+    section(&mut page, "Registers", |register| param(register).is_none());
+    section(&mut page, "Parameters", |register| param(register).is_some());
+    page
+}
+
+fn errors(page: &mut String) {
+    page.push_str("## Errors in a status packet\n\n| number | meaning |\n| --- | --- |\n");
+    let meanings = [
+        (StatusError::Result, "understood, but cannot be carried out just now"),
+        (StatusError::Instruction, "no such instruction, or not under this ID"),
+        (StatusError::Crc, "the packet arrived damaged"),
+        (StatusError::Range, "a value outside its register's range"),
+        (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
+        (StatusError::Limit, "a value beyond what other registers allow: the goal beyond force_max_mn, parameters that contradict each other"),
+        (StatusError::Access, "no such register, or one that cannot be written, or not while torque is on"),
+    ];
+    for (error, meaning) in meanings {
+        *page += &format!("| {} | {meaning} |\n", error as u8);
+    }
+    page.push_str("\nBit 7 of the error is the alert: the hardware error status is not zero.\n");
+}
+
+fn section(page: &mut String, title: &str, wanted: impl Fn(&Register) -> bool) {
+    *page += &format!(
+        "\n## {title}\n\n| address | name | type | access | one is | range | default | meaning |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+    );
+    for register in REGISTERS.iter().filter(|register| wanted(register)) {
+        let default = register.default.map_or(String::new(), |value| value.to_string());
+        *page += &format!(
+            "| {} | {} | {} | {} | {} | {} to {} | {default} | {} |\n",
+            register.address,
+            register.name.to_lowercase(),
+            kind(register),
+            access(register.access),
+            step(register),
+            register.min,
+            register.max,
+            register.doc.trim(),
+        );
+    }
+}
+
+fn param(register: &Register) -> Option<usize> {
+    let place = usize::from(register.address.checked_sub(address::PARAMS)?) / 4;
+    (place < Params::COUNT).then_some(place)
+}
+
+fn kind(register: &Register) -> String {
+    let name = match register.kind {
+        Kind::U8 => "u8",
+        Kind::I8 => "i8",
+        Kind::U16 => "u16",
+        Kind::I16 => "i16",
+        Kind::U32 => "u32",
+        Kind::I32 => "i32",
+    };
+    if register.count == 1 { name.into() } else { format!("{name} x {}", register.count) }
+}
+
+fn access(access: Access) -> &'static str {
+    match access {
+        Access::ReadOnly => "R",
+        Access::ReadWrite => "RW",
+        Access::TorqueOff => "RW-off",
+        Access::Stored => "S",
+    }
+}
+
+/// What a step of the number means: as the definition has it, for a parameter as its name says.
+pub fn step(register: &Register) -> String {
+    if param(register).is_some() {
+        return unit_of(register.name).into();
+    }
+    match (register.unit, register.scale) {
+        ("", _) => "1".into(),
+        (unit, 1) if unit.starts_with("1/") => unit.into(),
+        (unit, scale) => format!("{scale} {unit}"),
+    }
+}
+
+/// The unit that a parameter's name ends with.
+fn unit_of(name: &str) -> &'static str {
+    const ENDINGS: [(&str, &str); 19] = [
+        ("codes_per_kpa_milli", "0.001 codes/kPa"),
+        ("_ppb_per_code", "1e-9 a code"),
+        ("_mrad_per_mm", "1 mrad/mm"),
+        ("_unm_per_a", "1 uN m/A"),
+        ("_um_per_s", "1 um/s"),
+        ("_mv_per_ms", "1 mV/ms"),
+        ("_counts_per_turn", "1 count"),
+        ("_ug_m2", "1 ug m^2"),
+        ("_unm", "1 uN m"),
+        ("_mohm", "1 mOhm"),
+        ("_codes", "1 code"),
+        ("_cycles", "1 cycle"),
+        ("_pa", "1 Pa"),
+        ("_mn", "1 mN"),
+        ("_mv", "1 mV"),
+        ("_ma", "1 mA"),
+        ("_um", "1 um"),
+        ("_ns", "1 ns"),
+        ("_us", "1 us"),
+    ];
+    ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("1", |(_, unit)| unit)
+}

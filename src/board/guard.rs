@@ -32,7 +32,10 @@ pub const fn frame_ticks(timing: ScanTiming) -> u32 {
 pub fn start(_timer: Peri<'static, TIM5>) {
     rcc::enable_and_reset::<TIM5>();
     pac::TIM5.arr().write_value(u32::MAX);
+    // The compare value of 0 out of reset would match at once.
+    pac::TIM5.ccr(COMPARE_1).write_value(u32::MAX);
     pac::TIM5.cr1().modify(|w| w.set_cen(true));
+    clear_flag();
     // SAFETY: the handler below touches only statics and registers that are its own or written whole, and its priority
     // is set.
     unsafe { interrupt::TIM5.enable() };
@@ -69,10 +72,14 @@ pub fn take_trip() -> bool {
 fn TIM5() {
     bridge::make_safe();
     TRIPPED.store(true, Ordering::Release);
-    // Flags of the status register are cleared by writing 0 and left alone by writing 1.
+    clear_flag();
+    pac::TIM5.ccr(COMPARE_1).write_value(now().wrapping_add(PERIOD.load(Ordering::Relaxed)));
+    scan::WAKE.signal(());
+}
+
+/// Flags of the status register are cleared by writing 0 and left alone by writing 1.
+fn clear_flag() {
     let mut cleared = SrGp16(u32::MAX);
     cleared.set_ccif(COMPARE_1, false);
     pac::TIM5.sr().write_value(cleared);
-    pac::TIM5.ccr(COMPARE_1).write_value(now().wrapping_add(PERIOD.load(Ordering::Relaxed)));
-    scan::WAKE.signal(());
 }

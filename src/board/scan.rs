@@ -129,8 +129,10 @@ impl Scan {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun();
         for (bank, buffer) in frame.banks.iter_mut().zip(&BUFFERS) {
-            for (codes, source) in bank.iter_mut().flatten().zip(buffer[half].iter().flatten()) {
-                *codes = source.load(Ordering::Relaxed);
+            for (codes, sources) in bank.iter_mut().zip(&buffer[half]) {
+                for (code, source) in codes.iter_mut().zip(sources) {
+                    *code = source.load(Ordering::Relaxed);
+                }
             }
         }
         fence(Ordering::Acquire);

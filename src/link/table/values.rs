@@ -1,0 +1,65 @@
+//! Registers whose values take more than a line to read or to write.
+
+use crate::config::newtons;
+use crate::link::packet::StatusError;
+use crate::link::settings::Settings;
+use crate::units::Duty;
+
+use super::Staged;
+
+/// The bus watchdog's unit.
+const WATCHDOG_MS: u16 = 20;
+
+/// Torque enable: refused while a fault or a tripped watchdog stands.
+pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    let on = value != 0;
+    if on && staged.settings.watchdog_tripped {
+        return Err(StatusError::Access);
+    }
+    if on && staged.faulted {
+        return Err(StatusError::Result);
+    }
+    staged.settings.command.torque = on;
+    Ok(())
+}
+
+/// Goal force: refused while a tripped watchdog stands.
+pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if staged.settings.watchdog_tripped {
+        return Err(StatusError::Access);
+    }
+    staged.settings.command.goal = newtons(value as i32);
+    Ok(())
+}
+
+/// Bus watchdog: 0 resets a tripped one.
+pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if staged.settings.watchdog_tripped && value != 0 {
+        return Err(StatusError::Access);
+    }
+    staged.settings.watchdog_tripped = false;
+    staged.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
+    Ok(())
+}
+
+/// The bus watchdog as it reads.
+pub(super) fn watchdog(settings: &Settings) -> i32 {
+    if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
+}
+
+/// Makes a request: a change of the number.
+pub(super) fn bump(request: &mut u8, value: i64) {
+    *request = request.wrapping_add(u8::from(value != 0));
+}
+
+/// One element of a picture of the array.
+pub(super) fn element(values: &[u16], place: usize) -> u32 {
+    values.get(place).map_or(0, |&value| u32::from(value))
+}
+
+/// Thousandths of the whole supply, rounded.
+pub(super) fn permille(duty: Duty) -> i32 {
+    let full = i32::from(Duty::FULL);
+    let duty = i32::from(duty.0);
+    (duty * 1000 + duty.signum() * (full / 2)) / full
+}

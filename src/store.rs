@@ -65,15 +65,8 @@ pub struct StoreError {
 /// What is wrong with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
-    /// It does not begin like a record, or its CRC is wrong: the write was cut short, or the flash lost bits.
-    Torn,
-    /// It was written by a firmware with another layout.
-    Layout {
-        /// The layout's version.
-        version: u16,
-        /// The number of parameters.
-        count: u16,
-    },
+    /// It is no whole record of this layout: the write was cut short, the flash lost bits, or another firmware wrote it.
+    Unreadable,
     /// The ID, the baud code or the return delay is out of its range.
     Bus,
     /// A parameter is out of its range.
@@ -130,20 +123,17 @@ fn is_blank(slot: &[u8]) -> bool {
 }
 
 fn decode(slot: &[u8]) -> Result<Record, Damage> {
-    let (body, tail) = slot.split_at_checked(CRC_PLACE).ok_or(Damage::Torn)?;
-    let (magic, rest) = body.split_first_chunk::<4>().ok_or(Damage::Torn)?;
-    let (layout, rest) = rest.split_first_chunk::<2>().ok_or(Damage::Torn)?;
-    let (count, rest) = rest.split_first_chunk::<2>().ok_or(Damage::Torn)?;
-    let (head, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Torn)?;
-    if *magic != MAGIC {
-        return Err(Damage::Torn);
-    }
-    let (version, count) = (u16::from_le_bytes(*layout), u16::from_le_bytes(*count));
-    if (version, count) != (LAYOUT, Params::COUNT as u16) {
-        return Err(Damage::Layout { version, count });
+    let (body, tail) = slot.split_at_checked(CRC_PLACE).ok_or(Damage::Unreadable)?;
+    let (magic, rest) = body.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
+    let (layout, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
+    let (head, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
+    let [a, b, c, d] = *layout;
+    let layout = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
+    if *magic != MAGIC || layout != [LAYOUT, Params::COUNT as u16] {
+        return Err(Damage::Unreadable);
     }
     if tail.first_chunk() != Some(&CRC.checksum(body).to_le_bytes()) {
-        return Err(Damage::Torn);
+        return Err(Damage::Unreadable);
     }
     let [id, baud_code, return_delay_2us, _] = *head;
     if id > ID_MAX || usize::from(baud_code) >= BAUD_RATES.len() || return_delay_2us == u8::MAX {

@@ -1,7 +1,7 @@
 //! Renders the control table's definition as `docs/control-table.md`.
 
 use fingertip::link::packet::StatusError;
-use fingertip::link::table::{Access, Kind, REGISTERS, READ_MAX, Register, address};
+use fingertip::link::table::{Access, Kind, READ_MAX, REGISTERS, Register, address};
 use fingertip::params::Params;
 
 /// How this page is made anew.
@@ -36,7 +36,10 @@ fn errors(page: &mut String) {
         (StatusError::Crc, "the packet arrived damaged"),
         (StatusError::Range, "a value outside its register's range"),
         (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
-        (StatusError::Limit, "a value beyond what other registers allow: the goal beyond force_max_mn, parameters that contradict each other"),
+        (
+            StatusError::Limit,
+            "a value beyond what other registers allow: the goal beyond force_max_mn, parameters that contradict each other",
+        ),
         (StatusError::Access, "no such register, or one that cannot be written, or not while torque is on"),
     ];
     for (error, meaning) in meanings {

@@ -84,7 +84,7 @@ impl Receiver {
         self.window = self.window << 8 | u32::from(byte);
         let header = self.window == u32::from_be_bytes(HEADER);
         if header && self.expect != Expect::CrcHigh {
-            let clean = self.expect == Expect::Header && usize::from(self.stray) + 1 == HEADER.len();
+            let clean = self.expect == Expect::Header && usize::from(self.stray) < HEADER.len();
             self.begin();
             return (!clean).then_some(Event::Framing);
         }
@@ -158,6 +158,7 @@ impl Receiver {
         if header {
             // The packet was cut short, and the next one's header was taken for its end.
             self.begin();
+            return Event::Framing;
         }
         Event::BadCrc
     }

@@ -1,0 +1,169 @@
+//! A server with a made-up loop behind it, and a host's side of the talk.
+
+use fingertip::frame::{COLUMNS, Frame, SLOTS, TAXELS};
+use fingertip::link::packet::{Packet, StatusError};
+use fingertip::link::receiver::{Event, Receiver};
+use fingertip::link::sender::Sender;
+use fingertip::link::{Crash, CrashCause, Reply, ResetCause, Server, Snapshot};
+use fingertip::pipeline::Status;
+use fingertip::safety::{Fault, Mode};
+use fingertip::store::Record;
+
+/// The ID of the device under test.
+pub const ID: u8 = 1;
+
+/// A status packet's content.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Answer {
+    pub id: u8,
+    pub error: u8,
+    pub data: Vec<u8>,
+}
+
+impl Answer {
+    /// The error's number, without the alert.
+    pub fn number(&self) -> u8 {
+        self.error & 0x7F
+    }
+}
+
+pub struct Bench {
+    pub server: Server,
+    pub status: Status,
+    frame: Frame,
+    pressures: [u16; TAXELS],
+    tare: [u16; TAXELS],
+}
+
+impl Bench {
+    pub fn new() -> Self {
+        Self::with(Record { id: ID, ..Record::DEFAULT })
+    }
+
+    pub fn with(record: Record) -> Self {
+        let mut frame = Frame::EMPTY;
+        for place in 0..SLOTS * COLUMNS {
+            frame.set_code(place / COLUMNS, place % COLUMNS, 1000 + place as u16);
+        }
+        Self {
+            server: Server::new(record),
+            status: Status::default(),
+            frame,
+            pressures: std::array::from_fn(|place| 20_000 + place as u16),
+            tare: std::array::from_fn(|place| 300 + place as u16),
+        }
+    }
+
+    /// Stops the made-up loop, or lets it run.
+    pub fn set_fault(&mut self, fault: Option<Fault>) {
+        self.status.fault = fault;
+        self.status.mode = if fault.is_some() { Mode::Fault } else { Mode::Off };
+    }
+
+    /// What the bus sends in return, packet by packet.
+    pub fn hear(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+        let snapshot = Snapshot {
+            status: self.status,
+            supply_mv: 6012,
+            tick_ms: 0x1_8123,
+            loop_time_us: 41,
+            loop_time_max_us: 47,
+            reset_cause: ResetCause::Watchdog,
+            crash: Crash { cause: CrashCause::Panic, line: 321, count: 7, pc: 0x0800_1234 },
+            pressures_10pa: &self.pressures,
+            frame: &self.frame,
+            tare_codes: &self.tare,
+        };
+        let mut reply = Reply::new();
+        let mut replies = Vec::new();
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            let taken = self.server.feed(rest, &snapshot, &mut reply);
+            rest = &rest[taken..];
+            if !reply.is_empty() {
+                replies.push(reply.to_vec());
+            }
+        }
+        replies
+    }
+
+    /// The answer to an instruction packet, where there is one.
+    pub fn ask_as(&mut self, id: u8, instruction: u8, params: &[u8]) -> Option<Answer> {
+        let mut replies = self.hear(&packet(id, instruction, params));
+        assert!(replies.len() <= 1, "{replies:02X?}");
+        replies.pop().map(|reply| answer(&reply))
+    }
+
+    /// The answer to an instruction packet for the device under test.
+    pub fn ask(&mut self, instruction: u8, params: &[u8]) -> Answer {
+        self.ask_as(self.server.settings().record.id, instruction, params).expect("an answer")
+    }
+
+    /// Reads bytes.
+    pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, u8> {
+        let answer = self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat());
+        if answer.number() == 0 { Ok(answer.data) } else { Err(answer.number()) }
+    }
+
+    /// Writes bytes.
+    pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), u8> {
+        let answer = self.ask(0x03, &[&address.to_le_bytes(), data].concat());
+        assert!(answer.data.is_empty());
+        if answer.number() == 0 { Ok(()) } else { Err(answer.number()) }
+    }
+
+    /// Reads a number of `width` bytes, unsigned.
+    pub fn number(&mut self, address: u16, width: u16) -> u32 {
+        let mut bytes = self.read(address, width).expect("a register");
+        bytes.resize(4, 0);
+        u32::from_le_bytes(bytes.try_into().expect("four bytes"))
+    }
+
+    /// How often an instruction was refused for this reason.
+    pub fn refused(&self, error: StatusError) -> u16 {
+        self.server.counters().refused(error)
+    }
+}
+
+/// An instruction or status packet as it goes over the wire.
+pub fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
+    let mut bytes = Reply::new();
+    let mut sender = Sender::new(&mut bytes, id, instruction);
+    params.iter().for_each(|&byte| sender.push(byte));
+    sender.finish();
+    assert!(!bytes.is_empty(), "{} parameters do not fit", params.len());
+    bytes.to_vec()
+}
+
+/// Bytes from their hexadecimal form.
+pub fn hex(text: &str) -> Vec<u8> {
+    text.split_whitespace().map(|byte| u8::from_str_radix(byte, 16).expect("hexadecimal")).collect()
+}
+
+/// ID, instruction and parameters.
+pub type Content = (u8, u8, Vec<u8>);
+
+/// All that a receiver makes of some bytes.
+pub fn receive(receiver: &mut Receiver, bytes: &[u8]) -> (Vec<Content>, Vec<Event>) {
+    let (mut packets, mut events) = (Vec::new(), Vec::new());
+    for &byte in bytes {
+        let Some(event) = receiver.push(byte) else { continue };
+        if event == Event::Packet {
+            let Packet { id, instruction, params, complete } = receiver.packet();
+            assert!(complete);
+            packets.push((id, instruction, params.to_vec()));
+        } else {
+            events.push(event);
+        }
+    }
+    (packets, events)
+}
+
+/// The content of a status packet.
+pub fn answer(reply: &[u8]) -> Answer {
+    let (packets, events) = receive(&mut Receiver::new(), reply);
+    assert!(packets.len() == 1 && events.is_empty(), "{reply:02X?}");
+    let (id, instruction, params) = packets[0].clone();
+    assert_eq!(instruction, 0x55);
+    Answer { id, error: params[0], data: params[1..].to_vec() }
+}

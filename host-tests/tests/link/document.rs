@@ -1,0 +1,23 @@
+//! The page of the control table.
+
+use fingertip::link::table::REGISTERS;
+use host_tests::control_table::{COMMAND, markdown, step};
+
+#[test]
+fn the_page_is_fresh() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/control-table.md");
+    let page = std::fs::read_to_string(path).expect("docs/control-table.md can be read");
+    assert!(page == markdown(), "docs/control-table.md is stale: write it anew with `{COMMAND}`");
+}
+
+#[test]
+fn every_register_is_explained() {
+    for register in REGISTERS {
+        assert!(register.doc.trim().ends_with('.'), "{}: {:?}", register.name, register.doc);
+        assert!(register.min <= register.max, "{}", register.name);
+        let plain = ["sample_cycles", "bad_taxels_max", "baseline_follows"];
+        let unit = step(register);
+        let named = register.address < 512 || register.address >= 768 || plain.contains(&register.name) || unit != "1";
+        assert!(named, "{} has no unit: give its ending one in `unit_of`", register.name);
+    }
+}

@@ -1,0 +1,13 @@
+//! The bus: packets, control table, server, parameter record, and a client that nobody here wrote.
+
+mod bench;
+mod client;
+mod document;
+mod instructions;
+mod noise;
+mod packets;
+mod safety;
+mod several;
+mod store;
+mod table;
+mod writes;

@@ -1,0 +1,127 @@
+//! Sync, Bulk and Fast Sync instructions: several devices on one bus, each hearing what the others send.
+
+use fingertip::link::crc;
+use fingertip::link::table::address;
+use fingertip::store::Record;
+
+use crate::bench::{Bench, answer, hex, packet};
+
+const BROADCAST: u8 = 254;
+
+fn device(id: u8) -> Bench {
+    let mut bench = Bench::with(Record { id, ..Record::DEFAULT });
+    bench.status.sequence = 100 + u32::from(id);
+    bench
+}
+
+/// Lets every device hear the packet, then each what the others answer, until all are silent.
+fn talk(devices: &mut [Bench], bytes: &[u8]) -> Vec<Vec<u8>> {
+    let mut said: Vec<(Option<usize>, Vec<u8>)> = vec![(None, bytes.to_vec())];
+    let mut next = 0;
+    while let Some((speaker, bytes)) = said.get(next).cloned() {
+        for (place, device) in devices.iter_mut().enumerate() {
+            if speaker != Some(place) {
+                said.extend(device.hear(&bytes).into_iter().map(|reply| (Some(place), reply)));
+            }
+        }
+        next += 1;
+    }
+    said.into_iter().skip(1).map(|(_, bytes)| bytes).collect()
+}
+
+#[test]
+fn sync_read_is_answered_in_the_order_of_the_list() {
+    let mut devices = [device(1), device(2), device(3)];
+    let counter = address::FRAME_COUNTER.to_le_bytes();
+    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[&counter[..], &[4, 0, 3, 1, 2]].concat()));
+    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data[0])).collect();
+    assert_eq!(answers, [(3, 0, 103), (1, 0, 101), (2, 0, 102)]);
+
+    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[10, 0, 1, 0, 2, 1]));
+    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data.len())).collect();
+    assert_eq!(answers, [(2, 7, 0), (1, 7, 0)], "refused in turn too");
+}
+
+#[test]
+fn who_is_not_asked_is_silent_and_so_is_who_waits_in_vain() {
+    let mut devices = [device(1), device(2)];
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x82, &[7, 0, 1, 0, 5, 1])).is_empty(), "5 is not there");
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x82, &[7, 0, 1, 0, 7])).is_empty());
+    // The old turn is forgotten with the next instruction, whoever it is for.
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x82, &[7, 0, 1, 0, 5, 1])).is_empty());
+    assert!(talk(&mut devices, &packet(9, 0x01, &[])).is_empty());
+    assert!(talk(&mut devices, &packet(5, 0x55, &[0, 5])).is_empty());
+    for params in [&[][..], &[7], &[7, 0, 1]] {
+        assert!(talk(&mut devices, &packet(BROADCAST, 0x82, params)).is_empty(), "{params:?}");
+    }
+    assert_eq!(devices[0].number(address::LENGTH_ERRORS, 2), 3);
+    assert_eq!(devices[0].ask(0x82, &[7, 0, 1, 0, 1]).number(), 2, "only for all");
+}
+
+#[test]
+fn sync_write_reaches_each_with_its_own() {
+    let mut devices = [device(1), device(2), device(3)];
+    let entries = hex("00 01 04 00  02 E8 03 00 00  01 D0 07 00 00");
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &entries)).is_empty());
+    let goals = devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4));
+    assert_eq!(goals, [2000, 1000, 0]);
+    // An entry that is cut short spoils the packet; one that is refused concerns its own device only.
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x83, &hex("00 01 04 00  01 00 00 00 00  02 00 00"))).is_empty());
+    assert!(
+        talk(&mut devices, &packet(BROADCAST, 0x83, &hex("00 01 04 00  01 00 00 00 40  02 01 00 00 00"))).is_empty()
+    );
+    let goals = devices.each_mut().map(|device| device.number(address::GOAL_FORCE_MN, 4));
+    assert_eq!(goals, [2000, 1, 0]);
+    assert_eq!(devices[0].number(address::RANGE_ERRORS, 2), 1);
+    assert_eq!(devices[0].number(address::LENGTH_ERRORS, 2), 1);
+}
+
+#[test]
+fn bulk_read_and_write_have_addresses_of_their_own() {
+    let mut devices = [device(1), device(2), device(3)];
+    let entries = hex("02 00 01 04 00 E8 03 00 00  01 44 00 01 00 01");
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x93, &entries)).is_empty());
+    assert_eq!(devices[1].number(address::GOAL_FORCE_MN, 4), 1000);
+    assert_eq!(devices[0].number(address::STATUS_RETURN_LEVEL, 1), 1);
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x93, &hex("01 44 00 02 00 02"))).is_empty(), "cut short");
+    assert_eq!(devices[0].number(address::STATUS_RETURN_LEVEL, 1), 1);
+
+    let replies = talk(&mut devices, &packet(BROADCAST, 0x92, &hex("02 00 01 04 00  01 07 00 01 00")));
+    let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.data)).collect();
+    assert_eq!(answers, [(2, vec![0xE8, 3, 0, 0]), (1, vec![1])]);
+    assert!(talk(&mut devices, &packet(BROADCAST, 0x92, &hex("02 00 01 04"))).is_empty());
+}
+
+#[test]
+fn fast_sync_read_makes_one_packet_of_all_parts() {
+    let mut devices = [device(1), device(2), device(3)];
+    let counter = address::FRAME_COUNTER.to_le_bytes();
+    for ids in [&[1][..], &[2, 3, 1], &[3, 1], &[1, 2, 3]] {
+        let request = packet(BROADCAST, 0x8A, &[&counter[..], &[4, 0], ids].concat());
+        let wire = talk(&mut devices, &request).concat();
+        let length = 1 + 8 * ids.len();
+        assert_eq!(wire.len(), 7 + length, "{wire:02X?}");
+        assert_eq!(wire[..8], [0xFF, 0xFF, 0xFD, 0, 0xFE, length as u8, 0, 0x55]);
+        for (place, &id) in ids.iter().enumerate() {
+            let begin = 8 + 8 * place;
+            let (part, checksum) = wire[begin..begin + 8].split_at(6);
+            assert_eq!(part, [0, id, 100 + id, 0, 0, 0]);
+            assert_eq!(checksum, crc::update(crc::START, &wire[..begin + 6]).to_le_bytes());
+        }
+    }
+}
+
+#[test]
+fn fast_sync_read_gives_way_to_another_packet() {
+    let mut waiting = device(2);
+    let request = packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]);
+    assert!(waiting.hear(&request).is_empty());
+    assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1, "a ping is answered as ever");
+    assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
+    // Data that cannot be read is zero, with its error; and nothing at all is sent where it would not fit.
+    let mut first = device(1);
+    let reply = first.hear(&packet(BROADCAST, 0x8A, &[10, 0, 3, 0, 1])).concat();
+    assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
+    assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 1, 1, 1])).is_empty());
+    assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 0xFF, 0xFF, 1])).is_empty());
+}

@@ -1,0 +1,167 @@
+//! Reading the control table.
+
+use fingertip::frame::TAXELS;
+use fingertip::link::packet::StatusError;
+use fingertip::link::table::{READ_MAX, REGISTERS, address};
+use fingertip::safety::{Fault, Limits, Mode};
+use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
+
+use crate::bench::Bench;
+
+#[test]
+fn registers_stand_in_order_and_apart() {
+    for pair in REGISTERS.windows(2) {
+        assert!(pair[0].address + pair[0].bytes() <= pair[1].address, "{} and {}", pair[0].name, pair[1].name);
+    }
+}
+
+/// What each address holds, read byte by byte; none where there is no register.
+fn bytes(bench: &mut Bench, end: u16) -> Vec<Option<u8>> {
+    (0..end).map(|address| bench.read(address, 1).map(|bytes| bytes[0]).ok()).collect()
+}
+
+#[test]
+fn every_span_reads_as_its_bytes_or_not_at_all() {
+    let mut bench = Bench::new();
+    let last = REGISTERS.last().expect("registers");
+    let end = last.address + last.bytes() + 4;
+    let bytes = bytes(&mut bench, end);
+    for register in REGISTERS {
+        for address in register.address..register.address + register.bytes() {
+            assert!(bytes[usize::from(address)].is_some(), "{} at {address}", register.name);
+        }
+    }
+    let owned: usize = REGISTERS.iter().map(|register| usize::from(register.bytes())).sum();
+    assert_eq!(bytes.iter().flatten().count(), owned, "nothing outside of registers can be read");
+    for start in 0..end {
+        // Every length up to 40, and every 7th beyond: all partial spans of all registers, and across them.
+        for length in (1..40).chain((40..=READ_MAX).step_by(7)) {
+            let span = bytes.get(usize::from(start)..usize::from(start + length));
+            let expected: Option<Vec<u8>> = span.and_then(|span| span.iter().copied().collect());
+            // The registers that the reads themselves change.
+            let counts = address::ACCESS_ERRORS - 12..address::PRESSURES;
+            if expected.is_some() && (counts.contains(&start) || counts.contains(&(start + length - 1))) {
+                assert_eq!(bench.read(start, length).map(|data| data.len()), Ok(usize::from(length)));
+            } else {
+                assert_eq!(bench.read(start, length), expected.ok_or(StatusError::Access as u8), "{length} at {start}");
+            }
+        }
+    }
+}
+
+#[test]
+fn reads_of_no_or_too_many_bytes_are_refused() {
+    let mut bench = Bench::new();
+    for (address, length, error) in [
+        (0, 0, StatusError::Length),
+        (address::RAW_CODES, READ_MAX + 1, StatusError::Length),
+        (address::RAW_CODES, u16::MAX, StatusError::Length),
+        (u16::MAX, 1, StatusError::Access),
+        (u16::MAX, 2, StatusError::Access),
+        (10, 1, StatusError::Access),
+    ] {
+        assert_eq!(bench.read(address, length), Err(error as u8), "{length} at {address}");
+    }
+}
+
+#[test]
+fn each_figure_stands_where_the_page_says() {
+    let mut bench = Bench::new();
+    let status = &mut bench.status;
+    status.sequence = 0xAABB_CCDD;
+    status.missed_frames = 77;
+    status.mode = Mode::Fault;
+    status.fault = Some(Fault::OverForce);
+    status.limits = Limits(Limits::SLEW | Limits::VOLTAGE);
+    status.contact.force = Newtons::from_bits(80_872); // 1.23401 N
+    status.contact.indentation = Millimetres::from_bits(25_166); // 1.50001 um
+    status.contact.centre_x = Millimetres::from_bits(-33_554_432);
+    status.contact.centre_y = Millimetres::from_bits(16_777_216);
+    status.contact.radius = Millimetres::from_bits(i32::MAX);
+    status.contact.peak_pa = 123_456;
+    status.contact.confidence = 200;
+    status.contact.bad_taxels = 3;
+    status.travel = Millimetres::from_bits(i32::MIN);
+    status.speed = MillimetresPerSecond::from_bits(-65_536 * 30);
+    status.duty = Duty(-i16::MAX);
+    for (address, width, expected) in [
+        (address::MODEL_NUMBER, 2, 0x5446),
+        (address::MODEL_INFORMATION, 4, 0x0001_0A0A),
+        (address::FIRMWARE_VERSION, 1, 1),
+        (address::ID, 1, 1),
+        (address::BAUD_RATE, 1, 3),
+        (address::RETURN_DELAY_TIME, 1, 250),
+        (address::TORQUE_ENABLE, 1, 0),
+        (address::STATUS_RETURN_LEVEL, 1, 2),
+        (address::HARDWARE_ERROR_STATUS, 1, 1 << 5),
+        (address::REALTIME_TICK, 2, 0x0123),
+        (address::PRESENT_MODE, 1, 5),
+        (address::FAULT, 1, 6),
+        (address::LIMITS, 2, 0x101),
+        (address::PRESENT_FORCE_MN, 4, 1234),
+        (address::INDENTATION_UM, 4, 2),
+        (address::CENTRE_X_UM, 4, -2000i32 as u32),
+        (address::CENTRE_Y_UM, 4, 1000),
+        (address::CONTACT_RADIUS_UM, 4, 128_000),
+        (address::PEAK_PRESSURE_PA, 4, 123_456),
+        (address::CONFIDENCE, 1, 200),
+        (address::BAD_TAXELS, 1, 3),
+        (address::DUTY_PERMILLE, 2, u32::from(-1000i16 as u16)),
+        (address::TRAVEL_UM, 4, -128_000i32 as u32),
+        (address::SPEED_UM_PER_S, 4, -30_000i32 as u32),
+        (address::FRAME_COUNTER, 4, 0xAABB_CCDD),
+        (address::MISSED_FRAMES, 4, 77),
+        (address::SUPPLY_MV, 2, 6012),
+        (address::LOOP_TIME_US, 2, 41),
+        (address::LOOP_TIME_MAX_US, 2, 47),
+        (address::RESET_CAUSE, 1, 5),
+        (address::CRASH_CAUSE, 1, 1),
+        (address::CRASH_COUNT, 4, 7),
+        (address::CRASH_PC, 4, 0x0800_1234),
+        (address::CRASH_LINE, 2, 321),
+        (address::PARAMS, 4, 10_000),
+        (address::PRESSURES, 2, 20_000),
+        (address::PRESSURES + 2 * TAXELS as u16 - 2, 2, 20_099),
+        (address::RAW_CODES, 2, 1000),
+        (address::RAW_CODES + 2 * 109, 2, 1109),
+        (address::TARE_CODES + 2 * 99, 2, 399),
+    ] {
+        assert_eq!(bench.number(address, width), expected, "address {address}");
+    }
+}
+
+#[test]
+fn one_read_fetches_the_whole_state_or_a_whole_picture() {
+    let mut bench = Bench::new();
+    let end = address::LOOP_TIME_MAX_US + 2;
+    assert!(bench.read(address::PRESENT_MODE, end - address::PRESENT_MODE).is_ok());
+    assert!(bench.read(address::GOAL_FORCE_MN, address::GOOD_PACKETS + 4 - address::GOAL_FORCE_MN).is_ok());
+    for (address, bytes) in [(address::PRESSURES, 200), (address::RAW_CODES, 220), (address::TARE_CODES, 200)] {
+        assert_eq!(bench.read(address, bytes).map(|data| data.len()), Ok(usize::from(bytes)));
+    }
+}
+
+#[test]
+fn refusals_are_counted_by_their_number() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.read(300, 0), Err(5));
+    assert_eq!(bench.read(10, 1), Err(7));
+    assert_eq!(bench.read(10, 1), Err(7));
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[2]), Err(4));
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &7_001i32.to_le_bytes()), Err(6));
+    assert_eq!(bench.ask(0x77, &[]).number(), 2);
+    assert_eq!(bench.ask(0x05, &[]).number(), 1);
+    for (address, count) in [
+        (address::RESULT_ERRORS, 1),
+        (address::INSTRUCTION_ERRORS, 1),
+        (address::CRC_ERRORS, 0),
+        (address::RANGE_ERRORS, 1),
+        (address::LENGTH_ERRORS, 1),
+        (address::LIMIT_ERRORS, 1),
+        (address::ACCESS_ERRORS, 2),
+        (address::FRAMING_ERRORS, 0),
+    ] {
+        assert_eq!(bench.number(address, 2), count, "address {address}");
+    }
+    assert_eq!(bench.number(address::GOOD_PACKETS, 4), 16);
+}

@@ -1,0 +1,217 @@
+//! Writing the control table: all or nothing, whole registers, inside ranges and limits, torque off where it matters.
+
+use fingertip::link::Actions;
+use fingertip::link::packet::StatusError;
+use fingertip::link::table::{Access, REGISTERS, Register, address};
+use fingertip::params::Params;
+use fingertip::safety::Fault;
+
+use crate::bench::Bench;
+
+/// A number as a register's bytes, where they can hold it.
+fn bytes(register: &Register, value: i64) -> Option<Vec<u8>> {
+    let width = usize::from(register.kind.width());
+    let unsigned = format!("{:?}", register.kind).starts_with('U');
+    let (least, largest) = match (unsigned, width) {
+        (true, _) => (0, (1i64 << (8 * width)) - 1),
+        (false, _) => (-(1i64 << (8 * width - 1)), (1i64 << (8 * width - 1)) - 1),
+    };
+    (least..=largest).contains(&value).then(|| value.to_le_bytes()[..width].to_vec())
+}
+
+fn refuses(bench: &mut Bench, address: u16, data: &[u8], error: StatusError, what: &str) {
+    let (before, count) = (*bench.server.settings(), bench.refused(error));
+    assert_eq!(bench.write(address, data), Err(error as u8), "{what}: {data:02X?}");
+    assert_eq!(*bench.server.settings(), before, "{what}: {data:02X?} changed something");
+    assert_eq!(bench.server.take_actions(), Actions::default(), "{what}");
+    assert_eq!(bench.refused(error), count + 1, "{what}");
+}
+
+#[test]
+fn no_register_takes_a_value_out_of_its_range() {
+    let mut bench = Bench::new();
+    let mut tried = 0;
+    for register in REGISTERS {
+        let refused = if register.access == Access::ReadOnly { StatusError::Access } else { StatusError::Range };
+        let wide = [
+            i64::MIN,
+            -1 << 31,
+            -1 << 15,
+            -129,
+            -128,
+            -1,
+            128,
+            255,
+            256,
+            1 << 15,
+            65_535,
+            (1 << 31) - 1,
+            (1 << 32) - 1,
+        ];
+        for value in wide.into_iter().chain([register.min - 1, register.max + 1]) {
+            if (register.min..=register.max).contains(&value) {
+                continue;
+            }
+            if let Some(data) = bytes(register, value) {
+                refuses(&mut bench, register.address, &data, refused, register.name);
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 400, "{tried} values tried");
+}
+
+#[test]
+fn no_read_only_register_takes_anything() {
+    let mut bench = Bench::new();
+    for register in REGISTERS.iter().filter(|register| register.access == Access::ReadOnly) {
+        for value in [register.min, register.max] {
+            let data = bytes(register, value).expect("its own range");
+            refuses(&mut bench, register.address, &data, StatusError::Access, register.name);
+        }
+    }
+}
+
+#[test]
+fn every_value_in_range_is_taken_or_stopped_by_a_limit() {
+    for register in REGISTERS.iter().filter(|register| register.access != Access::ReadOnly) {
+        for value in [register.min, register.max, (register.min + register.max) / 2] {
+            let mut bench = Bench::new();
+            let before = *bench.server.settings();
+            let data = bytes(register, value).expect("its own range");
+            match bench.write(register.address, &data) {
+                Ok(())
+                    if [address::TARE, address::CLEAR_FAULT, address::SAVE_PARAMETERS].contains(&register.address) =>
+                {
+                    assert_eq!(bench.number(register.address, 1), 0, "{}", register.name);
+                }
+                Ok(()) => {
+                    let level = bench.server.settings().status_return_level;
+                    if level > 0 {
+                        assert_eq!(bench.read(register.address, register.bytes()), Ok(data), "{}", register.name);
+                    }
+                }
+                Err(error) => {
+                    let limited = register.address >= address::PARAMS || register.address == address::GOAL_FORCE_MN;
+                    assert!(limited && error == StatusError::Limit as u8, "{} = {value}: {error}", register.name);
+                    assert_eq!(*bench.server.settings(), before, "{}", register.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn defaults_are_what_a_new_device_holds() {
+    let mut bench = Bench::new();
+    for register in REGISTERS {
+        if let Some(default) = register.default {
+            let expected = bytes(register, default).expect("its own range");
+            assert_eq!(bench.read(register.address, register.bytes()), Ok(expected), "{}", register.name);
+        }
+    }
+}
+
+#[test]
+fn a_part_of_a_register_cannot_be_written() {
+    let mut bench = Bench::new();
+    for register in REGISTERS.iter().filter(|register| register.access != Access::ReadOnly) {
+        refuses(&mut bench, register.address, &[], StatusError::Length, register.name);
+        for skip in 0..register.bytes() {
+            for length in 1..=usize::from(register.bytes() - skip) {
+                if length < usize::from(register.bytes()) {
+                    let data = vec![0; length];
+                    refuses(&mut bench, register.address + skip, &data, StatusError::Length, register.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn one_bad_value_spoils_the_whole_write() {
+    let mut bench = Bench::new();
+    let goal = 1000i32.to_le_bytes();
+    // Goal, tare, clear, then 2 for save; then a register that cannot be written; then one that does not exist.
+    refuses(&mut bench, address::GOAL_FORCE_MN, &[&goal[..], &[1, 1, 2]].concat(), StatusError::Range, "save");
+    refuses(
+        &mut bench,
+        address::GOAL_FORCE_MN,
+        &[&goal[..], &[1, 1, 1, 0]].concat(),
+        StatusError::Access,
+        "saved state",
+    );
+    refuses(&mut bench, address::BAUD_RATE, &[4, 10, 0], StatusError::Access, "beyond return delay");
+    let mut params: Vec<u8> = Params::DEFAULT.to_array().into_iter().flat_map(i32::to_le_bytes).collect();
+    let last = params.len() - 1;
+    params[last] = 0x7F;
+    refuses(&mut bench, address::PARAMS, &params, StatusError::Range, "parameters");
+
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &[&goal[..], &[1, 1, 1]].concat()), Ok(()));
+    let command = bench.server.command();
+    assert_eq!((command.goal.to_bits(), command.tare_request, command.clear_request), (65_536, 1, 1));
+    assert_eq!(bench.server.take_actions(), Actions { save: true, ..Actions::default() });
+    assert_eq!(bench.server.take_actions(), Actions::default());
+}
+
+#[test]
+fn with_torque_on_only_the_command_can_be_written() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    for register in REGISTERS {
+        let value = register.default.unwrap_or(register.min);
+        let data = bytes(register, value).expect("its own range");
+        if matches!(register.access, Access::TorqueOff | Access::Stored) {
+            refuses(&mut bench, register.address, &data, StatusError::Access, register.name);
+        }
+    }
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &5_000i32.to_le_bytes()), Ok(()));
+    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 5_000);
+}
+
+#[test]
+fn every_goal_comes_back_as_it_was_written() {
+    let mut bench = Bench::new();
+    for goal in 0..=7_000i32 {
+        assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal.to_le_bytes()), Ok(()));
+        assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), goal as u32);
+    }
+}
+
+#[test]
+fn a_goal_beyond_the_largest_force_is_a_limit_error() {
+    let mut bench = Bench::new();
+    refuses(&mut bench, address::GOAL_FORCE_MN, &7_001i32.to_le_bytes(), StatusError::Limit, "goal");
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &7_000i32.to_le_bytes()), Ok(()));
+    let force_max = param("force_max_mn");
+    refuses(&mut bench, force_max, &6_999i32.to_le_bytes(), StatusError::Limit, "force_max_mn below the goal");
+}
+
+#[test]
+fn parameters_that_contradict_each_other_are_a_limit_error() {
+    let mut bench = Bench::new();
+    for (name, value) in
+        [("contact_off_mn", 40), ("force_max_mn", 9_000), ("supply_min_mv", 8_500), ("sample_cycles", 16)]
+    {
+        refuses(&mut bench, param(name), &i32::to_le_bytes(value), StatusError::Limit, name);
+    }
+    assert_eq!(bench.write(param("sample_cycles"), &28i32.to_le_bytes()), Ok(()));
+    assert_eq!(bench.server.take_actions(), Actions { configure: true, ..Actions::default() });
+    assert_eq!(bench.number(address::SAVED_STATE, 1), 1);
+}
+
+#[test]
+fn torque_is_refused_while_a_fault_stands() {
+    let mut bench = Bench::new();
+    bench.set_fault(Some(Fault::SupplyLow));
+    let answer = bench.ask(0x03, &[64, 0, 1]);
+    assert_eq!(answer.error, 0x80 | StatusError::Result as u8);
+    bench.set_fault(None);
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    assert!(bench.server.command().torque);
+}
+
+/// The address of a parameter.
+fn param(name: &str) -> u16 {
+    REGISTERS.iter().find(|register| register.name == name).map(|register| register.address).expect("a parameter")
+}

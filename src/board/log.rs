@@ -23,8 +23,7 @@ pub fn log_boot(boot: Boot) {
 pub fn log_damage(error: StoreError) {
     error!("stored parameters: the record at {=usize:#x} is damaged", error.offset);
     match error.damage {
-        Damage::Torn => error!("torn: no magic, or a wrong CRC"),
-        Damage::Layout { version, count } => error!("layout {=u16} with {=u16} parameters", version, count),
+        Damage::Unreadable => error!("cut short, damaged, or written by another firmware"),
         Damage::Bus => error!("ID, baud code or return delay out of range"),
         Damage::Param(cause) => log_parameter(cause),
     }

@@ -35,9 +35,9 @@ impl Quotient {
         }
     }
 
-    /// The product with `factor` below 2^30, rounded to nearest.
-    fn scale(&self, factor: u64) -> u64 {
-        if self.shift > 63 { 0 } else { ((factor * self.significand) >> (self.shift - 1)).div_ceil(2) }
+    /// The product with `factor` below 2^27, with 4 bits after the point, rounded down.
+    const fn scale_q4(&self, factor: u64) -> u64 {
+        if self.shift > 63 { 0 } else { (factor * self.significand) >> (self.shift - 4) }
     }
 }
 
@@ -52,10 +52,24 @@ impl Tip {
     ///
     /// With `L = sqrt(a^2 - r^2)`, `dL = L - (a - d)` cancels at the rim and at small `d`. Here `dL/L` is
     /// `(r_c^2 - r^2) / (L^2 + L (a - d))`: the numerator and `L^2` are exact integers, and nothing is subtracted after a
-    /// rounding. Non-increasing in `r`.
+    /// rounding. That is off by less than 0.1 of a unit; where two results remain possible, integers decide between them.
+    /// So it is correctly rounded for every input, and non-increasing in `r`.
     pub fn pressure(&self, r: Millimetres, d: Millimetres) -> Kilopascals {
-        let strain = self.strain_at_square(square(self.distance(r)), self.depth(d));
-        Kilopascals::from_bits(strain.scale(self.modulus_bits()) as i32)
+        let (depth, distance_square) = (self.depth(d), square(self.distance(r)));
+        let estimate_q4 = self.strain_at_square(distance_square, depth).scale_q4(self.modulus_bits());
+        // The exact value is between the estimate less 2/16 and the estimate plus 3/16.
+        let (low, high) = ((estimate_q4 + 8 - 2) >> 4, (estimate_q4 + 8 + 3) >> 4);
+        let bits = if low < high && self.pressure_reaches(high, distance_square, depth) { high } else { low };
+        Kilopascals::from_bits(bits as i32)
+    }
+
+    /// Whether the pressure comes within half a unit of `bits` from below: `Y (1 - (a - d)/L) >= bits - 1/2`, cleared of
+    /// fraction and root.
+    fn pressure_reaches(&self, bits: u64, distance_square: u64, depth: u32) -> bool {
+        let lost = u128::from(2 * self.modulus_bits() * u64::from(self.rest(depth)));
+        let left = u128::from(2 * (self.modulus_bits() - bits) + 1);
+        let length_square = u128::from(square(self.radius_bits()) - distance_square);
+        lost * lost <= left * left * length_square
     }
 
     /// Pressure at the contact's centre, `p(0) = Y d / a`. Correctly rounded.

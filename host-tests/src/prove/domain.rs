@@ -46,7 +46,7 @@ pub fn boundary_distances(tip: &Tip, d: i32) -> Vec<i32> {
 
 /// Whether a force is at most that of the deepest indentation, judged exactly: its rounded value may be half a unit more.
 pub fn in_reach(tip: &Tip, force: i32) -> bool {
-    force < tip.force_max().to_bits() || super::exact::reaches(tip, force, tip.depth_max().to_bits())
+    force < tip.force_max().to_bits() || super::exact::force_in_reach(tip, force)
 }
 
 /// A random point of the domain.

@@ -19,11 +19,11 @@ const CHUNK: u64 = 1 << 16;
 pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7] {
     let round_trip_max = (tip.indentation(newtons(1)).to_bits() + 1).into();
     let tallies = [
-        Tally::new("F(d)", 1.0),
-        Tally::new("r_c(d)", 1.0),
-        Tally::new("k(d)", 1.0),
-        Tally::new("p(0)", 1.0),
-        Tally::new("mean p", 1.0),
+        Tally::new("F(d)", 0.5),
+        Tally::new("r_c(d)", 0.5),
+        Tally::new("k(d)", 0.5),
+        Tally::new("p(0)", 0.5),
+        Tally::new("mean p", 0.5),
         Tally::new("F(d + 1 ulp) - F(d)", 1.0),
         Tally::new("d(F(d)) - d", round_trip_max),
     ];
@@ -51,7 +51,7 @@ pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7
 /// indentation back, nor by more than the first unit does.
 pub fn forces(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 3] {
     let first = tip.indentation(newtons(1)).to_bits();
-    let tallies = [Tally::new("d(F)", 1.0), Tally::new("k(F)", 1.0), Tally::new("d(F + 1 ulp) - d(F)", first.into())];
+    let tallies = [Tally::new("d(F)", 0.5), Tally::new("k(F)", 0.5), Tally::new("d(F + 1 ulp) - d(F)", first.into())];
     parallel(range, CHUNK, tallies, progress, |range, [indentation, stiffness, step]| {
         for f in range.map(|f| f as i32).filter(|&f| in_reach(tip, f)) {
             let at = at(tip, f, 0);
@@ -67,8 +67,8 @@ pub fn forces(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 3
 
 /// Every contact radius up to that of the deepest indentation.
 pub fn radii(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 1] {
-    parallel(range, CHUNK, [Tally::new("d(r_c)", 1.0)], progress, |range, [indentation]| {
-        for radius in range.map(|radius| radius as i32) {
+    parallel(range, CHUNK, [Tally::new("d(r_c)", 0.5)], progress, |range, [indentation]| {
+        for radius in range.map(|radius| radius as i32).filter(|&radius| exact::radius_in_reach(tip, radius)) {
             let d = tip.indentation_from_radius(mm(radius)).to_bits();
             indentation.add(exact::indentation_from_radius(tip, radius, d, 1), at(tip, radius, 0));
         }
@@ -77,7 +77,7 @@ pub fn radii(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 1]
 
 /// Every peak pressure up to that of the deepest indentation.
 pub fn peaks(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 1] {
-    parallel(range, CHUNK, [Tally::new("d(p(0))", 1.0)], progress, |range, [indentation]| {
+    parallel(range, CHUNK, [Tally::new("d(p(0))", 0.5)], progress, |range, [indentation]| {
         for peak in range.map(|peak| peak as i32) {
             let d = tip.indentation_from_peak(Kilopascals::from_bits(peak)).to_bits();
             indentation.add(exact::indentation_from_peak(tip, peak, d, 1), at(tip, peak, 0));
@@ -88,7 +88,7 @@ pub fn peaks(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 1]
 /// A grid of `depths` by `distances` from the centre to past the rim, denser at small depths and towards the rim: the
 /// pressure, and that it never rises with the distance.
 pub fn pressures(tip: &Tip, depths: u64, distances: u64, progress: Progress<'_>) -> [Tally; 2] {
-    let tallies = [Tally::new("p(r, d)", 2.0), Tally::new("p(r) rise with r", 0.0)];
+    let tallies = [Tally::new("p(r, d)", 0.5), Tally::new("p(r) rise with r", 0.0)];
     parallel(1..depths + 1, 16, tallies, progress, |range, [pressure, rise]| {
         for step in range {
             let share = step as f64 / depths as f64;
@@ -106,7 +106,7 @@ pub fn pressures(tip: &Tip, depths: u64, distances: u64, progress: Progress<'_>)
                 let at = at(tip, d, r);
                 // Past the radius a every distance is the same.
                 pressure.add(exact::pressure(tip, r.min(tip.radius().to_bits()), d, p, 2), at);
-                let error_ulp = if before == i32::MAX { 0.0 } else { f64::from(p) - f64::from(before) };
+                let error_ulp = f64::from((p - before).max(0));
                 rise.add(Judged { error_ulp, nearest: None, within: p <= before }, at);
                 before = p;
             }

@@ -23,12 +23,12 @@ impl Tallies {
     /// Nothing judged yet.
     pub const fn new() -> Self {
         Self([
-            Tally::new("F(d)", 1.0),
-            Tally::new("d(F)", 1.0),
-            Tally::new("r_c(d)", 1.0),
-            Tally::new("k(d)", 1.0),
-            Tally::new("p(r, d)", 2.0),
-            Tally::new("theta_max(d)", 4.0),
+            Tally::new("F(d)", 0.5),
+            Tally::new("d(F)", 0.5),
+            Tally::new("r_c(d)", 0.5),
+            Tally::new("k(d)", 0.5),
+            Tally::new("p(r, d)", 0.5),
+            Tally::new("theta_max(d)", 1.0),
         ])
     }
 }
@@ -80,7 +80,7 @@ pub fn boundaries(progress: Progress<'_>) -> [Tally; 6] {
 pub fn touching_angles(tip: &Tip, count: u64, progress: Progress<'_>) -> [Tally; 1] {
     let reference = Reference::new(tip);
     let top = tip.depth_max().to_bits() as u64;
-    parallel(1..count + 1, CHUNK, [Tally::new("theta_max(d)", 4.0)], progress, |range, [tally]| {
+    parallel(1..count + 1, CHUNK, [Tally::new("theta_max(d)", 1.0)], progress, |range, [tally]| {
         for place in range {
             touching_angle_max(tip, &reference, (place * top / count).max(1) as i32, tally);
         }

@@ -98,39 +98,46 @@ impl Array {
     /// Reads a frame. Any codes are taken: what a sound array cannot show becomes a bad taxel.
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
         let [[rows_a @ .., undriven_a], [rows_b @ .., undriven_b]] = &frame.banks;
+        let undriven = joined(undriven_a, undriven_b);
         let picture = &mut self.picture;
-        *picture = Picture::EMPTY;
-        picture.undriven_max = undriven_a.iter().chain(undriven_b).copied().max().unwrap_or(0);
-
-        let mut columns = [0; COLUMNS];
+        let (mut sum, mut moment_x, mut moment_y, mut peak) = (0, 0, 0, 0);
+        let mut bad_count = 0;
         let mut weight = 1 - ROWS as i32;
-        let places = picture.taxels.iter_mut().zip(&mut picture.bad);
+        let codes = rows_a.iter().zip(rows_b);
         let calibrations = self.tare.iter().zip(&self.gain);
-        for ((codes, calibration), (out, bad)) in rows_a.iter().zip(rows_b).zip(calibrations).zip(places) {
-            let net = net_codes(codes.0, codes.1, undriven_a, undriven_b);
-            let boost = sag_boost(net.iter().map(|net| u32::from(*net)).sum(), config.sag_q32);
-            let live = live_columns(codes.0, codes.1, &net, config.dead_codes);
-            *bad = !live & COLUMN_MASK;
-            let mut row_sum = 0;
-            let taxels = out.iter_mut().zip(&mut columns).zip(net).zip(calibration.0.iter().zip(calibration.1));
-            for (place, (((out, column), net), (tare, gain))) in taxels.enumerate() {
-                if live >> place & 1 == 0 {
-                    continue;
-                }
-                let corrected = (u32::from(net) * boost + (1 << 11)) >> (16 - CODE_BITS);
-                let value = ((corrected * u32::from(*gain)) >> 14) as i32 - (tare >> (TARE_BITS - CODE_BITS));
-                *out = value;
-                *column += value;
-                row_sum += value;
-                picture.peak = picture.peak.max(value);
+        let places = picture.taxels.iter_mut().zip(&mut picture.bad);
+        for (((codes_a, codes_b), (tare, gain)), (out, bad)) in codes.zip(calibrations).zip(places) {
+            let codes = joined(codes_a, codes_b);
+            let mut row = Row::of(&codes, &undriven, config.dead_codes);
+            *bad = 0;
+            if row.suspect {
+                *bad = row.leave_out_bad(&codes, config.dead_codes);
+                bad_count += bad.count_ones() as u8;
             }
-            picture.sum += row_sum;
-            picture.moment_y += row_sum * weight;
+            let boost = sag_boost(row.sum, config.sag_q32);
+            let mut row_sum = 0;
+            for column in 0..COLUMNS {
+                let corrected = row.net[column].wrapping_mul(boost).wrapping_add(1 << 11) >> (16 - CODE_BITS);
+                let gained = (corrected.wrapping_mul(u32::from(gain[column])) >> 14) as i32;
+                let mut value = gained - (tare[column] >> (TARE_BITS - CODE_BITS));
+                if row.suspect && *bad >> column & 1 != 0 {
+                    value = 0;
+                }
+                out[column] = value;
+                row_sum += value;
+                moment_x += value * WEIGHTS[column];
+                peak = i32::max(peak, value);
+            }
+            sum += row_sum;
+            moment_y += row_sum * weight;
             weight += 2;
         }
-        picture.bad_count = picture.bad.iter().map(|bad| bad.count_ones() as u8).sum();
-        picture.moment_x =
-            columns.iter().zip((1 - COLUMNS as i32..).step_by(2)).map(|(sum, weight)| sum * weight).sum();
+        picture.sum = sum;
+        picture.moment_x = moment_x;
+        picture.moment_y = moment_y;
+        picture.peak = peak;
+        picture.bad_count = bad_count;
+        picture.undriven_max = undriven.iter().fold(0, |max, level| if *level > max { *level } else { max });
         picture
     }
 
@@ -161,7 +168,47 @@ impl Array {
     }
 }
 
-const COLUMN_MASK: u16 = (1 << COLUMNS) - 1;
+/// Twice a column's distance from the middle, in pitches.
+const WEIGHTS: [i32; COLUMNS] = [-9, -7, -5, -3, -1, 1, 3, 5, 7, 9];
+
+/// One driven row, before calibration.
+struct Row {
+    /// Codes above the columns' undriven levels.
+    net: [u32; COLUMNS],
+    /// Their sum.
+    sum: u32,
+    /// A taxel is dead or saturated.
+    suspect: bool,
+}
+
+impl Row {
+    /// Without a branch for each taxel: one sign bit collects what is wrong with any of them.
+    fn of(codes: &[u16; COLUMNS], undriven: &[u16; COLUMNS], dead_codes: u16) -> Self {
+        let mut net = [0; COLUMNS];
+        let mut sum = 0u32;
+        let mut sign = 0;
+        for column in 0..COLUMNS {
+            let (code, level) = (i32::from(codes[column]), i32::from(undriven[column]));
+            sign |= (code - level - i32::from(dead_codes)) | (i32::from(SATURATED) - 1 - code);
+            net[column] = (code - level) as u32;
+            sum = sum.wrapping_add(net[column]);
+        }
+        Self { net, sum, suspect: sign < 0 }
+    }
+
+    /// Holds every net code to what a converter can mean, and tells the bad columns, a bit each.
+    #[cold]
+    fn leave_out_bad(&mut self, codes: &[u16; COLUMNS], dead_codes: u16) -> u16 {
+        let mut bad = 0;
+        self.sum = 0;
+        for (column, (net, code)) in self.net.iter_mut().zip(codes).enumerate() {
+            *net = (*net as i32).clamp(0, 0xfff) as u32;
+            self.sum += *net;
+            bad |= u16::from(*code >= SATURATED || *net < u32::from(dead_codes)) << column;
+        }
+        bad
+    }
+}
 
 /// Moves each tare (Q16) by `weight` (Q16) of what the taxel now reads above it.
 fn learn(tares: &mut [i32; COLUMNS], values: &[i32; COLUMNS], weight: i32) {
@@ -170,32 +217,12 @@ fn learn(tares: &mut [i32; COLUMNS], values: &[i32; COLUMNS], weight: i32) {
     }
 }
 
-/// Codes above the columns' undriven level, never below 0.
-fn net_codes(
-    codes_a: &[u16; BANK_COLUMNS],
-    codes_b: &[u16; BANK_COLUMNS],
-    undriven_a: &[u16; BANK_COLUMNS],
-    undriven_b: &[u16; BANK_COLUMNS],
-) -> [u16; COLUMNS] {
-    let mut net = [0; COLUMNS];
-    let codes = codes_a.iter().chain(codes_b).zip(undriven_a.iter().chain(undriven_b));
-    for (net, (code, undriven)) in net.iter_mut().zip(codes) {
-        *net = (code & 0xfff).saturating_sub(*undriven);
-    }
-    net
-}
-
-/// A bit for each column whose taxel is neither dead nor saturated.
-fn live_columns(
-    codes_a: &[u16; BANK_COLUMNS],
-    codes_b: &[u16; BANK_COLUMNS],
-    net: &[u16; COLUMNS],
-    dead_codes: u16,
-) -> u16 {
-    let codes = codes_a.iter().chain(codes_b).zip(net);
-    codes
-        .enumerate()
-        .fold(0, |live, (place, (code, net))| live | u16::from(*code < SATURATED && *net >= dead_codes) << place)
+/// The columns of both banks.
+fn joined(a: &[u16; BANK_COLUMNS], b: &[u16; BANK_COLUMNS]) -> [u16; COLUMNS] {
+    let mut columns = [0; COLUMNS];
+    columns[..BANK_COLUMNS].copy_from_slice(a);
+    columns[BANK_COLUMNS..].copy_from_slice(b);
+    columns
 }
 
 /// 1 / (1 - rho N) in Q16, at most 2: a row that loses half its voltage is broken, not sagging.

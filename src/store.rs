@@ -3,14 +3,14 @@
 //! | bytes | content |
 //! | --- | --- |
 //! | 0 to 3 | magic "FTIP" |
-//! | 4, 5 | layout version |
-//! | 6, 7 | number of parameters |
+//! | 4 to 7 | fingerprint of the layout: CRC-32 of the parameters' names in order |
 //! | 8, 9, 10, 11 | ID, baud code, return delay, 0 |
 //! | 12 to 12 + 4 n | parameters in the order of [`Params`], 32 bits each |
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
-//! All little-endian; FF up to the next multiple of 16. The newest record is the last that is not blank. A write cut short
-//! fails the CRC: it is reported, not skipped, because the values that the user saved are not the ones before it.
+//! All little-endian; FF up to the next multiple of 16. The newest record is the last that is not blank. A write cut
+//! short fails the CRC: it is reported, not skipped, because the values that the user saved are not the ones before it.
+//! A firmware with other parameters, or the same in another order, refuses the record: no value is taken for another's.
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
@@ -19,12 +19,23 @@ use crate::link::settings::BAUD_RATES;
 use crate::params::{ParamError, Params};
 
 const MAGIC: [u8; 4] = *b"FTIP";
-const LAYOUT: u16 = 1;
 const HEADER_BYTES: usize = 12;
 const CRC_PLACE: usize = HEADER_BYTES + 4 * Params::COUNT;
+const LAYOUT: [u8; 4] = fingerprint().to_le_bytes();
 /// What flash reads after an erase.
 const BLANK: u8 = 0xFF;
-static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+const fn fingerprint() -> u32 {
+    let mut digest = CRC.digest();
+    let mut place = 0;
+    while place < Params::COUNT {
+        digest.update(Params::RANGES[place].0.as_bytes());
+        digest.update(b"\n");
+        place += 1;
+    }
+    digest.finalize()
+}
 
 /// From record to record in the sector.
 pub const SLOT_BYTES: usize = (CRC_PLACE + 4).next_multiple_of(16);
@@ -65,7 +76,8 @@ pub struct StoreError {
 /// What is wrong with a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
-    /// It is no whole record of this layout: the write was cut short, the flash lost bits, or another firmware wrote it.
+    /// It is no whole record of this layout: the write was cut short, the flash lost bits, or another firmware wrote
+    /// it.
     Unreadable,
     /// The ID, the baud code or the return delay is out of its range.
     Bus,
@@ -78,8 +90,7 @@ pub fn encode(record: &Record) -> [u8; SLOT_BYTES] {
     let mut slot = [BLANK; SLOT_BYTES];
     let head = [record.id, record.baud_code, record.return_delay_2us, 0];
     let bytes = (MAGIC.into_iter())
-        .chain(LAYOUT.to_le_bytes())
-        .chain((Params::COUNT as u16).to_le_bytes())
+        .chain(LAYOUT)
         .chain(head)
         .chain(record.params.to_array().into_iter().flat_map(i32::to_le_bytes));
     for (place, byte) in slot.iter_mut().zip(bytes) {
@@ -102,7 +113,9 @@ pub fn latest(sector: &[u8]) -> Result<Option<Record>, StoreError> {
     decode(slot).map(Some).map_err(|damage| StoreError { offset: place * SLOT_BYTES, damage })
 }
 
-/// The newest record that is whole, skipping damaged ones: good for the ID and the bus speed under which the fault is read.
+/// The newest record that is whole, skipping damaged ones.
+///
+/// Good for the ID and the bus speed, so that the fault can be read.
 pub fn newest_whole(sector: &[u8]) -> Option<Record> {
     used(sector).find_map(|(_, slot)| decode(slot).ok())
 }
@@ -127,9 +140,7 @@ fn decode(slot: &[u8]) -> Result<Record, Damage> {
     let (magic, rest) = body.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
     let (layout, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
     let (head, rest) = rest.split_first_chunk::<4>().ok_or(Damage::Unreadable)?;
-    let [a, b, c, d] = *layout;
-    let layout = [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
-    if *magic != MAGIC || layout != [LAYOUT, Params::COUNT as u16] {
+    if *magic != MAGIC || *layout != LAYOUT {
         return Err(Damage::Unreadable);
     }
     if tail.first_chunk() != Some(&CRC.checksum(body).to_le_bytes()) {

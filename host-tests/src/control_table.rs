@@ -15,11 +15,11 @@ pub fn markdown() -> String {
     page += &format!(
         "# Control table\n\n\
         Generated from `src/link/table/registers.rs` and `src/params.rs` by `{COMMAND}`: do not edit.\n\n\
-        DYNAMIXEL Protocol 2.0. Numbers are little-endian, signed ones two's complement. One Read of {state_bytes} bytes from \
-        {state} fetches the whole state of the loop, all from one frame. A read may take any bytes that belong to registers, \
-        1 to {READ_MAX} of them; a write covers whole registers, and either all of it happens or nothing.\n\n\
-        - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash once \
-        `save_parameters` was written.\n\
+        DYNAMIXEL Protocol 2.0. Numbers are little-endian, signed ones two's complement. One Read of {state_bytes} \
+        bytes from {state} fetches the whole state of the loop, all from one frame. A read may take any bytes that belong \
+        to registers, 1 to {READ_MAX} of them; a write covers whole registers, and either all of it happens or nothing.\n\n\
+        - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash \
+        once `save_parameters` was written.\n\
         - **one is**: what a step of the number means, which is also its resolution.\n\n"
     );
     errors(&mut page);
@@ -38,7 +38,7 @@ fn errors(page: &mut String) {
         (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
         (
             StatusError::Limit,
-            "a value beyond what other registers allow: the goal beyond force_max_mn, parameters that contradict each other",
+            "a value beyond what other registers allow: a goal above force_max_mn, parameters that contradict each other",
         ),
         (StatusError::Access, "no such register, or one that cannot be written, or not while torque is on"),
     ];

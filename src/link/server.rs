@@ -31,7 +31,9 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// How often an instruction was refused for this reason, damaged packets for other devices included; holds at its top.
+    /// How often an instruction was refused for this reason; holds at its top.
+    ///
+    /// [`StatusError::Crc`] counts damaged packets for other devices too.
     pub fn refused(&self, error: StatusError) -> u16 {
         self.refused.get(error as usize - 1).copied().unwrap_or(0)
     }
@@ -109,7 +111,8 @@ impl Server {
 
     /// Takes bytes up to the end of the first packet that is answered, and returns how many it took.
     ///
-    /// `reply` is cleared first; where it is not empty afterwards, send it after [`Server::reply_delay_us`] and feed the rest.
+    /// `reply` is cleared first. Where it is not empty afterwards, send it after [`Server::reply_delay_us`], then feed the
+    /// rest.
     /// Do not feed what this device itself sends.
     pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) -> usize {
         reply.clear();

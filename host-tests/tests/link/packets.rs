@@ -92,11 +92,12 @@ proptest! {
     #[test]
     fn what_is_sent_is_received(
         packets in prop::collection::vec(
-            (0..=252u8, 0..=255u8, prop::collection::vec(prop::sample::select(&[0xFF, 0xFD, 0x00, 0x55][..]), 0..40)), 1..6,
+            (0..=252u8, 0..=255u8, prop::collection::vec(prop::sample::select(&[0xFF, 0xFD, 0x00, 0x55][..]), 0..40)),
+            1..6,
         ),
         slice in 1..50usize,
     ) {
-        let bytes: Vec<u8> = packets.iter().flat_map(|(id, instruction, params)| packet(*id, *instruction, params)).collect();
+        let bytes: Vec<u8> = packets.iter().flat_map(|(id, number, params)| packet(*id, *number, params)).collect();
         let mut receiver = Receiver::new();
         let mut received = Vec::new();
         for bytes in bytes.chunks(slice) {

@@ -64,7 +64,10 @@ fn crc32(bytes: &[u8]) -> [u8; 4] {
 #[test]
 fn the_layout_is_the_documented_one() {
     let bytes = encode(&record(9));
-    assert_eq!(bytes[..12], [b'F', b'T', b'I', b'P', 1, 0, Params::COUNT as u8, 0, 9, 4, 7, 0]);
+    let names: String = Params::RANGES.iter().map(|(name, ..)| format!("{name}\n")).collect();
+    assert_eq!(bytes[..4], *b"FTIP");
+    assert_eq!(bytes[4..8], crc32(names.as_bytes()));
+    assert_eq!(bytes[8..12], [9, 4, 7, 0]);
     assert_eq!(bytes[12..16], record(9).params.tip_radius_um.to_le_bytes());
     let end = 12 + 4 * Params::COUNT;
     assert_eq!(bytes[end..end + 4], crc32(&bytes[..end]));
@@ -110,7 +113,7 @@ fn a_record_of_another_layout_or_out_of_range_is_refused() {
     assert!(matches!(refused(bad), Damage::Param(error) if error.name == "pitch_um"));
     for place in 4..8 {
         let mut other = encode(&record(1));
-        other[place] += 1;
+        other[place] ^= 1;
         // With the CRC that such a record would have.
         let end = 12 + 4 * Params::COUNT;
         let crc = crc32(&other[..end]);

@@ -126,7 +126,7 @@ impl State {
         Ok(())
     }
 
-    /// Defaults to the stored registers: 1 keeps the ID, 2 the ID and the bus speed, FF keeps nothing and is no broadcast.
+    /// Defaults to the stored registers: 1 keeps the ID, 2 the ID and the bus speed, FF nothing, but not by broadcast.
     fn factory_reset(&mut self, params: &[u8], own: bool) -> Result<(), StatusError> {
         let &[kind] = params else { return Err(StatusError::Length) };
         let kept = &self.settings.record;

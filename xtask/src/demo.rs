@@ -13,17 +13,26 @@ use std::{path::PathBuf, process::Command};
 #[command(after_help = "Examples:\n  \
     cargo xtask demo\n  \
     cargo xtask demo --json target/demo.json --out target/pictures\n  \
-    cargo xtask demo --serve    (then talk to it with any DYNAMIXEL client)")]
+    cargo xtask demo --serve --tcp 7000    (then talk to it with any DYNAMIXEL client)")]
 pub struct Args {
     /// Write the figures to this file, as JSON
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "serve")]
     json: Option<PathBuf>,
     /// Write the pictures to this folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with = "serve")]
     out: Option<PathBuf>,
-    /// Keep the board alive behind a port for any DYNAMIXEL client
+    /// Hold each force for a shorter time, and leave out the second run
+    #[arg(long, conflicts_with = "serve")]
+    quick: bool,
+    /// Keep the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
     #[arg(long)]
     serve: bool,
+    /// Serve behind this TCP port of this machine; 0 takes any that is free
+    #[arg(long, value_name = "PORT", requires = "serve", conflicts_with = "pty")]
+    tcp: Option<u16>,
+    /// Make a symbolic link of this name to the pseudo-terminal
+    #[arg(long, value_name = "PATH", requires = "serve")]
+    pty: Option<PathBuf>,
 }
 
 /// Builds the flash image and runs it on the virtual board.
@@ -34,11 +43,17 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = virtual_board("run");
-    command.args(["--quiet", "--"]).arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
-    for (flag, value) in [("--json", &args.json), ("--out", &args.out)] {
+    command.arg("--").arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
+    for (flag, value) in [("--json", &args.json), ("--out", &args.out), ("--pty", &args.pty)] {
         if let Some(path) = value {
             command.arg(flag).arg(std::path::absolute(path)?);
         }
+    }
+    if let Some(port) = args.tcp {
+        command.arg("--tcp").arg(port.to_string());
+    }
+    if args.quick {
+        command.arg("--quick");
     }
     console.run(&mut command)
 }

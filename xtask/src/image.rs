@@ -50,16 +50,7 @@ impl Image {
                 segments.push((header.p_paddr(LittleEndian), bytes));
             }
         }
-        let base = segments.iter().map(|(start, _)| *start).min().context("the image loads nothing")?;
-        let mut bytes = Vec::new();
-        for (start, segment) in segments {
-            let (start, end) = ((start - base) as usize, (start - base) as usize + segment.len());
-            if end > SPAN_MAX {
-                bail!("{} loads to addresses {end:#x} bytes apart: no flash is that large", paths::shown(elf));
-            }
-            bytes.resize(bytes.len().max(end), ERASED);
-            bytes[start..end].copy_from_slice(segment);
-        }
+        let (base, bytes) = lay_out(&segments).with_context(|| paths::shown(elf))?;
         Ok(Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base })
     }
 
@@ -78,6 +69,22 @@ impl Image {
             self.sha256()
         )
     }
+}
+
+/// The lowest address, and all bytes from there on.
+fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
+    let base = segments.iter().map(|(start, _)| *start).min().context("the image loads nothing")?;
+    let mut bytes = Vec::new();
+    for (start, segment) in segments {
+        let start = (start - base) as usize;
+        let end = start + segment.len();
+        if end > SPAN_MAX {
+            bail!("the image loads to addresses {end:#x} bytes apart: no flash is that large");
+        }
+        bytes.resize(bytes.len().max(end), ERASED);
+        bytes[start..end].copy_from_slice(segment);
+    }
+    Ok((base, bytes))
 }
 
 /// Builds the flash image.
@@ -105,4 +112,21 @@ pub fn build_command(toolchain: Toolchain, name: &str, feature: &str) -> std::pr
     let mut command = toolchain.cargo("build");
     command.args(["--release", "--package", "fingertip", "--bin", name, "--features", feature]);
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn segments_lie_at_their_addresses_and_gaps_read_as_erased() {
+        let (base, bytes) = lay_out(&[(0x0800_0006, &[3, 4]), (0x0800_0000, &[1, 2])]).unwrap();
+        assert_eq!((base, bytes), (0x0800_0000, vec![1, 2, 0xff, 0xff, 0xff, 0xff, 3, 4]));
+    }
+
+    #[test]
+    fn an_image_without_bytes_and_one_in_two_memories_are_refused() {
+        assert!(lay_out(&[]).is_err());
+        assert!(lay_out(&[(0x0800_0000, &[1]), (0x2000_0000, &[1])]).is_err());
+    }
 }

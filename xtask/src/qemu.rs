@@ -27,7 +27,7 @@ pub struct Args {
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     let mut command = console::cargo("run");
-    command.args(["--quiet", "--package", "host-tests", "--bin", "qemu-host", "--"]);
+    command.args(["--package", "host-tests", "--bin", "qemu-host", "--"]);
     console.run(command.arg(image).arg(paths::target().join("stimulus")).args(&args.inject))
 }
 

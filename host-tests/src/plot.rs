@@ -32,8 +32,15 @@ const LABEL_PX: u32 = 13;
 const TITLE_PX: u32 = 15;
 /// Light to dark in equal steps of brightness.
 const INK: RGBColor = RGBColor(20, 40, 90);
+const PALE_INK: RGBColor = RGBColor(185, 195, 215);
 const GOAL_INK: RGBColor = RGBColor(200, 110, 0);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
+
+/// A number on an axis, without needless digits.
+fn number(value: &f64) -> String {
+    // Adding 0 turns -0 into 0.
+    format!("{}", (value * 1e3).round() / 1e3 + 0.0)
+}
 
 /// Draws on a white picture of a size.
 fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {

@@ -1,12 +1,14 @@
 //! Charts over time: the whole run, and each change of the goal at a larger scale.
 
-use super::{Area, FAINT, FONT, GOAL_INK, INK, LABEL_PX, PlotError, TITLE_PX, failed, picture};
+use super::{Area, FAINT, FONT, GOAL_INK, INK, LABEL_PX, PALE_INK, PlotError, TITLE_PX, failed, number, picture};
 use crate::metrics::Sample;
 use plotters::prelude::*;
 
 /// Points that a line has at most: two for each pixel of the widest chart.
 const POINTS_MAX: usize = 1_800;
 const WIDTH_PX: u32 = 900;
+/// Width of the mean.
+const SMOOTH_S: f64 = 0.01;
 
 /// A stretch of the run to look at more closely.
 #[derive(Clone, Debug)]
@@ -46,7 +48,14 @@ pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
         frame("Indentation of the fingertip", "mm", 0.0, top_mm)
             .draw(&panels[1], |chart| chart.solid(&indentation, INK))?;
         let duty = points(|s| 100.0 * s.duty);
-        frame("Duty of the bridge", "%", -100.0, 100.0).draw(&panels[2], |chart| chart.solid(&duty, INK))
+        let mean = thinned(smoothed(trace.iter().map(|s| (s.time_s, 100.0 * s.duty)).collect()));
+        frame("Duty of the bridge: as it was (pale) and its mean of 10 ms", "%", -100.0, 100.0).draw(
+            &panels[2],
+            |chart| {
+                chart.line(&duty, PALE_INK.stroke_width(1))?;
+                chart.solid(&mean, INK)
+            },
+        )
     })
 }
 
@@ -128,6 +137,8 @@ impl Frame<'_> {
             .label_style((FONT, LABEL_PX))
             .x_desc(self.x)
             .y_desc(self.unit)
+            .x_label_formatter(&number)
+            .y_label_formatter(&number)
             .y_labels(6)
             .x_labels(10)
             .draw()
@@ -138,8 +149,11 @@ impl Frame<'_> {
 
 impl Chart<'_, '_> {
     fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
-        let line = LineSeries::new(points.iter().copied(), ink.stroke_width(2));
-        self.context.draw_series(line).map(drop).map_err(failed)
+        self.line(points, ink.stroke_width(2))
+    }
+
+    fn line(&mut self, points: &Points, style: ShapeStyle) -> Result<(), PlotError> {
+        self.context.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
     }
 
     fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
@@ -181,6 +195,22 @@ fn steps_of(samples: &[Sample], point: impl Fn(&Sample) -> (f64, f64)) -> Vec<(f
     corners
 }
 
+/// The mean over time of the last 10 ms at each point; a value holds until the next.
+fn smoothed(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let (mut oldest, mut sum) = (0, 0.0);
+    let held = |at: usize| points[at].1 * (points[at + 1].0 - points[at].0);
+    let mut smooth = Vec::with_capacity(points.len());
+    for at in 1..points.len() {
+        sum += held(at - 1);
+        while oldest + 1 < at && points[at].0 - points[oldest].0 > SMOOTH_S {
+            sum -= held(oldest);
+            oldest += 1;
+        }
+        smooth.push((points[at].0, sum / (points[at].0 - points[oldest].0)));
+    }
+    smooth
+}
+
 /// The least and the largest of as many points as fall together, so that no spike is lost.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= POINTS_MAX {
@@ -209,6 +239,16 @@ mod tests {
         assert!(thin.len() <= POINTS_MAX + 2);
         assert!(thin.contains(&(77_777.0, 5.0)) && thin.contains(&(12_345.0, -5.0)));
         assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
+    }
+
+    #[test]
+    fn a_mean_weighs_by_time() {
+        // 1 held for 9 ms, 0 for 1 ms, whatever the samples' distance.
+        let points = vec![(0.0, 1.0), (0.004, 1.0), (0.009, 0.0), (0.010, 0.0)];
+        let smooth = smoothed(points);
+        assert_eq!(smooth.len(), 3);
+        assert!((smooth[1].1 - 1.0).abs() < 1e-12 && (smooth[2].1 - 0.9).abs() < 1e-12, "{smooth:?}");
+        assert!(smoothed(Vec::new()).is_empty());
     }
 
     #[test]

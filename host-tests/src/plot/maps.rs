@@ -1,6 +1,6 @@
 //! Pressure maps: one square for each taxel, the contact's circle dotted over them, one scale for all.
 
-use super::{Area, FONT, INK, LABEL_PX, PlotError, TITLE_PX, failed, picture};
+use super::{Area, FONT, INK, LABEL_PX, PlotError, TITLE_PX, failed, number, picture};
 use crate::heatmap::Pressures;
 use core::f64::consts::TAU;
 use plotters::prelude::*;
@@ -19,7 +19,8 @@ pub struct Map {
 }
 
 const MAP_PX: u32 = 280;
-const HEIGHT_PX: u32 = 300;
+/// Makes the taxels squares.
+const HEIGHT_PX: u32 = 295;
 const SCALE_PX: u32 = 90;
 /// Steps of the scale beside the maps.
 const SCALE_STEPS: u32 = 64;
@@ -77,6 +78,8 @@ fn draw_map(map: &Map, pitch_mm: f64, full_kpa: f64, area: &Area<'_>) -> Result<
         .label_style((FONT, LABEL_PX))
         .x_desc("columns, mm")
         .y_desc("rows, mm")
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
         .x_labels(5)
         .y_labels(5)
         .draw()
@@ -98,8 +101,16 @@ fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
         Rectangle::new(corners, ink(share(n)).filled())
     };
     chart.draw_series((0..SCALE_STEPS).map(step)).map_err(failed)?;
-    let mut mesh = chart.configure_mesh();
-    mesh.disable_mesh().disable_x_axis().label_style((FONT, LABEL_PX)).y_labels(6).draw().map_err(failed)
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .set_all_tick_mark_size(6)
+        .label_style((FONT, LABEL_PX))
+        .x_labels(0)
+        .y_labels(6)
+        .y_label_formatter(&number)
+        .draw()
+        .map_err(failed)
 }
 
 /// White for no pressure, the ink for the most, evenly between.

@@ -59,6 +59,15 @@ fn who_is_not_asked_is_silent_and_so_is_who_waits_in_vain() {
 }
 
 #[test]
+fn only_the_device_before_gives_the_turn() {
+    let mut waiting = device(2);
+    assert!(waiting.hear(&packet(BROADCAST, 0x82, &[7, 0, 1, 0, 3, 1, 2])).is_empty());
+    assert!(waiting.hear(&packet(3, 0x55, &[0, 3])).is_empty());
+    assert_eq!(waiting.hear(&packet(1, 0x55, &[0, 1])).len(), 1);
+    assert!(waiting.hear(&packet(1, 0x55, &[0, 1])).is_empty(), "once");
+}
+
+#[test]
 fn sync_write_reaches_each_with_its_own() {
     let mut devices = [device(1), device(2), device(3)];
     let entries = hex("00 01 04 00  02 E8 03 00 00  01 D0 07 00 00");

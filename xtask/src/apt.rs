@@ -21,21 +21,24 @@ pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
     }
     console.say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
-    let mut install = || {
-        let mut command = Command::new("apt-get");
-        command.env("DEBIAN_FRONTEND", "noninteractive").args(["install", "-qq", "-y", "--no-install-recommends"]);
-        console.run(command.args(&missing))
-    };
-    if install().is_ok() {
+    if install(&missing, console).is_ok() {
         return Ok(());
     }
     console.say("apt-get may know old package lists only: updating them.");
     console.run(Command::new("apt-get").args(["update", "-qq"]))?;
+    install(&missing, console)
+        .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
+}
+
+/// Whether nothing of these packages is missing.
+pub fn all_installed(packages: &[&str]) -> bool {
+    packages.iter().all(|package| installed(package))
+}
+
+fn install(packages: &[&str], console: &mut Console) -> Result<()> {
     let mut command = Command::new("apt-get");
     command.env("DEBIAN_FRONTEND", "noninteractive").args(["install", "-qq", "-y", "--no-install-recommends"]);
-    console
-        .run(command.args(&missing))
-        .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
+    console.run(command.args(packages))
 }
 
 fn installed(package: &str) -> bool {

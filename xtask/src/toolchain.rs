@@ -1,7 +1,7 @@
 //! The compiler for the firmware: rustup's bare-metal target, or Debian's Rust where rustup's server is out of reach.
 
 use crate::{apt, console, console::Console, paths};
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
 use std::{path::PathBuf, process::Command};
 
@@ -68,33 +68,29 @@ impl Toolchain {
 /// # Errors
 /// Neither rustup nor Debian could provide one: says what was tried and what to do.
 pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
-    let native = || -> Result<Toolchain> { Ok(Toolchain::Native) };
-    if choice != Choice::Debian && has_target() {
-        return native();
+    if choice == Choice::Debian {
+        return debian(console);
     }
-    let by_rustup = match choice {
-        Choice::Debian => None,
-        _ => match add_target(console) {
-            Ok(()) => return native(),
-            Err(error) => Some(error),
-        },
-    };
-    if let Some(error) = by_rustup {
-        if choice == Choice::Rustup {
-            return Err(error);
-        }
-        console.say(&format!("{error:#}\nThe Rust distribution server is out of reach: taking Debian's Rust instead."));
-        return debian(console).with_context(|| {
-            format!(
-                "no compiler for {TARGET}.\n\
-                 Tried `rustup target add {TARGET}`: {error:#}.\n\
-                 Tried Debian's `{}`: see below.\n\
-                 Do either by hand, or open the way to static.rust-lang.org or to a Debian mirror.",
-                DEBIAN_PACKAGES.join(" ")
-            )
-        });
+    if has_target() {
+        return Ok(Toolchain::Native);
     }
-    debian(console)
+    // Debian's compiler once taken is taken again: asking an unreachable server each time would cost minutes.
+    if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && apt::all_installed(&DEBIAN_PACKAGES) {
+        return debian(console);
+    }
+    let Err(rustup) = add_target(console) else { return Ok(Toolchain::Native) };
+    if choice == Choice::Rustup {
+        return Err(rustup);
+    }
+    console.say(&format!("{rustup:#}: taking Debian's Rust instead."));
+    debian(console).map_err(|debian| {
+        anyhow!(
+            "no compiler for {TARGET}.\n\
+             - rustup: {rustup:#}\n\
+             - Debian: {debian:#}\n\
+             Open the way to static.rust-lang.org or to a Debian mirror, or do one of the two by hand."
+        )
+    })
 }
 
 fn debian(console: &mut Console) -> Result<Toolchain> {
@@ -116,10 +112,11 @@ fn has_target() -> bool {
 
 fn add_target(console: &mut Console) -> Result<()> {
     if paths::find_program("rustup").is_none() {
-        bail!("no rustup in PATH");
+        bail!("there is no rustup in PATH");
     }
     console.say(&format!("Adding rustup's target {TARGET}: the firmware is compiled for it."));
-    console.run(Command::new("rustup").args(["target", "add", TARGET]))?;
+    let added = console.run(Command::new("rustup").args(["target", "add", TARGET]));
+    added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
     if !has_target() {
         bail!("rustup added {TARGET} to another toolchain than the one that cargo takes");
     }

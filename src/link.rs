@@ -20,6 +20,7 @@
 //! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
 //! | broadcast Ping | answered after 14 byte times for each lower ID |
+//! | Action | answered like a write where it names this device; `dynamixel-sdk` does not read that answer, so let it pass |
 //! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
 
 pub mod crc;

@@ -11,7 +11,7 @@
 //! which goes from 8/15 for a shallow contact to 0.655 at 0.95 a (a uniform pressure has 2/3, Hertz 0.589).
 
 use super::Tip;
-use super::arith::{quotient, root, square};
+use super::arith::{quotient, square};
 use crate::units::{Millimetres, NewtonMillimetres, Newtons, Ratio};
 
 /// `g` in powers of `d/a`, Q0.32: Chebyshev fit on 0 to 0.951, off by less than 4e-10. The formula itself cancels at small
@@ -48,7 +48,9 @@ impl Tip {
         let depth = self.depth(d);
         let mu = u64::from(mu.to_bits().clamp(0, 4 << 16).unsigned_abs());
         let area = scale(square(depth), mu, 16);
-        let arm = scale(u64::from(root(self.contact_square(depth))), self.shape(depth), 24);
+        // The contact radius with 3 bits more than a length has.
+        let radius_q27 = (self.contact_square(depth) << 6).isqrt();
+        let arm = scale(radius_q27, self.shape(depth), 27);
         LimitSurface {
             force: self.force_of_area(area),
             moment: NewtonMillimetres::from_bits(self.force_gain.round_short(scale(area, arm, 32), 2) as i32),

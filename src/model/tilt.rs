@@ -77,6 +77,8 @@ impl Tip {
     }
 
     /// The shift at which a tip that slides freely rests, `s = -(d tan t)/2`: there the energy is least and `F_t` is 0.
+    ///
+    /// It may be beyond the -a/2 to a/2 that [`Displacement`] covers.
     pub fn free_shift(&self, normal: Millimetres, tilt: Radians) -> Millimetres {
         let pose = self.pose(Displacement { normal, shift: Millimetres::ZERO, tilt });
         Millimetres::from_bits(-shift_product(pose.normal, pose.tangent, 31) as i32)

@@ -1,0 +1,277 @@
+//! What must hold for any tip and any input: order, ways back, energy, quadrature, totality.
+
+use core::num::NonZeroU16;
+
+use fingertip::model::{
+    Displacement, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Relaxation, RelaxationState, RelaxationTerm, Tip,
+    force_on, pressure_of, strain_of,
+};
+use fingertip::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
+use host_tests::prove::domain::{mm, newtons, reference_tip};
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+fn config() -> ProptestConfig {
+    ProptestConfig {
+        cases: 2_000,
+        rng_seed: RngSeed::Fixed(2003),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    }
+}
+
+fn any_tip() -> impl Strategy<Value = Tip> {
+    (RADIUS_MIN.to_bits()..=RADIUS_MAX.to_bits(), MODULUS_MIN.to_bits()..=MODULUS_MAX.to_bits())
+        .prop_map(|(a, y)| Tip::new(Millimetres::from_bits(a), Kilopascals::from_bits(y)).unwrap())
+}
+
+/// A tip, and a share of its depth from one unit on, even in the logarithm.
+fn tip_and_depth() -> impl Strategy<Value = (Tip, i32)> {
+    (any_tip(), 0.0..1.0_f64).prop_map(|(tip, share)| {
+        let top = f64::from(tip.depth_max().to_bits());
+        (tip, top.powf(share) as i32)
+    })
+}
+
+fn number(bits: i32, fraction_bits: i32) -> f64 {
+    f64::from(bits) / 2_f64.powi(fraction_bits)
+}
+
+proptest! {
+    #![proptest_config(config())]
+
+    #[test]
+    fn force_radius_angle_and_stiffness_never_fall_with_the_depth((tip, d) in tip_and_depth(), step in 1..10_000_i32) {
+        let deeper = mm(d + step);
+        prop_assert!(tip.force(deeper) >= tip.force(mm(d)));
+        prop_assert!(tip.contact_radius(deeper) >= tip.contact_radius(mm(d)));
+        prop_assert!(tip.stiffness(deeper) >= tip.stiffness(mm(d)));
+        prop_assert!(tip.peak_pressure(deeper) >= tip.peak_pressure(mm(d)));
+        // No step larger than the slope at its far end allows, and one unit of rounding.
+        let rise = number(tip.force(deeper).to_bits() - tip.force(mm(d)).to_bits(), 16);
+        let slope = number(tip.stiffness(deeper).to_bits() + 1, 16);
+        prop_assert!(rise <= slope * number(step, 24) + number(1, 16));
+    }
+
+    #[test]
+    fn the_pressure_never_rises_with_the_distance((tip, d) in tip_and_depth(), share in 0.0..1.1_f64) {
+        let start = (number(tip.contact_radius(mm(d)).to_bits(), 0) * share) as i32;
+        let mut before = tip.pressure(mm(start), mm(d));
+        for r in start + 1..start + 200 {
+            let now = tip.pressure(mm(r), mm(d));
+            prop_assert!(now <= before, "r {r}");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn the_way_back_from_the_force_is_as_good_as_the_force((tip, d) in tip_and_depth()) {
+        let (depth, again) = (number(d, 24), number(tip.indentation(tip.force(mm(d))).to_bits(), 24));
+        // Half a unit of force, at the local slope or from zero, and half a unit of depth.
+        let lost = number(1, 17) / (std::f64::consts::PI * number(tip.modulus().to_bits(), 16) / 1000.0);
+        let bound = lost.sqrt().min(lost / depth) * 1.000_001 + number(1, 25);
+        prop_assert!((again - depth).abs() <= bound, "{again}, {depth}, {bound}");
+    }
+
+    #[test]
+    fn the_way_back_from_the_radius_and_the_peak_is_as_good_as_they_are((tip, d) in tip_and_depth()) {
+        let (a, depth) = (number(tip.radius().to_bits(), 24), number(d, 24));
+        let by_radius = number(tip.indentation_from_radius(tip.contact_radius(mm(d))).to_bits(), 24);
+        let radius_slope = number(tip.contact_radius(mm(d)).to_bits() + 1, 24) / (a - depth);
+        prop_assert!((by_radius - depth).abs() <= radius_slope * number(1, 24) + number(1, 25));
+        let by_peak = number(tip.indentation_from_peak(tip.peak_pressure(mm(d))).to_bits(), 24);
+        let peak_slope = a / number(tip.modulus().to_bits(), 16);
+        prop_assert!((by_peak - depth).abs() <= peak_slope * number(1, 17) + number(1, 25));
+    }
+
+    #[test]
+    fn geometry_closes((tip, d) in tip_and_depth(), share in 0.0..=1.0_f64) {
+        let d = mm(d);
+        let theta = Radians::from_bits((number(tip.touching_angle_max(d).to_bits(), 0) * share) as i32);
+        let r = tip.distance_at(theta, d);
+        // There and back: the distance's unit in angle, and the two roundings.
+        let slope = number(tip.distance_slope(theta, d).to_bits(), 16);
+        let back = tip.touching_angle(r, d);
+        prop_assert!(number((back.to_bits() - theta.to_bits()).abs(), 0) <= 1.2 + 0.7 / slope.min(1e9));
+        // x^2 + z^2 = a^2 (eq. 1), and QC = Q_z - (a - d) (eq. 4).
+        let (x, z) = (number(r.to_bits(), 24), number(tip.height_at(theta, d).to_bits(), 24));
+        let a = number(tip.radius().to_bits(), 24);
+        prop_assert!((x * x + z * z - a * a).abs() <= 2.0 * a * number(1, 24));
+        let compression = number(tip.compression_at(theta, d).to_bits(), 24);
+        prop_assert!((compression - (z - (a - number(d.to_bits(), 24))).max(0.0)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_column_obeys_equations_9_to_13((tip, d) in tip_and_depth(), share in 0.0..1.0_f64, area in 1..100 << 16) {
+        let r = mm((number(tip.contact_radius(mm(d)).to_bits(), 0) * share) as i32);
+        let (length, compression) = (tip.particle_length(r), tip.compression(r, mm(d)));
+        let area = SquareMillimetres::from_bits(area);
+        // e = dL/L (10): dL holds half a unit of Q24.
+        let (strain, direct) = (strain_of(compression, length), tip.strain(r, mm(d)));
+        let bound = number(1, 24) / number(length.to_bits(), 24) + number(2, 30);
+        prop_assert!((number(strain.to_bits(), 30) - number(direct.to_bits(), 30)).abs() <= bound);
+        // F = Y e S (11) is F = P S (13).
+        let (by_strain, by_pressure) = (tip.particle_force(compression, length, area), force_on(tip.pressure(r, mm(d)), area));
+        let y_s = number(tip.modulus().to_bits(), 16) / 1000.0 * number(area.to_bits(), 16);
+        let bound = y_s * bound + number(area.to_bits(), 16) / 1000.0 * number(1, 17) + number(1, 16);
+        prop_assert!((number(by_strain.to_bits(), 16) - number(by_pressure.to_bits(), 16)).abs() <= bound);
+        // P = F/S (9, 12) undoes it.
+        let pressure = number(pressure_of(by_pressure, area).to_bits(), 16);
+        let bound = 1000.0 * number(1, 17) / number(area.to_bits(), 16) + number(1, 16);
+        prop_assert!((pressure - number(tip.pressure(r, mm(d)).to_bits(), 16)).abs() <= bound);
+    }
+
+    /// The energy is a cubic of the depth, so Simpson's rule on the force gives its differences exactly.
+    #[test]
+    fn the_force_is_the_slope_of_the_energy((tip, d) in tip_and_depth(), step in 0.0..=1.0_f64) {
+        let half = (number(d.min(tip.depth_max().to_bits() - d), 0) * step) as i32;
+        let at = |d: i32| Displacement { normal: mm(d), ..Displacement::default() };
+        let gained = number(tip.energy(at(d + half)).to_bits() - tip.energy(at(d - half)).to_bits(), 14);
+        let forces = [d - half, d, d + half].map(|d| number(tip.force(mm(d)).to_bits(), 16));
+        let width = number(half, 24);
+        let work = width / 3.0 * (forces[0] + 4.0 * forces[1] + forces[2]);
+        prop_assert!((gained - work).abs() <= number(1, 14) + number(1, 16) * width, "{gained}, {work}");
+        prop_assert_eq!(tip.load(at(d)).normal, tip.force(mm(d)));
+        prop_assert_eq!(tip.load(at(d)).tangential.to_bits(), 0);
+        prop_assert_eq!(tip.load(at(d)).moment.to_bits(), 0);
+    }
+
+    #[test]
+    fn tangential_force_and_moment_are_slopes_of_the_energy((tip, d) in tip_and_depth(), s in -0.45..0.45_f64, t in -0.9..0.9_f64) {
+        let shift = (number(tip.radius().to_bits(), 0) * s) as i32;
+        let tilt = (t * number(1 << 24, 0)) as i32;
+        let at = |shift: i32, tilt: i32| Displacement { normal: mm(d), shift: mm(shift), tilt: Radians::from_bits(tilt) };
+        let load = tip.load(at(shift, tilt));
+        let h = 1 << 18; // 1/64 mm or rad
+        // The energy is a quadratic of the shift: the central difference is exact.
+        let by_shift = number(tip.energy(at(shift + h, tilt)).to_bits() - tip.energy(at(shift - h, tilt)).to_bits(), 14) * 32.0;
+        prop_assert!((by_shift - number(load.tangential.to_bits(), 16)).abs() <= number(1, 14) * 35.0);
+        // Of the tilt it is not: the third derivative is below 60 pi Y (d^3 + d^2 |s|) for these tilts.
+        let by_tilt = number(tip.energy(at(shift, tilt + h)).to_bits() - tip.energy(at(shift, tilt - h)).to_bits(), 14) * 32.0;
+        let (depth, y) = (number(d, 24), number(tip.modulus().to_bits(), 16) / 1000.0);
+        let third = 60.0 * std::f64::consts::PI * y * depth * depth * (depth + number(shift.abs(), 24));
+        prop_assert!((by_tilt - number(load.moment.to_bits(), 14)).abs() <= number(1, 14) * 35.0 + third / 6.0 / 64.0 / 64.0);
+    }
+
+    #[test]
+    fn a_free_tip_slides_to_where_nothing_pulls((tip, d) in tip_and_depth(), t in -1.0..=1.0_f64) {
+        let tilt = Radians::from_bits((t * number(1 << 24, 0)) as i32);
+        let shift = tip.free_shift(mm(d), tilt);
+        // Further than that the shift itself is outside the domain.
+        prop_assume!(shift.to_bits().abs() < tip.radius().to_bits() / 2 - (1 << 20));
+        let displacement = Displacement { normal: mm(d), shift, tilt };
+        // Half a unit of shift at the lateral stiffness 2 pi Y d.
+        let bound = number(tip.stiffness(mm(d)).to_bits() + 1, 16) * number(1, 25) + number(1, 16);
+        prop_assert!(number(tip.load(displacement).tangential.to_bits().abs(), 16) <= bound);
+        let there = tip.energy(displacement).to_bits();
+        for off in [-1 << 20, 1 << 20] {
+            let beside = Displacement { shift: mm(shift.to_bits() + off), ..displacement };
+            prop_assert!(tip.energy(beside).to_bits() >= there);
+        }
+    }
+
+    #[test]
+    fn the_slip_margin_is_0_on_the_limit_1_at_rest_and_falls_along_a_ray(
+        tip in any_tip(), depth in 0.05..1.0_f64, mu in 0.1..4.0_f64, angle in 0.0..1.57_f64,
+    ) {
+        let d = (number(tip.depth_max().to_bits(), 0) * depth) as i32;
+        let limit = tip.limit_surface(mm(d), Ratio::from_bits((mu * 65_536.0) as i32));
+        // So that a share of the limit can be told to a part in a thousand.
+        prop_assume!(limit.force.to_bits() > 1 << 10 && limit.moment.to_bits() > 1 << 10);
+        let on_ray = |share: f64| {
+            let force = number(limit.force.to_bits(), 0) * angle.cos() * share;
+            let moment = number(limit.moment.to_bits(), 0) * angle.sin() * share;
+            number(limit.margin(Newtons::from_bits(force as i32), NewtonMillimetres::from_bits(-moment as i32)).to_bits(), 16)
+        };
+        for share in [0.0, 0.3, 0.9, 1.0, 2.0, 5.0] {
+            prop_assert!((on_ray(share) - (1.0 - share)).abs() < 1e-3 * (1.0 + share), "{share}: {}", on_ray(share));
+        }
+    }
+
+    /// Nothing panics, whatever goes in; in a test build overflow is a panic too.
+    #[test]
+    fn every_function_takes_every_input(tip in any_tip(), x: i32, y: i32, z: i32, rings: NonZeroU16) {
+        let (d, r, theta) = (mm(x), mm(y), Radians::from_bits(z));
+        let depths = [tip.indentation(newtons(x)), tip.indentation_from_peak(Kilopascals::from_bits(x)), tip.indentation_from_radius(d)];
+        for depth in depths {
+            prop_assert!(depth >= mm(0) && depth <= tip.depth_max());
+        }
+        let _ = (tip.force(d), tip.contact_radius(d), tip.stiffness(d), tip.touching_angle_max(d), tip.mean_pressure(d));
+        let _ = (tip.pressure(r, d), tip.strain(r, d), tip.compression(r, d), tip.touching_angle(r, d), tip.peak_pressure(d));
+        let _ = (tip.distance_at(theta, d), tip.height_at(theta, d), tip.compression_at(theta, d));
+        let _ = (tip.distance_slope(theta, d), tip.area_density(theta, d), tip.stiffness_at_force(newtons(x)));
+        let _ = tip.force_by_rings(d, NonZeroU16::new(rings.get() % 64 + 1).unwrap());
+        let displacement = Displacement { normal: d, shift: r, tilt: theta };
+        let _ = (tip.load(displacement), tip.free_shift(d, theta));
+        prop_assert!(tip.energy(displacement).to_bits() >= 0);
+        let area = SquareMillimetres::from_bits(z);
+        let _ = (pressure_of(newtons(x), area), strain_of(d, r), force_on(Kilopascals::from_bits(x), area));
+        let _ = tip.particle_force(d, r, area);
+        let limit = tip.limit_surface(d, Ratio::from_bits(y));
+        prop_assert!(limit.margin(newtons(z), NewtonMillimetres::from_bits(x)).to_bits() <= 1 << 16);
+        let term = RelaxationTerm { share: Ratio::from_bits(y), time_constant_us: x.unsigned_abs() };
+        if let Ok(filter) = Relaxation::new(z.unsigned_abs(), &[term]) {
+            let mut state = RelaxationState::settled(newtons(x));
+            for elastic in [x, y, z, i32::MAX, i32::MIN, i32::MAX] {
+                let _ = filter.step(&mut state, newtons(elastic));
+            }
+        }
+    }
+}
+
+#[test]
+fn the_quadrature_converges_with_the_square_of_the_rings_down_to_the_formats_floor() {
+    let tip = Tip::new(Millimetres::from_bits(16 << 24), MODULUS_MAX).unwrap();
+    for d_mm in [4, 8, 12] {
+        let d = mm(d_mm << 24);
+        let rings = |n: u16| number(tip.force_by_rings(d, NonZeroU16::new(n).unwrap()).to_bits(), 16);
+        let exact = std::f64::consts::PI * 2.0 * f64::from(d_mm * d_mm);
+        // Midpoint rule: the error is h^2/24 times the difference of the slopes at the ends, h the width in r^2.
+        let (a, rest) = (16.0, 16.0 - f64::from(d_mm));
+        let slopes = std::f64::consts::PI * (1.0 / (rest * rest) - rest / (a * a * a));
+        let contact_square: f64 = a * a - rest * rest;
+        for n in [16, 32, 64, 128, 256] {
+            let predicted = (contact_square / f64::from(n)).powi(2) / 24.0 * slopes;
+            let share = (rings(n) - exact) / predicted;
+            // The next term of the series is smaller by 1/n^2; two units of the format at the other end.
+            let bound = 40.0 / f64::from(n).powi(2) + number(2, 16) / predicted;
+            assert!((share - 1.0).abs() < bound, "d {d_mm}, n {n}: {share}, {bound}");
+        }
+        assert!((rings(u16::MAX) - exact).abs() <= number(2, 16), "d {d_mm}: {}", rings(u16::MAX) - exact);
+    }
+}
+
+#[test]
+fn the_friction_shape_is_that_of_the_pressure_profile() {
+    let tip = reference_tip();
+    for (d_mm, shape) in [(1, 0.541_284), (2, 0.549_963), (3, 0.559_480)] {
+        let ours = number(tip.friction_shape(mm(d_mm << 24)).to_bits(), 16);
+        assert!((ours - shape).abs() < 1.6e-5, "{ours}");
+    }
+    let shallow = number(tip.friction_shape(mm(1)).to_bits(), 16);
+    assert!((shallow - 8.0 / 15.0).abs() < 1e-5, "{shallow}");
+}
+
+#[test]
+fn a_held_tip_relaxes_by_its_terms_and_recovers() {
+    // Half of the force relaxes: 30 % with 10 ms, 20 % with 1 s.
+    let terms = [(19_661, 10_000), (13_107, 1_000_000)]
+        .map(|(share, time_constant_us)| RelaxationTerm { share: Ratio::from_bits(share), time_constant_us });
+    let filter = Relaxation::new(100, &terms).unwrap();
+    let mut state = RelaxationState::REST;
+    let full = newtons(4 << 16);
+    let expected = |t: f64| 4.0 * (0.5 + 0.3 * (-t / 0.01).exp() + 0.2 * (-t).exp());
+    let mut relaxed = filter.step(&mut state, full);
+    for step in 1..100_000 {
+        relaxed = filter.step(&mut state, full);
+        // The rise took one period: as if the step had come half a period before its end.
+        let t = (f64::from(step) + 0.5) * 1e-4;
+        assert!((number(relaxed.to_bits(), 16) - expected(t)).abs() < 1e-4, "step {step}");
+    }
+    assert!((number(relaxed.to_bits(), 16) - 2.0).abs() < 1e-4);
+    assert_eq!(filter.step(&mut RelaxationState::settled(full), full), newtons(2 << 16));
+    for _ in 0..100_000 {
+        relaxed = filter.step(&mut state, newtons(0));
+    }
+    assert!(number(relaxed.to_bits(), 16).abs() < 1e-4);
+}

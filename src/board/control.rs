@@ -117,8 +117,7 @@ impl State {
             loop_ticks,
             loop_ticks_max: self.report.loop_ticks_max.max(loop_ticks),
         };
-        // A quarter of the frame's time is left for the tasks below this one.
-        if loop_ticks <= frame_ticks / 4 * 3 {
+        if loop_ticks <= guard::answer_ticks(frame_ticks) {
             guard::restart(completed.stamp, frame_ticks);
             parts.watchdog.pet();
         } else {

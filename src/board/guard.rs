@@ -1,8 +1,9 @@
 //! The frame guard, and the stopwatch that it hangs on: TIM5 runs freely, its compare 1 is the guard's deadline.
 //!
-//! Every valid frame moves the deadline to one and a half frame times after that frame's end. When it passes, the
-//! interrupt of the highest priority cuts the bridge, tells the control task, and sets the next deadline, so that control
-//! runs on (without frames) and can see to the bridge, the watchdog and the scan's restart.
+//! Control has three quarters of a frame time to answer a frame, and each answer moves the guard to the instant at which the
+//! next one is due: one and three quarters frame times after this frame's end. When that passes, the interrupt of the highest
+//! priority cuts the bridge, tells the control task, and sets the next deadline, so that control runs on (without frames) and
+//! can see to the bridge, the watchdog and the scan's restart.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
@@ -28,6 +29,11 @@ pub const fn frame_ticks(timing: ScanTiming) -> u32 {
     timing.frame_ticks() / (TIMER_HZ / HZ)
 }
 
+/// What control has from a frame's end to its new duty; the last quarter is left for the tasks below it.
+pub const fn answer_ticks(frame_ticks: u32) -> u32 {
+    frame_ticks / 4 * 3
+}
+
 /// Starts the stopwatch; the guard waits for [`restart`].
 pub fn start(_timer: Peri<'static, TIM5>) {
     rcc::enable_and_reset::<TIM5>();
@@ -46,9 +52,9 @@ pub fn now() -> u32 {
     pac::TIM5.cnt().read()
 }
 
-/// Lets one and a half frames of `frame_ticks` pass from the instant `from` before the guard trips.
+/// Lets a frame of `frame_ticks` and the time to answer it pass from the instant `from` before the guard trips.
 pub fn restart(from: u32, frame_ticks: u32) {
-    let period = frame_ticks + frame_ticks / 2;
+    let period = frame_ticks + answer_ticks(frame_ticks);
     PERIOD.store(period, Ordering::Relaxed);
     pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
     pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, true));

@@ -18,7 +18,7 @@ use super::flash::Store;
 use super::guard;
 use super::log::log_refusal;
 
-/// Control answers within a frame and a half, even while frames are lost: at most this for the slowest scan.
+/// Control answers within two frames, even while frames are lost: at most this for the slowest scan.
 const DETAIL_TIMEOUT: Duration = Duration::from_millis(3);
 const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
 /// Fractional bits of a corrected code.

@@ -16,6 +16,9 @@ pub const SEED: u64 = 0x2003_0914;
 
 const CHUNK: u64 = 1_000;
 
+/// The reference's arc tangent takes ten times as long as all the rest together: one point in so many has it.
+const ANGLE_EVERY: u64 = 10;
+
 /// Force, indentation, contact radius, stiffness, pressure and touching angle.
 pub struct Tallies(pub [Tally; 6]);
 
@@ -43,14 +46,16 @@ impl Default for Tallies {
 pub fn points(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
     parallel(range, CHUNK, Tallies::new().0, progress, |range, tallies| {
         let mut rng = Rng::with_seed(SEED ^ range.start);
-        for _ in range {
+        for place in range {
             let Point { tip, d, force, r } = Point::random(&mut rng);
             let reference = Reference::new(&tip);
             let [by_depth @ .., by_angle] = tallies;
             depth(&tip, &reference, d, by_depth);
             indentation(&tip, &reference, force, &mut by_depth[1]);
             pressure(&tip, &reference, r, d, &mut by_depth[4]);
-            touching_angle_max(&tip, &reference, d, by_angle);
+            if place % ANGLE_EVERY == 0 {
+                touching_angle_max(&tip, &reference, d, by_angle);
+            }
         }
     })
 }

@@ -134,7 +134,9 @@ impl State {
     /// only after reading back that the bridge is cut, so that the fault can be read on the bus.
     fn without_frames(&mut self) {
         self.stop(Fault::LostFrames);
+        // Both keep track of counters that wrap.
         self.parts.encoder.read();
+        self.bus.silent_ms();
         let Command { torque, clear_request, .. } = COMMAND.get();
         self.publish();
         if clear_request != self.clear_seen && !torque {

@@ -131,7 +131,7 @@ fn panic(info: &PanicInfo) -> ! {
     // Interrupts first: control could drive the bridge again before the reset.
     cortex_m::interrupt::disable();
     bridge::make_safe();
-    end(CrashCause::Panic, info.location().map_or(0, |location| location.line()), 0)
+    end(CrashCause::Panic, info.location().map_or(0, core::panic::Location::line), 0)
 }
 
 /// Any vector without a handler.

@@ -29,7 +29,8 @@ pub async fn run(mut led: Output<'static>) {
             missed_frames = status.missed_frames;
             warn!("{=u32} frames missed", missed_frames);
         }
-        let on = if status.mode == Mode::Fault { period / BLINK_PERIODS % 2 == 0 } else { COMMAND.get().torque };
+        let blink = (period / BLINK_PERIODS).is_multiple_of(2);
+        let on = if status.mode == Mode::Fault { blink } else { COMMAND.get().torque };
         led.set_level(on.into());
         Timer::after_millis(PERIOD_MS).await;
     }

@@ -3,6 +3,7 @@
 //! This is the only place with floating point: single precision, and only + - * /, so the host and the target agree to
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
+use crate::contact::Geometry;
 use crate::model::Tip;
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
@@ -47,6 +48,8 @@ pub struct Config {
     pub newtons_per_sum_q48: i64,
     /// Pressure in Pa for a sixteenth of a corrected code, Q32.
     pub pascals_per_sum_q32: i64,
+    /// The array under the tip, for the fit.
+    pub geometry: Geometry,
     /// Half of the pitch.
     pub half_pitch: Millimetres,
     /// See [`Params::contact_on_mn`].
@@ -143,6 +146,7 @@ impl Config {
             dead_codes: p.dead_codes as u16,
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
+            geometry: Geometry::new(p),
             half_pitch: millimetres(p.pitch_um / 2),
             contact_on: newtons(p.contact_on_mn),
             contact_off: newtons(p.contact_off_mn),

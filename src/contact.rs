@@ -1,43 +1,178 @@
-//! The picture to a contact: total force, centre of pressure, peak, and indentation and radius by the model.
+//! The picture to a contact: total force, centre, indentation and radius, and how far the picture is a contact at all.
+//!
+//! Where the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. Where it
+//! does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to the
+//! taxels that do see it. `docs/contact.md` gives the method and the measured errors.
+
+mod arith;
+mod geometry;
+mod guess;
+mod rim;
+mod start;
+mod step;
+mod sums;
+mod view;
+
+pub use geometry::Geometry;
+pub use sums::from_sums;
 
 use crate::config::Config;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
-use crate::units::{Millimetres, Newtons};
-use fixed::types::{I8F24, I16F16};
+use crate::root::floor_sqrt;
+use geometry::PLACE_BITS;
+use guess::{CENTRE_BITS, Guess, Pressed, square};
+use rim::Rim;
+use step::Misfit;
+use view::{PEAK_BITS, View};
 
-/// Fractional bits of a centre of pressure in half pitches.
-const RATIO_BITS: u32 = 11;
+/// How much work a reading may be.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Effort {
+    /// Force by the sum of the taxels; the centre stays at the array's middle.
+    Sum,
+    /// Force by the sum, centre by the moments.
+    Moments,
+    /// The model, one refinement.
+    #[default]
+    One,
+    /// The model, two refinements, the second with the rim worked out closely.
+    Two,
+    /// The model, refined until it rests, at most [`Effort::STEPS_MAX`] times, with the rim worked out closely.
+    Full,
+}
 
-/// Reads the contact off the sums.
-///
-/// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
-/// never below zero. The centre is that of the pressure, zero where there is no force.
-pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
-    let force_bits = (i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32;
-    let force = Newtons(I16F16::from_bits(force_bits.clamp(0, i64::from(i32::MAX)) as i32));
-    let indentation = config.tip.indentation(force);
-    let touching = force >= config.contact_off;
-    let centre = |moment| if touching { centre(moment, picture.sum, config) } else { Millimetres::ZERO };
-    Contact {
-        force,
-        indentation,
-        centre_x: centre(picture.moment_x),
-        centre_y: centre(picture.moment_y),
-        radius: config.tip.contact_radius(indentation),
-        peak_pa: ((i64::from(picture.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32,
-        confidence: 255,
-        bad_taxels: picture.bad_count,
+impl Effort {
+    /// All of them, least first.
+    pub const ALL: [Self; 5] = [Self::Sum, Self::Moments, Self::One, Self::Two, Self::Full];
+    /// Refinements of [`Effort::Full`] at most.
+    pub const STEPS_MAX: u32 = 6;
+
+    /// Refinements with the quick rim and then with the close one.
+    const fn steps(self) -> (u32, u32) {
+        match self {
+            Self::Sum | Self::Moments => (0, 0),
+            Self::One => (1, 0),
+            Self::Two => (1, 1),
+            Self::Full => (1, Self::STEPS_MAX - 1),
+        }
     }
 }
 
-/// moment / sum in half pitches, as a length; the resolution is 1/2048 of half a pitch.
-fn centre(moment: i32, sum: i32, config: &Config) -> Millimetres {
-    // Both are shifted alike so that the sum keeps 16 bits and the moment, at most nine times as large, 20.
-    let shift = (32 - sum.leading_zeros()).saturating_sub(16);
-    let sum = (sum >> shift).clamp(1, 0xffff);
-    let moment = (moment >> shift).clamp(-9 * sum, 9 * sum);
-    let half_pitches = (moment << RATIO_BITS) / sum;
-    let bits = (i64::from(half_pitches) * i64::from(config.half_pitch.to_bits())) >> RATIO_BITS;
-    Millimetres(I8F24::from_bits(bits as i32))
+/// A contact with less confidence than this is not a hemisphere on a plane.
+pub const CONFIDENCE_LEAST: u8 = 128;
+/// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 4 %.
+const RESIDUAL_MAX: u32 = 655;
+/// A first step that moves farther than this, Q24 of the radius, is followed by another: 1/32.
+const FAR: u32 = 1 << (CENTRE_BITS - 5);
+/// Steps shorter than this end the refinement: 1/16384 of the radius.
+const RESTS: u32 = 1 << (CENTRE_BITS - 14);
+/// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
+const TAXELS_MIN: u32 = 5;
+
+/// Reads the contact. Any picture is taken.
+///
+/// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps the
+/// sum's force and centre; the model then only gives the confidence.
+pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
+    let sums = from_sums(picture, config);
+    let geometry = &config.geometry;
+    match effort {
+        Effort::Sum => return Contact { centre_x: Default::default(), centre_y: Default::default(), ..sums },
+        Effort::Moments => return sums,
+        Effort::One | Effort::Two | Effort::Full => {}
+    }
+    if sums.force < config.contact_off {
+        return sums;
+    }
+    let Some(view) = View::new(picture, geometry) else {
+        return sums;
+    };
+    let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.tip, geometry);
+    let pressed = Pressed::new(&guess, &view, geometry);
+    if covered(&guess, &pressed, picture, geometry) {
+        let misfit = step::compare(&pressed, &view);
+        return Contact { confidence: confidence(&misfit, &view), ..sums };
+    }
+    let start = start::plane(&view, geometry).unwrap_or(guess);
+    let (guess, misfit) = refine(start, effort, &view, geometry);
+    let confidence = confidence(&misfit, &view);
+    if misfit.taxels < TAXELS_MIN {
+        return Contact { confidence, ..sums };
+    }
+    let indentation = guess.indentation(&config.tip);
+    let [centre_x, centre_y] = guess.centre(&config.tip);
+    Contact {
+        force: config.tip.force(indentation),
+        indentation,
+        centre_x,
+        centre_y,
+        radius: config.tip.contact_radius(indentation),
+        confidence,
+        ..sums
+    }
 }
+
+/// Whether the whole contact lies on good taxels of the array.
+fn covered(guess: &Guess, pressed: &Pressed, picture: &Picture, geometry: &Geometry) -> bool {
+    let rim = geometry::root(guess.rim_square().into()) >> (geometry::SQUARE_BITS - CENTRE_BITS);
+    let farthest = guess.x.unsigned_abs().max(guess.y.unsigned_abs());
+    let edge = 5 * (geometry.pitch.unsigned_abs() >> (geometry::SQUARE_BITS - CENTRE_BITS));
+    if farthest + rim > edge {
+        return false;
+    }
+    if picture.bad_count == 0 {
+        return true;
+    }
+    let mut rows = picture.bad.iter().zip(&pressed.dy);
+    rows.all(|(bad, dy)| {
+        let mut columns = pressed.dx.iter().enumerate();
+        *bad == 0 || columns.all(|(column, dx)| bad >> column & 1 == 0 || square(*dx) + square(*dy) >= pressed.outside)
+    })
+}
+
+/// Refines a guess as often as the effort allows.
+fn refine(start: Guess, effort: Effort, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
+    let (mut quick, mut close) = effort.steps();
+    let mut guess = start;
+    let mut misfit = Misfit::default();
+    let mut again = true;
+    while quick + close > 0 {
+        let rim = (quick == 0).then(|| Rim::new(&guess, geometry));
+        let equations = step::equations(&Pressed::new(&guess, view, geometry), view, rim.as_ref());
+        let (next, promised) = equations.solve(&guess, view, geometry);
+        let moved = distance(&guess, &next);
+        (guess, misfit) = (next, promised);
+        if quick > 0 {
+            // A start from few taxels can be far off; few taxels are also quick.
+            if moved > FAR && again {
+                again = false;
+            } else {
+                quick -= 1;
+            }
+        } else {
+            close -= 1;
+            if moved < RESTS {
+                break;
+            }
+        }
+    }
+    (guess, misfit)
+}
+
+/// The largest change of a coordinate, Q24.
+fn distance(from: &Guess, to: &Guess) -> u32 {
+    let rest =
+        (from.rest >> (geometry::SQUARE_BITS - CENTRE_BITS)).abs_diff(to.rest >> (geometry::SQUARE_BITS - CENTRE_BITS));
+    rest.max(from.x.abs_diff(to.x)).max(from.y.abs_diff(to.y))
+}
+
+/// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
+fn confidence(misfit: &Misfit, view: &View) -> u8 {
+    let taxels = misfit.taxels.max(1);
+    let mean = (misfit.squares.unsigned_abs().min(u64::from(u32::MAX)) as u32) / taxels;
+    let residual = floor_sqrt(mean.saturating_sub(view.converter_square()).into());
+    (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
+}
+
+const _: () = assert!(PLACE_BITS < CENTRE_BITS && PEAK_BITS < 16);

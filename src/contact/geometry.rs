@@ -1,0 +1,100 @@
+//! What the fit knows of the array and the tip before it sees a picture: places, and a table over the distance squared.
+//!
+//! Lengths are in tip radii. A taxel at the distance r from the contact's centre, with sides h, sees squared distances
+//! spread around `r^2 + h^2/6` with the variance `(h r)^2 / 3` whatever its direction. So its mean is taken over squared
+//! distances spread evenly over `r^2 + h^2/6 +- h r`, and both parts of the model have closed forms there:
+//!
+//! - inside the contact, `p/Y = 1 - s G` with `G = (L1 - L2) / (h r)`, the mean of 1/L,
+//! - under the rim, `p/Y = (L1 - s)^2 / (2 h r)`,
+//!
+//! where s is what is left between the plane and the hemisphere's centre, `1 - d`, and `L1 = sqrt(1 - r^2 - h^2/6 + h r)`
+//! and `L2 = sqrt(1 - r^2 - h^2/6 - h r)` are the columns' lengths at the near and the far end of the spread.
+
+use crate::frame::COLUMNS;
+use crate::params::Params;
+use crate::root::floor_sqrt;
+
+/// Fractional bits of a squared distance, of a column's length and of s.
+pub(super) const SQUARE_BITS: u32 = 28;
+/// Fractional bits of a taxel's place.
+pub(super) const PLACE_BITS: u32 = 15;
+/// Squared distance from node to node: 1/128.
+pub(super) const NODE_BITS: u32 = SQUARE_BITS - 7;
+/// Nodes of the table; the last stands at 1.5, where no contact within the radius reaches a taxel.
+const NODES: usize = 193;
+/// 1 in Q28.
+pub(super) const ONE: i32 = 1 << SQUARE_BITS;
+
+/// The model at one distance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// G, Q26.
+    pub mean_inverse_length: i32,
+    /// L1, Q28.
+    pub near_length: i32,
+    /// 1 / (h r), Q18.
+    pub inverse_spread: i32,
+}
+
+/// The array under the tip, in tip radii.
+#[derive(Clone, Debug)]
+pub struct Geometry {
+    /// h, Q28.
+    pub(super) pitch: i32,
+    /// Middles of the columns, and of the rows, Q15.
+    pub(super) places: [i32; COLUMNS],
+    /// What a taxel under the pressure Y shows, in sixteenths of a code, Q8.
+    pub(super) modulus_q8: u32,
+    /// The model over the squared distance.
+    pub(super) nodes: [Node; NODES],
+}
+
+impl Geometry {
+    /// The geometry that these parameters describe. In integers; they must have been checked.
+    pub(crate) fn new(params: &Params) -> Self {
+        let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
+        let pitch = ((pitch_um << SQUARE_BITS) / radius_um) as i32;
+        let half_pitches = |n: i64| (((n * pitch_um) << (PLACE_BITS - 1)) / radius_um) as i32;
+        let units_q8 = i64::from(params.modulus_pa) * i64::from(params.codes_per_kpa_milli) * (16 << 8) / 1_000_000;
+        let mut places = [0; COLUMNS];
+        for (place, weight) in places.iter_mut().zip((1 - COLUMNS as i64..).step_by(2)) {
+            *place = half_pitches(weight);
+        }
+        let mut nodes = [Node { mean_inverse_length: 0, near_length: 0, inverse_spread: 0 }; NODES];
+        for (index, node) in nodes.iter_mut().enumerate().skip(1) {
+            *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));
+        }
+        // At the centre nothing is spread by the distance; a taxel there is under the rim only where the whole contact is
+        // smaller than a taxel.
+        let [centre, first, ..] = &mut nodes;
+        let square = i64::from(ONE) - square(i64::from(pitch)) / 6;
+        centre.mean_inverse_length = ((1 << 54) / i64::from(root(square)).max(1)) as i32;
+        centre.near_length = root(square) as i32;
+        centre.inverse_spread = 2 * first.inverse_spread;
+        Self { pitch, places, modulus_q8: units_q8.clamp(1, i64::from(u32::MAX)) as u32, nodes }
+    }
+}
+
+impl Node {
+    /// The model at a squared distance above 0, for taxels with sides `pitch`; both in Q28.
+    fn at(distance_square: i64, pitch: i64) -> Self {
+        let spread = ((pitch * i64::from(root(distance_square))) >> SQUARE_BITS).max(1);
+        let square = i64::from(ONE) - distance_square - square(pitch) / 6;
+        let (near, far) = (i64::from(root(square + spread)), i64::from(root(square - spread)));
+        Self {
+            mean_inverse_length: (((near - far) << 26) / spread).min(i64::from(i32::MAX)) as i32,
+            near_length: near as i32,
+            inverse_spread: ((1 << 46) / spread).min(1 << 28) as i32,
+        }
+    }
+}
+
+/// The square of a Q28 number.
+const fn square(x: i64) -> i64 {
+    (x * x) >> SQUARE_BITS
+}
+
+/// The root of a Q28 number; 0 where it is negative.
+pub(super) fn root(x: i64) -> u32 {
+    floor_sqrt(x.max(0).unsigned_abs() << SQUARE_BITS)
+}

@@ -1,0 +1,156 @@
+//! A contact supposed, and what the model makes of it for each taxel.
+
+use super::arith::{between, high, quotient, within};
+use super::geometry::{Geometry, NODE_BITS, ONE, PLACE_BITS, SQUARE_BITS, root};
+use super::view::View;
+use crate::frame::{COLUMNS, ROWS};
+use crate::model::Tip;
+use crate::units::Millimetres;
+
+/// Fractional bits of a centre.
+pub(super) const CENTRE_BITS: u32 = 24;
+/// Fractional bits of a slope.
+pub(super) const SLOPE_BITS: u32 = 13;
+/// The deepest indentation that the fit looks for: 7/8 of the radius.
+pub(super) const REST_MIN: i32 = ONE / 8;
+/// The shallowest: 1/1024 of the radius.
+pub(super) const REST_MAX: i32 = ONE - ONE / 1024;
+/// The largest squared distance of a taxel that a contact can reach.
+const SQUARE_MAX: u32 = 3 << (SQUARE_BITS - 1);
+
+/// A contact, in tip radii.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Guess {
+    /// s = 1 - d, Q28.
+    pub rest: i32,
+    /// Centre, Q24.
+    pub x: i32,
+    /// Centre, Q24.
+    pub y: i32,
+}
+
+impl Guess {
+    /// The nearest that the fit covers: the centre within a radius of the array.
+    pub fn new(rest: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
+        let limit = (5 * (geometry.pitch >> 4)) + (1 << CENTRE_BITS);
+        let centre = |value| within(value, limit);
+        Self { rest: rest.min(REST_MAX).max(REST_MIN), x: centre(x), y: centre(y) }
+    }
+
+    /// From lengths.
+    pub fn from_lengths(d: Millimetres, x: Millimetres, y: Millimetres, tip: &Tip, geometry: &Geometry) -> Self {
+        let radius = tip.radius().to_bits().unsigned_abs().max(1).into();
+        let share = |length: Millimetres, bits| quotient(length.to_bits().into(), radius, bits);
+        Self::new(ONE - share(d, SQUARE_BITS), share(x, CENTRE_BITS), share(y, CENTRE_BITS), geometry)
+    }
+
+    /// Indentation.
+    pub fn indentation(&self, tip: &Tip) -> Millimetres {
+        Millimetres::from_bits(scale(ONE - self.rest, tip, SQUARE_BITS))
+    }
+
+    /// Centre along the columns and along the rows.
+    pub fn centre(&self, tip: &Tip) -> [Millimetres; 2] {
+        [self.x, self.y].map(|value| Millimetres::from_bits(scale(value, tip, CENTRE_BITS)))
+    }
+
+    /// r_c^2 = 1 - s^2, Q28.
+    pub fn rim_square(&self) -> i32 {
+        ONE - (high(self.rest, self.rest) << 4)
+    }
+}
+
+/// A number of radii as a length.
+fn scale(radii: i32, tip: &Tip, bits: u32) -> i32 {
+    ((i64::from(radii) * i64::from(tip.radius().to_bits())) >> bits) as i32
+}
+
+/// What the model says of a taxel: pressure as a share of the peak, and its slopes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Felt {
+    /// Pressure, Q14 of the peak.
+    pub pressure: i32,
+    /// How the pressure falls with ln(s), in Y, Q13: `-dp / d ln(s)`.
+    pub by_rest: i32,
+    /// How it falls with the squared distance, times 2 s^2, in Y, Q13.
+    pub by_square: i32,
+}
+
+/// A guess worked out for all taxels.
+pub(super) struct Pressed<'a> {
+    geometry: &'a Geometry,
+    rest: i32,
+    /// s^3, Q27.
+    rest_cube_q27: i32,
+    /// Taxels nearer than this, squared, lie inside the contact.
+    pub inside: u32,
+    /// Taxels from here on, squared, lie outside of it.
+    pub outside: u32,
+    /// Twice the modulus in shares of the peak, Q14.
+    twice_modulus: i32,
+    modulus: i32,
+    modulus_shift: u32,
+    /// Places of the columns from the contact's centre, Q15.
+    pub dx: [i32; COLUMNS],
+    /// Places of the rows from it, Q15.
+    pub dy: [i32; ROWS],
+}
+
+impl<'a> Pressed<'a> {
+    pub fn new(guess: &Guess, view: &View, geometry: &'a Geometry) -> Self {
+        let pitch = i64::from(geometry.pitch);
+        let middle = i64::from(root(i64::from(guess.rim_square()) + ((pitch * pitch) >> SQUARE_BITS) / 12));
+        let square = |r: i64| ((r.max(0) * r.max(0)) >> SQUARE_BITS).min(i64::from(SQUARE_MAX)) as u32;
+        let rest_square = high(guess.rest, guess.rest) << 4;
+        let from = |centre: i32| geometry.places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)));
+        Self {
+            geometry,
+            rest: guess.rest,
+            rest_cube_q27: high(rest_square, guess.rest) << 3,
+            inside: square(middle - pitch / 2),
+            outside: square(middle + pitch / 2),
+            twice_modulus: 2 * view.modulus,
+            modulus: view.modulus << view.modulus_shift,
+            modulus_shift: view.modulus_shift,
+            dx: from(guess.x),
+            dy: from(guess.y),
+        }
+    }
+
+    /// A taxel at a squared distance below [`Pressed::outside`].
+    #[inline(always)]
+    pub fn felt(&self, square: u32) -> Felt {
+        let Some([low, up, ..]) = self.geometry.nodes.get((square >> NODE_BITS) as usize..) else {
+            return Felt::default();
+        };
+        let share = ((square << (32 - NODE_BITS)) >> 1) as i32;
+        if square < self.inside {
+            let rise = up.mean_inverse_length - low.mean_inverse_length;
+            let mean = low.mean_inverse_length + 2 * high(rise, share);
+            let left_q22 = high(self.rest, mean);
+            let strain_q22 = ((1 << 22) - left_q22).max(0);
+            return Felt {
+                pressure: high(strain_q22 << 9, self.twice_modulus),
+                by_rest: left_q22 >> (22 - SLOPE_BITS),
+                by_square: high(rise, self.rest_cube_q27),
+            };
+        }
+        let length = between(low.near_length, up.near_length, share);
+        let wet = (length - self.rest).max(0);
+        // (L1 - s) / (h r), Q14, below 8.
+        let ratio = high(wet, between(low.inverse_spread, up.inverse_spread, share)).min((8 << 14) - 1);
+        let by_rest = high(ratio << 3, self.rest).min(3 << (SLOPE_BITS - 1));
+        Felt {
+            pressure: high(high(wet, self.modulus), ratio << 14) >> (self.modulus_shift - 7),
+            by_rest,
+            by_square: by_rest * (self.rest >> SLOPE_BITS) / (length >> SLOPE_BITS).max(1),
+        }
+    }
+}
+
+/// The square of a place, Q28; it stops at 4.
+#[inline(always)]
+pub(super) fn square(place: i32) -> u32 {
+    let place = place.unsigned_abs().min(u32::from(u16::MAX));
+    (place * place) >> 2
+}

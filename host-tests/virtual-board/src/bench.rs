@@ -1,13 +1,14 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
 use crate::board::FingerBoard;
+use crate::error::Error;
 use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
 use crate::log::{Log, LogLine};
 use crate::measure::{BridgeEdge, Latency};
+use crate::recorder::Recorder;
 use crate::trace::{Record, Trace};
 use crate::wire::TimedByte;
-use crate::error::Error;
 use host_tests::plant::Bridge;
 use rigless::emulator::{Access, AccessKind, Host, Stop};
 use rigless::session::Session;
@@ -41,6 +42,8 @@ pub struct Bench {
     pub received: Vec<TimedByte>,
     /// The core is held until the next reset.
     pub core_held: bool,
+    /// Samples the world where somebody asked for it; a snapshot does not keep it.
+    pub recorder: Option<Recorder>,
     world_ns: u64,
     bridge: Bridge,
     encoder: i32,
@@ -62,6 +65,7 @@ impl Bench {
             log: Log::new(image)?,
             received: Vec::new(),
             core_held: false,
+            recorder: None,
             world_ns: 0,
             bridge: Bridge::Coast,
             encoder: 0,
@@ -115,6 +119,9 @@ impl Bench {
         let board = session.board_mut();
         self.watch_bridge(board, now_ns);
         self.advance_world(now_ns);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.look(now_ns, &self.front_end.lock().world, self.bridge);
+        }
         let counts = self.front_end.lock().world.encoder_counts();
         if counts != self.encoder {
             board.part.turn_encoder(stop.at, counts.wrapping_sub(self.encoder));

@@ -42,6 +42,8 @@ pub struct FrontEnd {
     pub world: World,
     /// The trigger line between timer and converters is cut.
     pub trigger_cut: bool,
+    /// The interrupt of the scan's stream does not reach the core.
+    pub scan_interrupt_lost: bool,
     /// What the converters have done.
     pub counts: ScanCounts,
     /// Newest first: a sample just before an edge still sees what was before it.
@@ -55,8 +57,13 @@ pub struct Shared(Arc<Mutex<FrontEnd>>);
 impl Shared {
     /// A front end with no row driven.
     pub fn new(world: World) -> Self {
-        let (trigger_cut, counts, drives) = (false, ScanCounts::default(), [Drive::default(); 3]);
-        Self(Arc::new(Mutex::new(FrontEnd { world, trigger_cut, counts, drives })))
+        Self(Arc::new(Mutex::new(FrontEnd {
+            world,
+            trigger_cut: false,
+            scan_interrupt_lost: false,
+            counts: ScanCounts::default(),
+            drives: [Drive::default(); 3],
+        })))
     }
 
     /// The front end; everything runs on one thread at a time, so nobody waits.

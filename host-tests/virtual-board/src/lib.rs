@@ -9,18 +9,27 @@
 
 pub mod bench;
 pub mod board;
+pub mod client;
 pub mod converter;
 pub mod error;
+pub mod faults;
 pub mod front_end;
+pub mod gaps;
 pub mod image;
+pub mod link;
 pub mod log;
 pub mod measure;
 pub mod part;
+pub mod pins;
+pub mod recorder;
+pub mod report;
 pub mod rig;
 pub mod scan_timer;
+pub mod stack;
 pub mod stand;
 pub mod trace;
 pub mod wire;
 
 pub use error::Error;
+pub use faults::Fault;
 pub use rig::{Options, Rig};

@@ -97,6 +97,11 @@ impl Part {
         std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
     }
 
+    /// The front end that the converters are on.
+    pub fn front_end(&self) -> &Shared {
+        &self.front_end
+    }
+
     /// Moves the encoder by quarter cycles, positive forward.
     pub fn turn_encoder(&mut self, at: VirtualNanos, quarters: i32) {
         for _ in 0..quarters.unsigned_abs() {
@@ -161,7 +166,9 @@ impl Mcu for Part {
 
     fn poll(&mut self, now: VirtualNanos) {
         // Of all models only the bus has something outside, and stops come often.
-        self.chip.drive_serial_port(now, BUS_PORT, |port, registers, context| port.poll(registers, context));
+        self.chip.drive_serial_port(now, BUS_PORT, |port, registers, context| {
+            Device::poll(port, registers, context);
+        });
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {

@@ -6,7 +6,7 @@
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
 use crate::error::Error;
-use crate::front_end::{Shared, ScanCounts};
+use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::stand::{Hall, Stand};
 use host_tests::plant::World;
@@ -32,10 +32,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
-            presets: Vec::new(),
-        }
+        Self { instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"), presets: Vec::new() }
     }
 }
 
@@ -86,8 +83,7 @@ impl Rig {
         let mut bench = Bench::new(front_end, &image)?;
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
-        let resume =
-            kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
+        let resume = kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
         let hall = Hall::new(bench, ordered, reaching, digest(&images));
         let thread = std::thread::Builder::new().name("board".into()).spawn(move || {
             let mut start = Start::new(&images);
@@ -224,8 +220,7 @@ fn digest(images: &[Image]) -> [u8; 32] {
 
 fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
     let read = |path: &Path, bytes: Vec<u8>, at| {
-        Image::new(path, bytes, at)
-            .map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
+        Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
     for (address, bytes) in &options.presets {

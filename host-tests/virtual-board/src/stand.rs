@@ -82,12 +82,7 @@ impl Driver<FingerBoard> for Hall {
         }
     }
 
-    fn on_stop(
-        &mut self,
-        session: &mut Session<FingerBoard>,
-        stop: Stop,
-        host: &mut dyn Host,
-    ) -> Option<VirtualNanos> {
+    fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
         self.bench.step(session, stop, host);
         if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
             return None;

@@ -1,0 +1,71 @@
+//! What can be broken while it runs, beside the defects that the world itself has (`World::faults`).
+
+use crate::board::FingerBoard;
+use crate::error::Error;
+use crate::rig::Rig;
+use rigless::emulator::{Host, Stop};
+use rigless::session::Session;
+
+/// A defect of the board or the microcontroller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// The timer's trigger no longer reaches the converters.
+    ConvertersStall,
+    /// The bridge's driver pulls nFAULT low.
+    BridgeFault,
+    /// The scan's interrupt never reaches the core, as if its enable were lost.
+    ScanInterruptLost,
+    /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
+    CoreHangs,
+    /// The core's next access to these addresses is a bus error: a hard fault.
+    BusError {
+        /// The first address.
+        from: u64,
+        /// The first address after them.
+        to: u64,
+    },
+}
+
+impl Fault {
+    fn apply(self, defect: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
+        match self {
+            Self::ConvertersStall => session.board().part.front_end().lock().trigger_cut = defect,
+            Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
+            Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
+            Self::CoreHangs => host.hold(defect),
+            Self::BusError { from, to } if defect => session.fail_next(from, to),
+            Self::BusError { .. } => {}
+        }
+    }
+}
+
+impl Rig {
+    /// Breaks something from now on.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn inject(&mut self, fault: Fault) -> Result<(), Error> {
+        self.set(fault, true)
+    }
+
+    /// Mends it again.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn mend(&mut self, fault: Fault) -> Result<(), Error> {
+        self.set(fault, false)
+    }
+
+    fn set(&mut self, fault: Fault, defect: bool) -> Result<(), Error> {
+        self.with(move |stand| {
+            fault.apply(defect, stand.session, stand.host, stand.stop);
+            if fault == Fault::CoreHangs {
+                stand.bench.core_held = defect;
+            }
+            if fault == Fault::BridgeFault {
+                let at_ns = stand.bench.next_ns;
+                stand.bench.watch_bridge(stand.session.board_mut(), at_ns);
+            }
+        })
+    }
+}

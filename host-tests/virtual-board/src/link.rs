@@ -1,0 +1,120 @@
+//! The bus from the host's side: bytes at their time, a byte stream, and whole transactions.
+
+use crate::error::Error;
+use crate::rig::Rig;
+use crate::wire::TimedByte;
+use std::io::{Read, Write};
+
+/// How far the run goes between two looks at what the image sent.
+const LOOK_NS: u64 = 50_000;
+
+impl Rig {
+    /// Sends bytes from now on, one after another at the port's baud rate.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let bytes = bytes.to_vec();
+        self.with(move |stand| {
+            let from_ns = stand.bench.next_ns;
+            stand.session.board_mut().wire().send(from_ns, &bytes);
+        })
+    }
+
+    /// Takes what the image has sent.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn take_received(&mut self) -> Result<Vec<TimedByte>, Error> {
+        self.with(|stand| std::mem::take(&mut stand.bench.received))
+    }
+
+    /// Bytes that have not gone out to the image yet.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn unsent(&mut self) -> Result<usize, Error> {
+        self.with(|stand| stand.session.board_mut().wire().pending())
+    }
+
+    /// Sends a packet and runs until a whole status packet has come back, or nothing has for the wait's time after the
+    /// last byte either way. What came back is not checked.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn transact(&mut self, packet: &[u8], wait_ns: u64) -> Result<Vec<u8>, Error> {
+        self.take_received()?;
+        self.send(packet)?;
+        let mut reply = Vec::new();
+        let mut quiet_since_ns = self.now_ns();
+        while !is_whole(&reply) && self.now_ns() < quiet_since_ns + wait_ns {
+            self.run_until_ns(self.now_ns() + LOOK_NS)?;
+            let bytes = self.take_received()?;
+            if !bytes.is_empty() || self.unsent()? > 0 {
+                quiet_since_ns = self.now_ns();
+            }
+            reply.extend(bytes.iter().map(|timed| timed.byte));
+        }
+        Ok(reply)
+    }
+
+    /// The bus as a byte stream; reading runs the board.
+    pub fn stream(&mut self, wait_ns: u64) -> Stream<'_> {
+        Stream { rig: self, wait_ns }
+    }
+}
+
+/// Whether these bytes hold a whole packet of the protocol: FF FF FD 00, ID, length of what follows.
+pub fn is_whole(bytes: &[u8]) -> bool {
+    packet_length(bytes).is_some_and(|length| bytes.len() >= length)
+}
+
+/// The length of the packet at the bytes' start, once it can be told; bytes that begin no packet count as one each.
+pub fn packet_length(bytes: &[u8]) -> Option<usize> {
+    const HEADER: [u8; 4] = [0xff, 0xff, 0xfd, 0x00];
+    if bytes.iter().zip(HEADER).any(|(byte, header)| *byte != header) {
+        return Some(1);
+    }
+    let length = bytes.get(5..7)?;
+    Some(7 + usize::from(u16::from_le_bytes([length[0], length[1]])))
+}
+
+/// The bus as a byte stream. A read with nothing there runs the board until something comes, or times out in virtual time.
+#[derive(Debug)]
+pub struct Stream<'a> {
+    rig: &'a mut Rig,
+    wait_ns: u64,
+}
+
+impl Read for Stream<'_> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let end_ns = self.rig.now_ns() + self.wait_ns;
+        loop {
+            let wanted = buffer.len();
+            let taken = self.rig.with(move |stand| {
+                let received = &mut stand.bench.received;
+                received.drain(..wanted.min(received.len())).map(|timed| timed.byte).collect::<Vec<_>>()
+            });
+            let taken = taken.map_err(std::io::Error::other)?;
+            buffer[..taken.len()].copy_from_slice(&taken);
+            if !taken.is_empty() || wanted == 0 {
+                return Ok(taken.len());
+            }
+            if self.rig.now_ns() >= end_ns {
+                return Err(std::io::ErrorKind::TimedOut.into());
+            }
+            self.rig.run_until_ns(self.rig.now_ns() + LOOK_NS).map_err(std::io::Error::other)?;
+        }
+    }
+}
+
+impl Write for Stream<'_> {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.rig.send(bytes).map_err(std::io::Error::other)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,0 +1,93 @@
+//! The flash image on the emulated board: it boots, scans, repeats, and survives a snapshot.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+use host_tests::plant::{Setup, World};
+use std::path::PathBuf;
+use virtual_board::{Options, Rig};
+
+fn image() -> PathBuf {
+    let path = std::env::var_os("FINGERTIP_IMAGE");
+    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
+}
+
+fn rig() -> Rig {
+    Rig::new(&image(), World::new(&Setup::default()), &Options::default()).expect("the image starts")
+}
+
+/// An instruction packet that asks ID 1 whether it is there.
+const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
+const WAIT_NS: u64 = 5_000_000;
+
+/// 100 ms with a ping in the middle, in which everything takes part.
+fn eventful(rig: &mut Rig) {
+    rig.run_until_ns(60_000_000).expect("it runs");
+    rig.transact(&PING, WAIT_NS).expect("it runs");
+    rig.run_until_ns(100_000_000).expect("it runs");
+}
+
+#[test]
+fn it_boots_and_frames_arrive_at_the_scans_rate() {
+    let mut rig = rig();
+    rig.run_until_ns(100_000_000).expect("it runs");
+    let before = rig.scan_counts().expect("it runs");
+    rig.run_until_ns(200_000_000).expect("it runs");
+    let after = rig.scan_counts().expect("it runs");
+    let frames = after.frames - before.frames;
+    assert!((1_000..=1_005).contains(&frames), "{frames} frames in 100 ms");
+    let conversions = after.conversions - before.conversions;
+    assert!(conversions.abs_diff(frames * 110) <= 110, "{conversions} conversions for {frames} frames");
+    assert_eq!(rig.miswired_pins().expect("it runs"), Vec::<String>::new());
+    assert_eq!(rig.resets().expect("it runs"), vec![]);
+    rig.check_gaps().expect("no unknown gap");
+}
+
+#[test]
+fn it_answers_a_ping_at_its_baud_rate() {
+    let mut rig = rig();
+    rig.run_until_ns(20_000_000).expect("it runs");
+    rig.send(&PING).expect("it runs");
+    rig.run_until_ns(25_000_000).expect("it runs");
+    let reply = rig.take_received().expect("it runs");
+    let bytes: Vec<u8> = reply.iter().map(|timed| timed.byte).collect();
+    assert_eq!(bytes[..9], [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00]);
+    assert_eq!(bytes.len(), 14);
+    // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
+    let took_ns = reply[13].at_ns - reply[0].at_ns;
+    assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
+}
+
+#[test]
+fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
+    let mut whole = rig();
+    eventful(&mut whole);
+    let hash = whole.trace_hash().expect("it runs");
+    drop(whole);
+    for _ in 0..2 {
+        let mut again = rig();
+        eventful(&mut again);
+        assert_eq!(again.trace_hash().expect("it runs"), hash);
+    }
+
+    let file = std::env::temp_dir().join(format!("virtual-board-{}.snapshot", std::process::id()));
+    let mut cut = rig();
+    cut.run_until_ns(33_000_000).expect("it runs");
+    cut.snapshot(&file).expect("a snapshot is taken");
+    drop(cut);
+    let mut rest = Rig::restore(&image(), &file, &Options::default()).expect("the snapshot is restored");
+    std::fs::remove_file(&file).expect("the snapshot's file was there");
+    assert_eq!(rest.now_ns(), 33_000_000);
+    eventful(&mut rest);
+    assert_eq!(rest.trace_hash().expect("it runs"), hash);
+}
+
+#[test]
+fn the_crate_dynamixel2_is_understood() {
+    let mut rig = rig();
+    rig.run_until_ns(20_000_000).expect("it runs");
+    let (ping, unknown) = rig
+        .client(WAIT_NS, |bus| (bus.ping(1).expect("the image answers").motor_id, bus.ping(7).is_err()))
+        .expect("the client runs");
+    assert_eq!(ping, 1);
+    assert!(unknown, "nobody has ID 7");
+}

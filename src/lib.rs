@@ -30,6 +30,8 @@ pub mod model;
 
 pub mod control;
 
+pub mod identify;
+
 pub mod safety;
 
 pub mod pipeline;

@@ -6,6 +6,7 @@ use crate::control::SpeedLoop;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
+use crate::identify::{Identification, Press, PressView, Refusal};
 use crate::pressure::Array;
 use crate::safety::monitor::{Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
@@ -24,6 +25,8 @@ pub struct Command {
     pub tare_request: u8,
     /// A change of this number clears a fault.
     pub clear_request: u8,
+    /// A change of this number asks for a measurement of Young's modulus.
+    pub identify_request: u8,
 }
 
 /// What a frame says of the contact.
@@ -68,6 +71,8 @@ pub struct Status {
     pub speed: MillimetresPerSecond,
     /// The duty that was returned.
     pub duty: Duty,
+    /// The measurement of Young's modulus.
+    pub identification: Identification,
 }
 
 /// The loop's state between frames.
@@ -78,10 +83,12 @@ pub struct Pipeline {
     motion: SpeedLoop,
     monitor: Monitor,
     goal: Goal,
+    press: Press,
     status: Status,
     tared: bool,
     tare_request: u8,
     clear_request: u8,
+    identify_request: u8,
 }
 
 impl Pipeline {
@@ -93,10 +100,12 @@ impl Pipeline {
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
             goal: Goal::default(),
+            press: Press::new(),
             status: Status::default(),
             tared: false,
             tare_request: 0,
             clear_request: 0,
+            identify_request: 0,
         }
     }
 
@@ -149,14 +158,27 @@ impl Pipeline {
             }
         }
 
+        // What a press that measures the modulus makes of it.
+        if self.status.mode == Mode::Identify {
+            let view = PressView { picture, contact: &contact, encoder: sense.encoder, motion: &self.motion };
+            self.press.observe(&view, &self.config);
+        }
+
         // What to do about it.
         let mode = self.next_mode(command, &contact, sense);
         self.status.mode = mode;
+        if self.press.running() && mode != Mode::Identify {
+            self.press.refuse(Refusal::Interrupted);
+        }
         let duty = match mode {
             Mode::Off | Mode::Tare | Mode::Fault => self.motion.coast(),
             Mode::Approach | Mode::Force | Mode::Release => {
                 let reference =
                     self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits);
+                self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
+            }
+            Mode::Identify => {
+                let reference = self.press.reference(&self.motion, &self.config, &mut limits);
                 self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
             }
         };
@@ -169,6 +191,7 @@ impl Pipeline {
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
+        self.status.identification = self.press.outcome();
         (duty, self.status)
     }
 
@@ -190,9 +213,12 @@ impl Pipeline {
         let clear_asked = command.clear_request != self.clear_request;
         self.tare_request = command.tare_request;
         self.clear_request = command.clear_request;
+        let identifying = self.status.mode == Mode::Identify;
+        let identify_asked = command.identify_request != self.identify_request && !identifying;
+        self.identify_request = command.identify_request;
 
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
-        match self.status.mode {
+        let mode = match self.status.mode {
             Mode::Fault if clear_asked && !command.torque => {
                 self.status.fault = None;
                 Mode::Off
@@ -219,13 +245,22 @@ impl Pipeline {
                 Mode::Off
             }
             Mode::Off => Mode::Off,
+            Mode::Identify if self.press.running() => Mode::Identify,
+            Mode::Approach | Mode::Force | Mode::Release if identify_asked => {
+                self.press.start(&self.motion);
+                Mode::Identify
+            }
             Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => Mode::Force,
             Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => Mode::Force,
-            Mode::Approach | Mode::Force | Mode::Release => {
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
                 self.follow_drift(contact);
                 wanted
             }
+        };
+        if identify_asked && mode != Mode::Identify {
+            self.press.refuse(Refusal::NotReady);
         }
+        mode
     }
 
     /// Lets the baseline follow drift where nothing is touched.

@@ -3,12 +3,13 @@
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
 use crate::frame::{Frame, SLOTS, Sense};
+use crate::identify::Modulus;
 use crate::pipeline::{Command, Contact, Status};
 use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x01";
+pub const MAGIC: [u8; 8] = *b"fingert\x02";
 
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,7 +24,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 9 + 9;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 9 + 10;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -43,11 +44,11 @@ impl Record {
         put(&supply_mv.to_le_bytes());
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
-        let Command { torque, goal, bus_watchdog_ms, tare_request, clear_request } = command;
+        let Command { torque, goal, bus_watchdog_ms, tare_request, clear_request, identify_request } = command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
         put(&bus_watchdog_ms.to_le_bytes());
-        put(&[*tare_request, *clear_request]);
+        put(&[*tare_request, *clear_request, *identify_request]);
         bytes
     }
 
@@ -69,6 +70,7 @@ impl Record {
             bus_watchdog_ms: u16::from_le_bytes(take(&mut rest)),
             tare_request: u8::from_le_bytes(take(&mut rest)),
             clear_request: u8::from_le_bytes(take(&mut rest)),
+            identify_request: u8::from_le_bytes(take(&mut rest)),
         };
         Self { frame, sense, command }
     }
@@ -95,7 +97,18 @@ impl Digest {
     /// Adds what a step returned.
     pub fn add(&mut self, duty: Duty, status: &Status) {
         // Taken apart field by field, so that a field cannot be forgotten.
-        let Status { sequence, missed_frames, mode, fault, limits, contact, travel, speed, duty: applied } = *status;
+        let Status {
+            sequence,
+            missed_frames,
+            mode,
+            fault,
+            limits,
+            contact,
+            travel,
+            speed,
+            duty: applied,
+            identification,
+        } = *status;
         let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, bad_taxels } = contact;
         for word in [sequence, missed_frames, peak_pa] {
             self.0.update(&word.to_le_bytes());
@@ -105,6 +118,11 @@ impl Digest {
         }
         self.0.update(&force.to_bits().to_le_bytes());
         self.0.update(&speed.to_bits().to_le_bytes());
+        let Modulus { modulus, sigma, contact, points } = identification.result();
+        for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
+            self.0.update(&bits.to_le_bytes());
+        }
+        self.0.update(&[identification.number(), identification.refusal()]);
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());
         self.0.update(&applied.0.to_le_bytes());
@@ -126,6 +144,7 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::identify::{Identification, Refusal};
     use crate::safety::{Fault, Limits, Mode};
     use crate::units::{Millimetres, MillimetresPerSecond};
 
@@ -135,7 +154,7 @@ mod tests {
         bytes.iter_mut().zip(1..=250).for_each(|(byte, value)| *byte = value);
         let record = Record::from_bytes(&bytes);
         assert_eq!(record.frame.code(0, 0), 0x0201);
-        assert_eq!(record.command.clear_request, 242);
+        assert_eq!(record.command.identify_request, 243);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
         // Bytes differ where a truth value was neither 0 nor 1, and nowhere else.
@@ -175,6 +194,9 @@ mod tests {
             with(|status| status.contact.peak_pa = 1),
             with(|status| status.contact.confidence = 1),
             with(|status| status.contact.bad_taxels = 1),
+            with(|status| status.identification = Identification::Running),
+            with(|status| status.identification = Identification::Refused(Refusal::Span)),
+            with(|status| status.identification = Identification::Done(Modulus { points: 1, ..Modulus::default() })),
         ];
         let count = values.len();
         values.sort_unstable();

@@ -7,7 +7,10 @@
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
 //! | 4 release | backs off to the set clearance, then holds there | goal > 0: approach |
+//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force | done or refused: approach (goal > 0), release (goal = 0) |
 //! | 5 fault | outputs low, motor coasts | the fault is cleared with torque off: off |
+//!
+//! Identify, which measures Young's modulus, is asked for in approach, force or release.
 //!
 //! Torque off leads to off from every mode but fault. A fault (stop) is latched until it is cleared; a limit (what holds the loop
 //! back just now) comes and goes by itself. The numbers are stable: hosts may store them.
@@ -31,6 +34,8 @@ pub enum Mode {
     Release = 4,
     /// Stopped by a fault.
     Fault = 5,
+    /// Pressing to measure Young's modulus.
+    Identify = 6,
 }
 
 /// Why the motor was stopped.

@@ -82,7 +82,7 @@ pub fn bridge(duty: Duty, status: Status) -> Bridge {
     use fingertip::safety::Mode;
     match status.mode {
         Mode::Off | Mode::Tare | Mode::Fault => Bridge::Coast,
-        Mode::Approach | Mode::Force | Mode::Release => {
+        Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
             Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) }
         }
     }

@@ -90,7 +90,7 @@ impl Bridge {
                 self.coast();
                 self.wake();
             }
-            Mode::Approach | Mode::Force | Mode::Release => {
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
                 self.wake();
                 if self.ready {
                     self.drive(duty);

@@ -80,7 +80,7 @@ fn way_to_goal(
 }
 
 /// No further than to the end of the travel.
-fn within_travel(way: Millimetres, motion: &SpeedLoop, config: &Config, limits: &mut Limits) -> Millimetres {
+pub(crate) fn within_travel(way: Millimetres, motion: &SpeedLoop, config: &Config, limits: &mut Limits) -> Millimetres {
     let left = Millimetres(config.travel_max.0.saturating_sub(motion.observer.travel.0));
     if left < way {
         limits.set(Limits::TRAVEL);

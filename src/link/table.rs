@@ -1,11 +1,13 @@
 //! The control table: every register defined once, for the device and for its documentation.
 //!
-//! [`registers`] holds the definition. From it come the addresses as constants ([`address`]), reading and writing here, and
-//! [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading sends a register's bytes straight into the reply.
+//! [`registers`] holds the definition. From it come the addresses as constants ([`address`]), reading and writing here,
+//! and [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes straight into the
+//! reply.
 
 mod registers;
 mod values;
 
+use crate::identify::Modulus;
 use crate::params::Params;
 use crate::pipeline::Contact;
 
@@ -145,6 +147,10 @@ impl<'a> View<'a> {
 
     fn contact(&self) -> &'a Contact {
         &self.snapshot.status.contact
+    }
+
+    fn identified(&self) -> Modulus {
+        self.snapshot.status.identification.result()
     }
 
     fn refused(&self, error: StatusError) -> u32 {

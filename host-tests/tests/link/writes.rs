@@ -81,7 +81,8 @@ fn every_value_in_range_is_taken_or_stopped_by_a_limit() {
             let data = bytes(register, value).expect("its own range");
             match bench.write(register.address, &data) {
                 Ok(())
-                    if [address::TARE, address::CLEAR_FAULT, address::SAVE_PARAMETERS].contains(&register.address) =>
+                    if [address::TARE, address::CLEAR_FAULT, address::SAVE_PARAMETERS, address::IDENTIFY]
+                        .contains(&register.address) =>
                 {
                     assert_eq!(bench.number(register.address, 1), 0, "{}", register.name);
                 }
@@ -90,6 +91,9 @@ fn every_value_in_range_is_taken_or_stopped_by_a_limit() {
                     if level > 0 {
                         assert_eq!(bench.read(register.address, register.bytes()), Ok(data), "{}", register.name);
                     }
+                }
+                Err(error) if register.address == address::IDENTIFY => {
+                    assert!(!before.command.torque && error == StatusError::Result as u8, "{}", register.name);
                 }
                 Err(error) => {
                     let limited = register.address >= address::PARAMS || register.address == address::GOAL_FORCE_MN;

@@ -1,7 +1,7 @@
 //! The definition itself: one entry for each register, in the order of the addresses.
 //!
-//! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the documentation
-//! above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each.
+//! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
+//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each.
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 
@@ -12,7 +12,7 @@ use crate::link::snapshot::hardware_error;
 use crate::params::Params;
 use crate::store::Record;
 
-use super::values::{bump, element, permille, set_goal, set_torque, set_watchdog, watchdog};
+use super::values::{bump, element, permille, set_goal, set_identify, set_torque, set_watchdog, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
@@ -42,7 +42,8 @@ macro_rules! optional {
 
 macro_rules! control_table {
     ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
-       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?, $get:expr $(, $set:expr)?;)*) => {
+       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?,
+       $get:expr $(, $set:expr)?;)*) => {
         /// Where each register begins.
         pub mod address {
             $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
@@ -160,8 +161,8 @@ control_table! {
     /// How the stored registers stand to the flash: 0 the same, 1 changed since, 2 the last save failed.
     263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
         |view, _| view.settings().saved as u32;
-    /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault.
-    264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 5,
+    /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 identify.
+    264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 6,
         |view, _| view.snapshot.status.mode as u32;
     /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
@@ -264,6 +265,29 @@ control_table! {
     /// Good instruction packets for this device, broadcasts included; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.counters().good_packets;
+    /// 1 measures Young's modulus: backs off, presses slowly, lets go; refused without torque. Reads 0.
+    350 IDENTIFY: U8 ReadWrite, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        set_identify;
+    /// The measurement of Young's modulus: 0 none since reset, 1 running, 2 done, 3 refused.
+    351 IDENTIFY_STATE: U8 ReadOnly, "" * 1, 0 to 3,
+        |view, _| u32::from(view.snapshot.status.identification.number());
+    /// Young's modulus as measured; 0 where there is no result. The parameter modulus_pa stays as it is.
+    352 IDENTIFIED_MODULUS_PA: U32 ReadOnly, "Pa" * 1, 0 to 2_000_000,
+        |view, _| thousandths(view.identified().modulus.to_bits(), 16) as u32;
+    /// Its standard uncertainty: scatter of the points and the array's readout, not the array's calibration.
+    356 IDENTIFIED_SIGMA_PA: U32 ReadOnly, "Pa" * 1, 0 to 2_000_000,
+        |view, _| thousandths(view.identified().sigma.to_bits(), 16) as u32;
+    /// Travel at which the tip touched.
+    360 IDENTIFIED_CONTACT_UM: I32 ReadOnly, "um" * 1, -128_000 to 128_000,
+        |view, _| thousandths(view.identified().contact.to_bits(), 24) as u32;
+    /// From how many points.
+    364 IDENTIFIED_POINTS: U16 ReadOnly, "" * 1, 0 to 4096,
+        |view, _| u32::from(view.identified().points);
+    /// Why there is no result; 0 it was not refused. 1 span below 0.3 mm, 2 too few points, 3 residual, 4 scatter, 5
+    /// out of the model's range, 6 bad taxels, 7 array's edge, 8 no contact, 9 stalled, 10 interrupted, 11 no torque.
+    366 IDENTIFY_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
+        |view, _| u32::from(view.snapshot.status.identification.refusal());
     /// Pressure on each taxel, row by row.
     768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
         |view, place| element(view.snapshot.pressures_10pa, place);

@@ -32,6 +32,15 @@ pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusErro
     Ok(())
 }
 
+/// Asks for a measurement of the modulus: refused without torque.
+pub(super) fn set_identify(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if value != 0 && !staged.settings.command.torque {
+        return Err(StatusError::Result);
+    }
+    bump(&mut staged.settings.command.identify_request, value);
+    Ok(())
+}
+
 /// Bus watchdog: 0 resets a tripped one.
 pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped && value != 0 {

@@ -1,4 +1,5 @@
-//! Prints `README.md` with the demonstration's figures, as `docs/demo.json` has them, between its markers.
+//! Prints `README.md` with the demonstration's figures between its markers, as `docs/demo.json` or the file named as
+//! the argument has them.
 
 use serde_json::Value;
 use std::error::Error;
@@ -11,7 +12,8 @@ const END: &str = "<!-- end of figures -->\n";
 fn main() -> Result<(), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let readme = std::fs::read_to_string(root.join("README.md"))?;
-    let figures = serde_json::from_str(&std::fs::read_to_string(root.join("docs/demo.json"))?)?;
+    let json = std::env::args_os().nth(1).map_or_else(|| root.join("docs/demo.json"), Into::into);
+    let figures = serde_json::from_str(&std::fs::read_to_string(json)?)?;
     let (before, rest) = readme.split_once(BEGIN).ok_or("README.md lacks the marker of the figures' begin")?;
     let (_, after) = rest.split_once(END).ok_or("README.md lacks the marker of the figures' end")?;
     print!("{before}{BEGIN}{}{END}{after}", block(&figures)?);

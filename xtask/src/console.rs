@@ -41,7 +41,7 @@ impl Console {
         command.current_dir(paths::root());
         let shown = show(command);
         let Some(text) = &mut self.captured else {
-            println!("$ {shown}");
+            eprintln!("$ {shown}");
             let status = command.status().with_context(|| missing(command))?;
             return if status.success() { Ok(()) } else { bail!("{status}: {shown}") };
         };

@@ -2,44 +2,75 @@
 
 use crate::{
     console::{self, Console},
-    paths,
+    demo, image, paths,
+    toolchain::Choice,
 };
 use anyhow::{Context, Result, bail};
-use std::fs;
+use std::{fs, path::Path};
 
-/// Files of the repository that a program writes: path, and the arguments of `cargo run` that print its text.
-const GENERATED: [(&str, &[&str]); 1] =
-    [("docs/control-table.md", &["--package", "host-tests", "--example", "control-table"])];
+/// Files that programs write: path, and the example of the package host-tests that prints their text.
+const GENERATED: [(&str, &str); 2] =
+    [("docs/control-table.md", "control-table"), ("examples/python/registers.py", "registers-python")];
+/// The demonstration's figures and pictures, as the README shows them.
+const FIGURES: &str = "docs/demo.json";
+const PICTURES: &str = "docs/pictures";
+const README: (&str, &str) = ("README.md", "readme");
 
 /// Flags of `cargo xtask docs`.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  cargo xtask docs\n  cargo xtask docs --check")]
 pub struct Args {
-    /// Change nothing; fail where a generated file is stale
+    /// Change nothing; fail where a generated file, or a figure of the README, is stale
     #[arg(long)]
     check: bool,
 }
 
-/// Writes or checks the generated files.
+/// Writes or checks the generated files; the figures come from a run of the demonstration.
 ///
 /// # Errors
-/// A generator fails, or a file is stale.
-pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+/// A generator fails, the demonstration misses what it must show, or a file is stale.
+pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
-    for (path, arguments) in GENERATED {
-        let text = console::output(console::cargo("run").arg("--quiet").args(arguments))?;
-        let file = paths::root().join(path);
-        if fs::read_to_string(&file).is_ok_and(|present| present == text) {
-            console.say(&format!("fresh    {path}"));
-        } else if args.check {
-            stale.push(path);
-        } else {
-            fs::write(&file, text).with_context(|| format!("cannot write {path}"))?;
-            console.say(&format!("written  {path}"));
-        }
+    for (path, example) in GENERATED {
+        renew(path, &print(example, None)?, args.check, &mut stale, console)?;
     }
+
+    let root = paths::root();
+    let (json, pictures) = if args.check {
+        (paths::target().join("docs").join("demo.json"), paths::target().join("docs").join("pictures"))
+    } else {
+        (root.join(FIGURES), root.join(PICTURES))
+    };
+    fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", paths::shown(&pictures)))?;
+    let image = image::firmware(choice, console)?;
+    let mut command = demo::virtual_board("run");
+    command.args(["--", "demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
+    console.run(&mut command)?;
+    renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
+
     if !stale.is_empty() {
         bail!("stale: {}; write them anew with `cargo xtask docs`", stale.join(", "));
+    }
+    Ok(())
+}
+
+/// The text that a program prints.
+fn print(example: &str, argument: Option<&Path>) -> Result<String> {
+    let mut command = console::cargo("run");
+    command.args(["--quiet", "--package", "host-tests", "--example", example, "--"]).args(argument);
+    console::output(&mut command)
+}
+
+fn renew(path: &'static str, text: &str, check: bool, stale: &mut Vec<&str>, console: &Console) -> Result<()> {
+    let file = paths::root().join(path);
+    if fs::read_to_string(&file).is_ok_and(|present| present == text) {
+        console.say(&format!("fresh    {path}"));
+    } else if check {
+        console.say(&format!("stale    {path}"));
+        stale.push(path);
+    } else {
+        fs::write(&file, text).with_context(|| format!("cannot write {path}"))?;
+        console.say(&format!("written  {path}"));
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ mod docs;
 mod flash;
 mod image;
 mod lint;
+mod model;
 mod paths;
 mod proof;
 mod python;
@@ -48,6 +49,11 @@ enum Command {
     Qemu(qemu::Args),
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
     Size,
+    /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
+    #[command(after_help = "Example:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
+    Model,
+    /// Prove the contact model's error bounds over whole input ranges
+    Prove(model::Args),
     /// Prove the control step free of panics and of floating-point calls
     PanicFree,
     /// Check format, lints, documentation and licences
@@ -78,9 +84,11 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
+        Command::Model => model::answer(console),
+        Command::Prove(args) => model::prove(args, console),
         Command::PanicFree => proof::run(toolchain, console),
         Command::Lint => lint::run(toolchain),
-        Command::Docs(args) => docs::run(args, console),
+        Command::Docs(args) => docs::run(args, toolchain, console),
         Command::Setup => setup(toolchain, console),
     }
 }

@@ -14,7 +14,7 @@ from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler, PortHandle
 import registers as reg
 
 BAUD = 1_000_000
-MODES = ["off", "tare", "approach", "force", "release", "fault"]
+MODES = ["off", "tare", "approach", "force", "release", "fault", "identify"]
 NOT_TARED = 1 << 6  # in the register LIMITS
 
 

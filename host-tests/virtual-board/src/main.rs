@@ -17,11 +17,17 @@ struct Arguments {
 enum Command {
     /// Runs the image for some time and reports speed, frames, log and emulator gaps.
     Run(commands::run::Arguments),
+    /// Touches an object, holds forces, lets go; judges the figures and draws pictures.
+    Demo(commands::demo::Arguments),
+    /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
+    Serve(commands::serve::Arguments),
 }
 
 fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().command {
         Command::Run(arguments) => commands::run::run(&arguments).map_err(Into::into),
+        Command::Demo(arguments) => commands::demo::run(&arguments).map_err(Into::into),
+        Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

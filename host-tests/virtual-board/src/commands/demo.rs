@@ -1,0 +1,41 @@
+//! `virtual-board demo`.
+
+use std::path::PathBuf;
+use virtual_board::demo::{self, DemoError, Plan, pictures, table};
+
+/// What to show and where to put it.
+#[derive(Debug, clap::Args)]
+pub struct Arguments {
+    /// The flash image, an ELF for the STM32F446RE.
+    #[arg(long, value_name = "ELF")]
+    image: PathBuf,
+    /// Writes the figures to this file.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draws the pictures into this folder.
+    #[arg(long, value_name = "DIR", default_value = "target/demo")]
+    out: PathBuf,
+    /// Holds each force for a shorter time and leaves out the second run.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Runs it, prints the table, writes figures and pictures.
+pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
+    let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
+    println!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes);
+    print!("{}", table::table(&figures));
+    for path in pictures::draw(&run, &figures, &arguments.out)? {
+        println!("picture  {}", path.display());
+    }
+    if let Some(path) = &arguments.json {
+        let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
+        let written = written.and_then(|text| std::fs::write(path, text + "\n"));
+        written.map_err(|source| DemoError::Write { path: path.clone(), source })?;
+        println!("figures  {}", path.display());
+    }
+    match figures.missed() {
+        0 => Ok(()),
+        missed => Err(DemoError::Missed(missed)),
+    }
+}

@@ -1,9 +1,9 @@
 //! The converters with what the crate's own lack: the external trigger, two of them at once, and the array at their
 //! inputs.
 //!
-//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, the
-//! words wait in order, and the DMA request stands until all are fetched. Nothing that the image can see depends on the
-//! words in between, and 110 conversions a frame cost 22 events. Not modelled: injected group, continuous and
+//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
+//! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
+//! conversions a frame cost 22 events. Not modelled: injected group, continuous and
 //! discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
 
 use crate::front_end::Shared;
@@ -16,7 +16,6 @@ use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
 use rigless::soc::{FieldSpec, Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
 
 /// `SMPx`, RM0090 13.13.4, in converter cycles.
 const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
@@ -65,31 +64,15 @@ pub struct Converter {
     status: u64,
     running: Option<Running>,
     rank: usize,
-    waiting: VecDeque<u16>,
-    request: Level,
     interrupt: Level,
 }
 
-store!(Converter {
-    values: [clock_hz, status, running, rank, waiting, request, interrupt],
-    parts: [],
-    built: [nth, front_end],
-});
+store!(Converter { values: [clock_hz, status, running, rank, interrupt], parts: [], built: [nth, front_end] });
 
 impl Converter {
     /// Out of reset, its inputs on a front end.
     pub fn new(nth: usize, front_end: Shared, clock_hz: u64) -> Self {
-        Self {
-            nth,
-            front_end,
-            clock_hz,
-            status: 0,
-            running: None,
-            rank: 0,
-            waiting: VecDeque::new(),
-            request: Level::Low,
-            interrupt: Level::Low,
-        }
+        Self { nth, front_end, clock_hz, status: 0, running: None, rank: 0, interrupt: Level::Low }
     }
 
     fn length(registers: &RegisterFile) -> usize {
@@ -120,7 +103,7 @@ impl Converter {
             return;
         }
         let by_dma = cr2::DMA.is_set(control);
-        if !self.waiting.is_empty() && by_dma {
+        if by_dma && !self.front_end.lock().waiting[self.nth].is_empty() {
             self.status = sr::OVR.set(self.status, 1);
             return;
         }
@@ -139,50 +122,44 @@ impl Converter {
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let (mut cycles, mut samples) = (0, Vec::with_capacity(running.ranks));
-        for rank in self.rank..self.rank + running.ranks {
-            let input = Self::input(registers, rank);
+        let mut cycles = 0;
+        let mut samples = [(0, 0); SEQUENCE.len()];
+        for (place, sample) in samples.iter_mut().enumerate().take(running.ranks) {
+            let input = Self::input(registers, self.rank + place);
             cycles += Self::sampling_cycles(registers, input);
-            samples.push((input, self.after(running.begun_ns, cycles)));
+            *sample = (input, self.after(running.begun_ns, cycles));
             cycles += CONVERSION_CYCLES;
         }
-        let mut words = Vec::with_capacity(samples.len());
-        let mut front_end = self.front_end.lock();
-        front_end.convert(self.nth, &samples, &mut words);
         self.rank += running.ranks;
         let complete = self.rank >= Self::length(registers);
+        let control = registers.get(Register::Cr2);
+        let by_dma = cr2::DMA.is_set(control);
+        let mut front_end = self.front_end.lock();
+        if !by_dma {
+            front_end.waiting[self.nth].clear();
+        }
+        front_end.convert(self.nth, samples.iter().copied().take(running.ranks));
+        if let Some(word) = front_end.waiting[self.nth].front() {
+            registers.set(Register::Dr, u64::from(*word));
+        }
         if complete && self.nth == 1 {
             front_end.sequence_done(context.now().0);
         }
         drop(front_end);
-        let control = registers.get(Register::Cr2);
-        if !cr2::DMA.is_set(control) {
-            self.waiting.clear();
-        }
-        self.waiting.extend(words);
-        self.show_front(registers);
         if complete || cr2::EOCS.is_set(control) {
             self.status = sr::EOC.set(self.status, 1);
+        }
+        if by_dma {
+            // The streams take all that waits; the line falls by itself.
+            context.request(DMA_REQUEST, Level::High);
         }
         if !complete {
             self.begin(registers, context);
         }
     }
 
-    fn show_front(&self, registers: &mut RegisterFile) {
-        if let Some(word) = self.waiting.front() {
-            registers.set(Register::Dr, u64::from(*word));
-        }
-    }
-
     fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         registers.set(Register::Sr, self.status);
-        let by_dma = cr2::DMA.is_set(registers.get(Register::Cr2)) && !sr::OVR.is_set(self.status);
-        let request = Level::from(by_dma && !self.waiting.is_empty());
-        if request != self.request {
-            self.request = request;
-            context.request(DMA_REQUEST, request);
-        }
         let enables = registers.get(Register::Cr1);
         let interrupt = Level::from(
             cr1::EOCIE.is_set(enables) && sr::EOC.is_set(self.status)
@@ -213,7 +190,7 @@ impl Converter {
         registers.set(Register::Cr2, cr2::SWSTART.set(value, 0));
         if !cr2::ADON.is_set(value) {
             (self.running, self.rank) = (None, 0);
-            self.waiting.clear();
+            self.front_end.lock().waiting[self.nth].clear();
         } else if cr2::SWSTART.is_set(value) {
             self.begin(registers, context);
         }
@@ -252,15 +229,21 @@ impl Device for Converter {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
-        if register != Register::Dr {
-            return None;
+        let taken = match register {
+            Register::Dr => self.front_end.lock().waiting[self.nth].pop_front().is_some(),
+            // Words that the streams fetched were read, too.
+            Register::Sr => {
+                cr2::DMA.is_set(registers.get(Register::Cr2)) && self.front_end.lock().waiting[self.nth].is_empty()
+            }
+            _ => return None,
+        };
+        if taken {
+            let value = registers.get(register);
+            self.status = sr::EOC.set(self.status, 0);
+            self.refresh(registers, context);
+            return (register == Register::Dr).then_some(value);
         }
-        let value = registers.get(Register::Dr);
-        self.status = sr::EOC.set(self.status, 0);
-        self.waiting.pop_front();
-        self.show_front(registers);
-        self.refresh(registers, context);
-        Some(value)
+        None
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -287,11 +270,7 @@ impl Device for Converter {
     }
 
     fn reset(&mut self) {
+        self.front_end.lock().waiting[self.nth].clear();
         *self = Self::new(self.nth, self.front_end.clone(), self.clock_hz);
-    }
-
-    fn reset_line(&mut self, _registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        context.lower_requests(&[self.request]);
-        self.reset();
     }
 }

@@ -2,6 +2,7 @@
 
 use host_tests::plant::{World, readout::decay};
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Rows of the array, as a port's lowest bits.
@@ -46,6 +47,8 @@ pub struct FrontEnd {
     pub scan_interrupt_lost: bool,
     /// What the converters have done.
     pub counts: ScanCounts,
+    /// Words of each converter that nobody has fetched yet.
+    pub waiting: [VecDeque<u16>; 3],
     /// Newest first: a sample just before an edge still sees what was before it.
     drives: [Drive; 3],
 }
@@ -62,6 +65,7 @@ impl Shared {
             trigger_cut: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
+            waiting: Default::default(),
             drives: [Drive::default(); 3],
         })))
     }
@@ -83,21 +87,22 @@ impl FrontEnd {
         self.drives[0] = Drive { rows, since_ns: at_ns };
     }
 
-    /// The part was reset: its pins let go of the rows.
-    pub fn release_rows(&mut self, at_ns: u64) {
+    /// The part was reset: its pins let go of the rows, and what it had converted is gone.
+    pub fn restart(&mut self, at_ns: u64) {
+        self.waiting = Default::default();
         for row in 0..ROWS {
             self.drive_row(row, false, at_ns);
         }
     }
 
-    /// The words that a converter makes of its inputs sampled at these instants.
-    pub fn convert(&mut self, converter: usize, samples: &[(usize, u64)], words: &mut Vec<u16>) {
+    /// A converter's inputs sampled at these instants: the words wait to be fetched.
+    pub fn convert(&mut self, converter: usize, samples: impl ExactSizeIterator<Item = (usize, u64)>) {
         if converter < COLUMN_INPUTS.len() {
             self.counts.conversions += samples.len() as u64;
         }
         let reference_v = self.world.setup().array.reference_v;
         let mut settled: Option<(usize, [f64; 10], [f64; 10])> = None;
-        for &(input, at_ns) in samples {
+        for (input, at_ns) in samples {
             let volts = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
                 Some(Some(place)) => {
                     let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
@@ -114,7 +119,8 @@ impl FrontEnd {
                 None if input == SUPPLY_INPUT => self.world.supply_v() / SUPPLY_RATIO,
                 _ => 0.0,
             };
-            words.push((volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16);
+            let word = (volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16;
+            self.waiting[converter].push_back(word);
         }
     }
 

@@ -29,6 +29,7 @@ pub mod scan_timer;
 pub mod serve;
 pub mod stack;
 pub mod stand;
+pub mod streams;
 pub mod trace;
 pub mod wire;
 

@@ -1,39 +1,29 @@
 //! The STM32F427 of `rigless` with what the image needs beyond it.
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
-//! - The converters take external triggers and read the fingertip's array.
+//! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
 use crate::board::BUS_PORT;
 use crate::converter::Converter;
 use crate::front_end::Shared;
 use crate::scan_timer::ScanTimer;
+use crate::streams::Streams;
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::peripherals::dma::{Dma, Wire};
+use rigless::soc::stm32f427::peripherals::CONVERTERS;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
-use rigless::soc::stm32f427::peripherals::tim::{Channel, UPDATE_REQUEST};
-use rigless::soc::stm32f427::peripherals::{CONTROLLERS, CONVERTERS};
+use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
-use std::sync::LazyLock;
 
 /// What the buses run at out of reset: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
-/// DMA2 in the part's list of controllers.
-const DMA2: usize = 1;
 /// TIM3 in the part's list of timers, and TIM1 in that of the advanced ones.
 const TIM3: usize = 1;
 const TIM1: usize = 0;
-
-/// The part's own requests and TIM8's.
-static DMA2_REQUESTS: LazyLock<Vec<Wire>> = LazyLock::new(|| {
-    let mut wires = CONTROLLERS[DMA2].wiring.to_vec();
-    wires.push(Wire { instance: "TIM8", request: UPDATE_REQUEST, channel: 7, streams: &[1] });
-    wires
-});
 
 /// The levels that the board holds on pins, through every reset of the part.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -51,16 +41,18 @@ pub struct Part {
     pub chip: Stm32f427,
     converters: [Converter; 3],
     scan_timer: ScanTimer,
+    streams: Streams,
     inputs: Inputs,
     front_end: Shared,
     converter_slots: [usize; 3],
     scan_timer_slot: usize,
+    streams_slot: usize,
 }
 
 store!(Part {
     values: [inputs],
-    parts: [chip, converters, scan_timer],
-    built: [front_end, converter_slots, scan_timer_slot],
+    parts: [chip, converters, scan_timer, streams],
+    built: [front_end, converter_slots, scan_timer_slot, streams_slot],
 });
 
 impl Part {
@@ -69,28 +61,26 @@ impl Part {
     /// # Errors
     /// The part's description lacks an instance: another release of the crate.
     pub fn new(front_end: Shared) -> Result<Self, Error> {
-        let mut chip = Stm32f427::new()?;
+        let chip = Stm32f427::new()?;
         let mut converter_slots = [0; 3];
         for (slot, name) in converter_slots.iter_mut().zip(CONVERTERS) {
             *slot = chip.bus().slot(name)?;
         }
         let scan_timer_slot = chip.bus().slot("TIM8")?;
-        chip.dma[DMA2] = Self::dma2();
+        let streams_slot = chip.bus().slot("DMA2")?;
         let mut part = Self {
             chip,
             converters: Self::converters(&front_end),
             scan_timer: ScanTimer::new(RESET_HZ),
+            streams: Streams::new(front_end.clone()),
             inputs: Inputs { quarter: 0, bridge_well: true },
             front_end,
             converter_slots,
             scan_timer_slot,
+            streams_slot,
         };
         part.drive_inputs(VirtualNanos(0));
         Ok(part)
-    }
-
-    fn dma2() -> Dma {
-        Dma::new(&DMA2_REQUESTS, CONTROLLERS[DMA2].last_data, CONTROLLERS[DMA2].reaches_memory)
     }
 
     fn converters(front_end: &Shared) -> [Converter; 3] {
@@ -157,10 +147,10 @@ impl Mcu for Part {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.chip.reset(at, cause);
-        self.chip.dma[DMA2] = Self::dma2();
+        self.streams = Streams::new(self.front_end.clone());
         self.converters = Self::converters(&self.front_end);
         self.scan_timer = ScanTimer::new(RESET_HZ);
-        self.front_end.lock().release_rows(at.0);
+        self.front_end.lock().restart(at.0);
         self.drive_inputs(at);
     }
 
@@ -174,6 +164,8 @@ impl Mcu for Part {
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
         let own: &mut dyn ErasedDevice = if slot == self.scan_timer_slot {
             &mut self.scan_timer
+        } else if slot == self.streams_slot {
+            &mut self.streams
         } else if let Some(nth) = self.converter_slots.iter().position(|own| *own == slot) {
             &mut self.converters[nth]
         } else {

@@ -1,0 +1,308 @@
+//! DMA2 as the scan uses it: converters to memory, memory to the row drives.
+//!
+//! The crate's own controller moves one item a request and an access at a time, which costs more than all else in a
+//! scan. This one takes a whole sequence's words at once and writes them in one go. Modelled: direct mode, circular or
+//! not, the requests below, half and full transfer, transfer errors, the registers' protection while a stream runs. Asking
+//! for more is told to the run.
+
+use crate::front_end::Shared;
+use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
+use rigless::snapshot::store;
+use rigless::soc::stm32f427::generated::dma2::{Register, s0cr, s0fcr};
+use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
+use rigless::soc::{Layout, Width};
+use serde::{Deserialize, Serialize};
+
+const STREAMS: usize = 8;
+/// Registers of a stream, and the first stream's first.
+const STREAM_ROWS: usize = 6;
+const FIRST_ROW: usize = 4;
+/// A stream's flags in the status registers.
+const TRANSFER_ERROR: u64 = 1 << 3;
+const HALF: u64 = 1 << 4;
+const COMPLETE: u64 = 1 << 5;
+/// Where each stream's flags begin, RM0390 9.5.1.
+const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
+/// The stream whose interrupt says that a frame is complete.
+const SCAN_STREAM: usize = 2;
+/// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
+const FETCH: u64 = 0x100;
+
+/// Who asks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    Converter(usize),
+    ScanTimer,
+}
+
+/// Stream, channel, who asks there: the rows of RM0390 table 29 that are wired.
+const REQUESTS: [(usize, u64, Source); 7] = [
+    (0, 0, Source::Converter(0)),
+    (4, 0, Source::Converter(0)),
+    (2, 1, Source::Converter(1)),
+    (3, 1, Source::Converter(1)),
+    (0, 2, Source::Converter(2)),
+    (1, 2, Source::Converter(2)),
+    (1, 7, Source::ScanTimer),
+];
+
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Stream {
+    /// Items of a round, and how many of them are still to come.
+    items: u64,
+    left: u64,
+    /// Registers as they were when the stream began.
+    control: u64,
+    peripheral: u64,
+    memory: u64,
+    running: bool,
+    interrupt: bool,
+}
+
+/// The controller.
+#[derive(Debug)]
+pub struct Streams {
+    streams: [Stream; STREAMS],
+    front_end: Shared,
+}
+
+store!(Streams { values: [streams], parts: [], built: [front_end] });
+
+/// A stream's registers that matter, by their place among its six.
+#[derive(Clone, Copy)]
+enum Row {
+    Control = 0,
+    Count = 1,
+    Peripheral = 2,
+    Memory0 = 3,
+    Fifo = 5,
+}
+
+fn register(stream: usize, row: Row) -> Register {
+    Register::from_index(FIRST_ROW + STREAM_ROWS * stream + row as usize).expect("eight streams of six registers")
+}
+
+fn get(registers: &RegisterFile, stream: usize, row: Row) -> u64 {
+    registers.get(register(stream, row))
+}
+
+fn status(stream: usize) -> (Register, u32) {
+    (if stream < 4 { Register::Lisr } else { Register::Hisr }, FLAG_SHIFT[stream % 4])
+}
+
+fn raise(registers: &mut RegisterFile, stream: usize, flags: u64) {
+    let (register, shift) = status(stream);
+    registers.set(register, registers.get(register) | flags << shift);
+}
+
+fn source(registers: &RegisterFile, stream: usize) -> Option<Source> {
+    let channel = s0cr::CHSEL.get(get(registers, stream, Row::Control));
+    REQUESTS.iter().find(|(at, on, _)| *at == stream && *on == channel).map(|(_, _, source)| *source)
+}
+
+/// Whether a stream is set up in a way that is modelled.
+fn fits(registers: &RegisterFile, stream: usize) -> bool {
+    let control = get(registers, stream, Row::Control);
+    let plain = s0cr::MINC.is_set(control)
+        && !s0cr::PINC.is_set(control)
+        && !s0cr::DBM.is_set(control)
+        && !s0cr::PFCTRL.is_set(control)
+        && !s0fcr::DMDIS.is_set(get(registers, stream, Row::Fifo));
+    let shape = (s0cr::DIR.get(control), s0cr::PSIZE.get(control));
+    plain
+        && match source(registers, stream) {
+            Some(Source::Converter(_)) => shape == (0, 1),
+            Some(Source::ScanTimer) => shape == (1, 2),
+            None => false,
+        }
+}
+
+impl Streams {
+    /// Out of reset.
+    pub fn new(front_end: Shared) -> Self {
+        Self { streams: [Stream::default(); STREAMS], front_end }
+    }
+
+    fn begin(&mut self, stream: usize, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if !fits(registers, stream) {
+            context.tell("SxCR", "of DMA2 only converters to memory and memory to the row drives are modelled");
+            return;
+        }
+        let items = get(registers, stream, Row::Count) & 0xffff;
+        let state = &mut self.streams[stream];
+        (state.items, state.left, state.running) = (items, items, items > 0);
+        state.control = get(registers, stream, Row::Control);
+        state.peripheral = get(registers, stream, Row::Peripheral);
+        state.memory = get(registers, stream, Row::Memory0);
+        if let Some(Source::Converter(nth)) = source(registers, stream) {
+            self.take_words(stream, nth, registers, context);
+        }
+    }
+
+    fn take_words(&mut self, stream: usize, nth: usize, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let shared = self.front_end.clone();
+        let mut front_end = shared.lock();
+        let waiting = &mut front_end.waiting[nth];
+        while self.streams[stream].running && !waiting.is_empty() {
+            let at = self.streams[stream].next_address(2);
+            let room = self.streams[stream].left as usize;
+            let (count, width) = match waiting.len().min(room) {
+                4.. => (4, Width::W64),
+                2..4 => (2, Width::W32),
+                _ => (1, Width::W16),
+            };
+            let words = waiting.drain(..count).enumerate();
+            let value = words.fold(0, |value, (place, word)| value | u64::from(word) << (16 * place));
+            context.write_to(at, width, value, stream as u64);
+            self.count(stream, count as u64, registers);
+        }
+    }
+
+    /// Items have been moved.
+    fn count(&mut self, stream: usize, items: u64, registers: &mut RegisterFile) {
+        let state = &mut self.streams[stream];
+        let before = state.items - state.left;
+        state.left -= items;
+        let half = state.items / 2;
+        let mut flags = if before < half && before + items >= half { HALF } else { 0 };
+        if state.left == 0 {
+            flags |= COMPLETE;
+            if s0cr::CIRC.is_set(state.control) {
+                state.left = state.items;
+            } else {
+                self.stop(stream, registers);
+            }
+        }
+        raise(registers, stream, flags);
+        registers.set(register(stream, Row::Count), self.streams[stream].left);
+    }
+
+    fn stop(&mut self, stream: usize, registers: &mut RegisterFile) {
+        self.streams[stream].running = false;
+        let control = get(registers, stream, Row::Control);
+        registers.set(register(stream, Row::Control), s0cr::EN.set(control, 0));
+    }
+
+    fn refresh(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+        let lost = self.front_end.lock().scan_interrupt_lost;
+        for (stream, state) in self.streams.iter_mut().enumerate() {
+            let (register, shift) = status(stream);
+            let flags = registers.get(register) >> shift;
+            let control = get(registers, stream, Row::Control);
+            let asked = (s0cr::TCIE.is_set(control) && flags & COMPLETE != 0)
+                || (s0cr::HTIE.is_set(control) && flags & HALF != 0)
+                || (s0cr::TEIE.is_set(control) && flags & TRANSFER_ERROR != 0);
+            let wanted = asked && !(lost && stream == SCAN_STREAM);
+            if wanted != state.interrupt {
+                state.interrupt = wanted;
+                context.interrupt(stream, Level::from(wanted));
+            }
+        }
+    }
+
+    fn write_control(&mut self, stream: usize, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let written = get(registers, stream, Row::Control);
+        if !self.streams[stream].running {
+            if s0cr::EN.is_set(written) {
+                self.begin(stream, registers, context);
+            }
+            return;
+        }
+        // While it runs only the enables can be changed.
+        let free = [s0cr::EN, s0cr::TEIE, s0cr::HTIE, s0cr::TCIE, s0cr::DMEIE];
+        let mask = free.iter().fold(0, |mask, field| mask | field.mask());
+        let control = self.streams[stream].control & !mask | written & mask;
+        registers.set(register(stream, Row::Control), control);
+        self.streams[stream].control = control;
+        if !s0cr::EN.is_set(control) {
+            self.streams[stream].running = false;
+            raise(registers, stream, COMPLETE);
+        }
+    }
+}
+
+impl Stream {
+    fn next_address(&self, item_bytes: u64) -> u64 {
+        self.memory + item_bytes * (self.items - self.left)
+    }
+}
+
+impl Device for Streams {
+    type Register = Register;
+
+    fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if change.level == Level::Low {
+            return;
+        }
+        let wanted = if change.instance == "TIM8" && change.request == tim::UPDATE_REQUEST {
+            Source::ScanTimer
+        } else if let Some(nth) = CONVERTERS.iter().position(|name| *name == change.instance) {
+            if change.request != adc::DMA_REQUEST {
+                return;
+            }
+            Source::Converter(nth)
+        } else {
+            return;
+        };
+        for (stream, _, _) in REQUESTS.iter().filter(|(_, _, source)| *source == wanted) {
+            if !self.streams[*stream].running || source(registers, *stream) != Some(wanted) {
+                continue;
+            }
+            match wanted {
+                Source::Converter(nth) => {
+                    self.take_words(*stream, nth, registers, context);
+                    self.refresh(registers, context);
+                }
+                Source::ScanTimer => {
+                    let at = self.streams[*stream].next_address(4);
+                    context.read_from(at, Width::W32, *stream as u64 | FETCH);
+                }
+            }
+            return;
+        }
+    }
+
+    fn on_access(&mut self, token: u64, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let stream = (token & !FETCH) as usize;
+        if token & FETCH != 0 && self.streams[stream].running {
+            context.write_to(self.streams[stream].peripheral, Width::W32, value, token & !FETCH);
+            self.count(stream, 1, registers);
+            self.refresh(registers, context);
+        }
+    }
+
+    fn on_refused(&mut self, token: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let stream = (token & !FETCH) as usize;
+        self.stop(stream, registers);
+        raise(registers, stream, TRANSFER_ERROR);
+        self.refresh(registers, context);
+    }
+
+    fn write(&mut self, written: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let row = written.index();
+        match written {
+            Register::Lifcr | Register::Hifcr => {
+                let flags = if written == Register::Lifcr { Register::Lisr } else { Register::Hisr };
+                registers.set(flags, registers.get(flags) & !value);
+                registers.set(written, 0);
+            }
+            _ if row >= FIRST_ROW => {
+                let stream = (row - FIRST_ROW) / STREAM_ROWS;
+                let state = self.streams[stream];
+                match (row - FIRST_ROW) % STREAM_ROWS {
+                    0 => self.write_control(stream, registers, context),
+                    1 if state.running => registers.set(written, state.left),
+                    2 if state.running => registers.set(written, state.peripheral),
+                    3 if state.running => registers.set(written, state.memory),
+                    _ => {}
+                }
+            }
+            _ => {}
+        }
+        self.refresh(registers, context);
+    }
+
+    fn reset(&mut self) {
+        *self = Self::new(self.front_end.clone());
+    }
+}

@@ -19,12 +19,11 @@ pub use sums::from_sums;
 use crate::config::Config;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
-use crate::root::floor_sqrt;
 use geometry::PLACE_BITS;
 use guess::{CENTRE_BITS, Guess, Pressed, square};
 use rim::Rim;
-use step::Misfit;
-use view::{PEAK_BITS, View};
+use step::{Misfit, Taxels};
+use view::View;
 
 /// How much work a reading may be.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -67,6 +66,8 @@ const RESIDUAL_MAX: u32 = 655;
 const FAR: u32 = 1 << (CENTRE_BITS - 5);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
 const RESTS: u32 = 1 << (CENTRE_BITS - 14);
+/// Where the sum is more than this many peaks, the least effort looks at every other taxel.
+const LARGE: i32 = 16;
 /// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
 const TAXELS_MIN: u32 = 5;
 
@@ -88,14 +89,16 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
     let Some(view) = View::new(picture, geometry) else {
         return sums;
     };
-    let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.tip, geometry);
+    // The sum over the peak is about half of the number of taxels that see the contact.
+    let which = if effort == Effort::One && picture.sum / LARGE > picture.peak { Taxels::Half } else { Taxels::All };
+    let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     let pressed = Pressed::new(&guess, &view, geometry);
     if covered(&guess, &pressed, picture, geometry) {
-        let misfit = step::compare(&pressed, &view);
+        let misfit = step::compare(&pressed, &view, which);
         return Contact { confidence: confidence(&misfit, &view), ..sums };
     }
-    let start = start::plane(&view, geometry).unwrap_or(guess);
-    let (guess, misfit) = refine(start, effort, &view, geometry);
+    let start = start::plane(&view, which, geometry).unwrap_or(guess);
+    let (guess, misfit) = refine(start, effort, which, &view, geometry);
     let confidence = confidence(&misfit, &view);
     if misfit.taxels < TAXELS_MIN {
         return Contact { confidence, ..sums };
@@ -115,7 +118,8 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
 
 /// Whether the whole contact lies on good taxels of the array.
 fn covered(guess: &Guess, pressed: &Pressed, picture: &Picture, geometry: &Geometry) -> bool {
-    let rim = geometry::root(guess.rim_square().into()) >> (geometry::SQUARE_BITS - CENTRE_BITS);
+    // The root of Q30 is Q15.
+    let rim = arith::root(guess.rim_square().unsigned_abs() << 2) << (CENTRE_BITS - PLACE_BITS);
     let farthest = guess.x.unsigned_abs().max(guess.y.unsigned_abs());
     let edge = 5 * (geometry.pitch.unsigned_abs() >> (geometry::SQUARE_BITS - CENTRE_BITS));
     if farthest + rim > edge {
@@ -132,14 +136,14 @@ fn covered(guess: &Guess, pressed: &Pressed, picture: &Picture, geometry: &Geome
 }
 
 /// Refines a guess as often as the effort allows.
-fn refine(start: Guess, effort: Effort, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
+fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
     let (mut quick, mut close) = effort.steps();
     let mut guess = start;
     let mut misfit = Misfit::default();
     let mut again = true;
     while quick + close > 0 {
-        let rim = (quick == 0).then(|| Rim::new(&guess, geometry));
-        let equations = step::equations(&Pressed::new(&guess, view, geometry), view, rim.as_ref());
+        let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
+        let equations = step::equations(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
         let (next, promised) = equations.solve(&guess, view, geometry);
         let moved = distance(&guess, &next);
         (guess, misfit) = (next, promised);
@@ -169,10 +173,8 @@ fn distance(from: &Guess, to: &Guess) -> u32 {
 
 /// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
 fn confidence(misfit: &Misfit, view: &View) -> u8 {
-    let taxels = misfit.taxels.max(1);
-    let mean = (misfit.squares.unsigned_abs().min(u64::from(u32::MAX)) as u32) / taxels;
-    let residual = floor_sqrt(mean.saturating_sub(view.converter_square()).into());
+    // Squares count 2^-24, 4 bits fewer than a share's square.
+    let mean = (misfit.squares.max(0).unsigned_abs() / misfit.taxels.max(1)).min(u32::MAX >> 4) << 4;
+    let residual = arith::root(mean.saturating_sub(view.converter_square()));
     (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
 }
-
-const _: () = assert!(PLACE_BITS < CENTRE_BITS && PEAK_BITS < 16);

@@ -21,15 +21,17 @@ pub(super) const PLACE_BITS: u32 = 15;
 /// Squared distance from node to node: 1/128.
 pub(super) const NODE_BITS: u32 = SQUARE_BITS - 7;
 /// Nodes of the table; the last stands at 1.5, where no contact within the radius reaches a taxel.
-const NODES: usize = 193;
+pub(super) const NODES: usize = 193;
 /// 1 in Q28.
 pub(super) const ONE: i32 = 1 << SQUARE_BITS;
 
 /// The model at one distance.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Node {
     /// G, Q26.
     pub mean_inverse_length: i32,
+    /// L, Q28.
+    pub length: i32,
     /// L1, Q28.
     pub near_length: i32,
     /// 1 / (h r), Q18.
@@ -43,6 +45,10 @@ pub struct Geometry {
     pub(super) pitch: i32,
     /// Middles of the columns, and of the rows, Q15.
     pub(super) places: [i32; COLUMNS],
+    /// 2/h, Q20.
+    pub(super) inverse_half_pitch: i32,
+    /// 2^56 over the tip's radius in units of its last place.
+    pub(super) inverse_radius: i32,
     /// What a taxel under the pressure Y shows, in sixteenths of a code, Q8.
     pub(super) modulus_q8: u32,
     /// The model over the squared distance.
@@ -60,18 +66,28 @@ impl Geometry {
         for (place, weight) in places.iter_mut().zip((1 - COLUMNS as i64..).step_by(2)) {
             *place = half_pitches(weight);
         }
-        let mut nodes = [Node { mean_inverse_length: 0, near_length: 0, inverse_spread: 0 }; NODES];
+        let mut nodes = [Node::default(); NODES];
         for (index, node) in nodes.iter_mut().enumerate().skip(1) {
             *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));
         }
         // At the centre nothing is spread by the distance; a taxel there is under the rim only where the whole contact is
         // smaller than a taxel.
         let [centre, first, ..] = &mut nodes;
-        let square = i64::from(ONE) - square(i64::from(pitch)) / 6;
-        centre.mean_inverse_length = ((1 << 54) / i64::from(root(square)).max(1)) as i32;
-        centre.near_length = root(square) as i32;
-        centre.inverse_spread = 2 * first.inverse_spread;
-        Self { pitch, places, modulus_q8: units_q8.clamp(1, i64::from(u32::MAX)) as u32, nodes }
+        let near_length = root(i64::from(ONE) - square(i64::from(pitch)) / 6);
+        *centre = Node {
+            mean_inverse_length: ((1 << 54) / i64::from(near_length).max(1)) as i32,
+            length: ONE,
+            near_length,
+            inverse_spread: 2 * first.inverse_spread,
+        };
+        Self {
+            pitch,
+            places,
+            inverse_half_pitch: ((radius_um << 21) / pitch_um.max(1)) as i32,
+            inverse_radius: ((1_i64 << 32) * 1000 / radius_um) as i32,
+            modulus_q8: units_q8.max(1).min(i64::from(u32::MAX)) as u32,
+            nodes,
+        }
     }
 }
 
@@ -83,6 +99,7 @@ impl Node {
         let (near, far) = (i64::from(root(square + spread)), i64::from(root(square - spread)));
         Self {
             mean_inverse_length: (((near - far) << 26) / spread).min(i64::from(i32::MAX)) as i32,
+            length: root(i64::from(ONE) - distance_square),
             near_length: near as i32,
             inverse_spread: ((1 << 46) / spread).min(1 << 28) as i32,
         }
@@ -95,6 +112,6 @@ const fn square(x: i64) -> i64 {
 }
 
 /// The root of a Q28 number; 0 where it is negative.
-pub(super) fn root(x: i64) -> u32 {
-    floor_sqrt(x.max(0).unsigned_abs() << SQUARE_BITS)
+fn root(x: i64) -> i32 {
+    floor_sqrt(x.max(0).unsigned_abs() << SQUARE_BITS) as i32
 }

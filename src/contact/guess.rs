@@ -1,7 +1,7 @@
 //! A contact supposed, and what the model makes of it for each taxel.
 
-use super::arith::{between, high, quotient, within};
-use super::geometry::{Geometry, NODE_BITS, ONE, PLACE_BITS, SQUARE_BITS, root};
+use super::arith::{between, high, root, within};
+use super::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
 use super::view::View;
 use crate::frame::{COLUMNS, ROWS};
 use crate::model::Tip;
@@ -33,14 +33,16 @@ impl Guess {
     /// The nearest that the fit covers: the centre within a radius of the array.
     pub fn new(rest: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
         let limit = (5 * (geometry.pitch >> 4)) + (1 << CENTRE_BITS);
-        let centre = |value| within(value, limit);
+        let centre = |value: i32| within(value.into(), limit);
         Self { rest: rest.min(REST_MAX).max(REST_MIN), x: centre(x), y: centre(y) }
     }
 
     /// From lengths.
-    pub fn from_lengths(d: Millimetres, x: Millimetres, y: Millimetres, tip: &Tip, geometry: &Geometry) -> Self {
-        let radius = tip.radius().to_bits().unsigned_abs().max(1).into();
-        let share = |length: Millimetres, bits| quotient(length.to_bits().into(), radius, bits);
+    pub fn from_lengths(d: Millimetres, x: Millimetres, y: Millimetres, geometry: &Geometry) -> Self {
+        let share = |length: Millimetres, bits: u32| {
+            let wide = i64::from(length.to_bits()) * i64::from(geometry.inverse_radius);
+            within(wide >> (56 - bits), i32::MAX)
+        };
         Self::new(ONE - share(d, SQUARE_BITS), share(x, CENTRE_BITS), share(y, CENTRE_BITS), geometry)
     }
 
@@ -54,9 +56,14 @@ impl Guess {
         [self.x, self.y].map(|value| Millimetres::from_bits(scale(value, tip, CENTRE_BITS)))
     }
 
+    /// s^2, Q28.
+    pub fn rest_square(&self) -> i32 {
+        high(self.rest, self.rest) << 4
+    }
+
     /// r_c^2 = 1 - s^2, Q28.
     pub fn rim_square(&self) -> i32 {
-        ONE - (high(self.rest, self.rest) << 4)
+        ONE - self.rest_square()
     }
 }
 
@@ -92,27 +99,32 @@ pub(super) struct Pressed<'a> {
     modulus_shift: u32,
     /// Places of the columns from the contact's centre, Q15.
     pub dx: [i32; COLUMNS],
+    /// Their squares, Q28.
+    pub dx_square: [u32; COLUMNS],
     /// Places of the rows from it, Q15.
     pub dy: [i32; ROWS],
 }
 
 impl<'a> Pressed<'a> {
     pub fn new(guess: &Guess, view: &View, geometry: &'a Geometry) -> Self {
-        let pitch = i64::from(geometry.pitch);
-        let middle = i64::from(root(i64::from(guess.rim_square()) + ((pitch * pitch) >> SQUARE_BITS) / 12));
-        let square = |r: i64| ((r.max(0) * r.max(0)) >> SQUARE_BITS).min(i64::from(SQUARE_MAX)) as u32;
-        let rest_square = high(guess.rest, guess.rest) << 4;
+        // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
+        let widened = guess.rim_square() + high(geometry.pitch, geometry.pitch) / 12 * 16;
+        let middle = root((widened as u32) << 2) as i32;
+        let half = geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1);
+        let reach = |place: i32| square(place.max(0)).min(SQUARE_MAX);
         let from = |centre: i32| geometry.places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)));
+        let dx = from(guess.x);
         Self {
             geometry,
             rest: guess.rest,
-            rest_cube_q27: high(rest_square, guess.rest) << 3,
-            inside: square(middle - pitch / 2),
-            outside: square(middle + pitch / 2),
+            rest_cube_q27: high(guess.rest_square(), guess.rest) << 3,
+            inside: reach(middle - half),
+            outside: reach(middle + half),
             twice_modulus: 2 * view.modulus,
             modulus: view.modulus << view.modulus_shift,
             modulus_shift: view.modulus_shift,
-            dx: from(guess.x),
+            dx,
+            dx_square: dx.map(square),
             dy: from(guess.y),
         }
     }
@@ -120,10 +132,7 @@ impl<'a> Pressed<'a> {
     /// A taxel at a squared distance below [`Pressed::outside`].
     #[inline(always)]
     pub fn felt(&self, square: u32) -> Felt {
-        let Some([low, up, ..]) = self.geometry.nodes.get((square >> NODE_BITS) as usize..) else {
-            return Felt::default();
-        };
-        let share = ((square << (32 - NODE_BITS)) >> 1) as i32;
+        let ([low, up], share) = interval(&self.geometry.nodes, square);
         if square < self.inside {
             let rise = up.mean_inverse_length - low.mean_inverse_length;
             let mean = low.mean_inverse_length + 2 * high(rise, share);
@@ -146,6 +155,13 @@ impl<'a> Pressed<'a> {
             by_square: by_rest * (self.rest >> SLOPE_BITS) / (length >> SLOPE_BITS).max(1),
         }
     }
+}
+
+/// The nodes around a squared distance, and its share of the way between them in Q31.
+#[inline(always)]
+pub(super) fn interval(nodes: &[Node; NODES], square: u32) -> ([&Node; 2], i32) {
+    let index = ((square >> NODE_BITS) as usize).min(NODES - 2);
+    ([&nodes[index], &nodes[index + 1]], ((square << (32 - NODE_BITS)) >> 1) as i32)
 }
 
 /// The square of a place, Q28; it stops at 4.

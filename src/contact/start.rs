@@ -6,20 +6,25 @@
 //! symmetric set of taxels), the paper's model says `s^2 g = -k - 2 D` and `s^2 m = 1 - V - D^2`: a quadratic equation for
 //! s^2, and then D.
 
-use super::arith::{high, quotient, within};
-use super::geometry::{Geometry, SQUARE_BITS};
+use super::arith::{Divisor, high, root, within};
+use super::geometry::{Geometry, ONE, SQUARE_BITS};
 use super::guess::{CENTRE_BITS, Guess};
+use super::step::Taxels;
 use super::view::{PEAK_BITS, View};
-use crate::root::floor_sqrt;
+use crate::frame::{COLUMNS, ROWS};
 
 /// Taxels below an eighth of the peak are left out: the rim crosses most of them.
 const SHARE_MIN: i32 = 1 << (PEAK_BITS - 3);
 /// Drops from a share to a weight: 64 at the peak.
 const WEIGHT_DROP: u32 = PEAK_BITS - 6;
-/// The largest strain that is believed, Q16: 3/4.
-const STRAIN_MAX: i32 = 3 << 14;
-/// Fractional bits of z.
+/// The largest strain that is believed, Q16: 5/8.
+const STRAIN_MAX: i32 = 5 << 13;
+/// Fractional bits of a taxel's z.
 const Z_BITS: u32 = 14;
+/// Bits dropped from weighted z, so that their moments fit 32 bits.
+const Z_DROP: u32 = 2;
+/// Fractional bits of sums of z.
+const Z_SUM_BITS: u32 = Z_BITS - Z_DROP;
 /// Fractional bits of means, slopes and the quadratic equation.
 const BITS: u32 = 20;
 /// Fractional bits of sums about the middle.
@@ -43,24 +48,28 @@ struct Sums {
     /// Of x and of y, times their squared length.
     x_cube: i32,
     y_cube: i32,
-    z: i64,
-    zx: i64,
-    zy: i64,
+    z: i32,
+    zx: i32,
+    zy: i32,
 }
 
 impl Sums {
-    fn of(view: &View) -> Self {
+    fn of(view: &View, which: Taxels) -> Self {
         let mut all = Self::default();
-        let inverse_modulus_q38 = (view.inverse_modulus >> (24 - view.modulus_shift)) as i32;
-        let mut y = -9;
-        for row in &view.picture.taxels {
+        // 2^38 over Y as a share of the peak.
+        let inverse_modulus = (view.inverse_modulus >> (24 - view.modulus_shift)) as i32;
+        let mut y = 1 - ROWS as i32;
+        for (row, taxels) in view.picture.taxels.iter().enumerate() {
             let (mut n, mut sx, mut sxx, mut sxxx, mut z, mut zx) = (0, 0, 0, 0, 0, 0);
-            for (taxel, x) in row.iter().zip((-9..).step_by(2)) {
-                let share = view.share(*taxel);
+            let (mut column, stride) = which.columns(row);
+            while column < COLUMNS {
+                let x = 2 * column as i32 + 1 - COLUMNS as i32;
+                let share = view.share(taxels[column]).min(1 << PEAK_BITS);
+                column += stride;
                 if share < SHARE_MIN {
                     continue;
                 }
-                let strain = high(share << 10, inverse_modulus_q38).min(STRAIN_MAX).unsigned_abs();
+                let strain = high(share << 10, inverse_modulus).min(STRAIN_MAX).unsigned_abs();
                 let left = (1 << 16) - strain;
                 let taxel_z = (strain * ((2 << 16) - strain) / ((left * left) >> (32 - 4 - Z_BITS))) as i32;
                 let weight = share >> WEIGHT_DROP;
@@ -69,8 +78,8 @@ impl Sums {
                 sx += wx;
                 sxx += wx * x;
                 sxxx += wx * x * x;
-                z += wz;
-                zx += wz * x;
+                z += wz >> Z_DROP;
+                zx += (wz >> Z_DROP) * x;
             }
             all.n += n;
             all.x += sx;
@@ -80,9 +89,9 @@ impl Sums {
             all.yy += n * y * y;
             all.x_cube += sxxx + sx * y * y;
             all.y_cube += (sxx + n * y * y) * y;
-            all.z += i64::from(z);
-            all.zx += i64::from(zx);
-            all.zy += i64::from(z) * i64::from(y);
+            all.z += z;
+            all.zx += zx;
+            all.zy += z * y;
             y += 2;
         }
         all
@@ -90,61 +99,69 @@ impl Sums {
 }
 
 /// The plane's guess; None where the taxels lie on one line, or fit no contact.
-pub(super) fn plane(view: &View, geometry: &Geometry) -> Option<Guess> {
-    let sums = Sums::of(view);
-    let n = u64::from(sums.n.unsigned_abs());
-    let (x, y) = (quotient(sums.x.into(), n, BITS), quotient(sums.y.into(), n, BITS));
+pub(super) fn plane(view: &View, which: Taxels, geometry: &Geometry) -> Option<Guess> {
+    let sums = Sums::of(view, which);
+    let by_n = Divisor::new(sums.n.unsigned_abs().into());
+    let (x, y) = (by_n.divide(sums.x.into(), BITS), by_n.divide(sums.y.into(), BITS));
 
-    // Sums about the middle.
-    let about =
-        |sum: i64, mean: i32, other: i64| (sum << ABOUT_BITS) - ((i64::from(mean) * other) >> (BITS - ABOUT_BITS));
-    let xx = about(sums.xx.into(), x, sums.x.into());
-    let xy = about(sums.xy.into(), x, sums.y.into());
-    let yy = about(sums.yy.into(), y, sums.y.into());
-    let determinant = xx * yy - xy * xy;
+    // Sums about the middle, Q4.
+    let scaled = |mean: i32, other: i32| ((i64::from(mean) * i64::from(other)) >> (BITS - ABOUT_BITS)) as i32;
+    let about = |sum: i32, mean: i32, other: i32| (sum << ABOUT_BITS) - scaled(mean, other);
+    let xx = about(sums.xx, x, sums.x);
+    let xy = about(sums.xy, x, sums.y);
+    let yy = about(sums.yy, y, sums.y);
+    let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
+    let determinant = product(xx, yy) - product(xy, xy);
     if determinant < DETERMINANT_MIN {
         return None;
     }
-    let slope = |with_x: i64, with_y: i64, bits: u32| {
-        let over = |numerator: i64| quotient(numerator, determinant.unsigned_abs(), bits);
-        [over(with_x * yy - with_y * xy), over(with_y * xx - with_x * xy)]
+    let by_determinant = Divisor::new(determinant.unsigned_abs());
+    let slope = |with_x: i32, with_y: i32, bits: u32| {
+        [
+            by_determinant.divide(product(with_x, yy) - product(with_y, xy), bits),
+            by_determinant.divide(product(with_y, xx) - product(with_x, xy), bits),
+        ]
     };
-    let z_about = |sum: i64, mean: i32| sum - ((i64::from(mean) * sums.z) >> BITS);
-    let z_slope = slope(z_about(sums.zx, x), z_about(sums.zy, y), BITS + ABOUT_BITS - Z_BITS);
-    let squares = i64::from(sums.xx) + i64::from(sums.yy);
-    let cube_about = |cube: i32, mean: i32, along: i64, across: i64, other: i32| {
-        let twice = i64::from(mean) * along + i64::from(other) * across;
-        about(cube.into(), mean, squares) - (twice >> (BITS - 1))
+    let z_about = |sum: i32, mean: i32| sum - (product(mean, sums.z) >> BITS) as i32;
+    let z_slope = slope(z_about(sums.zx, x), z_about(sums.zy, y), BITS + ABOUT_BITS - Z_SUM_BITS);
+    // About the middle, the squared length's slope against x and y.
+    let cube_about = |cube: i32, mean: i32, along: i32, across: i32, other: i32| {
+        let twice = product(mean, along) + product(other, across);
+        about(cube, mean, sums.xx + sums.yy) - (twice >> (BITS - 1)) as i32
     };
     let k = slope(cube_about(sums.x_cube, x, xx, xy, y), cube_about(sums.y_cube, y, yy, xy, x), BITS);
 
     // From half pitches to tip radii.
-    let half_pitch = geometry.pitch >> 1;
-    let to_radii = |half_pitches: i32| high(half_pitches, half_pitch) << (32 - SQUARE_BITS);
-    let g =
-        z_slope.map(|slope| within(quotient(slope.into(), half_pitch.unsigned_abs().into(), SQUARE_BITS), SLOPE_MAX));
-    let k = k.map(|slope| within(to_radii(slope), SKEW_MAX));
-    let spread = to_radii(to_radii(quotient(xx + yy, n, BITS - ABOUT_BITS)) + to_radii(2 << BITS) / 3);
+    let to_radii = |half_pitches: i32| high(half_pitches, geometry.pitch) << (31 - SQUARE_BITS);
+    let g = z_slope.map(|slope| within(product(slope, geometry.inverse_half_pitch) >> 20, SLOPE_MAX));
+    let k = k.map(|slope| within(to_radii(slope).into(), SKEW_MAX));
+    let own = to_radii(2 << BITS) / 3;
+    let spread = to_radii(to_radii(by_n.divide((xx + yy).into(), BITS - ABOUT_BITS)) + own);
 
-    // |s^2 g + k|^2 / 4 + s^2 m - 1 + V = 0.
+    // S^2 g^2/4 + S (m + g k/2) + k^2/4 + V - 1 = 0 for S = s^2.
     let dot = |a: [i32; 2], b: [i32; 2]| {
         let ([ax, ay], [bx, by]) = (a, b);
-        (i64::from(ax) * i64::from(bx) + i64::from(ay) * i64::from(by)) >> BITS
+        (product(ax, bx) + product(ay, by)) >> BITS
     };
     let quadratic = dot(g, g) >> 2;
-    let linear = i64::from(quotient(sums.z, n, BITS - Z_BITS)) + (1 << BITS) + (dot(g, k) >> 1);
+    let linear = i64::from(by_n.divide(sums.z.into(), BITS - Z_SUM_BITS)) + (1 << BITS) + (dot(g, k) >> 1);
     let constant = (1 << BITS) - i64::from(spread) - (dot(k, k) >> 2);
     if constant <= 0 {
         return None;
     }
-    let root = floor_sqrt((linear * linear + 4 * quadratic * constant).unsigned_abs());
-    let rest_square = quotient(2 * constant, (linear + i64::from(root)).max(1).unsigned_abs(), SQUARE_BITS);
-    let centre = |mean: i32, g: i32, k: i32| {
-        let toward = ((i64::from(rest_square) * i64::from(g)) >> SQUARE_BITS) + i64::from(k);
-        (i64::from(to_radii(mean)) << (CENTRE_BITS - BITS)) + (toward << (CENTRE_BITS - BITS - 1))
+    let wide_root = |square: i64| {
+        // The top 32 bits, by an even shift.
+        let drop = (33 - square.unsigned_abs().leading_zeros().min(32)) & !1;
+        i64::from(root((square >> drop) as u32)) << (drop / 2)
     };
-    let [centre_x, centre_y] = [centre(x, g[0], k[0]), centre(y, g[1], k[1])]
-        .map(|centre| centre.max(i64::from(-i32::MAX)).min(i64::from(i32::MAX)) as i32);
-    let rest = floor_sqrt(u64::from(rest_square.unsigned_abs()) << SQUARE_BITS);
-    Some(Guess::new(rest.min(1 << SQUARE_BITS) as i32, centre_x, centre_y, geometry))
+    let twice = linear + wide_root((linear * linear + 4 * quadratic * constant).max(0));
+    let rest_square = Divisor::new(twice.max(1).unsigned_abs()).divide(2 * constant, SQUARE_BITS).min(ONE);
+    let centre = |mean: i32, g: i32, k: i32| {
+        let toward = (product(rest_square, g) >> SQUARE_BITS) + i64::from(k);
+        let wide = (i64::from(to_radii(mean)) << (CENTRE_BITS - BITS)) + (toward << (CENTRE_BITS - BITS - 1));
+        within(wide, i32::MAX)
+    };
+    // The root of Q30 is Q15.
+    let rest = (root((rest_square << 2).unsigned_abs()) as i32) << (SQUARE_BITS - 15);
+    Some(Guess::new(rest, centre(x, g[0], k[0]), centre(y, g[1], k[1]), geometry))
 }

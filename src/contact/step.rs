@@ -3,18 +3,17 @@
 //! The unknowns are scaled so that every slope is at most about 1: the change of ln(s), and the centre's in units of s^2.
 //! A taxel's weight falls from 1 where the model sees no pressure to 1/4 at the peak: a reading's error grows with the reading.
 
-use super::arith::{high, quotient, within};
+use super::arith::{Divisor, high, within};
 use super::geometry::{Geometry, PLACE_BITS};
 use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
 use super::rim::Rim;
 use super::view::{PEAK_BITS, View};
+use crate::frame::{COLUMNS, ROWS};
 
 /// A residual stops at half of the peak.
-const RESIDUAL_MAX: i32 = 1 << (PEAK_BITS - 1);
-/// Least weight of a taxel, Q13.
-const WEIGHT_MIN: i32 = 1 << (SLOPE_BITS - 3);
-/// Fractional bits of a solution before it is scaled.
-const SOLUTION_BITS: u32 = 20;
+const RESIDUAL_LIMIT: i32 = 1 << (PEAK_BITS - 1);
+/// Fractional bits of shares and of the solution before it is scaled.
+const SHARE_BITS: u32 = 24;
 /// The farthest that ln(s) moves in one step, Q28: 1/8.
 const REST_STEP: i32 = 1 << 25;
 /// The farthest that a centre moves along one axis, Q24: 1/4 of the radius.
@@ -25,8 +24,8 @@ const GUARD_BITS: u32 = 14;
 /// How far the model and the picture are apart.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Misfit {
-    /// Sum of the squared residuals, weighted, Q28 of the peak's square.
-    pub squares: i64,
+    /// Sum of the squared residuals, weighted, Q24 of the peak's square.
+    pub squares: i32,
     /// Live taxels within the model's contact.
     pub taxels: u32,
 }
@@ -46,84 +45,109 @@ struct Row {
     squares: i32,
 }
 
-/// The normal equations; all in Q26 shifted right by 3, so that no diagonal reaches 2^31.
+/// Bits dropped from a row's sums, so that ten rows fit 32 bits.
+const ROW_DROP: u32 = 4;
+
+/// The normal equations, Q22.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Equations {
-    matrix: [i64; 6],
-    right: [i64; 3],
+    matrix: [i32; 6],
+    right: [i32; 3],
     /// At the guess.
     pub misfit: Misfit,
 }
 
-/// What a taxel adds where the model is only compared, not refined.
-pub(super) fn compare(pressed: &Pressed, view: &View) -> Misfit {
-    let mut misfit = Misfit::default();
-    each_row(pressed, view, |row, bad, dy| {
-        let mut squares = 0;
-        for ((column, taxel), dx) in row.iter().enumerate().zip(&pressed.dx) {
-            if bad >> column & 1 != 0 {
-                continue;
-            }
-            let at = square(*dx) + square(dy);
-            let mut residual = view.share(*taxel);
-            if at < pressed.outside {
-                let felt = pressed.felt(at);
-                misfit.taxels += 1;
-                residual = within(residual - felt.pressure, RESIDUAL_MAX);
-                squares += ((weight(&felt) * residual) >> SLOPE_BITS) * residual;
-            } else {
-                residual = within(residual, RESIDUAL_MAX);
-                squares += residual * residual;
-            }
+/// Which taxels a pass looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Taxels {
+    /// All.
+    All,
+    /// Every other one, like a chessboard's white fields.
+    Half,
+}
+
+impl Taxels {
+    /// The first column and the distance to the next.
+    #[inline(always)]
+    pub const fn columns(self, row: usize) -> (usize, usize) {
+        match self {
+            Self::All => (0, 1),
+            Self::Half => (row & 1, 2),
         }
-        misfit.squares += i64::from(squares);
-    });
+    }
+}
+
+/// How far the model and the picture are apart, where it is not to be refined.
+pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
+    let mut misfit = Misfit::default();
+    for row in 0..ROWS {
+        let (mut column, stride) = which.columns(row);
+        let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
+        let dy_square = square(pressed.dy[row]);
+        let mut squares = 0;
+        while column < COLUMNS {
+            if bad & 1 == 0 {
+                let at = pressed.dx_square[column] + dy_square;
+                let share = view.share(taxels[column]);
+                if at < pressed.outside {
+                    let felt = pressed.felt(at);
+                    misfit.taxels += 1;
+                    let residual = residual(share - felt.pressure);
+                    squares += ((weight(&felt) * residual) >> SLOPE_BITS) * residual;
+                } else {
+                    squares += residual(share) * residual(share);
+                }
+            }
+            column += stride;
+            bad >>= stride;
+        }
+        misfit.squares += squares >> ROW_DROP;
+    }
     misfit
 }
 
 /// Sets up the normal equations; with a rim, the taxels under it are worked out by it.
-pub(super) fn equations(pressed: &Pressed, view: &View, rim: Option<&Rim>) -> Equations {
+pub(super) fn equations(pressed: &Pressed, view: &View, which: Taxels, rim: Option<&Rim>) -> Equations {
     let mut all = Equations::default();
-    each_row(pressed, view, |row, bad, dy| {
+    for row in 0..ROWS {
+        let (mut column, stride) = which.columns(row);
+        let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
+        let dy_square = square(dy);
         let mut sums = Row::default();
-        for ((column, taxel), dx) in row.iter().enumerate().zip(&pressed.dx) {
-            if bad >> column & 1 != 0 {
-                continue;
+        while column < COLUMNS {
+            if bad & 1 == 0 {
+                let at = pressed.dx_square[column] + dy_square;
+                let share = view.share(taxels[column]);
+                if at < pressed.outside {
+                    let dx = pressed.dx[column];
+                    let mut felt = pressed.felt(at);
+                    if let (Some(rim), true) = (rim, at >= pressed.inside) {
+                        felt.pressure = rim.pressure(dx, dy);
+                    }
+                    all.misfit.taxels += 1;
+                    sums.add(&felt, dx, residual(share - felt.pressure));
+                } else {
+                    sums.squares += residual(share) * residual(share);
+                }
             }
-            let at = square(*dx) + square(dy);
-            let share = view.share(*taxel);
-            if at >= pressed.outside {
-                let residual = within(share, RESIDUAL_MAX);
-                sums.squares += residual * residual;
-                continue;
-            }
-            let mut felt = pressed.felt(at);
-            if let (Some(rim), true) = (rim, at >= pressed.inside) {
-                felt.pressure = rim.pressure(*dx, dy, view);
-            }
-            all.misfit.taxels += 1;
-            sums.add(&felt, *dx, within(share - felt.pressure, RESIDUAL_MAX));
+            column += stride;
+            bad >>= stride;
         }
         all.add(&sums, dy);
-    });
-    for element in all.matrix.iter_mut().chain(&mut all.right) {
-        *element >>= 3;
     }
     all
 }
 
-/// Hands each row's taxels, bad bits and place to `f`.
+/// A residual, stopped at half of the peak.
 #[inline(always)]
-fn each_row(pressed: &Pressed, view: &View, mut f: impl FnMut(&[i32; 10], u16, i32)) {
-    for ((row, bad), dy) in view.picture.taxels.iter().zip(&view.picture.bad).zip(&pressed.dy) {
-        f(row, *bad, *dy);
-    }
+fn residual(of: i32) -> i32 {
+    of.max(-RESIDUAL_LIMIT).min(RESIDUAL_LIMIT - 1)
 }
 
 /// 1 less 3/4 of the model's pressure over the peak, Q13.
 #[inline(always)]
 fn weight(felt: &Felt) -> i32 {
-    ((1 << SLOPE_BITS) - (3 * felt.pressure >> 3)).max(WEIGHT_MIN)
+    (1 << SLOPE_BITS) - (3 * felt.pressure.max(0).min((1 << PEAK_BITS) - 1) >> 3)
 }
 
 impl Row {
@@ -149,55 +173,55 @@ impl Row {
 
 impl Equations {
     fn add(&mut self, row: &Row, dy: i32) {
-        let times_dy = |sum: i32| (i64::from(sum) * i64::from(dy)) >> PLACE_BITS;
+        // A row within reach lies within two radii, so this fits; elsewhere the sums are 0.
+        let dy = dy << (32 - PLACE_BITS - ROW_DROP);
         let [ss, sx, sy, xx, xy, yy] = &mut self.matrix;
-        *ss += i64::from(row.rest_rest);
-        *sx -= i64::from(row.rest_x);
-        *sy -= times_dy(row.rest_square);
-        *xx += i64::from(row.x_x);
-        *xy += times_dy(row.square_x);
-        *yy += (times_dy(row.square_square) * i64::from(dy)) >> PLACE_BITS;
+        *ss += row.rest_rest >> ROW_DROP;
+        *sx -= row.rest_x >> ROW_DROP;
+        *sy -= high(row.rest_square, dy);
+        *xx += row.x_x >> ROW_DROP;
+        *xy += high(row.square_x, dy);
+        *yy += high(high(row.square_square, dy), dy) << ROW_DROP;
         let [s, x, y] = &mut self.right;
-        *s -= i64::from(row.rest);
-        *x += i64::from(row.x);
-        *y += times_dy(row.square);
-        self.misfit.squares += i64::from(row.squares);
+        *s -= row.rest >> ROW_DROP;
+        *x += row.x >> ROW_DROP;
+        *y += high(row.square, dy);
+        self.misfit.squares += row.squares >> ROW_DROP;
     }
 
     /// The next guess, and the misfit that the linearised model promises there.
     pub fn solve(&self, guess: &Guess, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
-        let pivot = |left: i64, of: i64| left.max(of >> GUARD_BITS).max(1);
-        let times = |share: i32, of: i64| (i64::from(share) * of) >> 28;
+        let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());
+        let times = |share: i32, of: i32| ((i64::from(share) * i64::from(of)) >> SHARE_BITS) as i32;
 
-        let ss = pivot(ss, ss);
-        let (share_x, share_y) = (quotient(sx, ss.unsigned_abs(), 28), quotient(sy, ss.unsigned_abs(), 28));
-        let left_xx = pivot(xx - times(share_x, sx), xx);
+        // The change of ln(s) is eliminated, then that of x.
+        let by_ss = divisor(ss, ss);
+        let share_x = by_ss.divide(sx.into(), SHARE_BITS);
+        let share_y = by_ss.divide(sy.into(), SHARE_BITS);
+        let left_xx = xx - times(share_x, sx);
         let left_xy = xy - times(share_x, sy);
         let (left_x, left_y) = (x - times(share_x, s), y - times(share_y, s));
-        let share = quotient(left_xy, left_xx.unsigned_abs(), 28);
-        let left_yy = pivot(yy - times(share_y, sy) - times(share, left_xy), yy);
-        let y_step = quotient(left_y - times(share, left_x), left_yy.unsigned_abs(), SOLUTION_BITS);
-        let times = |step: i32, of: i64| (i64::from(step) * of) >> SOLUTION_BITS;
-        let x_step = quotient(left_x - times(y_step, left_xy), left_xx.unsigned_abs(), SOLUTION_BITS);
-        let rest_step = quotient(s - times(x_step, sx) - times(y_step, sy), ss.unsigned_abs(), SOLUTION_BITS);
+        let by_xx = divisor(left_xx, xx);
+        let share = by_xx.divide(left_xy.into(), SHARE_BITS);
+        let by_yy = divisor(yy - times(share_y, sy) - times(share, left_xy), yy);
+        let y_step = by_yy.divide((left_y - times(share, left_x)).into(), SHARE_BITS);
+        let x_step = by_xx.divide((left_x - times(y_step, left_xy)).into(), SHARE_BITS);
+        let rest_step = by_ss.divide((s - times(x_step, sx) - times(y_step, sy)).into(), SHARE_BITS);
 
         // Slopes count Y and residuals the peak, so the solution is divided by Y over the peak.
-        let drop = 62 - view.modulus_shift - SLOPE_BITS - (28 - SOLUTION_BITS);
-        let scaled = |step: i32, limit: i32| {
-            let wide = (i64::from(step) * i64::from(view.inverse_modulus)) >> drop;
-            within(wide.max(i64::from(-limit)).min(i64::from(limit)) as i32, limit)
-        };
-        let rest = guess.rest + (high(guess.rest, scaled(rest_step, REST_STEP)) << 4);
-        let rest_square = high(guess.rest, guess.rest) << 4;
+        let drop = 62 - view.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
+        let scaled = |step: i32| within((i64::from(step) * i64::from(view.inverse_modulus)) >> drop, i32::MAX);
+        let change = within(scaled(rest_step).into(), REST_STEP);
+        let rest = guess.rest + (high(guess.rest, change) << 4);
+        let rest_square = guess.rest_square();
         let moved = |centre: i32, step: i32| {
-            let step = (i64::from(rest_square) * i64::from(scaled(step, i32::MAX))) >> (56 - CENTRE_BITS);
-            centre + within(step.max(i64::from(-CENTRE_STEP)).min(i64::from(CENTRE_STEP)) as i32, CENTRE_STEP)
+            let wide = (i64::from(rest_square) * i64::from(scaled(step))) >> (56 - CENTRE_BITS);
+            centre + within(wide, CENTRE_STEP)
         };
         let next = Guess::new(rest, moved(guess.x, x_step), moved(guess.y, y_step), geometry);
-        let promised = (times(rest_step, s) + times(x_step, x) + times(y_step, y)) << 3;
-        let squares = (self.misfit.squares - promised).max(0);
-        (next, Misfit { squares, ..self.misfit })
+        let promised = times(rest_step, s) + times(x_step, x) + times(y_step, y);
+        (next, Misfit { squares: (self.misfit.squares - promised).max(0), ..self.misfit })
     }
 }

@@ -1,11 +1,15 @@
 //! The picture in shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
 
-use super::arith::{reciprocal, within};
+use super::arith::reciprocal;
 use super::geometry::Geometry;
 use crate::pressure::{CODE_BITS, Picture};
 
 /// Fractional bits of a pressure as a share of the peak.
 pub(super) const PEAK_BITS: u32 = 14;
+/// The lowest peak that is looked at: one code.
+const PEAK_MIN: i32 = 1 << CODE_BITS;
+/// The highest peak that the converter, the sag and the gain can make.
+const PEAK_MAX: i32 = 1 << 18;
 /// Y over the peak at most: 512. Below that indentation of a / 512 the model says nothing that the sum does not.
 const MODULUS_MAX: u32 = 1 << (PEAK_BITS + 9);
 /// Y over the peak at least: beyond, the tip would be pressed flat.
@@ -14,10 +18,7 @@ const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 /// A picture and its scale.
 pub(super) struct View<'a> {
     pub picture: &'a Picture,
-    peak: i32,
-    /// Puts the peak's top bit at 30.
-    shift: u32,
-    /// 2^61 over the shifted peak.
+    /// 2^34 over the peak.
     inverse_peak: i32,
     /// Y in shares of the peak, Q14.
     pub modulus: i32,
@@ -30,33 +31,29 @@ pub(super) struct View<'a> {
 impl<'a> View<'a> {
     /// None where the peak is too low for the model.
     pub fn new(picture: &'a Picture, geometry: &Geometry) -> Option<Self> {
-        let peak = picture.peak.min(1 << 22);
-        if peak <= 0 {
+        if picture.peak < PEAK_MIN {
             return None;
         }
-        let divisor = peak.unsigned_abs();
+        let divisor = picture.peak.min(PEAK_MAX).unsigned_abs();
         let (whole, rest) = (geometry.modulus_q8 / divisor, geometry.modulus_q8 % divisor);
         if whole >= MODULUS_MAX >> (PEAK_BITS - 8) {
             return None;
         }
         let modulus = ((whole << (PEAK_BITS - 8)) + (rest << (PEAK_BITS - 8)) / divisor).max(MODULUS_MIN);
-        let shift = divisor.leading_zeros() - 1;
         let modulus_shift = modulus.leading_zeros() - 1;
         Some(Self {
             picture,
-            peak,
-            shift,
-            inverse_peak: (reciprocal(divisor << (shift + 1)) >> 1) as i32,
+            inverse_peak: (reciprocal(divisor << divisor.leading_zeros()) >> (29 - divisor.leading_zeros())) as i32,
             modulus: modulus as i32,
             modulus_shift,
             inverse_modulus: reciprocal(modulus << (modulus_shift + 1)),
         })
     }
 
-    /// A taxel as a share of the peak, -1 to 1 in Q14.
+    /// A taxel as a share of the peak, Q14.
+    #[inline(always)]
     pub fn share(&self, taxel: i32) -> i32 {
-        let shifted = within(taxel, self.peak) << self.shift;
-        ((i64::from(shifted) * i64::from(self.inverse_peak)) >> (61 - PEAK_BITS)) as i32
+        ((i64::from(taxel) * i64::from(self.inverse_peak)) >> (34 - PEAK_BITS)) as i32
     }
 
     /// The square of what the converter's steps do to a share: a third of a code's square.

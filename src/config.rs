@@ -61,6 +61,8 @@ pub struct Config {
     pub frame_s_q40: i64,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
+    /// Encoder counts at which the travel reaches the end of its type.
+    pub counts_max: i64,
     /// l1 (Q32), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
     pub observer_gains: [i64; 3],
     /// k_v in 1/s.
@@ -152,6 +154,7 @@ impl Config {
             contact_off: newtons(p.contact_off_mn),
             frame_s_q40: wide(frame_s * exp2(40)),
             mm_per_count_q40: wide(mm_per_count * exp2(40)),
+            counts_max: wide(exp2(31) / (mm_per_count * exp2(24)) + 1.0),
             observer_gains: [
                 wide((1.0 - beta * beta * beta) * exp2(32)),
                 wide(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
@@ -161,10 +164,10 @@ impl Config {
             position_gain_per_s: slope as i32,
             half_over_slope_q32: wide(0.5 / slope * exp2(32)),
             half_over_slope2_q40: wide(0.5 / (slope * slope) * exp2(40)),
-            damping_q8_per_s: wide(c * exp2(8)),
-            voltage_limit: wide(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8)),
-            current_limit: wide(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8)),
-            slew_limit: wide(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            damping_q8_per_s: narrow(c * exp2(8)),
+            voltage_limit: narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8)),
+            current_limit: narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8)),
+            slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
             mv_per_acceleration_q32: wide(1e3 / g * exp2(32)),
             speed_max: speed(p.speed_max_um_per_s),
@@ -193,6 +196,11 @@ const fn exp2(n: u32) -> f32 {
 /// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
 fn wide(value: f32) -> i64 {
     value.clamp(-4e18, 4e18) as i64
+}
+
+/// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
+fn narrow(value: f32) -> i64 {
+    wide(value).min(i64::from(i32::MAX))
 }
 
 /// `value / 1000` in units of 2^-bits, rounded.

@@ -45,13 +45,13 @@ impl Observer {
 
     /// Travel that an encoder count means, Q24 mm, held to the type's range.
     pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
-        let counts = i64::from(encoder.wrapping_sub(self.origin));
+        let counts = i64::from(encoder.wrapping_sub(self.origin)).max(-config.counts_max).min(config.counts_max);
         Millimetres::from_bits(saturate((counts * config.mm_per_count_q40) >> 16))
     }
 
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
     pub fn update(&mut self, encoder: i32, acceleration: i64, config: &Config) {
-        let total = acceleration + i64::from(self.disturbance.to_bits());
+        let total = i64::from(saturate(acceleration + i64::from(self.disturbance.to_bits())));
         let speed_before = i64::from(self.speed.to_bits());
         let gained = round_shift(total * config.frame_s_q40, 32);
         // Mean speed over the frame, Q16, times T (Q40), to Q24 mm.

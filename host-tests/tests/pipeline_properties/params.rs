@@ -1,0 +1,106 @@
+//! Parameters at and between the ends of their ranges, and the configurations they make.
+
+use fingertip::config::Config;
+use fingertip::params::Params;
+use proptest::prelude::*;
+
+/// The sampling times that the converter has.
+const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
+
+/// Where in its range each parameter is.
+#[derive(Clone, Copy, Debug)]
+pub enum Place {
+    Least,
+    Largest,
+    Default,
+    /// This share of the range, on a scale of ratios.
+    Between(f64),
+}
+
+/// The parameters with each at its place, and those that contradict each other moved apart.
+pub fn placed(places: impl IntoIterator<Item = Place>) -> Params {
+    let mut values = Params::DEFAULT.to_array();
+    for ((value, place), (_, default, min, max)) in values.iter_mut().zip(places).zip(Params::RANGES) {
+        *value = match place {
+            Place::Least => min,
+            Place::Largest => max,
+            Place::Default => default,
+            Place::Between(share) => {
+                let (low, high) = (f64::from(min).max(1.0), f64::from(max).max(1.0));
+                ((low * (high / low).powf(share)) as i32).clamp(min, max)
+            }
+        };
+    }
+    let mut params = Params::from_array(&values);
+    let nearest = SAMPLE_CYCLES.into_iter().min_by_key(|cycles| cycles.abs_diff(params.sample_cycles));
+    params.sample_cycles = nearest.expect("there are some");
+    apart(&mut params.contact_off_mn, &mut params.contact_on_mn, 2_000);
+    apart(&mut params.force_max_mn, &mut params.force_fault_mn, 200_000);
+    apart(&mut params.supply_min_mv, &mut params.supply_max_mv, 60_000);
+    params
+}
+
+/// Puts the first below the second, which may go up to `max`.
+fn apart(low: &mut i32, high: &mut i32, max: i32) {
+    if *low >= *high {
+        *high = (*low + 1).min(max);
+        *low = *high - 1;
+    }
+}
+
+fn place() -> impl Strategy<Value = Place> {
+    prop_oneof![Just(Place::Least), Just(Place::Largest), Just(Place::Default), (0.0..=1.0).prop_map(Place::Between),]
+}
+
+/// Any parameters allowed, the ends of the ranges more often than what lies between.
+pub fn any_params() -> impl Strategy<Value = Params> {
+    prop_oneof![
+        1 => Just(Params::DEFAULT),
+        4 => prop::collection::vec(place(), Params::COUNT).prop_map(placed),
+        4 => prop::collection::vec(prop_oneof![Just(Place::Least), Just(Place::Largest)], Params::COUNT).prop_map(placed),
+    ]
+}
+
+/// The configuration, with what the loop's arithmetic relies on.
+pub fn config(params: &Params) -> Config {
+    let config = Config::new(params).expect("allowed");
+    assert!(config.speed_gain_per_s >= 1 && config.position_gain_per_s >= 1, "{params:?}");
+    let positive = [
+        config.frame_s_q40,
+        config.mm_per_count_q40,
+        config.newtons_per_sum_q48,
+        config.pascals_per_sum_q32,
+        config.half_over_slope_q32,
+        config.half_over_slope2_q40,
+        config.mv_per_acceleration_q32,
+        config.counts_max,
+    ];
+    assert!(positive.iter().chain(&config.observer_gains).all(|value| (1..1 << 61).contains(value)), "{config:?}");
+    // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
+    let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q8_per_s];
+    assert!(limits.iter().all(|value| (0..1 << 31).contains(value)), "{config:?}");
+    config
+}
+
+#[test]
+fn every_corner_of_the_parameters_makes_a_configuration() {
+    for rest in [Place::Least, Place::Largest, Place::Default] {
+        config(&placed([rest; Params::COUNT]));
+        for odd in 0..Params::COUNT {
+            for place in [Place::Least, Place::Largest] {
+                let mut places = [rest; Params::COUNT];
+                places[odd] = place;
+                config(&placed(places));
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(crate::fixed(4_000))]
+
+    #[test]
+    fn any_allowed_parameters_make_a_configuration(params in any_params()) {
+        config(&params);
+    }
+}

@@ -1,0 +1,194 @@
+//! Runs of steps, judged one by one.
+
+use crate::inputs::{Arguments, Input, any_inputs};
+use crate::params::{any_params, config};
+use fingertip::params::Params;
+use fingertip::pipeline::{Pipeline, Status};
+use fingertip::pressure::TARE_FRAMES;
+use fingertip::record::Digest;
+use fingertip::safety::{Fault, Mode};
+use fingertip::units::{Duty, Newtons};
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use std::cell::RefCell;
+use std::collections::BTreeSet;
+
+/// Runs of each test.
+const CASES: u32 = 500;
+
+/// A pipeline and what it was last given.
+struct Run {
+    pipeline: Pipeline,
+    arguments: Arguments,
+    before: Status,
+    clear_seen: u8,
+    digest: Digest,
+    seen: Seen,
+}
+
+/// The numbers of the modes, faults, outcomes and refusals that runs came to.
+type Seen = [BTreeSet<u8>; 4];
+
+impl Run {
+    /// Tared where `tared` says so; a broken array may refuse.
+    fn new(params: &Params, tared: bool) -> Self {
+        let pipeline = Pipeline::new(&config(params));
+        let mut run = Self {
+            pipeline,
+            arguments: Arguments::new(),
+            before: Status::default(),
+            clear_seen: 0,
+            digest: Digest::new(),
+            seen: Seen::default(),
+        };
+        if tared {
+            run.arguments.command.tare_request += 1;
+            for _ in 0..TARE_FRAMES + 2 {
+                run.arguments.frame.sequence += 1;
+                run.step();
+            }
+        }
+        run
+    }
+
+    fn take(&mut self, inputs: &[Input]) {
+        for input in inputs {
+            self.arguments.next(input);
+            self.step();
+        }
+    }
+
+    /// A step, with everything that must hold after it.
+    fn step(&mut self) -> Status {
+        let clear_before = core::mem::replace(&mut self.clear_seen, self.arguments.command.clear_request);
+        let Arguments { frame, sense, command } = &self.arguments;
+        let (duty, status) = self.pipeline.step(frame, sense, command);
+        self.digest.add(duty, &status);
+
+        assert!(duty.0 >= -Duty::FULL, "{duty:?}");
+        assert_eq!(duty, status.duty);
+        if !drives(status.mode) {
+            assert_eq!(duty, Duty::ZERO, "{:?} does not drive", status.mode);
+        }
+        if !command.torque {
+            assert!(!drives(status.mode), "{:?} without torque", status.mode);
+        }
+        assert_eq!(status.mode == Mode::Fault, status.fault.is_some());
+        if self.before.mode == Mode::Fault {
+            let cleared = command.clear_request != clear_before && !command.torque;
+            let expected = if cleared { (Mode::Off, None) } else { (Mode::Fault, self.before.fault) };
+            assert_eq!((status.mode, status.fault), expected);
+        }
+        // Enabling torque begins with an approach or a release, whatever was asked before.
+        if drives(status.mode) && !drives(self.before.mode) {
+            let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
+            assert_eq!(status.mode, wanted, "first after {:?}", self.before.mode);
+        }
+        let contact = status.contact;
+        let tip = self.pipeline.config().tip;
+        assert!(contact.force >= Newtons::ZERO);
+        assert!((0..=tip.depth_max().to_bits()).contains(&contact.indentation.to_bits()));
+        assert!((0..=100).contains(&contact.bad_taxels));
+        let identification = status.identification;
+        let fault = status.fault.map_or(0, |fault| fault as u8);
+        let numbers = [status.mode as u8, fault, identification.number(), identification.refusal()];
+        for (seen, number) in self.seen.iter_mut().zip(numbers) {
+            seen.insert(number);
+        }
+        self.before = status;
+        status
+    }
+}
+
+fn drives(mode: Mode) -> bool {
+    match mode {
+        Mode::Off | Mode::Tare | Mode::Fault => false,
+        Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => true,
+    }
+}
+
+proptest! {
+    #![proptest_config(crate::fixed(CASES))]
+
+    #[test]
+    fn any_run_keeps_to_the_rules(params in any_params(), tared in prop::bool::weighted(0.9), inputs in any_inputs(200)) {
+        Run::new(&params, tared).take(&inputs);
+    }
+
+    #[test]
+    fn the_same_run_gives_the_same_bits(params in any_params(), inputs in any_inputs(100)) {
+        let digest = || {
+            let mut run = Run::new(&params, true);
+            run.take(&inputs);
+            run.digest.value()
+        };
+        prop_assert_eq!(digest(), digest());
+    }
+
+    /// Whatever was commanded before: with torque off nothing drives, and with torque on again the old goal is forgotten.
+    #[test]
+    fn nothing_commanded_acts_after_torque_off(params in any_params(), inputs in any_inputs(100)) {
+        let mut run = Run::new(&params, true);
+        run.take(&inputs);
+        run.arguments.command.torque = false;
+        for _ in 0..10 {
+            prop_assert_eq!(run.step().duty, Duty::ZERO);
+        }
+        run.arguments.command.torque = true;
+        run.arguments.command.goal = Newtons::ZERO;
+        let mode = run.step().mode;
+        prop_assert!(matches!(mode, Mode::Release | Mode::Off | Mode::Tare | Mode::Fault), "{:?}", mode);
+    }
+
+    #[test]
+    fn a_stop_from_outside_is_latched(params in any_params(), before in any_inputs(60), after in any_inputs(60)) {
+        let mut run = Run::new(&params, true);
+        run.take(&before);
+        let status = run.pipeline.stop(Fault::LostFrames);
+        prop_assert_eq!((status.mode, status.duty), (Mode::Fault, Duty::ZERO));
+        prop_assert!(status.fault.is_some());
+        run.before = status;
+        run.take(&after);
+    }
+
+    /// New parameters at any moment: the bridge is off, and the loop goes on with them.
+    #[test]
+    fn parameters_may_change_at_any_moment(
+        first in any_params(),
+        second in any_params(),
+        before in any_inputs(60),
+        after in any_inputs(60),
+    ) {
+        let mut run = Run::new(&first, true);
+        run.take(&before);
+        run.pipeline.configure(&config(&second));
+        if run.before.mode != Mode::Fault {
+            run.before.mode = Mode::Off;
+        }
+        run.take(&after);
+    }
+}
+
+/// The inputs are not so wild that everything ends at once: each mode, and each fault that a step can find, is reached.
+#[test]
+fn the_runs_come_everywhere() {
+    let all = RefCell::new(Seen::default());
+    let inputs = (any_params(), any_inputs(200));
+    let outcome = TestRunner::new(crate::fixed(2 * CASES)).run(&inputs, |(params, inputs)| {
+        let mut run = Run::new(&params, true);
+        run.take(&inputs);
+        for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {
+            all.extend(seen);
+        }
+        Ok(())
+    });
+    outcome.expect("the rules hold");
+    let [modes, faults, outcomes, refusals] = all.into_inner();
+    assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6]);
+    assert!(
+        outcomes.contains(&1) && [10, 11].iter().all(|number| refusals.contains(number)),
+        "{outcomes:?} {refusals:?}"
+    );
+    // Frames that do not come, damaged parameters, late steps and crashes are found outside the step.
+    assert_eq!(Vec::from_iter(faults), [0, 2, 3, 4, 5, 6, 7, 9, 10, 11]);
+}

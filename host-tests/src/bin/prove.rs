@@ -45,7 +45,7 @@ fn main() -> ExitCode {
         random::points(0..10_000_000 / share, progress).to_vec()
     });
     report.section("the rest of the model at random points, in arbitrary precision", |progress| {
-        let points = 0..1_000_000 / share;
+        let points = 0..200_000 / share;
         let mut all = beyond::geometry(points.clone(), progress).to_vec();
         all.extend(beyond::tilt(points.clone(), progress));
         all.extend(beyond::friction(points, progress));

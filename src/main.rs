@@ -18,15 +18,18 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::wdg::IndependentWatchdog;
-use fingertip::config::Config;
+use fingertip::config::{Config, ConfigError};
 use fingertip::link::Settings;
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::safety::Fault;
 use fingertip::store::Record;
+use static_cell::StaticCell;
 
 /// Runs control above everything but the scan and the guard.
 static CONTROL: InterruptExecutor = InterruptExecutor::new();
+
+static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 
 #[embassy_stm32::interrupt]
 fn SPI3() {
@@ -45,10 +48,15 @@ async fn main(spawner: Spawner) {
     log_boot(boot);
 
     let mut store = Store::new(p.FLASH);
-    let Stored { record, config, broken } = load(&mut store);
-
-    let mut pipeline = Pipeline::new(&config);
-    if broken {
+    let (mut record, mut sound) = load(&mut store);
+    let made = make_pipeline(&record.params).or_else(|cause| {
+        log_refusal(cause);
+        sound = false;
+        record.params = Params::DEFAULT;
+        make_pipeline(&record.params)
+    });
+    let pipeline = unwrap!(made.ok(), "the default parameters make a configuration: a test of the core holds that");
+    if !sound {
         pipeline.stop(Fault::BrokenParameters);
     }
     if boot.crashed {
@@ -99,26 +107,20 @@ async fn main(spawner: Spawner) {
     let bus = unwrap!(bus::Bus::new(bus_parts, Settings::new(record).baud()));
     let led = Output::new(p.PA5, Level::Low, Speed::Low);
 
-    spawner.spawn(unwrap!(host::run(bus, store, record, config, boot).ok()));
+    spawner.spawn(unwrap!(host::run(bus, store, record, boot).ok()));
     spawner.spawn(unwrap!(watch::run(led).ok()));
     CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
 
-/// What the flash holds, and whether it is damaged.
-struct Stored {
-    record: Record,
-    config: Config,
-    broken: bool,
-}
-
-/// Damaged parameters are replaced by the defaults; the ID and the bus speed of an older record stay, so that the fault can
-/// be read on the bus.
-fn load(store: &mut Store) -> Stored {
+/// What the flash holds. Where that is damaged: the ID and the bus speed of an older record, so that the fault can be read on
+/// the bus, the default parameters, and false.
+fn load(store: &mut Store) -> (Record, bool) {
     let record = match store.latest() {
         Ok(record) => record.unwrap_or_default(),
         Err(cause) => {
             log_damage(cause);
-            return Stored::broken(store.newest_whole().unwrap_or_default());
+            let record = store.newest_whole().unwrap_or_default();
+            return (Record { params: Params::DEFAULT, ..record }, false);
         }
     };
     match store.make_room(&record) {
@@ -126,20 +128,12 @@ fn load(store: &mut Store) -> Stored {
         Ok(true) => info!("parameter sector was full: erased, newest record kept"),
         Err(cause) => error!("parameter sector: {}", cause),
     }
-    match Config::new(&record.params) {
-        Ok(config) => Stored { record, config, broken: false },
-        Err(cause) => {
-            log_refusal(cause);
-            Stored::broken(record)
-        }
-    }
+    (record, true)
 }
 
-impl Stored {
-    fn broken(record: Record) -> Self {
-        let record = Record { params: Params::DEFAULT, ..record };
-        // The defaults make a configuration: a test of the core holds that.
-        let config = unwrap!(Config::new(&record.params).ok());
-        Self { record, config, broken: true }
-    }
+/// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free again.
+#[inline(never)]
+fn make_pipeline(params: &Params) -> Result<&'static mut Pipeline, ConfigError> {
+    let config = Config::new(params)?;
+    Ok(PIPELINE.init_with(|| Pipeline::new(&config)))
 }

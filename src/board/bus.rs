@@ -2,9 +2,10 @@
 
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::mode::Async;
+use embassy_stm32::pac::usart::regs::Sr;
 use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, PA2, PA3, PC8, USART2};
 use embassy_stm32::usart::{self, ConfigError, RingBufferedUartRx, Uart, UartTx};
-use embassy_stm32::{Peri, bind_interrupts, dma};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac};
 use static_cell::ConstStaticCell;
 
 bind_interrupts!(struct Irqs {
@@ -69,6 +70,10 @@ impl Bus {
     /// The port's own.
     pub async fn send(&mut self, bytes: &[u8]) -> Result<(), usart::Error> {
         self.transmit_enable.set_high();
+        // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given back early.
+        let mut cleared = Sr(u32::MAX);
+        cleared.set_tc(false);
+        pac::USART2.sr().write_value(cleared);
         let mut result = self.tx.write(bytes).await;
         if result.is_ok() {
             result = self.tx.flush().await;

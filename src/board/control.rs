@@ -6,14 +6,16 @@ use core::sync::atomic::Ordering;
 
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use fingertip::config::Config;
 use fingertip::frame::{Frame, Sense};
+use fingertip::params::Params;
 use fingertip::pipeline::{Command, Pipeline};
 use fingertip::safety::{Fault, Mode};
 use fingertip::units::Duty;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{COMMAND, CONFIG, DETAIL, DETAIL_READY, DETAIL_WANTED, PACKETS, REPORT, Report};
+use super::exchange::{COMMAND, DETAIL, DETAIL_READY, DETAIL_WANTED, PACKETS, PARAMS, REPORT, Report};
 use super::guard;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
@@ -37,7 +39,7 @@ pub struct Control {
     /// Fed here and nowhere else.
     pub watchdog: IndependentWatchdog<'static, IWDG>,
     /// The core.
-    pub pipeline: Pipeline,
+    pub pipeline: &'static mut Pipeline,
 }
 
 /// Runs for ever.
@@ -56,6 +58,8 @@ struct State {
     frame: Frame,
     seen: u32,
     discard_next: bool,
+    /// The scan is not to be trusted before its next start.
+    lost: bool,
     report: Report,
     bus: BusClock,
     clear_seen: u8,
@@ -68,6 +72,7 @@ impl State {
             frame: Frame::EMPTY,
             seen: 0,
             discard_next: true,
+            lost: false,
             report: Report::default(),
             bus: BusClock::new(),
             clear_seen: 0,
@@ -83,6 +88,21 @@ impl State {
         if guard::take_trip() {
             self.without_frames();
         }
+        self.find_frames();
+        self.take_frame();
+        self.configure();
+    }
+
+    /// Starts the scan anew when its fault is to be cleared, with torque off. The next frame clears it.
+    fn find_frames(&mut self) {
+        let Command { torque, clear_request, .. } = COMMAND.get();
+        if self.lost && clear_request != self.clear_seen && !torque {
+            self.clear_seen = clear_request;
+            self.restart_scan();
+        }
+    }
+
+    fn take_frame(&mut self) {
         let newest = super::scan::newest();
         if newest.sequence == self.seen {
             return;
@@ -125,24 +145,19 @@ impl State {
         }
         self.clear_seen = command.clear_request;
         self.publish();
-        self.configure();
     }
 
-    /// The guard cut the bridge: latches the fault, and starts the scan anew once that is cleared.
+    /// The guard cut the bridge: latches the fault. The scan starts anew when that is cleared.
     ///
     /// The watchdog guards against firmware that hangs. Here it does not: it has seen the fault, and it feeds the watchdog
     /// only after reading back that the bridge is cut, so that the fault can be read on the bus.
     fn without_frames(&mut self) {
         self.stop(Fault::LostFrames);
+        self.lost = true;
         // Both keep track of counters that wrap.
         self.parts.encoder.read();
         self.bus.silent_ms();
-        let Command { torque, clear_request, .. } = COMMAND.get();
         self.publish();
-        if clear_request != self.clear_seen && !torque {
-            self.clear_seen = clear_request;
-            self.restart_scan();
-        }
         if bridge::is_safe() {
             self.parts.watchdog.pet();
         }
@@ -156,6 +171,7 @@ impl State {
     fn restart_scan(&mut self) {
         let timing = self.parts.pipeline.config().timing;
         self.discard_next = true;
+        self.lost = false;
         self.parts.scan.start(timing);
         self.seen = super::scan::newest().sequence;
         guard::restart(guard::now(), FRAMES_TO_START * guard::frame_ticks(timing));
@@ -164,9 +180,11 @@ impl State {
     fn publish(&mut self) {
         REPORT.set(self.report);
         if DETAIL_WANTED.swap(false, Ordering::Relaxed) {
-            let (array, frame) = (self.parts.pipeline.array(), &self.frame);
+            let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
+            let array = pipeline.array();
             DETAIL.fill(|detail| {
                 detail.frame = *frame;
+                detail.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
                 detail.taxels = array.picture().taxels;
                 for (place, tare) in detail.tare.iter_mut().zip(array.tare()) {
                     *place = tare;
@@ -176,19 +194,27 @@ impl State {
         }
     }
 
-    /// Takes a new configuration; the bridge is off meanwhile, and the scan starts anew where its timing changed.
+    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and the scan
+    /// starts anew.
     fn configure(&mut self) {
-        let pipeline = &mut self.parts.pipeline;
-        let timing = pipeline.config().timing;
-        let taken = CONFIG.take(|config| config.take().map(|config| pipeline.configure(&config)));
-        if taken.is_some() {
-            let now = pipeline.config().timing;
-            self.parts.bridge.apply(Mode::Off, Duty::ZERO);
-            if now != timing {
-                self.restart_scan();
-            }
+        let Some(params) = PARAMS.take(|params| *params) else { return };
+        self.parts.bridge.apply(Mode::Off, Duty::ZERO);
+        self.parts.scan.stop();
+        guard::rest();
+        if !set_config(self.parts.pipeline, &params) {
+            self.stop(Fault::BrokenParameters);
         }
+        self.restart_scan();
     }
+}
+
+/// A function of its own, because a configuration is large and takes stack only here.
+#[inline(never)]
+fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
+    Config::new(params).is_ok_and(|config| {
+        pipeline.configure(&config);
+        true
+    })
 }
 
 /// How long the bus has been silent, measured where a hanging link cannot stop the clock.

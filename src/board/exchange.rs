@@ -6,8 +6,8 @@ use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use fingertip::config::Config;
 use fingertip::frame::{COLUMNS, Frame, ROWS, TAXELS};
+use fingertip::params::Params;
 use fingertip::pipeline::{Command, Status};
 
 /// What control reports after every step, and after every trip of the guard.
@@ -27,6 +27,8 @@ pub struct Report {
 pub struct Detail {
     /// The frame that the newest report was made from.
     pub frame: Frame,
+    /// Pressure in Pa for a sixteenth of a corrected code, Q32.
+    pub pascals_per_sum_q32: i64,
     /// Sixteenths of a corrected code above tare.
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Sixteenths of a corrected code.
@@ -39,15 +41,19 @@ pub static REPORT: Shared<Report> = Shared::new();
 pub static COMMAND: Shared<Command> = Shared::new();
 /// Valid packets heard; only its changes count.
 pub static PACKETS: AtomicU32 = AtomicU32::new(0);
-/// A new configuration for control.
-pub static CONFIG: Mailbox<Option<Config>> = Mailbox::new(None);
+/// New parameters for control.
+pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
 /// Set by the link for control to fill [`DETAIL`].
 pub static DETAIL_WANTED: AtomicBool = AtomicBool::new(false);
 /// Raised when [`DETAIL`] is filled.
 pub static DETAIL_READY: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 /// The last detail asked for.
-pub static DETAIL: Mailbox<Detail> =
-    Mailbox::new(Detail { frame: Frame::EMPTY, taxels: [[0; COLUMNS]; ROWS], tare: [0; TAXELS] });
+pub static DETAIL: Mailbox<Detail> = Mailbox::new(Detail {
+    frame: Frame::EMPTY,
+    pascals_per_sum_q32: 0,
+    taxels: [[0; COLUMNS]; ROWS],
+    tare: [0; TAXELS],
+});
 
 /// A small value that is read and replaced as a whole.
 pub struct Shared<T>(Mutex<CriticalSectionRawMutex, Cell<Option<T>>>);

@@ -38,10 +38,7 @@ pub const fn answer_ticks(frame_ticks: u32) -> u32 {
 pub fn start(_timer: Peri<'static, TIM5>) {
     rcc::enable_and_reset::<TIM5>();
     pac::TIM5.arr().write_value(u32::MAX);
-    // The compare value of 0 out of reset would match at once.
-    pac::TIM5.ccr(COMPARE_1).write_value(u32::MAX);
     pac::TIM5.cr1().modify(|w| w.set_cen(true));
-    clear_flag();
     // SAFETY: the handler below touches only statics and registers that are its own or written whole, and its priority
     // is set.
     unsafe { interrupt::TIM5.enable() };
@@ -57,11 +54,20 @@ pub fn restart(from: u32, frame_ticks: u32) {
     let period = frame_ticks + answer_ticks(frame_ticks);
     PERIOD.store(period, Ordering::Relaxed);
     pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
+    if !pac::TIM5.dier().read().ccie(COMPARE_1) {
+        // What matched while the guard rested is void.
+        clear_flag();
+    }
     pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, true));
     if now().wrapping_sub(from) >= period {
         // Too late: the counter has passed the new deadline already and would meet it only after a wrap.
         pac::TIM5.egr().write(|w| w.set_ccg(COMPARE_1, true));
     }
+}
+
+/// Lets the guard rest until the next [`restart`], while no frames are to come and the bridge is off.
+pub fn rest() {
+    pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, false));
 }
 
 /// Whether the guard has tripped since [`take_trip`].

@@ -4,19 +4,16 @@ use core::sync::atomic::Ordering;
 
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer, with_timeout};
-use fingertip::config::Config;
 use fingertip::frame::{Frame, TAXELS};
 use fingertip::link::{Actions, Reply, Server, Snapshot};
-use fingertip::params::Params;
 use fingertip::safety::Mode;
 use fingertip::store::Record;
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{COMMAND, CONFIG, DETAIL, DETAIL_READY, DETAIL_WANTED, Detail, PACKETS, REPORT};
+use super::exchange::{COMMAND, DETAIL, DETAIL_READY, DETAIL_WANTED, Detail, PACKETS, PARAMS, REPORT};
 use super::flash::Store;
 use super::guard;
-use super::log::log_refusal;
 
 /// Control answers within two frames, even while frames are lost: at most this for the slowest scan.
 const DETAIL_TIMEOUT: Duration = Duration::from_millis(3);
@@ -26,10 +23,9 @@ const CODE_BITS: u32 = fingertip::pressure::CODE_BITS;
 
 /// Runs for ever.
 #[embassy_executor::task]
-pub async fn run(bus: Bus, store: Store, record: Record, config: Config, boot: Boot) {
-    Host { bus, store, boot, server: Server::new(record), pictures: Pictures::new(&config), line_good: true }
-        .run()
-        .await
+pub async fn run(bus: Bus, store: Store, record: Record, boot: Boot) {
+    let mut host = Host { bus, store, boot, server: Server::new(record), pictures: Pictures::new(), line_good: true };
+    host.run().await;
 }
 
 struct Host {
@@ -84,7 +80,9 @@ impl Host {
     fn carry_out(&mut self, actions: Actions) {
         let settings = *self.server.settings();
         if actions.configure {
-            self.configure(&settings.record.params);
+            // The newest count where control has not yet taken those before.
+            PARAMS.take(|_| ());
+            PARAMS.fill(|params| *params = settings.record.params);
         }
         if actions.save {
             let saved = self.save(&settings.record);
@@ -98,18 +96,6 @@ impl Host {
         }
         if actions.reboot {
             crash::reboot();
-        }
-    }
-
-    /// Hands a new configuration to control; the newest counts where control has not yet taken the one before.
-    fn configure(&mut self, params: &Params) {
-        match Config::new(params) {
-            Ok(config) => {
-                self.pictures.scale(&config);
-                CONFIG.take(|waiting| *waiting = None);
-                CONFIG.fill(|place| *place = Some(config));
-            }
-            Err(cause) => log_refusal(cause),
         }
     }
 
@@ -134,24 +120,14 @@ impl Host {
 
 /// The array's details in the units of the bus.
 struct Pictures {
-    pascals_per_sum_q32: i64,
     pressures_10pa: [u16; TAXELS],
     tare_codes: [u16; TAXELS],
     frame: Frame,
 }
 
 impl Pictures {
-    fn new(config: &Config) -> Self {
-        Self {
-            pascals_per_sum_q32: config.pascals_per_sum_q32,
-            pressures_10pa: [0; TAXELS],
-            tare_codes: [0; TAXELS],
-            frame: Frame::EMPTY,
-        }
-    }
-
-    fn scale(&mut self, config: &Config) {
-        self.pascals_per_sum_q32 = config.pascals_per_sum_q32;
+    const fn new() -> Self {
+        Self { pressures_10pa: [0; TAXELS], tare_codes: [0; TAXELS], frame: Frame::EMPTY }
     }
 
     /// Asks control for the newest frame's details; keeps the old ones where it does not answer.
@@ -166,7 +142,7 @@ impl Pictures {
     fn convert(&mut self, detail: &Detail) {
         self.frame = detail.frame;
         for (place, taxel) in self.pressures_10pa.iter_mut().zip(detail.taxels.as_flattened()) {
-            let pascals = (i64::from(*taxel) * self.pascals_per_sum_q32) >> 32;
+            let pascals = (i64::from(*taxel) * detail.pascals_per_sum_q32) >> 32;
             *place = saturate(((pascals + 5) / 10) as i32);
         }
         for (place, tare) in self.tare_codes.iter_mut().zip(detail.tare) {

@@ -107,6 +107,11 @@ impl Scan {
         Self(())
     }
 
+    /// Stops, with no row driven.
+    pub fn stop(&mut self) {
+        stop();
+    }
+
     /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         stop();
@@ -124,10 +129,11 @@ impl Scan {
         start_timer(timing);
     }
 
-    /// Copies the frame, or says that it is not whole: a bank is missing or the DMA was in this half meanwhile.
+    /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or the DMA
+    /// was in this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
-        let arrived = bank_a_completed(half) && !overrun();
+        let arrived = bank_a_completed(half) && !overrun() && in_step();
         for (bank, buffer) in frame.banks.iter_mut().zip(&BUFFERS) {
             for (codes, sources) in bank.iter_mut().zip(&buffer[half]) {
                 for (code, source) in codes.iter_mut().zip(sources) {
@@ -138,7 +144,7 @@ impl Scan {
         fence(Ordering::Acquire);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
-        arrived && untouched && newest() == completed
+        arrived && untouched && in_step() && newest() == completed
     }
 }
 
@@ -234,6 +240,20 @@ fn start_timer(timing: ScanTiming) {
 /// The half of the buffer that a stream writes to next.
 fn written_half(stream: usize) -> usize {
     usize::from((BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt()) / HALF_LEN) & 1)
+}
+
+/// Whether the codes belong to the rows under which they are stored.
+///
+/// In the slot that the rows' stream has set last, each bank has completed as many slots of the frame as came before it, or
+/// one more. A trigger that was lost leaves the banks behind the rows for good; only a new start brings them together.
+fn in_step() -> bool {
+    let slots = SLOTS as u16;
+    let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;
+    [STREAM_A, STREAM_B].into_iter().all(|stream| {
+        let stored = BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt());
+        let completed = stored / BANK_COLUMNS as u16 % slots;
+        completed == current || completed == (current + 1) % slots
+    })
 }
 
 /// Whether the first bank's stream, which does not interrupt, has completed this half too.

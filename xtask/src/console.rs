@@ -174,7 +174,12 @@ impl Stages {
                 Some(value)
             }
             Err(error) => {
-                println!("{}\n{error:#}", console.captured());
+                println!("{}", console.captured());
+                // Again at the end, where one looks first.
+                for line in console.captured().lines().filter(|line| is_failed_test(line)) {
+                    println!("    {line}");
+                }
+                println!("{error:#}");
                 println!("FAILED {seconds:7.1} s  {name}");
                 self.failed.push(name.into());
                 None
@@ -193,6 +198,11 @@ impl Stages {
         println!("{what}: all passed");
         Ok(())
     }
+}
+
+/// Cargo's line of a test that failed.
+fn is_failed_test(line: &str) -> bool {
+    line.starts_with("test ") && line.ends_with(" ... FAILED")
 }
 
 /// Cargo's closing line of each test binary that ran a test.

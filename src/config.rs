@@ -19,6 +19,11 @@ const POSITION_TO_SPEED: f32 = 3.0;
 /// Poles of the observer, in frames: 1 / (2 T), 2.5 times faster than the speed loop that it serves.
 const OBSERVER_FRAMES: f32 = 2.0;
 
+/// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,
+const JUMP_FRAMES: f32 = 4.0;
+/// and at least this far, mm.
+const JUMP_MM: f32 = 0.5;
+
 /// Why parameters were refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
@@ -61,6 +66,8 @@ pub struct Config {
     pub frame_s_q40: i64,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
+    /// Error of the travel that is not motion but a jump of the encoder, Q24 mm.
+    pub jump: i64,
     /// Encoder counts at which the travel reaches the end of its type.
     pub counts_max: i64,
     /// l1 (Q32), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
@@ -154,6 +161,7 @@ impl Config {
             contact_off: newtons(p.contact_off_mn),
             frame_s_q40: wide(frame_s * exp2(40)),
             mm_per_count_q40: wide(mm_per_count * exp2(40)),
+            jump: wide((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24)),
             counts_max: wide(exp2(31) / (mm_per_count * exp2(24)) + 1.0),
             observer_gains: [
                 wide((1.0 - beta * beta * beta) * exp2(32)),

@@ -8,12 +8,12 @@
 //! x += l1 e,   v += l2 e,   w += l3 e
 //! l1 = 1 - beta^3,   l2 = 1.5 (1 - beta)^2 (1 + beta) / T,   l3 = (1 - beta)^3 / T^2
 //! ```
+//!
+//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts anew at the new place, at
+//! rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
 
 use crate::config::Config;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
-
-/// Largest error that a correction takes, Q24 mm (0.5 mm): more is not motion but a jump of the encoder.
-const ERROR_MAX: i64 = 1 << 23;
 
 /// The estimate at the last frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,7 +59,12 @@ impl Observer {
         let travel = i64::from(self.travel.to_bits()) + moved;
         let speed = speed_before + gained;
 
-        let error = (i64::from(self.measured(encoder, config).to_bits()) - travel).clamp(-ERROR_MAX, ERROR_MAX);
+        let measured = self.measured(encoder, config);
+        let error = i64::from(measured.to_bits()) - travel;
+        if error.abs() > config.jump {
+            *self = Self { travel: measured, origin: self.origin, ..Self::new() };
+            return;
+        }
         let [l1_q32, l2_per_s_q16, l3_per_s2] = config.observer_gains;
         self.travel = Millimetres::from_bits(saturate(travel + round_shift(error * l1_q32, 32)));
         self.speed = MillimetresPerSecond::from_bits(saturate(speed + round_shift(error * l2_per_s_q16, 24)));

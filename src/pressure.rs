@@ -57,7 +57,7 @@ impl Picture {
 }
 
 /// Per-taxel calibration and the last picture.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
     picture: Picture,
     /// Reading without contact, codes in Q16.

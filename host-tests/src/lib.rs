@@ -5,6 +5,7 @@
 pub mod control_table;
 pub mod fit_cases;
 pub mod heatmap;
+pub mod long_run;
 pub mod metrics;
 pub mod native;
 pub mod optimal;

@@ -1,0 +1,260 @@
+//! The machines: observer, drive, speed loop, baseline, tare, relaxation.
+
+use super::{Machine, Outcome};
+use fingertip::config::Config;
+use fingertip::control::SpeedLoop;
+use fingertip::control::drive::Drive;
+use fingertip::control::observer::Observer;
+use fingertip::control::profile::Reference;
+use fingertip::frame::{Frame, ROWS, SATURATED, SLOTS};
+use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
+use fingertip::params::Params;
+use fingertip::pressure::{Array, TARE_FRAMES};
+use fingertip::safety::Limits;
+use fingertip::units::{Millimetres, Newtons, Ratio};
+use std::sync::Mutex;
+
+/// Steps within which a machine must come to its cycle.
+const MOST: u64 = 200_000_000;
+/// The supply of the reference finger, mV.
+const SUPPLY_MV: u16 = 6_000;
+/// Fastest and slowest scan, and the one between.
+const SCANS: [(&str, i32, i32); 3] = [("fast", 500, 3), ("default", 2_400, 15), ("slow", 100_000, 480)];
+
+/// Documented limit cycles of the observer, in units of the last place: 60 pm, 2 um/s, 4 mm/s^2.
+const TRAVEL_SWING: i64 = 1;
+const SPEED_SWING: i64 = 131;
+const DISTURBANCE_SWING: i64 = 1_024;
+
+/// All machines. With `whole`, those that are quick enough also take all their steps one by one, and the relaxation has its
+/// longest time constant.
+pub fn all(whole: bool) -> Vec<Outcome> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (scan, settle_ns, sample_cycles) in SCANS {
+        let config = Config::new(&Params { settle_ns, sample_cycles, ..Params::DEFAULT }).expect("allowed");
+        // The default scan is the one to take every step of.
+        let whole = whole && scan == "default";
+        queue(&mut runs, observers(scan, &config), whole);
+        queue(&mut runs, drives(scan, &config), whole);
+        queue(&mut runs, loops(scan, &config), whole);
+    }
+    queue(&mut runs, baselines(), false);
+    queue(&mut runs, tares(), false);
+    queue(&mut runs, relaxations(whole), whole);
+    in_parallel(runs)
+}
+
+type Run = Box<dyn FnOnce() -> Outcome + Send>;
+
+fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: Vec<Machine<S>>, whole: bool) {
+    runs.extend(machines.into_iter().map(|machine| Box::new(move || machine.run(MOST, whole)) as Run));
+}
+
+/// The outcomes in the order of the runs.
+fn in_parallel(runs: Vec<Run>) -> Vec<Outcome> {
+    let count = runs.len();
+    let queue = Mutex::new(runs.into_iter().enumerate());
+    let outcomes = Mutex::new(Vec::with_capacity(count));
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                loop {
+                    let next = queue.lock().expect("no run panicked").next();
+                    let Some((place, run)) = next else { break };
+                    let outcome = run();
+                    outcomes.lock().expect("no run panicked").push((place, outcome));
+                }
+            });
+        }
+    });
+    let mut outcomes = outcomes.into_inner().expect("no run panicked");
+    outcomes.sort_by_key(|(place, _)| *place);
+    outcomes.into_iter().map(|(_, outcome)| outcome).collect()
+}
+
+/// Encoder and acceleration, held or in turns.
+fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
+    let limit = config.current_limit;
+    let inputs = [
+        ("nothing", [(0, 0); 2]),
+        ("one count", [(1, 0); 2]),
+        ("a blocked motor at its current limit", [(0, limit); 2]),
+        ("the least acceleration", [(0, 1); 2]),
+        ("the encoder at its end", [(i32::MAX, limit); 2]),
+        ("the encoder at its other end", [(i32::MIN, -limit); 2]),
+        ("one count in turns", [(0, 0), (1, 0)]),
+        ("the current limit in turns", [(0, limit), (0, -limit)]),
+        ("the encoder's ends in turns", [(i32::MIN, i64::from(i32::MAX)), (i32::MAX, i64::from(i32::MIN))]),
+        ("accelerations beyond the type in turns", [(0, 1 << 60), (1, -(1 << 60))]),
+    ];
+    let machine = |(input, pair): (&str, [(i32, i64); 2])| {
+        let config = config.clone();
+        Machine {
+            name: format!("observer, {scan} scan, {input}"),
+            start: Observer::new(),
+            inputs: 2,
+            step: Box::new(move |observer: &mut Observer| {
+                pair.iter().for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, &config));
+            }),
+            outputs: vec![
+                ("travel", |observer| observer.travel.to_bits().into(), TRAVEL_SWING),
+                ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
+                ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
+            ],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// The wanted acceleration, held or in turns.
+fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
+    let far = 1 << 46;
+    let inputs =
+        [("nothing", [0; 2]), ("all", [far; 2]), ("all in turns", [far, -far]), ("the least in turns", [1, -1])];
+    let machine = |(input, pair): (&str, [i64; 2])| {
+        let config = config.clone();
+        Machine {
+            name: format!("drive, {scan} scan, {input} wanted"),
+            start: Drive::new(),
+            inputs: 2,
+            step: Box::new(move |drive: &mut Drive| {
+                for wanted in pair {
+                    drive.apply(wanted, 0, SUPPLY_MV, &config, &mut Limits::default());
+                }
+            }),
+            outputs: vec![("acceleration", |drive| drive.acceleration(), 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// Observer and drive joined by the law, behind a motor that does not move, with the way still to go held or in turns.
+fn loops(scan: &str, config: &Config) -> Vec<Machine<(Observer, Drive)>> {
+    let inputs =
+        [("none", [0; 2]), ("1 um", [1 << 14; 2]), ("far", [i32::MAX; 2]), ("far in turns", [i32::MAX, i32::MIN])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let config = config.clone();
+        Machine {
+            name: format!("speed loop, {scan} scan, blocked motor, way {input}"),
+            start: (Observer::new(), Drive::new()),
+            inputs: 2,
+            step: Box::new(move |state: &mut (Observer, Drive)| {
+                for way in pair.map(Millimetres::from_bits) {
+                    let mut motion = SpeedLoop { observer: state.0, drive: state.1 };
+                    motion.observe(0, &config);
+                    let (speed, brake) = (motion.observer.speed, motion.brake(way, &config));
+                    let reference = Reference::towards(way, speed, brake, &config).limited(config.speed_max);
+                    motion.follow(reference, SUPPLY_MV, &config, &mut Limits::default());
+                    *state = (motion.observer, motion.drive);
+                }
+            }),
+            outputs: vec![
+                ("travel", |state| state.0.travel.to_bits().into(), TRAVEL_SWING),
+                ("speed", |state| state.0.speed.to_bits().into(), SPEED_SWING),
+                ("disturbance", |state| state.0.disturbance.to_bits().into(), DISTURBANCE_SWING),
+                ("acceleration", |state| state.1.acceleration(), DISTURBANCE_SWING),
+            ],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// A sound frame with every taxel at so many codes above a level of 372.
+fn frame(codes: u16) -> Frame {
+    let mut frame = Frame::EMPTY;
+    for (slot, column) in (0..SLOTS).flat_map(|slot| (0..10).map(move |column| (slot, column))) {
+        frame.set_code(slot, column, 372 + if slot < ROWS { codes } else { 0 });
+    }
+    frame
+}
+
+/// Sum of the tares, sixteenths of a code.
+fn tare_sum(array: &Array) -> i64 {
+    array.tare().map(i64::from).sum()
+}
+
+/// Frames held or in turns, from a tare at 40 codes.
+fn baselines() -> Vec<Machine<Array>> {
+    let most = SATURATED - 372 - 1;
+    let inputs = [
+        ("as tared", [40; 2]),
+        ("one code more", [41; 2]),
+        ("almost dead", [12; 2]),
+        ("almost saturated", [most; 2]),
+        ("one code in turns", [40, 41]),
+        ("the extremes in turns", [12, most]),
+    ];
+    let machine = |(input, pair): (&str, [u16; 2])| {
+        let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+        let frames = pair.map(frame);
+        let mut start = Array::new();
+        tare(&mut start, &frame(40), &config);
+        Machine {
+            name: format!("baseline, {input}"),
+            start,
+            inputs: ROWS as u64,
+            step: Box::new(move |array: &mut Array| {
+                // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
+                for frame in frames.iter().cycle().take(ROWS) {
+                    array.read(frame, &config);
+                    array.follow_drift();
+                }
+            }),
+            outputs: vec![("sum of the tares", tare_sum, 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+fn tare(array: &mut Array, frame: &Frame, config: &Config) {
+    array.start_tare();
+    for _ in 0..TARE_FRAMES {
+        array.read(frame, config);
+        array.continue_tare();
+    }
+}
+
+/// Tare upon tare, of one frame or of two in turns.
+fn tares() -> Vec<Machine<Array>> {
+    let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, SATURATED - 372 - 1])];
+    let machine = |(input, pair): (&str, [u16; 2])| {
+        let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+        let frames = pair.map(frame);
+        Machine {
+            name: format!("tare, {input}"),
+            start: Array::new(),
+            inputs: 2 * u64::from(TARE_FRAMES),
+            step: Box::new(move |array: &mut Array| frames.iter().for_each(|frame| tare(array, frame, &config))),
+            outputs: vec![("sum of the tares", tare_sum, 0)],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// Three terms from the shortest to the longest time constant.
+fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
+    let period_us = 94;
+    let periods = if longest { fingertip::model::PERIODS_MAX } else { 1 << 14 };
+    let terms = [(20_000, 1), (20_000, 1_000), (25_536, periods)];
+    let terms = terms.map(|(share, periods)| RelaxationTerm {
+        share: Ratio::from_bits(share),
+        time_constant_us: periods * period_us,
+    });
+    let inputs =
+        [("none", [0; 2]), ("the least", [1; 2]), ("the largest", [i32::MAX; 2]), ("extremes in turns", [0, i32::MAX])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let filter = Relaxation::new(period_us, &terms).expect("allowed");
+        Machine {
+            name: format!("relaxation over {periods} periods, force {input}"),
+            start: RelaxationState::settled(Newtons::from_bits(1 << 20)),
+            inputs: 2,
+            step: Box::new(move |state: &mut RelaxationState<3>| {
+                for force in pair.map(Newtons::from_bits) {
+                    filter.step(state, force);
+                }
+            }),
+            outputs: vec![],
+        }
+    };
+    inputs.map(machine).into()
+}

@@ -1,0 +1,84 @@
+//! Filters and integrators in the loop over 10^9 steps, by their cycles; `long-run` also takes the steps one by one.
+
+use fastrand::Rng;
+use fingertip::config::Config;
+use fingertip::control::observer::Observer;
+use fingertip::params::Params;
+use fingertip::safety::Mode;
+use host_tests::long_run::{Cycle, Machine, all, cycle, hold};
+
+#[test]
+fn nothing_in_the_loop_drifts_or_swings() {
+    for outcome in all(false) {
+        println!("{outcome}");
+        assert!(outcome.passes(), "{outcome}");
+    }
+}
+
+#[test]
+fn the_pipeline_comes_to_rest_under_what_does_not_change() {
+    let cases = [
+        ("off", false, 0, 0, Mode::Off),
+        ("off, with a drifted array", false, 0, 1, Mode::Off),
+        ("released", true, 0, 0, Mode::Release),
+        ("released, with a drifted array", true, 0, 1, Mode::Release),
+        ("pressing with less than the goal", true, 7_000, 60, Mode::Force),
+        ("pressing with more than the goal", true, 50, 1_500, Mode::Force),
+    ];
+    for (name, torque, goal_mn, codes, mode) in cases {
+        let (outcome, status) = hold(name, torque, goal_mn, codes, 20_000_000);
+        println!("{outcome}");
+        assert_eq!((status.mode, status.fault), (mode, None), "{name}");
+    }
+}
+
+/// Whatever the encoder did, the observer comes to rest once it stands: also after jumps, and from speeds that no tip has.
+#[test]
+fn the_observer_recovers_from_anything() {
+    for (settle_ns, sample_cycles, speed_max_um_per_s) in
+        [(500, 3, 2_000_000), (2_400, 15, 250_000), (100_000, 480, 1_000)]
+    {
+        let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, ..Params::DEFAULT };
+        let config = Config::new(&params).unwrap();
+        let mut rng = Rng::with_seed(11);
+        for _ in 0..300 {
+            let mut observer = Observer::new();
+            let (reach, frames) = (1 << rng.u32(1..31), rng.u32(1..200));
+            for _ in 0..frames {
+                observer.update(rng.i32(-reach..reach), rng.i64(-(1 << 40)..1 << 40), &config);
+            }
+            let encoder = rng.i32(-50_000..50_000);
+            let (_, rest) =
+                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config)).expect("a cycle");
+            let measured = rest.measured(encoder, &config).to_bits();
+            assert!((rest.travel.to_bits() - measured).abs() <= 1, "{rest:?} at {measured}");
+            assert!(rest.speed.to_bits().abs() <= 131 && rest.disturbance.to_bits().abs() <= 1_024, "{rest:?}");
+        }
+    }
+}
+
+/// The search for cycles finds those that are known.
+#[test]
+fn known_cycles_are_found() {
+    let step = |x: &mut u32| *x = if *x < 100 { *x + 1 } else { 94 };
+    let (found, begin) = cycle(&0, 10_000, step).unwrap();
+    assert_eq!(found.length, 7);
+    assert!(found.lead >= 94 && (94..=100).contains(&begin));
+    let (rest, _) = cycle(&5, 10, |_: &mut i32| {}).unwrap();
+    assert_eq!(rest, Cycle { lead: 0, length: 1 });
+    assert_eq!(cycle(&0_u64, 100_000, |x| *x += 1), None);
+}
+
+/// A swing beyond what is documented is a failure, one within it is not.
+#[test]
+fn a_swing_is_measured() {
+    let swings = |allowed| Machine {
+        name: "two-step".into(),
+        start: 0,
+        inputs: 1,
+        step: Box::new(|x: &mut i64| *x = 5 - *x),
+        outputs: vec![("value", |x| *x, allowed)],
+    };
+    assert!(swings(5).run(100, false).passes());
+    assert!(!swings(4).run(100, false).passes());
+}

@@ -60,8 +60,8 @@ impl Effort {
 
 /// A contact with less confidence than this is not a hemisphere on a plane.
 pub const CONFIDENCE_LEAST: u8 = 128;
-/// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 4 %.
-const RESIDUAL_MAX: u32 = 655;
+/// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 2.7 %.
+const RESIDUAL_MAX: u32 = 442;
 /// A first step that moves farther than this, Q24 of the radius, is followed by another: 1/32.
 const FAR: u32 = 1 << (CENTRE_BITS - 5);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
@@ -69,7 +69,7 @@ const RESTS: u32 = 1 << (CENTRE_BITS - 14);
 /// Where the sum is more than this many peaks, the least effort looks at every other taxel.
 const LARGE: i32 = 16;
 /// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
-const TAXELS_MIN: u32 = 5;
+const TAXELS_MIN: i32 = 5;
 
 /// Reads the contact. Any picture is taken.
 ///
@@ -144,7 +144,7 @@ fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &G
     while quick + close > 0 {
         let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
         let equations = step::equations(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
-        let (next, promised) = equations.solve(&guess, view, geometry);
+        let (next, promised) = equations.solve(&guess, rim.is_some(), view, geometry);
         let moved = distance(&guess, &next);
         (guess, misfit) = (next, promised);
         if quick > 0 {
@@ -173,8 +173,10 @@ fn distance(from: &Guess, to: &Guess) -> u32 {
 
 /// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
 fn confidence(misfit: &Misfit, view: &View) -> u8 {
+    let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
     // Squares count 2^-24, 4 bits fewer than a share's square.
-    let mean = (misfit.squares.max(0).unsigned_abs() / misfit.taxels.max(1)).min(u32::MAX >> 4) << 4;
+    let larger = mean(misfit.inside, misfit.taxels).max(mean(misfit.outside, misfit.others));
+    let mean = larger.min(u32::MAX >> 4) << 4;
     let residual = arith::root(mean.saturating_sub(view.converter_square()));
     (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
 }

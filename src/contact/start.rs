@@ -71,7 +71,7 @@ impl Sums {
                 }
                 let strain = high(share << 10, inverse_modulus).min(STRAIN_MAX).unsigned_abs();
                 let left = (1 << 16) - strain;
-                let taxel_z = (strain * ((2 << 16) - strain) / ((left * left) >> (32 - 4 - Z_BITS))) as i32;
+                let taxel_z = (strain * ((2 << 16) - strain) / ((left * left) >> (32 - 4 - Z_BITS)).max(1)) as i32;
                 let weight = share >> WEIGHT_DROP;
                 let (wx, wz) = (weight * x, weight * taxel_z);
                 n += weight;

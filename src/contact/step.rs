@@ -1,7 +1,8 @@
 //! One refinement: the weighted normal equations of all live taxels, and their solution.
 //!
 //! The unknowns are scaled so that every slope is at most about 1: the change of ln(s), and the centre's in units of s^2.
-//! A taxel's weight falls from 1 where the model sees no pressure to 1/4 at the peak: a reading's error grows with the reading.
+//! A reading's error grows with the reading, so a taxel's weight falls with the model's pressure: in the quick steps from 1
+//! to 1/4 at the peak, in the close ones to 1/25.
 
 use super::arith::{Divisor, high, within};
 use super::geometry::{Geometry, PLACE_BITS};
@@ -21,13 +22,17 @@ const CENTRE_STEP: i32 = 1 << 22;
 /// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
-/// How far the model and the picture are apart.
+/// How far the model and the picture are apart; squares count 2^-24 of the peak's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Misfit {
-    /// Sum of the squared residuals, weighted, Q24 of the peak's square.
-    pub squares: i32,
-    /// Live taxels within the model's contact.
-    pub taxels: u32,
+    /// Sum of the squared residuals, weighted, of live taxels within the model's contact.
+    pub inside: i32,
+    /// How many these are.
+    pub taxels: i32,
+    /// Sum of the squares of the other live taxels.
+    pub outside: i32,
+    /// How many these are.
+    pub others: i32,
 }
 
 /// Sums over a row: rest is `a`, square times weight is `k`, of which the place makes the centre's slope.
@@ -42,7 +47,8 @@ struct Row {
     rest: i32,
     square: i32,
     x: i32,
-    squares: i32,
+    inside: i32,
+    outside: i32,
 }
 
 /// Bits dropped from a row's sums, so that ten rows fit 32 bits.
@@ -84,7 +90,7 @@ pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
         let (mut column, stride) = which.columns(row);
         let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
         let dy_square = square(pressed.dy[row]);
-        let mut squares = 0;
+        let (mut inside, mut outside) = (0, 0);
         while column < COLUMNS {
             if bad & 1 == 0 {
                 let at = pressed.dx_square[column] + dy_square;
@@ -93,15 +99,17 @@ pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
                     let felt = pressed.felt(at);
                     misfit.taxels += 1;
                     let residual = residual(share - felt.pressure);
-                    squares += ((weight(&felt) * residual) >> SLOPE_BITS) * residual;
+                    inside += ((weight(felt.pressure) * residual) >> SLOPE_BITS) * residual;
                 } else {
-                    squares += residual(share) * residual(share);
+                    misfit.others += 1;
+                    outside += residual(share) * residual(share);
                 }
             }
             column += stride;
             bad >>= stride;
         }
-        misfit.squares += squares >> ROW_DROP;
+        misfit.inside += inside >> ROW_DROP;
+        misfit.outside += outside >> ROW_DROP;
     }
     misfit
 }
@@ -125,9 +133,11 @@ pub(super) fn equations(pressed: &Pressed, view: &View, which: Taxels, rim: Opti
                         felt.pressure = rim.pressure(dx, dy);
                     }
                     all.misfit.taxels += 1;
-                    sums.add(&felt, dx, residual(share - felt.pressure));
+                    let weights = [weight(felt.pressure), if rim.is_some() { noise_weight(felt.pressure) } else { 0 }];
+                    sums.add(&felt, dx, residual(share - felt.pressure), weights);
                 } else {
-                    sums.squares += residual(share) * residual(share);
+                    all.misfit.others += 1;
+                    sums.outside += residual(share) * residual(share);
                 }
             }
             column += stride;
@@ -144,16 +154,25 @@ fn residual(of: i32) -> i32 {
     of.max(-RESIDUAL_LIMIT).min(RESIDUAL_LIMIT - 1)
 }
 
-/// 1 less 3/4 of the model's pressure over the peak, Q13.
+/// The weight of the quick model and of the residual: 1 less 3/4 of the model's pressure over the peak, Q13.
 #[inline(always)]
-fn weight(felt: &Felt) -> i32 {
-    (1 << SLOPE_BITS) - (3 * felt.pressure.max(0).min((1 << PEAK_BITS) - 1) >> 3)
+fn weight(pressure: i32) -> i32 {
+    (1 << SLOPE_BITS) - (3 * pressure.max(0).min((1 << PEAK_BITS) - 1) >> 3)
+}
+
+/// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak, Q13.
+#[inline(always)]
+fn noise_weight(pressure: i32) -> i32 {
+    let quarter = 1 << (PEAK_BITS - 2);
+    let ratio = (quarter << SLOPE_BITS) / (pressure.max(0).min(1 << PEAK_BITS) + quarter);
+    (ratio * ratio) >> SLOPE_BITS
 }
 
 impl Row {
     #[inline(always)]
-    fn add(&mut self, felt: &Felt, dx: i32, residual: i32) {
-        let weight = weight(felt);
+    fn add(&mut self, felt: &Felt, dx: i32, residual: i32, weights: [i32; 2]) {
+        let [own, noise] = weights;
+        let weight = if noise > 0 { noise } else { own };
         let rest = (weight * felt.by_rest) >> SLOPE_BITS;
         let square = (weight * felt.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
@@ -167,7 +186,7 @@ impl Row {
         self.rest += rest * residual;
         self.square += square * residual;
         self.x += weighted_x * residual;
-        self.squares += ((weight * residual) >> SLOPE_BITS) * residual;
+        self.inside += ((own * residual) >> SLOPE_BITS) * residual;
     }
 }
 
@@ -186,11 +205,12 @@ impl Equations {
         *s -= row.rest >> ROW_DROP;
         *x += row.x >> ROW_DROP;
         *y += high(row.square, dy);
-        self.misfit.squares += row.squares >> ROW_DROP;
+        self.misfit.inside += row.inside >> ROW_DROP;
+        self.misfit.outside += row.outside >> ROW_DROP;
     }
 
     /// The next guess, and the misfit that the linearised model promises there.
-    pub fn solve(&self, guess: &Guess, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
+    pub fn solve(&self, guess: &Guess, close: bool, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
         let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());
@@ -221,7 +241,7 @@ impl Equations {
             centre + within(wide, CENTRE_STEP)
         };
         let next = Guess::new(rest, moved(guess.x, x_step), moved(guess.y, y_step), geometry);
-        let promised = times(rest_step, s) + times(x_step, x) + times(y_step, y);
-        (next, Misfit { squares: (self.misfit.squares - promised).max(0), ..self.misfit })
+        let promised = if close { 0 } else { times(rest_step, s) + times(x_step, x) + times(y_step, y) };
+        (next, Misfit { inside: (self.misfit.inside - promised).max(0), ..self.misfit })
     }
 }

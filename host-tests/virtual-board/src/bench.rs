@@ -2,6 +2,7 @@
 
 use crate::board::FingerBoard;
 use crate::error::Error;
+use crate::flash::Kept;
 use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
 use crate::log::{Log, LogLine};
@@ -15,6 +16,7 @@ use rigless::session::Session;
 use rigless::snapshot::{self, Reader, Store, Writer};
 use rigless::soc::stm32f427::generated::{GPIOC, TIM1};
 use rigless::time::VirtualNanos;
+use serde::{Deserialize, Serialize};
 
 /// The world's step.
 pub const STEP_NS: u64 = 10_000;
@@ -22,6 +24,21 @@ pub const STEP_NS: u64 = 10_000;
 const LOG_NS: u64 = 1_000_000;
 /// TIM1's registers behind which the duty stands, as offsets: CCR1 and CCR2.
 const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
+
+/// What the encoder still has to turn of the last step's way. The timer's input filter, like the real one, ignores edges that
+/// follow each other faster than any motor turns, so they are spread over the step.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Turning {
+    left: i32,
+    at_ns: u64,
+    every_ns: u64,
+}
+
+impl Turning {
+    fn new(at_ns: u64, quarters: i32) -> Self {
+        Self { left: quarters, at_ns, every_ns: STEP_NS / u64::from(quarters.unsigned_abs().max(1)) }
+    }
+}
 
 /// All that is not the board, and that a snapshot keeps.
 #[derive(Debug)]
@@ -42,11 +59,14 @@ pub struct Bench {
     pub received: Vec<TimedByte>,
     /// The core is held until the next reset.
     pub core_held: bool,
+    /// What the image wrote to the flash.
+    pub flash: Kept,
     /// Samples the world where somebody asked for it; a snapshot does not keep it.
     pub recorder: Option<Recorder>,
     world_ns: u64,
     bridge: Bridge,
     encoder: i32,
+    turning: Turning,
     resets: usize,
 }
 
@@ -65,10 +85,12 @@ impl Bench {
             log: Log::new(image)?,
             received: Vec::new(),
             core_held: false,
+            flash: Kept::default(),
             recorder: None,
             world_ns: 0,
             bridge: Bridge::Coast,
             encoder: 0,
+            turning: Turning::default(),
             resets: 0,
         })
     }
@@ -124,10 +146,11 @@ impl Bench {
         }
         let counts = self.front_end.lock().world.encoder_counts();
         if counts != self.encoder {
-            board.part.turn_encoder(stop.at, counts.wrapping_sub(self.encoder));
+            self.turning = Turning::new(now_ns, counts.wrapping_sub(self.encoder));
             self.encoder = counts;
+            self.turn(session.board_mut(), stop);
         }
-        for byte in board.wire().take_received() {
+        for byte in session.board_mut().wire().take_received() {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));
             self.received.push(byte);
         }
@@ -143,8 +166,22 @@ impl Bench {
         }
     }
 
-    /// The instant of the grid to stop at next.
+    /// Moves the encoder by the next of the edges that are still to come before the grid's next instant; false where none is.
+    pub fn turn(&mut self, board: &mut FingerBoard, stop: Stop) -> bool {
+        let quarter = self.turning.left.signum();
+        if quarter != 0 {
+            board.part.turn_encoder(stop.at, quarter);
+            self.turning.left -= quarter;
+        }
+        quarter != 0
+    }
+
+    /// The instant to stop at next: that of an edge of the encoder on the way, or the grid's.
     pub fn next(&mut self) -> VirtualNanos {
+        if self.turning.left != 0 {
+            self.turning.at_ns += self.turning.every_ns;
+            return VirtualNanos(self.turning.at_ns);
+        }
         self.next_ns += STEP_NS;
         VirtualNanos(self.next_ns)
     }
@@ -152,19 +189,19 @@ impl Bench {
 
 impl Store for Bench {
     fn store(&self, to: &mut Writer) -> Result<(), snapshot::Error> {
-        let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, .. } = self;
-        let Self { world_ns, bridge, encoder, resets, .. } = self;
-        to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held))?;
-        to.put(&(world_ns, bridge, encoder, resets))?;
+        let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, flash, .. } = self;
+        let Self { world_ns, bridge, encoder, turning, resets, .. } = self;
+        to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held, flash))?;
+        to.put(&(world_ns, bridge, encoder, turning, resets))?;
         to.put(&*front_end.lock())
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), snapshot::Error> {
         let log: (Vec<u8>, Vec<LogLine>);
-        (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held) =
+        (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held, self.flash) =
             from.take()?;
         self.log.set_state(log.0, log.1);
-        (self.world_ns, self.bridge, self.encoder, self.resets) = from.take()?;
+        (self.world_ns, self.bridge, self.encoder, self.turning, self.resets) = from.take()?;
         *self.front_end.lock() = from.take::<FrontEnd>()?;
         Ok(())
     }

@@ -100,10 +100,13 @@ impl Board for FingerBoard {
     }
 
     fn mcu(&mut self, target: usize) -> Option<&mut dyn Mcu> {
+        self.part.set_laying_out(false);
         (target == 0).then_some(&mut self.part)
     }
 
+    /// The emulator asks for the targets when it lays out memory, and for the microcontroller from then on.
     fn targets(&mut self) -> Vec<Target<'_>> {
+        self.part.set_laying_out(true);
         let core = self.core();
         vec![Target::new("stm32", &mut self.part, core)]
     }

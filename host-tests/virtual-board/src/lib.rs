@@ -14,6 +14,7 @@ pub mod converter;
 pub mod demo;
 pub mod error;
 pub mod faults;
+pub mod flash;
 pub mod front_end;
 pub mod gaps;
 pub mod image;

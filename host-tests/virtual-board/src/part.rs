@@ -5,6 +5,7 @@
 
 use crate::board::BUS_PORT;
 use crate::converter::Converter;
+use crate::flash;
 use crate::front_end::Shared;
 use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
@@ -12,9 +13,9 @@ use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
-use rigless::soc::stm32f427::peripherals::CONVERTERS;
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::tim::Channel;
+use rigless::soc::stm32f427::peripherals::{CONVERTERS, SERIAL_INTERFACES};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,18 @@ const RESET_HZ: u64 = 16_000_000;
 /// TIM3 in the part's list of timers, and TIM1 in that of the advanced ones.
 const TIM3: usize = 1;
 const TIM1: usize = 0;
+
+/// Who answers for a slot of the bus.
+#[derive(Clone, Copy, Debug)]
+enum Model {
+    /// The crate's part.
+    Chip,
+    Converter(usize),
+    ScanTimer,
+    Streams,
+    /// Nobody: the image does not use the SPIs, and they would hear every request of the scan.
+    None,
+}
 
 /// The levels that the board holds on pins, through every reset of the part.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -44,15 +57,15 @@ pub struct Part {
     streams: Streams,
     inputs: Inputs,
     front_end: Shared,
-    converter_slots: [usize; 3],
-    scan_timer_slot: usize,
-    streams_slot: usize,
+    layout: Bus,
+    laying_out: bool,
+    wiring: Vec<Model>,
 }
 
 store!(Part {
     values: [inputs],
     parts: [chip, converters, scan_timer, streams],
-    built: [front_end, converter_slots, scan_timer_slot, streams_slot],
+    built: [front_end, layout, laying_out, wiring],
 });
 
 impl Part {
@@ -62,12 +75,16 @@ impl Part {
     /// The part's description lacks an instance: another release of the crate.
     pub fn new(front_end: Shared) -> Result<Self, Error> {
         let chip = Stm32f427::new()?;
-        let mut converter_slots = [0; 3];
-        for (slot, name) in converter_slots.iter_mut().zip(CONVERTERS) {
-            *slot = chip.bus().slot(name)?;
+        let mut wiring = vec![Model::Chip; chip.bus().slots().len()];
+        for (nth, name) in CONVERTERS.iter().enumerate() {
+            wiring[chip.bus().slot(name)?] = Model::Converter(nth);
         }
-        let scan_timer_slot = chip.bus().slot("TIM8")?;
-        let streams_slot = chip.bus().slot("DMA2")?;
+        wiring[chip.bus().slot("TIM8")?] = Model::ScanTimer;
+        wiring[chip.bus().slot("DMA2")?] = Model::Streams;
+        for name in SERIAL_INTERFACES {
+            wiring[chip.bus().slot(name)?] = Model::None;
+        }
+        let layout = flash::layout(chip.bus())?;
         let mut part = Self {
             chip,
             converters: Self::converters(&front_end),
@@ -75,9 +92,9 @@ impl Part {
             streams: Streams::new(front_end.clone()),
             inputs: Inputs { quarter: 0, bridge_well: true },
             front_end,
-            converter_slots,
-            scan_timer_slot,
-            streams_slot,
+            layout,
+            laying_out: false,
+            wiring,
         };
         part.drive_inputs(VirtualNanos(0));
         Ok(part)
@@ -85,6 +102,11 @@ impl Part {
 
     fn converters(front_end: &Shared) -> [Converter; 3] {
         std::array::from_fn(|nth| Converter::new(nth, front_end.clone(), RESET_HZ / 2))
+    }
+
+    /// Whether the emulator is laying out memory just now: then the bus is one that knows who programs the flash.
+    pub fn set_laying_out(&mut self, laying_out: bool) {
+        self.laying_out = laying_out;
     }
 
     /// The front end that the converters are on.
@@ -138,7 +160,7 @@ impl Part {
 
 impl Mcu for Part {
     fn bus(&self) -> &Bus {
-        self.chip.bus()
+        if self.laying_out { &self.layout } else { self.chip.bus() }
     }
 
     fn bus_mut(&mut self) -> &mut Bus {
@@ -162,15 +184,13 @@ impl Mcu for Part {
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
-        let own: &mut dyn ErasedDevice = if slot == self.scan_timer_slot {
-            &mut self.scan_timer
-        } else if slot == self.streams_slot {
-            &mut self.streams
-        } else if let Some(nth) = self.converter_slots.iter().position(|own| *own == slot) {
-            &mut self.converters[nth]
-        } else {
-            return self.chip.split(slot);
+        let own: Option<&mut dyn ErasedDevice> = match self.wiring.get(slot) {
+            Some(Model::Converter(nth)) => Some(&mut self.converters[*nth]),
+            Some(Model::ScanTimer) => Some(&mut self.scan_timer),
+            Some(Model::Streams) => Some(&mut self.streams),
+            Some(Model::None) => None,
+            Some(Model::Chip) | None => return self.chip.split(slot),
         };
-        (self.chip.bus_mut(), Some(own))
+        (self.chip.bus_mut(), own)
     }
 }

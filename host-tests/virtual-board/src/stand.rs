@@ -28,6 +28,7 @@ impl Stand<'_> {
     /// # Errors
     /// A reset is under way at this very instant.
     pub fn snapshot(&mut self) -> Result<Vec<u8>, Error> {
+        self.bench.flash.keep(self.host);
         Ok(rigless::snapshot::take(self.session, self.host, self.stop, self.firmware, self.bench)?.file)
     }
 }
@@ -52,6 +53,9 @@ impl Hall {
     /// Takes orders until one says to run on; false when nobody will order any more.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let Self { bench, orders, reached, firmware, until_ns, begun } = self;
+        if !*begun {
+            bench.flash.put_back(host);
+        }
         *begun = true;
         if reached.send(bench.next_ns).is_err() {
             return false;
@@ -72,7 +76,10 @@ impl Hall {
 impl Driver<FingerBoard> for Hall {
     fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
         match settled {
-            Settled::Access { access, .. } => self.bench.accessed(session.board_mut(), &access),
+            Settled::Access { access, .. } => {
+                self.bench.accessed(session.board_mut(), &access);
+                self.bench.flash.stored(session, host, &access);
+            }
             // A run from a snapshot comes back first to where it was taken, inside that halt.
             Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {
                 let next = if self.halt(session, stop, host) { self.bench.next() } else { stop.at };
@@ -83,6 +90,9 @@ impl Driver<FingerBoard> for Hall {
     }
 
     fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        if self.bench.turn(session.board_mut(), stop) {
+            return Some(self.bench.next());
+        }
         self.bench.step(session, stop, host);
         if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
             return None;

@@ -1,0 +1,110 @@
+//! The defects that the rig can inject do to the microcontroller what they say.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+use host_tests::plant::{Setup, World};
+use std::path::PathBuf;
+use virtual_board::flash::SECTOR;
+use virtual_board::{Fault, Options, Rig};
+
+fn image() -> PathBuf {
+    let path = std::env::var_os("FINGERTIP_IMAGE");
+    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
+}
+
+/// A board that has run for 20 ms.
+fn running(options: &Options) -> Rig {
+    let mut rig = Rig::new(&image(), World::new(&Setup::default()), options).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    rig
+}
+
+fn frames(rig: &mut Rig) -> u64 {
+    rig.scan_counts().expect("it runs").frames
+}
+
+const WAIT_NS: u64 = 5_000_000;
+
+#[test]
+fn converters_stall_and_go_on() {
+    let mut rig = running(&Options::default());
+    rig.inject(Fault::ConvertersStall).expect("it runs");
+    let before = frames(&mut rig);
+    rig.run_ms(2).expect("it runs");
+    assert!(frames(&mut rig) <= before + 1, "a frame under way may end");
+    rig.mend(Fault::ConvertersStall).expect("it runs");
+    rig.run_ms(2).expect("it runs");
+    assert!(frames(&mut rig) > before + 15);
+}
+
+#[test]
+fn a_core_that_hangs_is_reset_by_the_watchdog_and_scans_again() {
+    let mut rig = running(&Options::default());
+    rig.inject(Fault::CoreHangs).expect("it runs");
+    rig.run_ms(100).expect("it runs");
+    let resets = rig.resets().expect("it runs");
+    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["IWDG"]);
+    let before = frames(&mut rig);
+    rig.run_ms(10).expect("it runs");
+    assert!(frames(&mut rig) > before + 90);
+}
+
+#[test]
+fn without_the_scans_interrupt_the_image_misses_frames_that_go_on() {
+    let mut rig = running(&Options::default());
+    assert_eq!(alert(&mut rig), Some(false));
+    rig.inject(Fault::ScanInterruptLost).expect("it runs");
+    let before = frames(&mut rig);
+    rig.run_ms(2).expect("it runs");
+    assert!(frames(&mut rig) > before + 10, "the image may restart the scan but not stop it");
+    assert_eq!(alert(&mut rig), Some(true));
+}
+
+/// The alert bit in the answer to a ping.
+fn alert(rig: &mut Rig) -> Option<bool> {
+    const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
+    let reply = rig.transact(&PING, WAIT_NS).expect("it runs");
+    reply.get(8).map(|error| error & 0x80 != 0)
+}
+
+#[test]
+fn a_bus_error_is_a_hard_fault_that_resets() {
+    let mut rig = running(&Options::default());
+    // The next access to TIM5, the frame guard.
+    rig.inject(Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 }).expect("it runs");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(rig.resets().expect("it runs").first().map(|reset| reset.cause.clone()).as_deref(), Some("software"));
+}
+
+#[test]
+fn what_is_stored_survives_a_snapshot_and_a_reboot() {
+    let file = std::env::temp_dir().join(format!("virtual-board-flash-{}.snapshot", std::process::id()));
+    let mut rig = running(&Options::default());
+    // Register 7 is the ID, register 262 stores it.
+    let written = rig.client(WAIT_NS, |bus| bus.write_u8(1, 7, 42).and_then(|_| bus.write_u8(42, 262, 1)).map(drop));
+    written.expect("the client runs").expect("the ID is taken and stored");
+    rig.run_ms(10).expect("it runs");
+    rig.snapshot(&file).expect("a snapshot is taken");
+    drop(rig);
+
+    let mut rig = Rig::restore(&image(), &file, &Options::default()).expect("the snapshot is restored");
+    std::fs::remove_file(&file).expect("the snapshot's file was there");
+    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(42).map(drop)).expect("the client runs");
+    rebooted.expect("it answers before it reboots");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(rig.resets().expect("it runs").len(), 1);
+    let found = rig.client(WAIT_NS, |bus| bus.ping(42).map(drop)).expect("the client runs");
+    found.expect("it answers to the stored ID");
+    rig.check_gaps().expect("no unknown gap");
+}
+
+#[test]
+fn a_damaged_sector_can_be_preset() {
+    let damaged = Options { presets: vec![(SECTOR.start, vec![0x55; 64])], ..Options::default() };
+    let logs = |options: &Options| {
+        let lines = running(options).log().expect("it runs");
+        lines.iter().any(|line| line.level.as_deref() != Some("info") && line.text.contains("record"))
+    };
+    assert!(logs(&damaged));
+    assert!(!logs(&Options::default()));
+}

@@ -52,7 +52,7 @@ impl Bridge {
         nfault: Peri<'static, PB12>,
         nsleep: Peri<'static, PC9>,
     ) -> Self {
-        pins::low_output(nsleep, Speed::Low);
+        pins::low_output(nsleep.into(), Speed::Low);
         rcc::enable_and_reset::<TIM1>();
         let timer = pac::TIM1;
         timer.arr().write(|w| w.set_arr(PERIOD_TICKS - 1));

@@ -11,7 +11,7 @@ pub fn rows(pins: [Peri<'static, AnyPin>; 10]) {
 }
 
 /// Inputs of the converters.
-pub fn analog<const N: usize>(pins: [Peri<'static, AnyPin>; N]) {
+pub fn analog(pins: impl IntoIterator<Item = Peri<'static, AnyPin>>) {
     for pin in pins {
         let mut pin = Flex::new(pin);
         pin.set_as_analog();
@@ -21,20 +21,22 @@ pub fn analog<const N: usize>(pins: [Peri<'static, AnyPin>; N]) {
 
 /// A timer's input.
 pub fn timer_input(pin: Peri<'static, impl Pin>, function: u8, pull: Pull) {
-    alternate(pin, function, AfType::input(pull));
+    alternate(pin.into(), function, AfType::input(pull));
 }
 
 /// A timer's output, pulled down while the timer leaves it.
 pub fn timer_output(pin: Peri<'static, impl Pin>, function: u8) {
-    alternate(pin, function, AfType::output_pull(OutputType::PushPull, Speed::High, Pull::Down));
+    alternate(pin.into(), function, AfType::output_pull(OutputType::PushPull, Speed::High, Pull::Down));
 }
 
 /// An output that starts low and is then set through its port.
-pub fn low_output(pin: Peri<'static, impl Pin>, speed: Speed) {
+#[inline(never)]
+pub fn low_output(pin: Peri<'static, AnyPin>, speed: Speed) {
     core::mem::forget(Output::new(pin, Level::Low, speed));
 }
 
-fn alternate(pin: Peri<'static, impl Pin>, function: u8, kind: AfType) {
+#[inline(never)]
+fn alternate(pin: Peri<'static, AnyPin>, function: u8, kind: AfType) {
     let mut pin = Flex::new(pin);
     pin.set_as_af_unchecked(function, kind);
     keep(pin);

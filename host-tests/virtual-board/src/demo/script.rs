@@ -7,6 +7,7 @@ use crate::front_end::ScanCounts;
 use crate::gaps::Gap;
 use crate::measure::Latency;
 use crate::recorder::Recorder;
+use dynamixel2::{InvalidMessage, ReadError, TransferError};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::link::table::address;
 use fingertip::safety::{Limits, Mode};
@@ -63,6 +64,8 @@ pub struct Poll {
     pub force_n: f64,
     /// Indentation from it.
     pub indentation_mm: f64,
+    /// Travel of the tip by the encoder, since torque was enabled.
+    pub travel_mm: f64,
     /// Centre of the contact, along columns and rows.
     pub centre_mm: [f64; 2],
     /// Contact radius.
@@ -252,7 +255,7 @@ fn fill_in(run: &mut Run) {
 fn ask<T: Send + 'static>(
     rig: &mut Rig,
     doing: &str,
-    job: impl FnOnce(&mut Client) -> Result<T, dynamixel2::TransferError> + Send,
+    job: impl FnOnce(&mut Client) -> Result<T, TransferError> + Send,
 ) -> Result<T, DemoError> {
     rig.client(WAIT_NS, job)?.map_err(|why| DemoError::Bus { doing: doing.to_owned(), why })
 }
@@ -261,8 +264,25 @@ fn write_u8(rig: &mut Rig, doing: &str, address: u16, value: u8) -> Result<(), D
     ask(rig, doing, move |bus| bus.write_u8(ID, address, value).map(drop))
 }
 
+/// Reads whole registers.
+///
+/// The client (0.9.1) leaves the stuffing in a reply with FF FF FF FD: a negative number, and a register that begins with FD.
+/// Read in two parts, these do not meet.
+fn read(rig: &mut Rig, doing: &str, from: u16, bytes: u16) -> Result<Vec<u8>, DemoError> {
+    let half = bytes / 8 * 4;
+    match rig.client(WAIT_NS, move |bus| bus.read(ID, from, bytes))? {
+        Ok(response) => Ok(response.data),
+        Err(TransferError::ReadError(ReadError::InvalidMessage(InvalidMessage::InvalidParameterCount(_))))
+            if half > 0 =>
+        {
+            Ok([read(rig, doing, from, half)?, read(rig, doing, from + half, bytes - half)?].concat())
+        }
+        Err(why) => Err(DemoError::Bus { doing: doing.to_owned(), why }),
+    }
+}
+
 fn poll(rig: &mut Rig) -> Result<Poll, DemoError> {
-    let bytes = ask(rig, "status", |bus| bus.read(ID, STATUS, STATUS_BYTES))?.data;
+    let bytes = read(rig, "status", STATUS, STATUS_BYTES)?;
     let at_s = rig.now_ns() as f64 * 1e-9;
     decode(at_s, &bytes).ok_or_else(|| DemoError::Unexpected(format!("a status of {} bytes", bytes.len())))
 }
@@ -287,6 +307,7 @@ fn decode(at_s: f64, bytes: &[u8]) -> Option<Poll> {
         limits: u16::from_le_bytes([byte(address::LIMITS)?, byte(address::LIMITS + 1)?]),
         force_n: thousandths(address::PRESENT_FORCE_MN)?,
         indentation_mm: thousandths(address::INDENTATION_UM)?,
+        travel_mm: thousandths(address::TRAVEL_UM)?,
         centre_mm: [thousandths(address::CENTRE_X_UM)?, thousandths(address::CENTRE_Y_UM)?],
         radius_mm: thousandths(address::CONTACT_RADIUS_UM)?,
         frame: word(address::FRAME_COUNTER)?,
@@ -296,8 +317,7 @@ fn decode(at_s: f64, bytes: &[u8]) -> Option<Poll> {
 
 /// The picture of the array, kPa.
 fn pressures(rig: &mut Rig) -> Result<Pressures, DemoError> {
-    let bytes = (2 * ROWS * COLUMNS) as u16;
-    let bytes = ask(rig, "pressures", move |bus| bus.read(ID, address::PRESSURES, bytes))?.data;
+    let bytes = read(rig, "pressures", address::PRESSURES, (2 * ROWS * COLUMNS) as u16)?;
     let mut pressures = [[0.0; COLUMNS]; ROWS];
     for (kpa, pair) in pressures.as_flattened_mut().iter_mut().zip(bytes.chunks_exact(2)) {
         // In units of 10 Pa.

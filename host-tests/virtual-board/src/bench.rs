@@ -11,12 +11,11 @@ use crate::recorder::Recorder;
 use crate::trace::{Record, Trace};
 use crate::wire::TimedByte;
 use host_tests::plant::Bridge;
-use rigless::emulator::{Access, AccessKind, Host, Stop};
+use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
 use rigless::snapshot::{self, Reader, Store, Writer};
 use rigless::soc::stm32f427::generated::{GPIOC, TIM1};
 use rigless::time::VirtualNanos;
-use serde::{Deserialize, Serialize};
 
 /// The world's step.
 pub const STEP_NS: u64 = 10_000;
@@ -24,21 +23,6 @@ pub const STEP_NS: u64 = 10_000;
 const LOG_NS: u64 = 1_000_000;
 /// TIM1's registers behind which the duty stands, as offsets: CCR1 and CCR2.
 const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
-
-/// What the encoder still has to turn of the last step's way. The timer's input filter, like the real one, ignores edges that
-/// follow each other faster than any motor turns, so they are spread over the step.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct Turning {
-    left: i32,
-    at_ns: u64,
-    every_ns: u64,
-}
-
-impl Turning {
-    fn new(at_ns: u64, quarters: i32) -> Self {
-        Self { left: quarters, at_ns, every_ns: STEP_NS / u64::from(quarters.unsigned_abs().max(1)) }
-    }
-}
 
 /// All that is not the board, and that a snapshot keeps.
 #[derive(Debug)]
@@ -66,7 +50,6 @@ pub struct Bench {
     world_ns: u64,
     bridge: Bridge,
     encoder: i32,
-    turning: Turning,
     resets: usize,
 }
 
@@ -90,7 +73,6 @@ impl Bench {
             world_ns: 0,
             bridge: Bridge::Coast,
             encoder: 0,
-            turning: Turning::default(),
             resets: 0,
         })
     }
@@ -136,7 +118,7 @@ impl Bench {
     }
 
     /// An instant of the grid was reached.
-    pub fn step(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) {
+    pub fn step(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host) {
         let now_ns = self.next_ns;
         let board = session.board_mut();
         self.watch_bridge(board, now_ns);
@@ -146,9 +128,8 @@ impl Bench {
         }
         let counts = self.front_end.lock().world.encoder_counts();
         if counts != self.encoder {
-            self.turning = Turning::new(now_ns, counts.wrapping_sub(self.encoder));
-            self.encoder = counts;
-            self.turn(session.board_mut(), stop);
+            let left = counts.wrapping_sub(self.encoder);
+            self.encoder += session.board_mut().part.turn_encoder(now_ns - STEP_NS, now_ns, left);
         }
         for byte in session.board_mut().wire().take_received() {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));
@@ -166,22 +147,8 @@ impl Bench {
         }
     }
 
-    /// Moves the encoder by the next of the edges that are still to come before the grid's next instant; false where none is.
-    pub fn turn(&mut self, board: &mut FingerBoard, stop: Stop) -> bool {
-        let quarter = self.turning.left.signum();
-        if quarter != 0 {
-            board.part.turn_encoder(stop.at, quarter);
-            self.turning.left -= quarter;
-        }
-        quarter != 0
-    }
-
-    /// The instant to stop at next: that of an edge of the encoder on the way, or the grid's.
+    /// The instant of the grid to stop at next.
     pub fn next(&mut self) -> VirtualNanos {
-        if self.turning.left != 0 {
-            self.turning.at_ns += self.turning.every_ns;
-            return VirtualNanos(self.turning.at_ns);
-        }
         self.next_ns += STEP_NS;
         VirtualNanos(self.next_ns)
     }
@@ -190,9 +157,9 @@ impl Bench {
 impl Store for Bench {
     fn store(&self, to: &mut Writer) -> Result<(), snapshot::Error> {
         let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, flash, .. } = self;
-        let Self { world_ns, bridge, encoder, turning, resets, .. } = self;
+        let Self { world_ns, bridge, encoder, resets, .. } = self;
         to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held, flash))?;
-        to.put(&(world_ns, bridge, encoder, turning, resets))?;
+        to.put(&(world_ns, bridge, encoder, resets))?;
         to.put(&*front_end.lock())
     }
 
@@ -201,7 +168,7 @@ impl Store for Bench {
         (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held, self.flash) =
             from.take()?;
         self.log.set_state(log.0, log.1);
-        (self.world_ns, self.bridge, self.encoder, self.turning, self.resets) = from.take()?;
+        (self.world_ns, self.bridge, self.encoder, self.resets) = from.take()?;
         *self.front_end.lock() = from.take::<FrontEnd>()?;
         Ok(())
     }

@@ -26,6 +26,9 @@ const RESET_HZ: u64 = 16_000_000;
 const TIM3: usize = 1;
 const TIM1: usize = 0;
 
+/// The least time between two edges of the encoder: more than the timer's filter takes.
+const EDGE_NS: u64 = 250;
+
 /// Who answers for a slot of the bus.
 #[derive(Clone, Copy, Debug)]
 enum Model {
@@ -114,13 +117,18 @@ impl Part {
         &self.front_end
     }
 
-    /// Moves the encoder by quarter cycles, positive forward.
-    pub fn turn_encoder(&mut self, at: VirtualNanos, quarters: i32) {
-        for _ in 0..quarters.unsigned_abs() {
-            let step = if quarters > 0 { 1 } else { 3 };
+    /// Moves the encoder by quarter cycles, positive forward, evenly over the time that has just passed, for the timer
+    /// filters its inputs. Says how many it moved: of an impossible speed the rest is left for later.
+    pub fn turn_encoder(&mut self, from_ns: u64, to_ns: u64, quarters: i32) -> i32 {
+        let most = ((to_ns - from_ns) / EDGE_NS) as i32;
+        let moved = quarters.clamp(-most, most);
+        let edges = u64::from(moved.unsigned_abs());
+        for edge in 1..=edges {
+            let step = if moved > 0 { 1 } else { 3 };
             self.inputs.quarter = (self.inputs.quarter + step) % 4;
-            self.drive_encoder(at);
+            self.drive_encoder(VirtualNanos(from_ns + (to_ns - from_ns) * edge / (edges + 1)));
         }
+        moved
     }
 
     /// Sets the bridge's nFAULT: the pin and the timer's break behind it.

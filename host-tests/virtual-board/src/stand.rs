@@ -90,10 +90,7 @@ impl Driver<FingerBoard> for Hall {
     }
 
     fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
-        if self.bench.turn(session.board_mut(), stop) {
-            return Some(self.bench.next());
-        }
-        self.bench.step(session, stop, host);
+        self.bench.step(session, host);
         if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
             return None;
         }

@@ -3,6 +3,8 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use host_tests::plant::{Setup, World};
+use rigless::mcu::Operate;
+use rigless::soc::Width;
 use std::path::PathBuf;
 use virtual_board::flash::SECTOR;
 use virtual_board::{Fault, Options, Rig};
@@ -96,6 +98,24 @@ fn what_is_stored_survives_a_snapshot_and_a_reboot() {
     let found = rig.client(WAIT_NS, |bus| bus.ping(42).map(drop)).expect("the client runs");
     found.expect("it answers to the stored ID");
     rig.check_gaps().expect("no unknown gap");
+}
+
+#[test]
+fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast() {
+    let mut rig = running(&Options::default());
+    for travel_mm in [1.0, 0.3, 0.301] {
+        rig.world(move |world| world.place(travel_mm)).expect("it runs");
+        rig.run_ms(3).expect("it runs");
+        let (counted, turned) = rig
+            .with(|stand| {
+                const TIM3_CNT: u64 = 0x4000_0424;
+                let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
+                (counted as u16, stand.bench.front_end.lock().world.encoder_counts() as u16)
+            })
+            .expect("it runs");
+        assert_ne!(turned, 0);
+        assert_eq!(counted, turned, "at {travel_mm} mm");
+    }
 }
 
 #[test]

@@ -18,6 +18,16 @@ MODES = ["off", "tare", "approach", "force", "release", "fault", "identify"]
 NOT_TARED = 1 << 6  # in the register LIMITS
 
 
+class PatientPort(PortHandler):
+    """Waits longer for an answer: a simulated board may be slower than a real one."""
+
+    patience_ms = 0
+
+    def setPacketTimeout(self, packet_length):
+        super().setPacketTimeout(packet_length)
+        self.packet_timeout += self.patience_ms
+
+
 class Fingertip:
     """A fingertip controller on the bus."""
 
@@ -76,9 +86,11 @@ def main():
     arguments.add_argument("--id", type=int, default=1)
     arguments.add_argument("--newtons", type=float, default=1.0)
     arguments.add_argument("--readings", type=int, default=1000, help="how often to read the force while it is held")
+    arguments.add_argument("--patience-ms", type=int, default=200, help="how much longer to wait for an answer")
     arguments = arguments.parse_args()
 
-    port = PortHandler(arguments.port)
+    port = PatientPort(arguments.port)
+    port.patience_ms = arguments.patience_ms
     if not port.openPort() or not port.setBaudRate(BAUD):
         sys.exit(f"cannot open {arguments.port}")
     finger = Fingertip(port, arguments.id)

@@ -6,6 +6,9 @@ use std::path::PathBuf;
 use virtual_board::serve::{Place, Port, serve};
 use virtual_board::{Error, Options, Rig};
 
+/// The image is up by then.
+const BOOT_MS: u64 = 20;
+
 /// What to serve and where.
 #[derive(Debug, clap::Args)]
 pub struct Arguments {
@@ -28,6 +31,8 @@ pub fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut setup = Setup::default();
     setup.wall.distance_mm = arguments.distance_mm;
     let mut rig = Rig::new(&arguments.image, World::new(&setup), &Options::default())?;
+    // Boots before anybody can ask.
+    rig.run_ms(BOOT_MS)?;
     let place = arguments.tcp.map_or_else(|| Place::Pty(arguments.pty.clone()), Place::Tcp);
     let mut port = Port::open(&place)?;
     let stop = port.stopper();

@@ -86,7 +86,7 @@ def main():
     arguments.add_argument("--id", type=int, default=1)
     arguments.add_argument("--newtons", type=float, default=1.0)
     arguments.add_argument("--readings", type=int, default=1000, help="how often to read the force while it is held")
-    arguments.add_argument("--patience-ms", type=int, default=200, help="how much longer to wait for an answer")
+    arguments.add_argument("--patience-ms", type=int, default=2000, help="how much longer to wait for an answer")
     arguments = arguments.parse_args()
 
     port = PatientPort(arguments.port)
@@ -94,9 +94,10 @@ def main():
     if not port.openPort() or not port.setBaudRate(BAUD):
         sys.exit(f"cannot open {arguments.port}")
     finger = Fingertip(port, arguments.id)
-    print(f"model {finger.ping()}, force {finger.read(reg.PRESENT_FORCE_MN)} mN")
+    print(f"model {finger.ping()}")
 
     finger.tare()
+    print(f"tared, force {finger.read(reg.PRESENT_FORCE_MN)} mN")
     finger.write(reg.TORQUE_ENABLE, 1)
     finger.write(reg.GOAL_FORCE_MN, round(1000 * arguments.newtons))
     while finger.read(reg.PRESENT_MODE) != MODES.index("force"):

@@ -65,7 +65,7 @@ fn the_python_example_touches_holds_and_lets_go() {
     let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert!(output.status.success(), "{said}{complained}");
     // The letters FT.
-    assert!(said.starts_with("model 21574, force "), "{said}");
+    assert!(said.starts_with("model 21574\ntared, force 0 mN\n"), "{said}");
     let held = said.lines().find_map(|line| line.strip_prefix("holding ")).expect(&said);
     let force_mn: f64 = held.split(' ').next().and_then(|number| number.parse().ok()).expect(held);
     assert!((1_480.0..=1_520.0).contains(&force_mn), "{said}");

@@ -1,5 +1,6 @@
 //! `virtual-board serve`.
 
+use fingertip::link::table::address;
 use host_tests::plant::{Setup, World};
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -8,6 +9,9 @@ use virtual_board::{Error, Options, Rig};
 
 /// The image is up by then.
 const BOOT_MS: u64 = 20;
+/// Its address on the bus, and how long it may take to answer.
+const ID: u8 = 1;
+const WAIT_NS: u64 = 20_000_000;
 
 /// What to serve and where.
 #[derive(Debug, clap::Args)]
@@ -31,8 +35,14 @@ pub fn run(arguments: &Arguments) -> Result<(), Error> {
     let mut setup = Setup::default();
     setup.wall.distance_mm = arguments.distance_mm;
     let mut rig = Rig::new(&arguments.image, World::new(&setup), &Options::default())?;
-    // Boots before anybody can ask.
+    // Up, and compiled by the emulator as far as an answer takes, before anybody can ask: clients do not wait long.
     rig.run_ms(BOOT_MS)?;
+    let up = rig.client(WAIT_NS, |bus| {
+        bus.ping(ID)?;
+        bus.read_u32(ID, address::PRESENT_FORCE_MN)?;
+        bus.write_u32(ID, address::GOAL_FORCE_MN, 0)
+    })?;
+    up.map_err(|why| Error::Client(std::io::Error::other(format!("the board does not answer: {why}"))))?;
     let place = arguments.tcp.map_or_else(|| Place::Pty(arguments.pty.clone()), Place::Tcp);
     let mut port = Port::open(&place)?;
     let stop = port.stopper();

@@ -12,19 +12,36 @@ fn image() -> PathBuf {
 }
 
 fn rig() -> Rig {
-    Rig::new(&image(), World::new(&Setup::default()), &Options::default()).expect("the image starts")
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.5;
+    Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts")
 }
 
 /// An instruction packet that asks ID 1 whether it is there.
 const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 const WAIT_NS: u64 = 5_000_000;
 
-/// 100 ms with a ping in the middle, in which everything takes part.
+/// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle.
 fn eventful(rig: &mut Rig) {
-    rig.run_until_ns(60_000_000).expect("it runs");
+    let write = |rig: &mut Rig, address, value| {
+        let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, address, value).map(drop));
+        written.expect("the client runs").expect("the image obeys");
+    };
+    rig.run_until_ns(50_000_000).expect("it runs");
+    write(rig, TARE, 1);
+    rig.run_until_ns(150_000_000).expect("it runs");
+    write(rig, TORQUE_ENABLE, 1);
+    let goal = rig.client(WAIT_NS, |bus| bus.write_u32(1, GOAL_FORCE_MN, 1_000).map(drop));
+    goal.expect("the client runs").expect("the image obeys");
+    rig.run_until_ns(250_000_000).expect("it runs");
     rig.transact(&PING, WAIT_NS).expect("it runs");
-    rig.run_until_ns(100_000_000).expect("it runs");
+    rig.run_until_ns(300_000_000).expect("it runs");
 }
+
+/// Registers of the control table.
+const TORQUE_ENABLE: u16 = 64;
+const GOAL_FORCE_MN: u16 = 256;
+const TARE: u16 = 260;
 
 #[test]
 fn it_boots_and_frames_arrive_at_the_scans_rate() {
@@ -62,6 +79,12 @@ fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
     let mut whole = rig();
     eventful(&mut whole);
     let hash = whole.trace_hash().expect("it runs");
+    let force_n = whole.world(|world| world.force_n()).expect("it runs");
+    assert!((0.9..1.1).contains(&force_n), "{force_n} N: the tip holds what was asked for");
+    let duties = whole.latency().expect("it runs").frames();
+    assert!(duties > 1_000, "{duties} duties");
+    let records = whole.with(|stand| stand.bench.trace.records()).expect("it runs");
+    assert!(records > 2 * duties, "{records} records");
     drop(whole);
     for _ in 0..2 {
         let mut again = rig();

@@ -6,6 +6,10 @@
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
+#![allow(
+    clippy::manual_clamp,
+    reason = "`clamp` panics where its bounds are out of order; the step must not be able to"
+)]
 
 #[cfg(test)]
 extern crate std;

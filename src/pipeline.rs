@@ -151,11 +151,11 @@ impl Pipeline {
 
         // Whether that is sound.
         let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
-        if !matches!(self.status.mode, Mode::Off | Mode::Fault) {
-            if let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
-                self.status.mode = Mode::Fault;
-                self.status.fault = Some(fault);
-            }
+        if !matches!(self.status.mode, Mode::Off | Mode::Fault)
+            && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config)
+        {
+            self.status.mode = Mode::Fault;
+            self.status.fault = Some(fault);
         }
 
         // What a press that measures the modulus makes of it.

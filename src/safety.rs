@@ -42,7 +42,7 @@ pub enum Mode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Fault {
-    /// No frame within one and a half frame times: the scan stands.
+    /// No frame within 1.75 frame times of the last one: the scan stands.
     LostFrames = 1,
     /// More taxels are dead or saturated than allowed.
     ArrayBroken = 2,

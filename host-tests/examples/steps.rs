@@ -68,8 +68,10 @@ fn main() {
         );
         if g > 0.0 && f0 > 0.0 {
             let s = n.world.setup().clone();
-            let t = host_tests::optimal::minimum_time_s(&s, s.tip.indentation_mm(f0), s.tip.indentation_mm(g), 6.0, 2.0).unwrap();
-            println!("   optimal {:.2} ms ratio {:.2}", t*1e3, (last_out-t0)/t);
+            let t =
+                host_tests::optimal::minimum_time_s(&s, s.tip.indentation_mm(f0), s.tip.indentation_mm(g), 6.0, 2.0)
+                    .unwrap();
+            println!("   optimal {:.2} ms ratio {:.2}", t * 1e3, (last_out - t0) / t);
         }
         if st.mode == Mode::Fault {
             break;

@@ -157,7 +157,7 @@ fn residual(of: i32) -> i32 {
 /// The weight of the quick model and of the residual: 1 less 3/4 of the model's pressure over the peak, Q13.
 #[inline(always)]
 fn weight(pressure: i32) -> i32 {
-    (1 << SLOPE_BITS) - (3 * pressure.max(0).min((1 << PEAK_BITS) - 1) >> 3)
+    (1 << SLOPE_BITS) - ((3 * pressure.max(0).min((1 << PEAK_BITS) - 1)) >> 3)
 }
 
 /// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak, Q13.

@@ -168,10 +168,12 @@ impl Press {
         let speed = view.motion.observer.speed;
         let measured = view.motion.observer.measured(view.encoder, config);
         let way = measured.0.saturating_sub(self.from.0).to_bits();
-        if way >= 0 && speed >= MillimetresPerSecond(-SPEED_TAKEN.0) && speed <= SPEED_TAKEN {
-            if let Some((way, force)) = self.step.take(way, contact.force) {
-                self.fit.add(Millimetres(self.from.0.saturating_add(way.0)), force);
-            }
+        if way >= 0
+            && speed >= MillimetresPerSecond(-SPEED_TAKEN.0)
+            && speed <= SPEED_TAKEN
+            && let Some((way, force)) = self.step.take(way, contact.force)
+        {
+            self.fit.add(Millimetres(self.from.0.saturating_add(way.0)), force);
         }
         let depth = Millimetres(measured.0.saturating_sub(self.touch.0));
         let at_edge = beyond_edge(&contact, depth, config);

@@ -180,7 +180,7 @@ mod tests {
         type Judge = fn(&Tip, i32, i32, u32) -> Judged;
         let cases: [(Judge, i32, i32); 9] = [
             (force, 2 << 24, 205_887),
-            (indentation, 205_887, 33_554_400),
+            (indentation, 205_887, 33_554_398),
             (contact_radius, 2 << 24, 6 << 24),
             (stiffness, 2 << 24, 205_887),
             (stiffness_at_force, 205_887, 205_887),

@@ -87,9 +87,11 @@ pub fn run(plan: &Plan) -> Result<(Figures, script::Run), DemoError> {
         script.play(phase, &mut rig, &mut run, &mut screen)?;
     }
     script.end(&mut rig, &mut run)?;
-    screen.waiting("the same run once more, cut by a snapshot, to compare the traces");
     let repeated = match repeat {
-        Some(repeat) => Some(repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?),
+        Some(repeat) => {
+            screen.waiting("the same run once more, cut by a snapshot, to compare the traces");
+            Some(repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
+        }
         None => None,
     };
     screen.finish();

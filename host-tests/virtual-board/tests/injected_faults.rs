@@ -1,0 +1,198 @@
+//! Faults injected while the image holds 1 N: the time until the bridge is off, and the number on the bus.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+use fingertip::link::table::address;
+use fingertip::safety::Fault as Number;
+use host_tests::plant::{Row, Setup, Taxel, World};
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use virtual_board::{Fault, Options, Rig};
+
+const WAIT_NS: u64 = 5_000_000;
+/// Two frames of 99.8 us: the limit for what the scan can see.
+const TWO_FRAMES_US: f64 = 199.6;
+
+fn image() -> PathBuf {
+    let path = std::env::var_os("FINGERTIP_IMAGE");
+    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
+}
+
+fn write_u8(rig: &mut Rig, register: u16, value: u8) {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+}
+
+fn write_goal(rig: &mut Rig, goal_mn: u32) {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, address::GOAL_FORCE_MN, goal_mn).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+}
+
+fn read_u8(rig: &mut Rig, register: u16) -> u8 {
+    let read = rig.client(WAIT_NS, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
+    read.expect("the client runs").expect("the image answers")
+}
+
+/// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
+fn holding() -> Rig {
+    static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
+    let snapshot = SNAPSHOT.get_or_init(|| {
+        let mut setup = Setup::default();
+        setup.wall.distance_mm = 0.5;
+        let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+        rig.run_until_ns(20_000_000).expect("it runs");
+        write_u8(&mut rig, address::TARE, 1);
+        rig.run_ms(20).expect("it runs");
+        write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+        write_goal(&mut rig, 1_000);
+        rig.run_ms(150).expect("it runs");
+        let force_n = rig.world(|world| world.force_n()).expect("it runs");
+        assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+        let path = std::env::temp_dir().join(format!("virtual-board-holding-{}.snapshot", std::process::id()));
+        rig.snapshot(&path).expect("a snapshot is taken");
+        path
+    });
+    Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored")
+}
+
+/// Microseconds from now to the bridge's being off, within `limit_ms`.
+fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
+    let from_ns = rig.now_ns();
+    rig.run_ms(limit_ms).expect("it runs");
+    let edges = rig.bridge_edges().expect("it runs");
+    let off = edges.iter().find(|edge| edge.at_ns >= from_ns && !edge.on);
+    off.map_or(f64::INFINITY, |edge| (edge.at_ns - from_ns) as f64 / 1e3)
+}
+
+/// Breaks a held board at three places within a frame; the longest time to the bridge's being off.
+fn break_and_time(name: &str, expected: &[Number], limit_us: f64, harm: impl Fn(&mut Rig)) {
+    for phase_us in [0, 30, 70] {
+        let mut rig = holding();
+        let at_ns = rig.now_ns() + 1_000_000 + phase_us * 1_000;
+        rig.run_until_ns(at_ns).expect("it runs");
+        harm(&mut rig);
+        let off_us = until_off_us(&mut rig, 20);
+        let number = read_u8(&mut rig, address::FAULT);
+        println!("{name}: bridge off after {off_us:.1} us (limit {limit_us}), fault {number}");
+        assert!(off_us <= limit_us, "{name}: {off_us} us");
+        assert!(expected.iter().any(|fault| *fault as u8 == number), "{name}: fault {number}");
+        assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0, "{name}: a fault turns torque off");
+        rig.check_gaps().expect("no unknown gap");
+    }
+}
+
+fn world(rig: &mut Rig, change: impl FnOnce(&mut World) + Send + 'static) {
+    rig.world(change).expect("it runs");
+}
+
+#[test]
+fn the_converters_stall() {
+    break_and_time("converters stall", &[Number::LostFrames], TWO_FRAMES_US, |rig| {
+        rig.inject(Fault::ConvertersStall).expect("it runs");
+    });
+}
+
+#[test]
+fn a_row_line_is_stuck() {
+    for state in [Row::StuckLow, Row::StuckHigh] {
+        break_and_time("row stuck", &[Number::ArrayBroken, Number::RowStuck], TWO_FRAMES_US, |rig| {
+            world(rig, move |world| world.faults.array.rows[4] = state);
+        });
+    }
+}
+
+#[test]
+fn all_taxels_saturate() {
+    break_and_time("saturated", &[Number::ArrayBroken, Number::RowStuck], TWO_FRAMES_US, |rig| {
+        world(rig, |world| world.faults.array.saturated = true);
+    });
+}
+
+#[test]
+fn twelve_taxels_die_or_short() {
+    for state in [Taxel::Dead, Taxel::Shorted] {
+        break_and_time("12 taxels", &[Number::ArrayBroken], TWO_FRAMES_US, |rig| {
+            world(rig, move |world| {
+                for place in 0..12 {
+                    world.faults.array.taxels[place * 7 / 10][place * 7 % 10] = state;
+                }
+            });
+        });
+    }
+}
+
+#[test]
+fn the_encoder_freezes() {
+    break_and_time("encoder frozen, goal to 4 N", &[Number::EncoderFrozen], 20_000.0, |rig| {
+        world(rig, |world| world.faults.encoder_frozen = true);
+        write_goal(rig, 4_000);
+    });
+}
+
+#[test]
+fn the_supply_sags() {
+    break_and_time("supply", &[Number::SupplyLow], 1_000.0, |rig| {
+        world(rig, |world| world.faults.supply_drop_v = 2.0);
+    });
+}
+
+#[test]
+fn the_bridges_driver_reports_a_fault() {
+    break_and_time("nFAULT", &[Number::Bridge], TWO_FRAMES_US, |rig| {
+        rig.inject(Fault::BridgeFault).expect("it runs");
+    });
+}
+
+#[test]
+fn the_bus_falls_silent() {
+    let mut rig = holding();
+    // 2 times 20 ms.
+    write_u8(&mut rig, address::BUS_WATCHDOG, 2);
+    let off_us = until_off_us(&mut rig, 80);
+    println!("bus silent: bridge off after {off_us:.1} us of a watchdog of 40,000");
+    assert!((39_000.0..=60_000.0).contains(&off_us), "{off_us} us");
+    assert_eq!(read_u8(&mut rig, address::FAULT), Number::BusSilent as u8);
+    assert_eq!(read_u8(&mut rig, address::BUS_WATCHDOG) as i8, -1);
+}
+
+#[test]
+fn a_starved_watchdog_resets_to_off_and_leaves_a_record() {
+    let mut rig = holding();
+    rig.inject(Fault::CoreHangs).expect("it runs");
+    let off_us = until_off_us(&mut rig, 60);
+    println!("core hangs: bridge off after {off_us:.1} us");
+    assert!(off_us <= 23_000.0, "{off_us} us");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), Number::Crash as u8);
+    assert_eq!(read_u8(&mut rig, address::RESET_CAUSE), 5, "watchdog");
+    assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 3, "hang");
+    assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0);
+    assert!(!rig.bridge_edges().expect("it runs").last().expect("it was on").on);
+}
+
+/// A linear congruential generator: the same bytes in every run.
+fn noise(count: usize) -> Vec<u8> {
+    let mut state = 1u64;
+    (0..count)
+        .map(|_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 56) as u8
+        })
+        .collect()
+}
+
+/// The link itself takes 10^6 bytes in `host-tests/tests/link`; here the line does, at 1 Mbaud, with the motor holding.
+#[test]
+fn noise_on_the_line_moves_nothing() {
+    let mut rig = holding();
+    let (before_mm, resets) = (rig.world(|world| world.travel_mm()).expect("it runs"), 0);
+    rig.send(&noise(20_000)).expect("it runs");
+    rig.run_ms(220).expect("it runs");
+    rig.take_received().expect("it runs");
+    let moved_mm = (rig.world(|world| world.travel_mm()).expect("it runs") - before_mm).abs();
+    println!("20,000 bytes of noise: the tip moved {:.1} um", moved_mm * 1e3);
+    assert!(moved_mm < 0.01, "{moved_mm} mm");
+    assert_eq!(rig.resets().expect("it runs").len(), resets);
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), 3);
+    assert_eq!(read_u8(&mut rig, address::FAULT), 0);
+}

@@ -79,7 +79,7 @@ params! {
     dead_codes = 12 in 1..=1_000;
     /// A column that reads more codes than this with no row driven shows a row that is stuck on.
     undriven_max_codes = 700 in 0..=4_000;
-    /// More dead or saturated taxels than this are a fault. With 5, twelve that fail anywhere in a scan are seen within two frames.
+    /// More dead or saturated taxels than this are a fault.
     bad_taxels_max = 5 in 0..=100;
     /// Contact begins above this force.
     contact_on_mn = 40 in 5..=2_000;

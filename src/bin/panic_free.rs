@@ -28,7 +28,9 @@ fn control_step(pipeline: &mut Pipeline, frame: &Frame, sense: &Sense, command: 
 #[cortex_m_rt::entry]
 fn main() -> ! {
     black_box(control_step as *const ());
-    loop {}
+    loop {
+        core::hint::spin_loop();
+    }
 }
 
 #[panic_handler]

@@ -1,6 +1,6 @@
 //! The control table: every register defined once, for the device and for its documentation.
 //!
-//! [`registers`] holds the definition. From it come the addresses as constants ([`address`]), reading and writing here,
+//! `table/registers.rs` holds the definition. From it come the addresses as constants ([`address`]), reading and writing here,
 //! and [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes straight into the
 //! reply.
 

@@ -148,7 +148,7 @@ impl Bench {
     }
 
     /// The instant of the grid to stop at next.
-    pub fn next(&mut self) -> VirtualNanos {
+    pub fn next_stop(&mut self) -> VirtualNanos {
         self.next_ns += STEP_NS;
         VirtualNanos(self.next_ns)
     }

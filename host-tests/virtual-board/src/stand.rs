@@ -82,7 +82,7 @@ impl Driver<FingerBoard> for Hall {
             }
             // A run from a snapshot comes back first to where it was taken, inside that halt.
             Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {
-                let next = if self.halt(session, stop, host) { self.bench.next() } else { stop.at };
+                let next = if self.halt(session, stop, host) { self.bench.next_stop() } else { stop.at };
                 session.run_until(next);
             }
             _ => {}
@@ -94,6 +94,6 @@ impl Driver<FingerBoard> for Hall {
         if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
             return None;
         }
-        Some(self.bench.next())
+        Some(self.bench.next_stop())
     }
 }

@@ -42,6 +42,8 @@ pub mod pipeline;
 
 pub mod record;
 
+pub mod same_bits;
+
 pub mod link;
 
 pub mod store;

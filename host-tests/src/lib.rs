@@ -3,6 +3,7 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod control_table;
+pub mod emulator;
 pub mod fit_cases;
 pub mod heatmap;
 pub mod long_run;

@@ -62,3 +62,33 @@ fn a_hard_fault_fails() {
 fn a_hang_fails() {
     assert_fails("hang", "FAILED: hang: a step took");
 }
+
+/// Runs the comparison of all functions.
+fn same_bits(words: &[&str]) -> Output {
+    let image =
+        env::var_os("FINGERTIP_QEMU_IMAGE").expect("FINGERTIP_QEMU_IMAGE names the image; use cargo xtask test");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_same-bits"));
+    command.arg(image).args(words).output().expect("the runner was built with this test")
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn every_function_gives_the_same_bits_for_a_million_inputs() {
+    let output = same_bits(&[]);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("46 functions give the same bits for 1000000 inputs each"), "{text}");
+    println!("{text}");
+}
+
+#[test]
+#[ignore = "needs QEMU: cargo xtask test"]
+fn one_function_that_differs_is_named() {
+    for name in ["pressure", "Drive::apply", "Config::new"] {
+        let output = same_bits(&["1000", name]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{name} went unnoticed");
+        assert_eq!(text.matches("FAILED").count(), 1, "{text}");
+        assert!(text.lines().all(|line| line.starts_with("FAILED") || line.ends_with(&format!(" {name}"))), "{text}");
+    }
+}

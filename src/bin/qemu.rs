@@ -1,8 +1,12 @@
-//! The core on an emulated Cortex-M4F: replays a recording and reports a digest of what came out, and instruction counts.
+//! The core on an emulated Cortex-M4F: replays a recording, or gives random inputs to every function of the model, and reports
+//! digests of what came out.
 //!
-//! Not for a board: it talks to the emulator by semihosting. The command line names the recording and, after a space, a
-//! failure to inject half way: `panic`, `hardfault` or `hang`. Each failure prints a line that begins with `FAILED:`
-//! and ends the emulator with an error.
+//! Not for a board: it talks to the emulator by semihosting. The command line is one of
+//!
+//! - `FILE [panic|hardfault|hang]`: replays the recording, counts instructions, and fails half way as it is told to;
+//! - `same-bits INPUTS [FUNCTION]`: gives so many inputs to every function, and changes the digest of the one named.
+//!
+//! Each failure prints a line that begins with `FAILED:` and ends the emulator with an error.
 //!
 //! SysTick is stopwatch and watchdog in one: it starts anew before each step, and if it ever runs out, the step hangs.
 //! A loop of known length tells how many instructions a tick is, so the counts do not depend on the emulator's clocks.
@@ -18,11 +22,14 @@ use fingertip::config::Config;
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
+use fingertip::same_bits::Comparison;
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
 /// Instructions of the loop that tells how long an instruction is.
 const LOOP_INSTRUCTIONS: u64 = 1_000_000;
+/// Inputs that the functions take before SysTick starts anew.
+const INPUTS_A_WATCH: u32 = 16;
 
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
@@ -36,7 +43,37 @@ async fn main(_spawner: Spawner) {
     syst.enable_counter();
 
     let mut line = [0; 256];
-    let (name, failure) = command_line(&mut line);
+    let (name, rest) = command_line(&mut line);
+    if name == b"same-bits\0" {
+        compare(rest, &mut syst);
+    } else {
+        replay(name, rest, &mut syst).await;
+    }
+    debug::exit(debug::EXIT_SUCCESS);
+}
+
+/// Gives random inputs to every function.
+fn compare(words: &[u8], syst: &mut SYST) {
+    let words = core::str::from_utf8(words).unwrap_or_default();
+    let (inputs, spoilt) = words.split_once(' ').unwrap_or((words, ""));
+    let inputs = inputs.parse::<u32>();
+    let (Ok(inputs), Ok(mut comparison)) = (inputs, Comparison::new()) else { fail(format_args!("no inputs to take")) };
+    for index in 0..inputs {
+        if index % INPUTS_A_WATCH == 0 {
+            syst.clear_current();
+        }
+        comparison.take();
+    }
+    if !spoilt.is_empty() && !comparison.spoil(spoilt) {
+        fail(format_args!("no function {spoilt}"))
+    }
+    for (name, digest, taken) in comparison.digests() {
+        say(format_args!("function {digest:016x} {taken} {name}"));
+    }
+}
+
+/// Replays a recording.
+async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     let recording = Recording::open(name);
     let mut count = [0; 4];
     let mut magic = [0; MAGIC.len()];
@@ -50,8 +87,8 @@ async fn main(_spawner: Spawner) {
     let Ok(config) = Config::new(&Params::DEFAULT) else { fail(format_args!("the default parameters are refused")) };
     let mut pipeline = Pipeline::new(&config);
     let mut digest = Digest::new();
-    let loop_ticks = ticks(&mut syst, spin);
-    let empty_ticks = ticks(&mut syst, || {});
+    let loop_ticks = ticks(syst, spin);
+    let empty_ticks = ticks(syst, || {});
     let (mut total, mut min, mut max) = (0, u32::MAX, 0);
     for index in 0..count {
         let mut bytes = [0; Record::BYTES];
@@ -61,7 +98,7 @@ async fn main(_spawner: Spawner) {
             inject(failure);
         }
         let mut outcome = None;
-        let taken = ticks(&mut syst, || outcome = Some(pipeline.step(&frame, &sense, &command)));
+        let taken = ticks(syst, || outcome = Some(pipeline.step(&frame, &sense, &command)));
         if let Some((duty, status)) = outcome {
             digest.add(duty, &status);
         }
@@ -83,7 +120,6 @@ async fn main(_spawner: Spawner) {
     say(format_args!("instructions_min {}", instructions(min.into(), 1)));
     say(format_args!("instructions_max {}", instructions(max.into(), 1)));
     say(format_args!("ticks_per_million_instructions {loop_ticks}"));
-    debug::exit(debug::EXIT_SUCCESS);
 }
 
 /// SysTick ticks that some work takes.

@@ -7,7 +7,7 @@ use crate::{
     toolchain::{self, Choice},
 };
 use anyhow::Result;
-use std::path::PathBuf;
+use std::{path::PathBuf, process::Command};
 
 const PROGRAM: &str = "qemu-system-arm";
 
@@ -20,15 +20,21 @@ pub struct Args {
     inject: Option<String>,
 }
 
-/// Runs the recorded stimulus on the emulator and on the host, and compares.
+/// Runs the recorded stimulus and random inputs for every function on the emulator and on the host, and compares.
 ///
 /// # Errors
 /// The image does not build, fails, hangs, or differs from the host.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
+    let mut replay = tool("qemu-host");
+    console.run(replay.arg(&image).arg(paths::target().join("stimulus")).args(&args.inject))?;
+    console.run(tool("same-bits").arg(&image))
+}
+
+fn tool(name: &str) -> Command {
     let mut command = console::cargo("run");
-    command.args(["--package", "host-tests", "--bin", "qemu-host", "--"]);
-    console.run(command.arg(image).arg(paths::target().join("stimulus")).args(&args.inject))
+    command.args(["--package", "host-tests", "--bin", name, "--"]);
+    command
 }
 
 /// Runs the tests that need the emulator.

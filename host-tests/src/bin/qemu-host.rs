@@ -2,21 +2,17 @@
 //!
 //! `qemu-host IMAGE FOLDER [panic|hardfault|hang]`: the image, where to put the recording, a failure to inject.
 
-use host_tests::stimulus;
+use host_tests::{emulator, stimulus};
 use std::{
     collections::BTreeMap,
     env,
     error::Error,
     fs,
-    io::Read,
     path::{Path, PathBuf},
-    process::{Command, ExitCode, Stdio},
-    sync::mpsc,
-    thread,
+    process::ExitCode,
     time::Duration,
 };
 
-const EMULATOR: &str = "qemu-system-arm";
 const RECORDING: &str = "stimulus.bin";
 /// The image's own watchdog ends a hang in virtual time. This one is for an image that cannot even do that.
 const WALL_LIMIT: Duration = Duration::from_secs(180);
@@ -45,7 +41,8 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     fs::write(&aside, stimulus::to_bytes(&records))?;
     fs::rename(aside, folder.join(RECORDING))?;
 
-    let text = emulate(image, folder, failure)?;
+    let words: Vec<_> = [RECORDING].into_iter().chain(failure).collect();
+    let text = emulator::run(image, folder, &words, WALL_LIMIT)?;
     let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
     let figure = |name| report.get(name).copied().ok_or_else(|| format!("the image reported no {name}:\n{text}"));
     let host = format!("{:016x}", stimulus::digest(&records));
@@ -71,43 +68,4 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
 /// Instructions in a tick, rounded up.
 fn resolution(ticks_per_million: &str) -> Result<u64, Box<dyn Error>> {
     Ok(1_000_000_u64.div_ceil(ticks_per_million.parse::<u64>()?.max(1)))
-}
-
-/// Runs the image to its end and returns what it wrote.
-fn emulate(image: &Path, folder: &Path, failure: Option<&str>) -> Result<String, Box<dyn Error>> {
-    let image = fs::canonicalize(image).map_err(|error| format!("the image {}: {error}", image.display()))?;
-    let words: Vec<_> = [RECORDING].into_iter().chain(failure).map(|word| format!(",arg={word}")).collect();
-    let mut child = Command::new(EMULATOR)
-        .current_dir(folder)
-        // An STM32F405; a board that QEMU 7 knows as well.
-        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"])
-        // An instruction takes 8 ns of virtual time: more than a tick of SysTick, so every one of them counts.
-        .args(["-icount", "shift=3,align=off,sleep=off", "-semihosting-config"])
-        .arg(format!("enable=on,target=native{}", words.concat()))
-        .arg("-kernel")
-        .arg(image)
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .spawn()
-        .map_err(|error| format!("cannot start {EMULATOR}: {error}; looked in PATH"))?;
-    let (sender, receiver) = mpsc::channel();
-    if let Some(mut stdout) = child.stdout.take() {
-        thread::spawn(move || {
-            let mut text = Vec::new();
-            // The pipe breaks when the emulator is killed; what came before still counts.
-            let _ = stdout.read_to_end(&mut text);
-            let _ = sender.send(String::from_utf8_lossy(&text).into_owned());
-        });
-    }
-    let Ok(text) = receiver.recv_timeout(WALL_LIMIT) else {
-        child.kill()?;
-        child.wait()?;
-        return Err(format!("FAILED: hang: the image did not end within {} s", WALL_LIMIT.as_secs()).into());
-    };
-    let status = child.wait()?;
-    match text.lines().find(|line| line.starts_with("FAILED:")) {
-        Some(line) => Err(line.into()),
-        None if !status.success() => Err(format!("FAILED: the emulator ended with {status}:\n{text}").into()),
-        None => Ok(text),
-    }
 }

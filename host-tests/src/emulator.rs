@@ -1,0 +1,55 @@
+//! QEMU with an emulated Cortex-M4F, for images that report by semihosting.
+
+use std::error::Error;
+use std::fs;
+use std::io::Read;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::thread;
+use std::time::Duration;
+
+const PROGRAM: &str = "qemu-system-arm";
+
+/// Runs an image in a folder with the words of its command line to its end, and returns what it wrote.
+///
+/// # Errors
+/// The emulator does not start, the image reports a failure, or does not end within the limit.
+pub fn run(image: &Path, folder: &Path, words: &[&str], limit: Duration) -> Result<String, Box<dyn Error>> {
+    let image = fs::canonicalize(image).map_err(|error| format!("the image {}: {error}", image.display()))?;
+    // A comma within a word is written twice.
+    let words: Vec<_> = words.iter().map(|word| format!(",arg={}", word.replace(',', ",,"))).collect();
+    let mut child = Command::new(PROGRAM)
+        .current_dir(folder)
+        // An STM32F405; a board that QEMU 7 knows as well.
+        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"])
+        // An instruction takes 8 ns of virtual time: more than a tick of SysTick, so every one of them counts.
+        .args(["-icount", "shift=3,align=off,sleep=off", "-semihosting-config"])
+        .arg(format!("enable=on,target=native{}", words.concat()))
+        .arg("-kernel")
+        .arg(image)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| format!("cannot start {PROGRAM}: {error}; looked in PATH"))?;
+    let (sender, receiver) = mpsc::channel();
+    if let Some(mut stdout) = child.stdout.take() {
+        thread::spawn(move || {
+            let mut text = Vec::new();
+            // The pipe breaks when the emulator is killed; what came before still counts.
+            let _ = stdout.read_to_end(&mut text);
+            let _ = sender.send(String::from_utf8_lossy(&text).into_owned());
+        });
+    }
+    let Ok(text) = receiver.recv_timeout(limit) else {
+        child.kill()?;
+        child.wait()?;
+        return Err(format!("FAILED: hang: the image did not end within {} s", limit.as_secs()).into());
+    };
+    let status = child.wait()?;
+    match text.lines().find(|line| line.starts_with("FAILED:")) {
+        Some(line) => Err(line.into()),
+        None if !status.success() => Err(format!("FAILED: the emulator ended with {status}:\n{text}").into()),
+        None => Ok(text),
+    }
+}

@@ -1,0 +1,149 @@
+//! The same random inputs for every function on any processor, and a digest of what each answered.
+//!
+//! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
+//! model ([`model`]) and to what has a configuration or a state ([`machines`]); about a quarter of the numbers is
+//! outside the functions' domains. What is costly to make, [`machines::MADE`], is made for every 1024th input only.
+
+pub mod machines;
+pub mod model;
+
+use crate::config::{Config, ConfigError};
+use crate::params::Params;
+use machines::Machines;
+use model::Sample;
+
+/// Inputs that a comparison takes.
+pub const INPUTS: u32 = 1_000_000;
+
+/// How many functions are compared.
+pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + machines::MADE.len();
+
+/// A seeded source of inputs: the upper half of a linear congruential generator.
+#[derive(Clone, Debug)]
+pub struct Source(u64);
+
+impl Source {
+    /// The source that every comparison begins with.
+    pub const fn new() -> Self {
+        Self(2003)
+    }
+
+    /// 32 random bits.
+    pub fn word(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 32) as u32
+    }
+
+    /// 0 to `top`, evenly.
+    pub fn up_to(&mut self, top: u32) -> u32 {
+        ((u64::from(self.word()) * (u64::from(top) + 1)) >> 32) as u32
+    }
+
+    /// Any number, every size as likely.
+    pub fn any(&mut self) -> i32 {
+        self.word().cast_signed() >> self.up_to(30)
+    }
+
+    /// `min` to `max`, evenly.
+    pub fn within(&mut self, min: i32, max: i32) -> i32 {
+        min.saturating_add_unsigned(self.up_to(max.abs_diff(min)))
+    }
+
+    /// Half of the draws evenly from `min` to `max`, a quarter near `min`, a quarter anything.
+    pub fn around(&mut self, min: i32, max: i32) -> i32 {
+        match self.up_to(3) {
+            0 | 1 => self.within(min, max),
+            2 => min.saturating_add_unsigned(self.up_to(max.abs_diff(min)) >> self.up_to(30)),
+            _ => self.any(),
+        }
+    }
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A digest of numbers in order. Each number permutes it, so that two runs that differ in one number differ for good, unless
+/// another difference undoes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mix(u64);
+
+impl Mix {
+    /// Of nothing.
+    pub const EMPTY: Self = Self(0);
+
+    /// Adds a number.
+    pub fn add(&mut self, number: impl Into<i64>) {
+        let number: i64 = number.into();
+        self.0 = (self.0.rotate_left(23) ^ number.cast_unsigned()).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    }
+
+    /// The digest so far.
+    pub const fn value(self) -> u64 {
+        self.0
+    }
+}
+
+/// A comparison under way.
+pub struct Comparison {
+    source: Source,
+    taken: u32,
+    sample: Sample,
+    machines: Machines,
+    mixes: [Mix; FUNCTIONS],
+}
+
+impl Comparison {
+    /// Nothing taken yet.
+    ///
+    /// # Errors
+    /// None: the default parameters are sound, as the core's own tests show.
+    pub fn new() -> Result<Self, ConfigError> {
+        let config = Config::new(&Params::DEFAULT)?;
+        let sample = Sample::new(config.tip);
+        let machines = Machines::new(config);
+        Ok(Self { source: Source::new(), taken: 0, sample, machines, mixes: [Mix::EMPTY; FUNCTIONS] })
+    }
+
+    /// Gives the next input to every function.
+    pub fn take(&mut self) {
+        self.sample.renew(&mut self.source);
+        let (by_model, rest) = self.mixes.split_at_mut(model::FUNCTIONS.len());
+        let (by_machine, by_maker) = rest.split_at_mut(machines::STEPS.len());
+        for ((_, function), mix) in model::FUNCTIONS.iter().zip(by_model) {
+            function(&self.sample, mix);
+        }
+        if self.taken.is_multiple_of(machines::MADE_EVERY) {
+            for ((_, make), mix) in machines::MADE.iter().zip(by_maker) {
+                make(&mut self.machines, &mut self.source, mix);
+            }
+        }
+        for ((_, step), mix) in machines::STEPS.iter().zip(by_machine) {
+            step(&mut self.machines, &self.sample, mix);
+        }
+        self.taken += 1;
+    }
+
+    /// Changes a function's digest as a different answer would, to see it found. False where there is no such function.
+    pub fn spoil(&mut self, name: &str) -> bool {
+        let place = names().position(|other| other == name);
+        place.and_then(|place| self.mixes.get_mut(place)).map(|mix| mix.add(1)).is_some()
+    }
+
+    /// Each function's name and digest, and how many inputs it took.
+    pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64, u32)> + '_ {
+        let made_from = FUNCTIONS - machines::MADE.len();
+        names().zip(&self.mixes).enumerate().map(move |(place, (name, mix))| {
+            let inputs = if place < made_from { self.taken } else { self.taken.div_ceil(machines::MADE_EVERY) };
+            (name, mix.value(), inputs)
+        })
+    }
+}
+
+/// The functions in the order of their digests.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    let model = model::FUNCTIONS.iter().map(|(name, _)| *name);
+    model.chain(machines::STEPS.iter().map(|(name, _)| *name)).chain(machines::MADE.iter().map(|(name, _)| *name))
+}

@@ -1,0 +1,296 @@
+//! What has a state or a configuration: the viscoelastic filter, the loop's observer, profile and drive, the least squares.
+
+use super::model::Sample;
+use super::{Mix, Source};
+use crate::config::{Config, ConfigError};
+use crate::control::SpeedLoop;
+use crate::control::drive::Drive;
+use crate::control::goal::Goal;
+use crate::control::observer::Observer;
+use crate::control::profile::Reference;
+use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
+use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm, Tip};
+use crate::params::Params;
+use crate::pipeline::Contact;
+use crate::safety::{Limits, Mode};
+use crate::scan::ScanTiming;
+use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio};
+
+/// A machine's name, and one step of it with what the step adds to its digest.
+pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
+/// A constructor's name, and one call of it with what that adds to its digest.
+pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
+
+/// One input of so many makes new machines: each takes up to half a million instructions.
+pub const MADE_EVERY: u32 = 1_024;
+/// Points of a fit before the next one begins; the least that gives a modulus is 20.
+const FIT_POINTS: u32 = 64;
+/// The largest braking of the profile: 1000 m/s^2 in Q8 mm/s^2.
+const BRAKE_MAX: i32 = 1_000_000 << 8;
+const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
+
+/// The states.
+pub struct Machines {
+    config: Config,
+    filter: Option<Relaxation<3>>,
+    memory: RelaxationState<3>,
+    observer: Observer,
+    drive: Drive,
+    motion: SpeedLoop,
+    goal: Goal,
+    press: Press,
+}
+
+/// A press that both fits follow.
+struct Press {
+    tip: Tip,
+    points: u32,
+    by_depth: DepthFit,
+    by_travel: TravelFit,
+}
+
+impl Machines {
+    /// At rest, with a first configuration.
+    pub fn new(config: Config) -> Self {
+        let press = Press::new(config.tip);
+        Self {
+            config,
+            filter: None,
+            memory: RelaxationState::REST,
+            observer: Observer::new(),
+            drive: Drive::new(),
+            motion: SpeedLoop::new(),
+            goal: Goal::default(),
+            press,
+        }
+    }
+}
+
+impl Press {
+    fn new(tip: Tip) -> Self {
+        let by_depth = DepthFit::new(tip.depth_max(), tip.force_max());
+        let by_travel = TravelFit::new(Millimetres::ZERO, tip.depth_max(), tip.force_max());
+        Self { tip, points: 0, by_depth, by_travel }
+    }
+
+    /// Begins anew after [`FIT_POINTS`] points.
+    fn advance(&mut self, sample: &Sample) {
+        self.points += 1;
+        if self.points > FIT_POINTS {
+            *self = Self { points: 1, ..Self::new(sample.tip) };
+        }
+    }
+
+    /// An indentation within the tip, with its force to 1.5 %; one in a thousand is nowhere near.
+    fn point(&self, sample: &Sample) -> (Millimetres, Newtons) {
+        let [noise, _, wild, wilder] = sample.words;
+        if wild == 0 && wilder == 0 {
+            return (sample.d, sample.force);
+        }
+        let top = i64::from(self.tip.depth_max().to_bits());
+        let depth = Millimetres::from_bits(((top * i64::from(sample.share_q32)) >> 32) as i32);
+        let exact = i64::from(self.tip.force(depth).to_bits());
+        (depth, Newtons::from_bits((exact + ((exact * i64::from(noise)) >> 37)) as i32))
+    }
+}
+
+/// One step of every machine for each input.
+pub const STEPS: [Step; 12] = [
+    ("Relaxation::step", |m, s, mix| {
+        if let Some(filter) = &m.filter {
+            mix.add(filter.step(&mut m.memory, s.force).to_bits());
+        }
+    }),
+    ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
+    ("Observer::update", |m, s, mix| {
+        let [encoder, acceleration, shift, _] = s.words;
+        let acceleration = i64::from(acceleration) << (shift & 15);
+        m.observer.update(encoder >> 24, acceleration, &m.config);
+        mix.add(m.observer.travel.to_bits());
+        mix.add(m.observer.speed.to_bits());
+        mix.add(m.observer.disturbance.to_bits());
+    }),
+    ("Reference::towards", |m, s, mix| add_reference(mix, towards(m, s))),
+    ("Reference::limited", |m, s, mix| {
+        let limit = MillimetresPerSecond::from_bits(s.words[3]);
+        add_reference(mix, towards(m, s).limited(limit));
+    }),
+    ("Drive::apply", |m, s, mix| {
+        let [wanted, back_emf, supply_mv, shift] = s.words;
+        let wanted = i64::from(wanted) << (shift & 15);
+        let mut limits = Limits::default();
+        let duty = m.drive.apply(wanted, back_emf.into(), supply_mv as u16, &m.config, &mut limits);
+        mix.add(duty.0);
+        mix.add(limits.0);
+        mix.add(m.drive.acceleration());
+    }),
+    ("SpeedLoop::observe", |m, s, mix| {
+        m.motion.observe(s.words[1], &m.config);
+        mix.add(m.motion.observer.travel.to_bits());
+        mix.add(m.motion.observer.speed.to_bits());
+        mix.add(m.motion.observer.disturbance.to_bits());
+    }),
+    ("SpeedLoop::brake", |m, s, mix| mix.add(m.motion.brake(s.displacement.shift, &m.config).to_bits())),
+    ("Goal::reference", |m, s, mix| {
+        let mode = match s.share_q32 & 3 {
+            0 => Mode::Approach,
+            1 => Mode::Release,
+            _ => Mode::Force,
+        };
+        let contact = Contact { force: s.force, indentation: s.d, ..Contact::default() };
+        let (goal, mut limits) = (Newtons::from_bits(s.words[1]), Limits::default());
+        add_reference(mix, m.goal.reference(mode, goal, &contact, &m.motion, &m.config, &mut limits));
+        mix.add(limits.0);
+    }),
+    ("SpeedLoop::follow", |m, s, mix| {
+        let (reference, mut limits) = (towards(m, s), Limits::default());
+        let duty = m.motion.follow(reference, (s.words[2] & 0xffff) as u16, &m.config, &mut limits);
+        mix.add(duty.0);
+        mix.add(limits.0);
+    }),
+    ("DepthFit", |m, s, mix| {
+        m.press.advance(s);
+        let (depth, force) = m.press.point(s);
+        m.press.by_depth.add(depth, force);
+        add_modulus(mix, m.press.by_depth.modulus());
+    }),
+    ("TravelFit", |m, s, mix| {
+        let (travel, force) = m.press.point(s);
+        m.press.by_travel.add(travel, force);
+        add_modulus(mix, m.press.by_travel.modulus());
+        mix.add(m.press.by_travel.span().to_bits());
+    }),
+];
+
+/// What is made for every [`MADE_EVERY`]th input.
+pub const MADE: [Make; 2] = [
+    ("Config::new", |m, source, mix| match Config::new(&params(source)) {
+        Ok(config) => {
+            m.config = config;
+            add_config(mix, &m.config);
+        }
+        Err(ConfigError::Param(error)) => mix.add(error.value),
+        Err(ConfigError::Scan(_)) => mix.add(-1),
+        Err(ConfigError::Order(first, _)) => mix.add(first.len() as u32),
+    }),
+    ("Relaxation::new", |m, source, mix| {
+        let period_us = source.up_to(2_000);
+        let terms = [(); 3].map(|()| RelaxationTerm {
+            share: Ratio::from_bits(source.within(0, 22_000)),
+            time_constant_us: period_us.saturating_mul(1 << source.up_to(20)),
+        });
+        match Relaxation::new(period_us, &terms) {
+            Ok(filter) => (m.filter, m.memory) = (Some(filter), RelaxationState::REST),
+            Err(RelaxationError::Sum(sum)) => mix.add(sum),
+            Err(_) => mix.add(-1),
+        }
+        // What it is made of shows in a step from rest.
+        let mut rest = RelaxationState::REST;
+        if let Some(filter) = &m.filter {
+            mix.add(filter.step(&mut rest, Newtons::from_bits(i32::MAX)).to_bits());
+        }
+    }),
+];
+
+/// The way of an input at its speed, with its braking.
+fn towards(machines: &Machines, sample: &Sample) -> Reference {
+    let [way, speed, brake, _] = sample.words;
+    let brake = MillimetresPerSecond2::from_bits(brake.max(0).min(BRAKE_MAX));
+    Reference::towards(Millimetres::from_bits(way), MillimetresPerSecond::from_bits(speed), brake, &machines.config)
+}
+
+fn add_reference(mix: &mut Mix, reference: Reference) {
+    mix.add(reference.speed.to_bits());
+    mix.add(reference.acceleration.to_bits());
+}
+
+fn add_modulus(mix: &mut Mix, result: Result<Modulus, Refusal>) {
+    match result {
+        Ok(Modulus { modulus, sigma, contact, points }) => {
+            mix.add(modulus.to_bits());
+            mix.add(sigma.to_bits());
+            mix.add(contact.to_bits());
+            mix.add(points);
+        }
+        Err(refusal) => mix.add(refusal as u8),
+    }
+}
+
+/// Parameters within their ranges, most of them such that they do not contradict each other.
+fn params(source: &mut Source) -> Params {
+    let mut params = Params::from_array(&Params::RANGES.map(|(_, _, min, max)| source.within(min, max)));
+    params.sample_cycles = SAMPLE_CYCLES.get((source.word() & 7) as usize).map_or(0, |cycles| *cycles);
+    for (low, high) in [
+        (&mut params.contact_off_mn, &mut params.contact_on_mn),
+        (&mut params.force_max_mn, &mut params.force_fault_mn),
+        (&mut params.supply_min_mv, &mut params.supply_max_mv),
+    ] {
+        (*low, *high) = ((*low).min(*high), (*low).max(*high));
+    }
+    params
+}
+
+/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in a
+/// replay of frames.
+fn add_config(mix: &mut Mix, config: &Config) {
+    // Taken apart, so that a field cannot be forgotten.
+    let Config {
+        params: _,
+        geometry: _,
+        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles },
+        tip,
+        sag_q32,
+        dead_codes,
+        newtons_per_sum_q48,
+        pascals_per_sum_q32,
+        half_pitch,
+        contact_on,
+        contact_off,
+        frame_s_q40,
+        mm_per_count_q40,
+        jump,
+        counts_max,
+        observer_gains: [l1, l2, l3],
+        speed_gain_per_s,
+        position_gain_per_s,
+        half_over_slope_q32,
+        half_over_slope2_q40,
+        damping_q8_per_s,
+        voltage_limit,
+        current_limit,
+        slew_limit,
+        acceleration_per_mv_q16,
+        mv_per_acceleration_q32,
+        speed_max,
+        approach,
+        travel_max,
+        clearance,
+        force_fault,
+        force_max,
+    } = config;
+    for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
+        mix.add(*ticks);
+    }
+    mix.add(*sag_q32);
+    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
+        mix.add(force.to_bits());
+    }
+    for length in [half_pitch, travel_max, clearance] {
+        mix.add(length.to_bits());
+    }
+    for number in
+        [newtons_per_sum_q48, pascals_per_sum_q32, frame_s_q40, mm_per_count_q40, jump, counts_max, l1, l2, l3]
+    {
+        mix.add(*number);
+    }
+    for gain in [speed_gain_per_s, position_gain_per_s, &speed_max.to_bits(), &approach.to_bits()] {
+        mix.add(*gain);
+    }
+    for number in
+        [half_over_slope_q32, half_over_slope2_q40, damping_q8_per_s, voltage_limit, current_limit, slew_limit]
+    {
+        mix.add(*number);
+    }
+    mix.add(*acceleration_per_mv_q16);
+    mix.add(*mv_per_acceleration_q32);
+}

@@ -1,0 +1,171 @@
+//! The model's functions: those of a tip, of a column, and the square root.
+
+use core::num::NonZeroU16;
+
+use super::{Mix, Source};
+use crate::model::{
+    Displacement, LimitSurface, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError, force_on, pressure_of,
+    strain_of,
+};
+use crate::root::floor_sqrt;
+use crate::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
+
+/// A function's name and what it adds to its digest.
+pub type Function = (&'static str, fn(&Sample, &mut Mix));
+
+/// One input for every function.
+#[derive(Clone, Debug)]
+pub struct Sample {
+    /// What the tip was made from, or why it was refused.
+    pub made: Result<Tip, TipError>,
+    /// The last tip that was made.
+    pub tip: Tip,
+    /// An indentation.
+    pub d: Millimetres,
+    /// A distance from the contact's centre: inside, at the rim, outside.
+    pub r: Millimetres,
+    /// A touching angle.
+    pub theta: Radians,
+    /// A contact radius.
+    pub radius: Millimetres,
+    /// A force.
+    pub force: Newtons,
+    /// A peak pressure.
+    pub peak: Kilopascals,
+    /// The area of a column.
+    pub area: SquareMillimetres,
+    /// A shift and a tilt beside the indentation.
+    pub displacement: Displacement,
+    /// A coefficient of friction.
+    pub mu: Ratio,
+    /// A moment.
+    pub moment: NewtonMillimetres,
+    /// Rings of the quadrature, few: each costs as much as a pressure.
+    pub rings: NonZeroU16,
+    /// A share, in 2^-32.
+    pub share_q32: u32,
+    /// Numbers of every size.
+    pub words: [i32; 4],
+}
+
+impl Sample {
+    /// Nothing but a tip.
+    pub const fn new(tip: Tip) -> Self {
+        Self {
+            made: Ok(tip),
+            tip,
+            d: Millimetres::ZERO,
+            r: Millimetres::ZERO,
+            theta: Radians::ZERO,
+            radius: Millimetres::ZERO,
+            force: Newtons::ZERO,
+            peak: Kilopascals::ZERO,
+            area: SquareMillimetres::ZERO,
+            displacement: Displacement { normal: Millimetres::ZERO, shift: Millimetres::ZERO, tilt: Radians::ZERO },
+            mu: Ratio::ZERO,
+            moment: NewtonMillimetres::ZERO,
+            rings: NonZeroU16::MIN,
+            share_q32: 0,
+            words: [0; 4],
+        }
+    }
+
+    /// The next one.
+    pub fn renew(&mut self, source: &mut Source) {
+        let radius = source.around(RADIUS_MIN.to_bits(), RADIUS_MAX.to_bits());
+        let modulus = source.around(MODULUS_MIN.to_bits(), MODULUS_MAX.to_bits());
+        self.made = Tip::new(Millimetres::from_bits(radius), Kilopascals::from_bits(modulus));
+        self.tip = self.made.unwrap_or(self.tip);
+        let tip = &self.tip;
+        self.d = Millimetres::from_bits(source.around(1, tip.depth_max().to_bits()));
+        let rim = tip.contact_radius(self.d).to_bits();
+        let r = match source.up_to(3) {
+            0 => rim.saturating_add(source.any() >> 8),
+            1 => source.within(0, tip.radius().to_bits()),
+            _ => source.around(0, rim),
+        };
+        self.r = Millimetres::from_bits(r);
+        self.theta = Radians::from_bits(source.around(0, tip.touching_angle_max(self.d).to_bits()));
+        self.radius = Millimetres::from_bits(source.around(0, tip.radius().to_bits()));
+        self.force = Newtons::from_bits(source.around(0, tip.force_max().to_bits()));
+        self.peak = Kilopascals::from_bits(source.around(0, tip.modulus().to_bits()));
+        self.area = SquareMillimetres::from_bits(source.around(0, 100 << 16));
+        let reach = tip.radius().to_bits() / 2;
+        self.displacement = Displacement {
+            normal: self.d,
+            shift: Millimetres::from_bits(source.around(-reach, reach)),
+            tilt: Radians::from_bits(source.around(-1 << 24, 1 << 24)),
+        };
+        self.mu = Ratio::from_bits(source.around(0, 4 << 16));
+        self.moment = NewtonMillimetres::from_bits(source.any());
+        self.rings = NonZeroU16::MIN.saturating_add(source.up_to(7) as u16);
+        self.share_q32 = source.word();
+        self.words = [(); 4].map(|()| source.any());
+    }
+}
+
+/// Every public function of the model that computes.
+pub const FUNCTIONS: [Function; 34] = [
+    ("Tip::new", |s, mix| match s.made {
+        Ok(tip) => {
+            mix.add(tip.depth_max().to_bits());
+            mix.add(tip.force_max().to_bits());
+        }
+        Err(TipError::Radius(radius)) => mix.add(radius.to_bits()),
+        Err(TipError::Modulus(modulus)) => mix.add(modulus.to_bits()),
+    }),
+    ("force", |s, mix| mix.add(s.tip.force(s.d).to_bits())),
+    ("force_by_rings", |s, mix| mix.add(s.tip.force_by_rings(s.d, s.rings).to_bits())),
+    ("indentation", |s, mix| mix.add(s.tip.indentation(s.force).to_bits())),
+    ("indentation_from_peak", |s, mix| mix.add(s.tip.indentation_from_peak(s.peak).to_bits())),
+    ("indentation_from_radius", |s, mix| mix.add(s.tip.indentation_from_radius(s.radius).to_bits())),
+    ("stiffness", |s, mix| mix.add(s.tip.stiffness(s.d).to_bits())),
+    ("stiffness_at_force", |s, mix| mix.add(s.tip.stiffness_at_force(s.force).to_bits())),
+    ("contact_radius", |s, mix| mix.add(s.tip.contact_radius(s.d).to_bits())),
+    ("touching_angle_max", |s, mix| mix.add(s.tip.touching_angle_max(s.d).to_bits())),
+    ("touching_angle", |s, mix| mix.add(s.tip.touching_angle(s.r, s.d).to_bits())),
+    ("distance_at", |s, mix| mix.add(s.tip.distance_at(s.theta, s.d).to_bits())),
+    ("distance_slope", |s, mix| mix.add(s.tip.distance_slope(s.theta, s.d).to_bits())),
+    ("area_density", |s, mix| mix.add(s.tip.area_density(s.theta, s.d).to_bits())),
+    ("height_at", |s, mix| mix.add(s.tip.height_at(s.theta, s.d).to_bits())),
+    ("compression_at", |s, mix| mix.add(s.tip.compression_at(s.theta, s.d).to_bits())),
+    ("particle_length", |s, mix| mix.add(s.tip.particle_length(s.r).to_bits())),
+    ("compression", |s, mix| mix.add(s.tip.compression(s.r, s.d).to_bits())),
+    ("strain", |s, mix| mix.add(s.tip.strain(s.r, s.d).to_bits())),
+    ("pressure", |s, mix| mix.add(s.tip.pressure(s.r, s.d).to_bits())),
+    ("peak_pressure", |s, mix| mix.add(s.tip.peak_pressure(s.d).to_bits())),
+    ("mean_pressure", |s, mix| mix.add(s.tip.mean_pressure(s.d).to_bits())),
+    ("pressure_of", |s, mix| mix.add(pressure_of(s.force, s.area).to_bits())),
+    ("strain_of", |s, mix| mix.add(strain_of(s.d, s.radius).to_bits())),
+    ("force_on", |s, mix| mix.add(force_on(s.peak, s.area).to_bits())),
+    ("particle_force", |s, mix| mix.add(s.tip.particle_force(s.d, s.radius, s.area).to_bits())),
+    ("load", |s, mix| {
+        let load = s.tip.load(s.displacement);
+        mix.add(load.normal.to_bits());
+        mix.add(load.tangential.to_bits());
+        mix.add(load.moment.to_bits());
+    }),
+    ("energy", |s, mix| mix.add(s.tip.energy(s.displacement).to_bits())),
+    ("free_shift", |s, mix| mix.add(s.tip.free_shift(s.d, s.displacement.tilt).to_bits())),
+    ("friction_shape", |s, mix| mix.add(s.tip.friction_shape(s.d).to_bits())),
+    ("limit_surface", |s, mix| {
+        let LimitSurface { force, moment } = s.tip.limit_surface(s.d, s.mu);
+        mix.add(force.to_bits());
+        mix.add(moment.to_bits());
+    }),
+    ("margin", |s, mix| {
+        let limit = LimitSurface { force: s.force, moment: NewtonMillimetres::from_bits(s.d.to_bits()) };
+        let [tangential, ..] = s.words;
+        mix.add(limit.margin(Newtons::from_bits(tangential), s.moment).to_bits());
+    }),
+    ("floor_sqrt", |s, mix| {
+        let [high, low, ..] = s.words;
+        mix.add(floor_sqrt(u64::from(high.cast_unsigned()) << 32 | u64::from(low.cast_unsigned())));
+    }),
+    ("floor_sqrt of squares", |s, mix| {
+        let [root, ..] = s.words;
+        let square = u64::from(root.unsigned_abs()) * u64::from(root.unsigned_abs());
+        mix.add(floor_sqrt(square));
+        mix.add(floor_sqrt(square.wrapping_sub(1)));
+    }),
+];

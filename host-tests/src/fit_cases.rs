@@ -157,6 +157,21 @@ impl Scene {
         })
     }
 
+    /// The share of the force on the live taxels that an edge takes; None without an edge.
+    pub fn cut(&self, pressures: &Pressures, bad: &[u16; ROWS]) -> Option<f64> {
+        let Object::Edge { angle_rad, .. } = self.object else { return None };
+        // The same samples without the edge.
+        let whole = Self { object: Object::Edge { offset_mm: f64::INFINITY, angle_rad }, ..*self }.pressures();
+        let seen = |pressures: &Pressures| -> f64 {
+            let rows = pressures.iter().zip(bad);
+            rows.flat_map(|(row, bad)| row.iter().enumerate().filter(move |(column, _)| bad >> column & 1 == 0))
+                .map(|(_, kpa)| kpa)
+                .sum()
+        };
+        let whole = seen(&whole);
+        Some(if whole > 0.0 { 1.0 - seen(pressures) / whole } else { 0.0 })
+    }
+
     fn sampled_kpa(&self, cell: &Cell) -> f64 {
         let at = |side: [f64; 2], index: usize| side[0] + (side[1] - side[0]) * (index as f64 + 0.5) / SAMPLES as f64;
         let mut sum = 0.0;

@@ -5,6 +5,8 @@
 pub mod control_table;
 pub mod emulator;
 pub mod fit_cases;
+pub mod fit_statistics;
+pub mod fit_tables;
 pub mod heatmap;
 pub mod long_run;
 pub mod metrics;

@@ -4,6 +4,7 @@ mod apt;
 mod console;
 mod demo;
 mod docs;
+mod fit;
 mod flash;
 mod image;
 mod lint;
@@ -54,6 +55,8 @@ enum Command {
     Model,
     /// Prove the contact model's error bounds over whole input ranges
     Prove(model::Args),
+    /// Judge the contact's fit on thousands of pictures, and renew the tables of docs/contact.md
+    Fit(fit::Args),
     /// Prove the control step free of panics and of floating-point calls
     PanicFree,
     /// Check format, lints, documentation and licences
@@ -86,6 +89,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Size => size::run(toolchain, console),
         Command::Model => model::answer(console),
         Command::Prove(args) => model::prove(args, console),
+        Command::Fit(args) => fit::run(args, console),
         Command::PanicFree => proof::run(toolchain, console),
         Command::Lint => lint::run(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),

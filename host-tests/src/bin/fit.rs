@@ -1,0 +1,76 @@
+//! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
+
+use host_tests::fit_tables::{CASES, markdown, renewed};
+use std::io::{self, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+const USAGE: &str = "fit [--cases N] [--quick] [--write | --check]";
+
+enum Page {
+    Print,
+    Write,
+    Check,
+}
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), String> {
+    let (mut cases, mut page) = (CASES, Page::Print);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        match argument.as_str() {
+            "--cases" => {
+                let number = arguments.next().and_then(|number| number.parse().ok()).filter(|number| *number > 0);
+                cases = number.ok_or("--cases takes a number above 0")?;
+            }
+            "--quick" => cases = CASES / 20,
+            "--write" => page = Page::Write,
+            "--check" => page = Page::Check,
+            other => return Err(format!("unknown argument {other}: {USAGE}")),
+        }
+    }
+    let shown = Mutex::new(Instant::now());
+    let tables = markdown(cases, &|name, done| {
+        if let Ok(mut shown) = shown.try_lock()
+            && shown.elapsed() > Duration::from_millis(500)
+        {
+            *shown = Instant::now();
+            eprint!("\r{name}: {done} of {cases}          ");
+            // Progress is a courtesy; a closed terminal is no reason to stop.
+            let _ = io::stderr().flush();
+        }
+    });
+    eprint!("\r{:60}\r", "");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/contact.md");
+    let renew = || -> Result<(String, String), String> {
+        let old = std::fs::read_to_string(&file).map_err(|error| format!("docs/contact.md: {error}"))?;
+        let new = renewed(&old, &tables).ok_or("docs/contact.md lacks the markers of its tables")?;
+        Ok((old, new))
+    };
+    match page {
+        Page::Print => print!("{tables}"),
+        Page::Write => {
+            std::fs::write(&file, renew()?.1).map_err(|error| format!("docs/contact.md: {error}"))?;
+            println!("written  docs/contact.md");
+        }
+        Page::Check => {
+            let (old, new) = renew()?;
+            if old != new {
+                return Err("docs/contact.md is stale: renew it with `cargo xtask fit --write`".into());
+            }
+            println!("fresh    docs/contact.md");
+        }
+    }
+    Ok(())
+}

@@ -13,45 +13,44 @@ pub const TAXELS: usize = ROWS * COLUMNS;
 pub const SLOTS: usize = ROWS + 1;
 /// Converters that work side by side.
 pub const BANKS: usize = 2;
-/// Columns that each converter reads.
+/// Columns that each converter reads: the pairs of codes that come at the same instant.
 pub const BANK_COLUMNS: usize = COLUMNS / BANKS;
 /// A code from which a taxel counts as saturated (12-bit converter).
 pub const SATURATED: u16 = 4090;
 
-/// 110 codes of 12 bits, in the order in which the two converters write them.
+/// 110 codes of 12 bits, in pairs as the two converters read them at the same instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// `banks[column / 5][slot][column % 5]`.
-    pub banks: [[[u16; BANK_COLUMNS]; SLOTS]; BANKS],
+    /// `pairs[slot][column % 5]`: columns 0 to 4 in the low halves, 5 to 9 in the high ones.
+    pub pairs: [[u32; BANK_COLUMNS]; SLOTS],
     /// Counts frames scanned, missed ones too; wraps.
     pub sequence: u32,
 }
 
 impl Frame {
     /// A frame of zeros.
-    pub const EMPTY: Self = Self { banks: [[[0; BANK_COLUMNS]; SLOTS]; BANKS], sequence: 0 };
+    pub const EMPTY: Self = Self { pairs: [[0; BANK_COLUMNS]; SLOTS], sequence: 0 };
 
     /// The code of a taxel (`slot` below [`ROWS`]) or of a column with nothing driven (`slot` = [`ROWS`]).
     ///
     /// Out of range reads as 0.
     pub fn code(&self, slot: usize, column: usize) -> u16 {
-        self.banks
-            .get(column / BANK_COLUMNS)
-            .and_then(|bank| bank.get(slot))
-            .and_then(|codes| codes.get(column % BANK_COLUMNS))
-            .copied()
-            .unwrap_or(0)
+        let pair = self.pairs.get(slot).and_then(|pairs| pairs.get(column % BANK_COLUMNS)).copied().unwrap_or(0);
+        match column / BANK_COLUMNS {
+            0 => pair as u16,
+            1 => (pair >> 16) as u16,
+            _ => 0,
+        }
     }
 
     /// Sets what [`Frame::code`] reads; out of range does nothing.
     pub fn set_code(&mut self, slot: usize, column: usize, code: u16) {
-        if let Some(place) = self
-            .banks
-            .get_mut(column / BANK_COLUMNS)
-            .and_then(|bank| bank.get_mut(slot))
-            .and_then(|codes| codes.get_mut(column % BANK_COLUMNS))
-        {
-            *place = code;
+        if let Some(pair) = self.pairs.get_mut(slot).and_then(|pairs| pairs.get_mut(column % BANK_COLUMNS)) {
+            match column / BANK_COLUMNS {
+                0 => *pair = *pair & 0xffff_0000 | u32::from(code),
+                1 => *pair = *pair & 0x0000_ffff | u32::from(code) << 16,
+                _ => {}
+            }
         }
     }
 }

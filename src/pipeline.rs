@@ -7,8 +7,8 @@ use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
 use crate::identify::{Identification, Press, PressView, Refusal};
-use crate::pressure::Array;
-use crate::safety::monitor::{Monitor, View};
+use crate::pressure::{self, Array};
+use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 
@@ -121,6 +121,10 @@ impl Pipeline {
     pub fn stop(&mut self, fault: Fault) -> Status {
         self.status.mode = Mode::Fault;
         self.status.fault.get_or_insert(fault);
+        if self.press.running() {
+            self.press.refuse(Refusal::Interrupted);
+            self.status.identification = self.press.outcome();
+        }
         self.status.duty = self.motion.coast();
         self.status
     }
@@ -139,8 +143,12 @@ impl Pipeline {
     pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
         let mut limits = self.count_frames(frame.sequence);
 
-        // What the array feels.
+        // What the array feels, where it can be trusted: the bridge does not wait for the rest.
+        let watched = self.watched();
         let picture = self.array.read(frame, &self.config);
+        if let Some(fault) = monitor::broken(picture, sense, &self.config).filter(|_| watched) {
+            return (Duty::ZERO, self.stop(fault));
+        }
         let contact = contact::from_sums(picture, &self.config);
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
@@ -151,9 +159,7 @@ impl Pipeline {
 
         // Whether that is sound.
         let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
-        if !matches!(self.status.mode, Mode::Off | Mode::Fault)
-            && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config)
-        {
+        if watched && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
             self.status.mode = Mode::Fault;
             self.status.fault = Some(fault);
         }
@@ -193,6 +199,20 @@ impl Pipeline {
         self.status.duty = duty;
         self.status.identification = self.press.outcome();
         (duty, self.status)
+    }
+
+    /// A look at a frame that is still being scanned, filled up from the frame before: stops where its array is broken, and tells
+    /// so. A taxel that fails just after it was read is seen a frame later; without this look the step would judge it only at
+    /// that frame's end.
+    pub fn glance(&mut self, frame: &Frame) -> Option<Status> {
+        let broken = self.watched()
+            && pressure::bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
+        broken.then(|| self.stop(Fault::ArrayBroken))
+    }
+
+    /// Whether faults count: not while the bridge is off anyhow.
+    fn watched(&self) -> bool {
+        !matches!(self.status.mode, Mode::Off | Mode::Fault)
     }
 
     /// Counts missed frames from the gap in the sequence.

@@ -5,8 +5,11 @@
 //! tells the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
 //! taxel would show behind a perfect row driver, and m times the taxel's gain, less its tare, is its pressure.
 
+mod row;
+
 use crate::config::Config;
-use crate::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
+use crate::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS};
+use row::{Columns, Row, without};
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = 4;
@@ -62,7 +65,8 @@ pub struct Array {
     picture: Picture,
     /// Reading without contact, codes in Q16.
     tare: [[i32; COLUMNS]; ROWS],
-    gain: [[u16; COLUMNS]; ROWS],
+    /// Q14, in pairs like the codes.
+    gain: [[u32; BANK_COLUMNS]; ROWS],
     tare_frames: u32,
     baseline_row: usize,
 }
@@ -79,7 +83,7 @@ impl Array {
         Self {
             picture: Picture::EMPTY,
             tare: [[0; COLUMNS]; ROWS],
-            gain: [[GAIN_ONE; COLUMNS]; ROWS],
+            gain: [[lanes::pair(GAIN_ONE as i16, GAIN_ONE as i16); BANK_COLUMNS]; ROWS],
             tare_frames: 0,
             baseline_row: 0,
         }
@@ -97,39 +101,29 @@ impl Array {
 
     /// Reads a frame. Any codes are taken: what a sound array cannot show becomes a bad taxel.
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
-        let [[rows_a @ .., undriven_a], [rows_b @ .., undriven_b]] = &frame.banks;
-        let undriven = joined(undriven_a, undriven_b);
+        let [rows @ .., undriven] = &frame.pairs;
         let picture = &mut self.picture;
         let (mut sum, mut moment_x, mut moment_y, mut peak) = (0, 0, 0, 0);
         let mut bad_count = 0;
         let mut weight = 1 - ROWS as i32;
-        let codes = rows_a.iter().zip(rows_b);
         let calibrations = self.tare.iter().zip(&self.gain);
         let places = picture.taxels.iter_mut().zip(&mut picture.bad);
-        for (((codes_a, codes_b), (tare, gain)), (out, bad)) in codes.zip(calibrations).zip(places) {
-            let codes = joined(codes_a, codes_b);
-            let mut row = Row::of(&codes, &undriven, config.dead_codes);
+        for ((codes, (tare, gain)), (out, bad)) in rows.iter().zip(calibrations).zip(places) {
+            let mut row = Row::of(codes, undriven, config.dead_codes);
+            let mut columns = Columns::default();
             *bad = 0;
             if row.suspect {
-                *bad = row.leave_out_bad(&codes, config.dead_codes);
+                *bad = row.leave_out_bad(codes, config.dead_codes);
                 bad_count += bad.count_ones() as u8;
+                let (tare, gain) = without(*bad, tare, gain);
+                columns.read(&row, &tare, &gain, config.sag_q32, out);
+            } else {
+                columns.read(&row, tare, gain, config.sag_q32, out);
             }
-            let boost = sag_boost(row.sum, config.sag_q32);
-            let mut row_sum = 0;
-            for column in 0..COLUMNS {
-                let corrected = row.net[column].wrapping_mul(boost).wrapping_add(1 << 11) >> (16 - CODE_BITS);
-                let gained = (corrected.wrapping_mul(u32::from(gain[column])) >> 14) as i32;
-                let mut value = gained - (tare[column] >> (TARE_BITS - CODE_BITS));
-                if row.suspect && *bad >> column & 1 != 0 {
-                    value = 0;
-                }
-                out[column] = value;
-                row_sum += value;
-                moment_x += value * WEIGHTS[column];
-                peak = i32::max(peak, value);
-            }
-            sum += row_sum;
-            moment_y += row_sum * weight;
+            peak = i32::max(peak, columns.peak);
+            sum += columns.sum();
+            moment_x += columns.moment();
+            moment_y += columns.sum() * weight;
             weight += 2;
         }
         picture.sum = sum;
@@ -137,7 +131,7 @@ impl Array {
         picture.moment_y = moment_y;
         picture.peak = peak;
         picture.bad_count = bad_count;
-        picture.undriven_max = undriven.iter().fold(0, |max, level| if *level > max { *level } else { max });
+        picture.undriven_max = undriven.iter().fold(0, |max, pair| max.max(*pair as u16).max((*pair >> 16) as u16));
         picture
     }
 
@@ -168,46 +162,17 @@ impl Array {
     }
 }
 
-/// Twice a column's distance from the middle, in pitches.
-const WEIGHTS: [i32; COLUMNS] = [-9, -7, -5, -3, -1, 1, 3, 5, 7, 9];
-
-/// One driven row, before calibration.
-struct Row {
-    /// Codes above the columns' undriven levels.
-    net: [u32; COLUMNS],
-    /// Their sum.
-    sum: u32,
-    /// A taxel is dead or saturated.
-    suspect: bool,
-}
-
-impl Row {
-    /// Without a branch for each taxel: one sign bit collects what is wrong with any of them.
-    fn of(codes: &[u16; COLUMNS], undriven: &[u16; COLUMNS], dead_codes: u16) -> Self {
-        let mut net = [0; COLUMNS];
-        let mut sum = 0u32;
-        let mut sign = 0;
-        for column in 0..COLUMNS {
-            let (code, level) = (i32::from(codes[column]), i32::from(undriven[column]));
-            sign |= (code - level - i32::from(dead_codes)) | (i32::from(SATURATED) - 1 - code);
-            net[column] = (code - level) as u32;
-            sum = sum.wrapping_add(net[column]);
+/// Taxels that a frame shows as dead or saturated: [`Array::read`] without the readings, and quicker.
+pub fn bad_taxels(frame: &Frame, config: &Config) -> u32 {
+    let [rows @ .., undriven] = &frame.pairs;
+    let mut count = 0;
+    for codes in rows {
+        let mut row = Row::of(codes, undriven, config.dead_codes);
+        if row.suspect {
+            count += row.leave_out_bad(codes, config.dead_codes).count_ones();
         }
-        Self { net, sum, suspect: sign < 0 }
     }
-
-    /// Holds every net code to what a converter can mean, and tells the bad columns, a bit each.
-    #[cold]
-    fn leave_out_bad(&mut self, codes: &[u16; COLUMNS], dead_codes: u16) -> u16 {
-        let mut bad = 0;
-        self.sum = 0;
-        for (column, (net, code)) in self.net.iter_mut().zip(codes).enumerate() {
-            *net = (*net as i32).clamp(0, 0xfff) as u32;
-            self.sum += *net;
-            bad |= u16::from(*code >= SATURATED || *net < u32::from(dead_codes)) << column;
-        }
-        bad
-    }
+    count
 }
 
 /// Moves each tare (Q16) by `weight` (Q16) of what the taxel now reads above it.
@@ -215,18 +180,4 @@ fn learn(tares: &mut [i32; COLUMNS], values: &[i32; COLUMNS], weight: i32) {
     for (tare, value) in tares.iter_mut().zip(values) {
         *tare += ((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32;
     }
-}
-
-/// The columns of both banks.
-fn joined(a: &[u16; BANK_COLUMNS], b: &[u16; BANK_COLUMNS]) -> [u16; COLUMNS] {
-    let mut columns = [0; COLUMNS];
-    columns[..BANK_COLUMNS].copy_from_slice(a);
-    columns[BANK_COLUMNS..].copy_from_slice(b);
-    columns
-}
-
-/// 1 / (1 - rho N) in Q16, at most 2: a row that loses half its voltage is broken, not sagging.
-fn sag_boost(row_codes: u32, sag_q32: u32) -> u32 {
-    let remaining = (u32::MAX - row_codes.saturating_mul(sag_q32)) >> 16;
-    u32::MAX / remaining.max(1 << 15)
 }

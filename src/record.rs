@@ -2,14 +2,14 @@
 //!
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
-use crate::frame::{Frame, SLOTS, Sense};
+use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
 use crate::identify::Modulus;
 use crate::pipeline::{Command, Contact, Status};
 use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x02";
+pub const MAGIC: [u8; 8] = *b"fingert\x03";
 
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +28,7 @@ impl Record {
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
-        let Self { frame: Frame { banks, sequence }, sense, command } = self;
+        let Self { frame, sense, command } = self;
         let mut bytes = [0; Self::BYTES];
         let mut rest = &mut bytes[..];
         let mut put = |value: &[u8]| {
@@ -37,8 +37,8 @@ impl Record {
                 rest = after;
             }
         };
-        banks.iter().flatten().flatten().for_each(|code| put(&code.to_le_bytes()));
-        put(&sequence.to_le_bytes());
+        places().for_each(|(slot, column)| put(&frame.code(slot, column).to_le_bytes()));
+        put(&frame.sequence.to_le_bytes());
         let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault } = sense;
         put(&encoder.to_le_bytes());
         put(&supply_mv.to_le_bytes());
@@ -56,7 +56,7 @@ impl Record {
     pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Self {
         let mut rest = &bytes[..];
         let mut frame = Frame::EMPTY;
-        frame.banks.iter_mut().flatten().flatten().for_each(|code| *code = u16::from_le_bytes(take(&mut rest)));
+        places().for_each(|(slot, column)| frame.set_code(slot, column, u16::from_le_bytes(take(&mut rest))));
         frame.sequence = u32::from_le_bytes(take(&mut rest));
         let sense = Sense {
             encoder: i32::from_le_bytes(take(&mut rest)),
@@ -74,6 +74,11 @@ impl Record {
         };
         Self { frame, sense, command }
     }
+}
+
+/// Slot by slot, column by column.
+fn places() -> impl Iterator<Item = (usize, usize)> {
+    (0..SLOTS).flat_map(|slot| (0..COLUMNS).map(move |column| (slot, column)))
 }
 
 /// The next bytes; zeros beyond the end.

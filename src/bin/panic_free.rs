@@ -16,8 +16,8 @@ use fingertip::units::Duty;
 #[inline(never)]
 fn control_step(pipeline: &mut Pipeline, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
     if cfg!(feature = "proof-control-panic") {
-        let codes = frame.banks.as_flattened();
-        return (Duty(codes[command.goal.to_bits() as usize][0] as i16), Status::default());
+        let codes = frame.pairs.as_flattened();
+        return (Duty(codes[command.goal.to_bits() as usize] as i16), Status::default());
     }
     if cfg!(feature = "proof-control-float") {
         return (Duty((f64::from(sense.supply_mv) * 0.1) as i16), Status::default());

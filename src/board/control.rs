@@ -90,6 +90,7 @@ impl State {
         }
         self.find_frames();
         self.take_frame();
+        self.glance();
         self.configure();
     }
 
@@ -114,6 +115,19 @@ impl State {
         // A frame that is not whole counts as missed: the guard runs on.
         if self.parts.scan.copy(newest, &mut self.frame) {
             self.step(newest);
+        }
+    }
+
+    /// Looks at the rows that are already there, half a frame before the step does.
+    fn glance(&mut self) {
+        if !super::scan::take_halfway() || self.discard_next {
+            return;
+        }
+        self.parts.scan.copy_so_far(&mut self.frame);
+        if let Some(status) = self.parts.pipeline.glance(&self.frame) {
+            self.parts.bridge.sleep();
+            self.report.status = status;
+            self.publish();
         }
     }
 

@@ -25,6 +25,7 @@ pub mod watch;
 pub fn set_priorities() {
     for (interrupt, priority) in [
         (interrupt::TIM5, Priority::P0),
+        (interrupt::DMA2_STREAM1, Priority::P1),
         (interrupt::DMA2_STREAM2, Priority::P1),
         (interrupt::SPI3, Priority::P2),
         (interrupt::TIM2, Priority::P5),

@@ -1,9 +1,9 @@
 //! The scan: rows, conversions and memory are moved by timers and DMA alone; see "Scan" in `docs/board.md`.
 //!
 //! The processor sees one interrupt a frame, from the second bank's stream. It counts the frame, notes the instant and
-//! wakes the control task. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
+//! wakes the control task. Another, from the rows' stream when half of them are driven, wakes it for a glance. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
 
-use core::sync::atomic::{AtomicU16, AtomicU32, Ordering, fence};
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering, fence};
 
 use embassy_stm32::gpio::AnyPin;
 use embassy_stm32::interrupt;
@@ -21,7 +21,7 @@ use fingertip::scan::ScanTiming;
 
 use super::{converter, guard, pins};
 
-/// Wakes the control task: a frame is complete, or the guard tripped.
+/// Wakes the control task: a frame is complete or half complete, or the guard tripped.
 pub static WAKE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
 /// Columns 0 to 4 on ADC1 and 5 to 9 on ADC2.
@@ -61,6 +61,7 @@ const ALL_ROWS: u32 = (1 << ROWS) - 1;
 
 static SEQUENCE: AtomicU32 = AtomicU32::new(1);
 static STAMP: AtomicU32 = AtomicU32::new(0);
+static HALFWAY: AtomicBool = AtomicBool::new(false);
 
 /// A frame that lies complete in memory.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -80,6 +81,11 @@ pub fn newest() -> Completed {
             return Completed { sequence, stamp };
         }
     }
+}
+
+/// Whether half of the rows were driven since the last call.
+pub fn take_halfway() -> bool {
+    HALFWAY.swap(false, Ordering::AcqRel)
 }
 
 /// The scan's hardware.
@@ -124,8 +130,11 @@ impl Scan {
         start_stream(STREAM_A, CHANNEL_ADC1, pac::ADC1.dr().as_ptr() as u32, &raw const BUFFERS[0] as u32);
         start_stream(STREAM_B, CHANNEL_ADC2, pac::ADC2.dr().as_ptr() as u32, &raw const BUFFERS[1] as u32);
         start_rows();
-        // SAFETY: the handler below touches only atomics and flags of its own streams, and its priority is set.
-        unsafe { interrupt::DMA2_STREAM2.enable() };
+        // SAFETY: the handlers below touch only atomics and flags of their own streams, and their priority is set.
+        unsafe {
+            interrupt::DMA2_STREAM1.enable();
+            interrupt::DMA2_STREAM2.enable();
+        }
         start_timer(timing);
     }
 
@@ -134,18 +143,32 @@ impl Scan {
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();
-        for (bank, buffer) in frame.banks.iter_mut().zip(&BUFFERS) {
-            for (codes, sources) in bank.iter_mut().zip(&buffer[half]) {
-                for (code, source) in codes.iter_mut().zip(sources) {
-                    *code = source.load(Ordering::Relaxed);
-                }
-            }
-        }
-        fence(Ordering::Acquire);
+        copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
         arrived && untouched && in_step() && newest() == completed
     }
+
+    /// Replaces the slots of `frame` that the scan has already read anew.
+    pub fn copy_so_far(&mut self, frame: &mut Frame) {
+        let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
+        if half_a == half_b {
+            let stored = u16::min(stored(STREAM_A) % HALF_LEN, stored(STREAM_B) % HALF_LEN);
+            copy_slots(half_a, usize::from(stored) / BANK_COLUMNS, frame);
+        }
+    }
+}
+
+/// Copies the first slots of a half.
+#[inline(never)]
+fn copy_slots(half: usize, slots: usize, frame: &mut Frame) {
+    let banks = BUFFERS[0][half].iter().zip(&BUFFERS[1][half]);
+    for (pairs, (bank_a, bank_b)) in frame.pairs.iter_mut().zip(banks).take(slots) {
+        for (pair, (low, high)) in pairs.iter_mut().zip(bank_a.iter().zip(bank_b)) {
+            *pair = u32::from(low.load(Ordering::Relaxed)) | u32::from(high.load(Ordering::Relaxed)) << 16;
+        }
+    }
+    fence(Ordering::Acquire);
 }
 
 /// Stops the timer first, so that nothing asks for DMA any more, then all that hung on it. No row stays driven.
@@ -171,6 +194,7 @@ fn stop() {
             w.set_feif(stream, true);
         }
     });
+    interrupt::DMA2_STREAM1.unpend();
     interrupt::DMA2_STREAM2.unpend();
     pac::GPIOB.bsrr().write(|w| w.0 = ALL_ROWS << 16);
 }
@@ -220,6 +244,7 @@ fn start_rows() {
         w.set_msize(Size::BITS32);
         w.set_psize(Size::BITS32);
         w.set_pl(Pl::HIGH);
+        w.set_htie(true);
     });
     stream.cr().modify(|w| w.set_en(true));
 }
@@ -237,9 +262,14 @@ fn start_timer(timing: ScanTiming) {
     timer.cr1().write(|w| w.set_cen(true));
 }
 
+/// Codes that a stream has stored in this round through both halves.
+fn stored(stream: usize) -> u16 {
+    BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt())
+}
+
 /// The half of the buffer that a stream writes to next.
 fn written_half(stream: usize) -> usize {
-    usize::from((BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt()) / HALF_LEN) & 1)
+    usize::from((stored(stream) / HALF_LEN) & 1)
 }
 
 /// Whether the codes belong to the rows under which they are stored.
@@ -250,8 +280,7 @@ fn in_step() -> bool {
     let slots = SLOTS as u16;
     let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;
     [STREAM_A, STREAM_B].into_iter().all(|stream| {
-        let stored = BUFFER_LEN.wrapping_sub(pac::DMA2.st(stream).ndtr().read().ndt());
-        let completed = stored / BANK_COLUMNS as u16 % slots;
+        let completed = stored(stream) / BANK_COLUMNS as u16 % slots;
         completed == current || completed == (current + 1) % slots
     })
 }
@@ -265,6 +294,13 @@ fn bank_a_completed(half: usize) -> bool {
 /// A converter that was not read in time stops asking for DMA.
 fn overrun() -> bool {
     [pac::ADC1, pac::ADC2].into_iter().any(|adc| adc.sr().read().ovr())
+}
+
+#[embassy_stm32::interrupt]
+fn DMA2_STREAM1() {
+    pac::DMA2.ifcr(0).write(|w| w.set_htif(STREAM_ROWS, true));
+    HALFWAY.store(true, Ordering::Release);
+    WAKE.signal(());
 }
 
 #[embassy_stm32::interrupt]

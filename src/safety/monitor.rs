@@ -54,20 +54,17 @@ impl Monitor {
         };
     }
 
-    /// The first fault that this frame shows, the most direct evidence first. While the bridge is off for a tare, only what the
-    /// frame itself shows counts.
+    /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off for a tare,
+    /// only the bus counts.
     pub fn check(&mut self, view: &View, driven: bool, config: &Config) -> Option<Fault> {
-        let p = &config.params;
-        let faults = [
-            (Fault::Bridge, view.sense.bridge_fault),
-            (Fault::RowStuck, i32::from(view.picture.undriven_max) > p.undriven_max_codes),
-            (Fault::ArrayBroken, i32::from(view.picture.bad_count) > p.bad_taxels_max),
-            (Fault::OverForce, driven && view.contact.force > config.force_fault),
-            (Fault::BusSilent, bus_silent(view)),
-        ];
-        let direct = faults.iter().find(|(_, found)| *found).map(|(fault, _)| *fault);
-        if direct.is_some() || !driven {
-            return direct;
+        if driven && view.contact.force > config.force_fault {
+            return Some(Fault::OverForce);
+        }
+        if bus_silent(view) {
+            return Some(Fault::BusSilent);
+        }
+        if !driven {
+            return None;
         }
         self.supply(view, config).or_else(|| self.motion(view, config))
     }
@@ -106,6 +103,20 @@ impl Monitor {
             self.travel = travel;
         }
         (distance(travel, self.travel) > BLIND_TRAVEL).then_some(Fault::ArrayFrozen)
+    }
+}
+
+/// A broken bridge or array: what a frame shows before its contact is read.
+pub fn broken(picture: &Picture, sense: &Sense, config: &Config) -> Option<Fault> {
+    let p = &config.params;
+    if sense.bridge_fault {
+        Some(Fault::Bridge)
+    } else if i32::from(picture.undriven_max) > p.undriven_max_codes {
+        Some(Fault::RowStuck)
+    } else if i32::from(picture.bad_count) > p.bad_taxels_max {
+        Some(Fault::ArrayBroken)
+    } else {
+        None
     }
 }
 

@@ -1,0 +1,100 @@
+//! Two signed 16-bit numbers in a word, worked on at once.
+//!
+//! Each function is one instruction of the Cortex-M4's DSP extension, which stable Rust offers only as assembly, and
+//! the same in portable Rust ([`portable`]) everywhere else. This crate is the only place outside the board layer with
+//! `unsafe`: the core forbids it. A test compares the portable functions with plain arithmetic on any host, and the
+//! emulated target's digest compares the instructions with the portable functions.
+#![no_std]
+
+/// The sign bits of both lanes.
+pub const SIGNS: u32 = 0x8000_8000;
+
+/// Two numbers side by side.
+///
+/// ```
+/// assert_eq!(lanes::pair(1, -1), 0xffff_0001);
+/// ```
+#[inline(always)]
+pub const fn pair(low: i16, high: i16) -> u32 {
+    low as u16 as u32 | (high as u16 as u32) << 16
+}
+
+/// The number in the low half.
+#[inline(always)]
+pub const fn low(pair: u32) -> i16 {
+    pair as i16
+}
+
+/// The number in the high half.
+#[inline(always)]
+pub const fn high(pair: u32) -> i16 {
+    (pair >> 16) as i16
+}
+
+/// The same functions without the instructions.
+pub mod portable {
+    use super::{high, low, pair};
+
+    /// See [`super::sub`].
+    #[inline(always)]
+    pub const fn sub(a: u32, b: u32) -> u32 {
+        pair(low(a).wrapping_sub(low(b)), high(a).wrapping_sub(high(b)))
+    }
+
+    /// See [`super::dot`].
+    #[inline(always)]
+    pub const fn dot(a: u32, b: u32, sum: i32) -> i32 {
+        let products = [low(a) as i32 * low(b) as i32, high(a) as i32 * high(b) as i32];
+        sum.wrapping_add(products[0]).wrapping_add(products[1])
+    }
+}
+
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+pub use instructions::{dot, sub};
+#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+pub use portable::{dot, sub};
+
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+mod instructions {
+    use core::arch::asm;
+
+    /// a - b in each lane, wrapping (SSUB16).
+    #[inline(always)]
+    pub fn sub(a: u32, b: u32) -> u32 {
+        let difference;
+        // SAFETY: reads and writes registers only. The flags that it sets (GE) are read by no other instruction here.
+        unsafe {
+            asm!("ssub16 {}, {}, {}", lateout(reg) difference, in(reg) a, in(reg) b, options(pure, nomem, nostack))
+        }
+        difference
+    }
+
+    /// sum + a.low b.low + a.high b.high, wrapping (SMLAD).
+    #[inline(always)]
+    pub fn dot(a: u32, b: u32, sum: i32) -> i32 {
+        let result;
+        // SAFETY: reads and writes registers only. The flag that it can set (Q) is sticky and read nowhere.
+        unsafe {
+            asm!("smlad {}, {}, {}, {}", lateout(reg) result, in(reg) a, in(reg) b, in(reg) sum, options(pure, nomem, nostack));
+        }
+        result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{high, low, pair, portable};
+
+    #[test]
+    fn lanes_do_not_touch_each_other() {
+        let edges = [i16::MIN, i16::MIN + 1, -1, 0, 1, 4090, i16::MAX - 1, i16::MAX];
+        for (a, b) in edges.iter().flat_map(|a| edges.map(|b| (*a, b))) {
+            for (c, d) in edges.iter().flat_map(|c| edges.map(|d| (*c, d))) {
+                let difference = portable::sub(pair(a, c), pair(b, d));
+                assert_eq!((low(difference), high(difference)), (a.wrapping_sub(b), c.wrapping_sub(d)));
+                let exact = 7 + i64::from(a) * i64::from(b) + i64::from(c) * i64::from(d);
+                assert_eq!(portable::dot(pair(a, c), pair(b, d), 7), exact as i32);
+            }
+        }
+    }
+}

@@ -1,9 +1,11 @@
-//! Pictures of a run as SVG: charts over time and pressure maps. Readable in grey, and the same bytes for the same run.
+//! Pictures of a run as SVG: charts over time, curves over a quantity and pressure maps. Readable in grey, and the same bytes for the same run.
 
 mod charts;
+mod curves;
 mod maps;
 
 pub use charts::{Panel, overview, steps};
+pub use curves::{Curve, Curves, curves};
 pub use maps::{Map, maps};
 
 use plotters::prelude::*;

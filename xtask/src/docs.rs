@@ -2,7 +2,7 @@
 
 use crate::{
     console::{self, Console},
-    demo, image, paths,
+    demo, figures, image, paths,
     toolchain::Choice,
 };
 use anyhow::{Context, Result, bail};
@@ -11,9 +11,12 @@ use std::{fs, path::Path};
 /// Files that programs write: path, and the example of the package host-tests that prints their text.
 const GENERATED: [(&str, &str); 2] =
     [("docs/control-table.md", "control-table"), ("examples/python/registers.py", "registers-python")];
-/// The demonstration's figures and pictures, as the README shows them.
+/// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
-const PICTURES: &str = "docs/pictures";
+/// Its pictures, and those of the paper.
+pub const PICTURES: &str = "docs/pictures";
+/// The paper's figures among the pictures.
+const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
 const README: (&str, &str) = ("README.md", "readme");
 
 /// Flags of `cargo xtask docs`.
@@ -33,6 +36,13 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED {
         renew(path, &print(example, None)?, args.check, &mut stale, console)?;
+    }
+    let drawn = paths::target().join("docs").join("figures");
+    figures::draw(&drawn, console)?;
+    for path in PAPER {
+        let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
+        let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", paths::shown(&file)))?;
+        renew(path, &text, args.check, &mut stale, console)?;
     }
 
     let root = paths::root();

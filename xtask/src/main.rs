@@ -4,6 +4,7 @@ mod apt;
 mod console;
 mod demo;
 mod docs;
+mod figures;
 mod fit;
 mod flash;
 mod image;
@@ -57,6 +58,8 @@ enum Command {
     Prove(model::Args),
     /// Judge the contact's fit on thousands of pictures, and renew the tables of docs/contact.md
     Fit(fit::Args),
+    /// Draw the paper's figures 7, 10 and 11 from the contact model, in the core's fixed point
+    Figures(figures::Args),
     /// Prove the control step free of panics and of floating-point calls
     PanicFree,
     /// Check format, lints, documentation and licences
@@ -90,6 +93,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Model => model::answer(console),
         Command::Prove(args) => model::prove(args, console),
         Command::Fit(args) => fit::run(args, console),
+        Command::Figures(args) => figures::run(args, console),
         Command::PanicFree => proof::run(toolchain, console),
         Command::Lint => lint::run(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),

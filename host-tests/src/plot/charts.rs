@@ -97,24 +97,26 @@ fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
     })
 }
 
-struct Frame<'a> {
-    title: &'a str,
-    x: &'a str,
-    unit: &'a str,
-    x_range: [f64; 2],
-    range: [f64; 2],
+/// A chart's title, axes and ranges.
+pub(super) struct Frame<'a> {
+    pub title: &'a str,
+    pub x: &'a str,
+    pub unit: &'a str,
+    pub x_range: [f64; 2],
+    pub range: [f64; 2],
 }
 
 type Points = [(f64, f64)];
 type Cartesian = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
 
-struct Chart<'a, 'b> {
+/// What a chart's lines are drawn on.
+pub(super) struct Chart<'a, 'b> {
     context: ChartContext<'a, SVGBackend<'b>, Cartesian>,
     range: [f64; 2],
 }
 
 impl Frame<'_> {
-    fn draw<'b>(
+    pub fn draw<'b>(
         &self,
         area: &Area<'b>,
         draw: impl FnOnce(&mut Chart<'_, 'b>) -> Result<(), PlotError>,
@@ -148,7 +150,7 @@ impl Frame<'_> {
 }
 
 impl Chart<'_, '_> {
-    fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
+    pub fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
         self.line(points, ink.stroke_width(2))
     }
 
@@ -156,7 +158,7 @@ impl Chart<'_, '_> {
         self.context.draw_series(LineSeries::new(points.iter().copied(), style)).map(drop).map_err(failed)
     }
 
-    fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
+    pub fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
         let line = DashedLineSeries::new(points.iter().copied(), 7, 4, ink.stroke_width(2));
         self.context.draw_series(line).map(drop).map_err(failed)
     }
@@ -167,6 +169,12 @@ impl Chart<'_, '_> {
         let fresh = points.iter().filter(|(_, value)| core::mem::replace(&mut last, *value) != *value);
         let dots = fresh.map(|point| Circle::new(*point, 2, INK.stroke_width(1)));
         self.context.draw_series(dots).map(drop).map_err(failed)
+    }
+
+    /// A circle at each point.
+    pub fn circles(&mut self, points: &Points) -> Result<(), PlotError> {
+        let circles = points.iter().map(|point| Circle::new(*point, 4, BLACK.stroke_width(1)));
+        self.context.draw_series(circles).map(drop).map_err(failed)
     }
 
     /// A dotted upright line.

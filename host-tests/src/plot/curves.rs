@@ -1,0 +1,56 @@
+//! Curves and points over a quantity, one panel beside the other.
+
+use super::charts::Frame;
+use super::{GOAL_INK, INK, PlotError, picture};
+
+/// What is drawn in a panel.
+#[derive(Clone, Debug)]
+pub enum Curve {
+    /// A solid line through points.
+    Solid(Vec<(f64, f64)>),
+    /// A dashed line through points.
+    Dashed(Vec<(f64, f64)>),
+    /// A circle at each point.
+    Circles(Vec<(f64, f64)>),
+}
+
+/// A panel.
+#[derive(Clone, Debug)]
+pub struct Curves {
+    /// What it shows.
+    pub title: String,
+    /// The horizontal axis, with its unit.
+    pub x: &'static str,
+    /// The vertical axis, with its unit.
+    pub y: &'static str,
+    /// Left and right end.
+    pub x_range: [f64; 2],
+    /// Lower and upper end.
+    pub y_range: [f64; 2],
+    /// First to last, the last on top.
+    pub curves: Vec<Curve>,
+}
+
+/// Panels side by side, each of a size.
+///
+/// # Errors
+/// There is no panel.
+pub fn curves(panels: &[Curves], panel_px: (u32, u32)) -> Result<String, PlotError> {
+    if panels.is_empty() {
+        return Err(PlotError("there is no panel".into()));
+    }
+    picture((panel_px.0 * panels.len() as u32, panel_px.1), |area| {
+        for (panel, area) in panels.iter().zip(area.split_evenly((1, panels.len()))) {
+            let Curves { title, x, y, x_range, y_range, curves } = panel;
+            let frame = Frame { title, x, unit: y, x_range: *x_range, range: *y_range };
+            frame.draw(&area, |chart| {
+                curves.iter().try_for_each(|curve| match curve {
+                    Curve::Solid(points) => chart.solid(points, INK),
+                    Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
+                    Curve::Circles(points) => chart.circles(points),
+                })
+            })?;
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,36 @@
+//! The paper's figures, drawn from the core.
+
+use crate::{
+    console::{self, Console},
+    docs, paths,
+};
+use anyhow::Result;
+use std::path::{Path, PathBuf};
+
+/// Flags of `cargo xtask figures`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask figures\n  cargo xtask figures --out /tmp/figures")]
+pub struct Args {
+    /// Folder to draw them into
+    #[arg(long, value_name = "DIR", default_value = docs::PICTURES)]
+    out: PathBuf,
+}
+
+/// Draws the figures.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn run(args: &Args, console: &mut Console) -> Result<()> {
+    let default = args.out == Path::new(docs::PICTURES);
+    draw(&if default { paths::root().join(docs::PICTURES) } else { args.out.clone() }, console)
+}
+
+/// Draws the figures into a folder.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn draw(folder: &Path, console: &mut Console) -> Result<()> {
+    let mut command = console::cargo("run");
+    command.args(["--quiet", "--package", "host-tests", "--bin", "figures", "--"]);
+    console.run(command.arg(folder))
+}

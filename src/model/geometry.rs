@@ -5,12 +5,12 @@
 
 use super::Tip;
 use super::angle::{angle_of, arc_tangent, sine_cosine};
-use super::arith::{nearest_quotient, quotient, root, square};
+use super::arith::{mul_high, nearest_long_quotient, quotient, root, square};
 use crate::root::floor_sqrt;
 use crate::units::{Millimetres, MillimetresPerRadian, Radians, SquareMillimetres};
 
-/// Below the cosine of every touching angle, in Q31: it is 1/20 at the deepest indentation.
-const COSINE_MIN: u32 = (1 << 31) / 21;
+/// Below the cosine of every touching angle, in Q63: it is 1/20 at the deepest indentation.
+const COSINE_MIN: u64 = (1 << 63) / 21;
 
 impl Tip {
     /// Height of the undeformed surface over the hemisphere's base at `r`: `z = sqrt(a^2 - r^2)` (eq. 1).
@@ -60,7 +60,7 @@ impl Tip {
     /// [`Tip::touching_angle_max`].
     pub fn distance_at(&self, theta: Radians, d: Millimetres) -> Millimetres {
         let (sine, cosine) = self.sine_cosine(theta, d);
-        let bits = nearest_quotient(u64::from(self.rest(self.depth(d))) * sine, cosine);
+        let bits = nearest_long_quotient(u128::from(self.rest(self.depth(d))) * u128::from(sine), cosine);
         Millimetres::from_bits(bits as i32).min(self.contact_radius(d))
     }
 
@@ -77,8 +77,9 @@ impl Tip {
     /// How fast the distance grows with the touching angle: `dr/dtheta = (a - d) / cos^2(theta)` (eq. 7).
     pub fn distance_slope(&self, theta: Radians, d: Millimetres) -> MillimetresPerRadian {
         let (_, cosine) = self.sine_cosine(theta, d);
-        let slope_q24 = quotient(quotient(u64::from(self.rest(self.depth(d))) << 31, cosine) << 31, cosine);
-        MillimetresPerRadian::from_bits((slope_q24 >> 7).div_ceil(2) as i32)
+        // Q24 over Q62 to Q16.
+        let bits = nearest_long_quotient(u128::from(self.rest(self.depth(d))) << 54, mul_high(cosine, cosine));
+        MillimetresPerRadian::from_bits(bits as i32)
     }
 
     /// The area element for each dtheta dphi: `dS = r dr dphi = (a - d)^2 sin(theta) / cos^3(theta) dtheta dphi` (eq. 8).
@@ -86,17 +87,17 @@ impl Tip {
     /// In mm^2/rad^2.
     pub fn area_density(&self, theta: Radians, d: Millimetres) -> SquareMillimetres {
         let (sine, cosine) = self.sine_cosine(theta, d);
-        let rest = u64::from(self.rest(self.depth(d)));
-        let slope_q24 = quotient(quotient(rest << 31, cosine) << 31, cosine);
-        let distance_q27 = quotient((rest * sine) << 3, cosine);
-        SquareMillimetres::from_bits(((slope_q24 * distance_q27) >> 34).div_ceil(2) as i32)
+        // Q48 times Q63 over Q61 to Q16.
+        let product = u128::from(square(self.rest(self.depth(d)))) * u128::from(sine);
+        let bits = nearest_long_quotient(product >> 34, mul_high(mul_high(cosine, cosine), cosine));
+        SquareMillimetres::from_bits(bits as i32)
     }
 
-    /// Sine and cosine of a touching angle in Q31; the cosine is at least 1/21.
+    /// Sine and cosine of a touching angle in Q63; the cosine is at least 1/21.
     fn sine_cosine(&self, theta: Radians, d: Millimetres) -> (u64, u64) {
         let theta = theta.max(Radians::ZERO).min(self.touching_angle_max(d)).to_bits().unsigned_abs();
         let (sine, cosine) = sine_cosine(theta);
-        (u64::from(sine), u64::from(cosine.max(COSINE_MIN)))
+        (sine, cosine.max(COSINE_MIN))
     }
 
     /// The radius in units of the last place.

@@ -15,6 +15,7 @@
 
 use super::Tip;
 use super::angle::sine_cosine;
+use super::arith::nearest_long_quotient;
 use crate::units::{Millimetres, NewtonMillimetres, Newtons, Radians};
 
 /// How an object has moved against the tip since they touched.
@@ -39,7 +40,10 @@ pub struct Load {
     pub moment: NewtonMillimetres,
 }
 
-/// A displacement within its domain: lengths in Q24, the tangent in Q30.
+/// Fractional bits of a tangent.
+const TANGENT_BITS: u32 = 46;
+
+/// A displacement within its domain: lengths in Q24, the tangent in Q46.
 struct Pose {
     normal: i64,
     shift: i64,
@@ -54,14 +58,14 @@ impl Tip {
     /// What is outside the ranges of [`Displacement`] counts as the nearest value inside.
     pub fn load(&self, displacement: Displacement) -> Load {
         let Pose { normal, shift, tangent, square } = self.pose(displacement);
-        let lean = shift_product(normal * normal, tangent, 30);
-        let shear = shift_product(2 * normal * shift, tangent, 30);
-        // 2 d tan t / 3 + s in Q30.
-        let arm = (shift_product(normal, tangent, 23)).div_euclid(3) + (shift << 6);
+        let lean = shift_product(normal * normal, tangent, TANGENT_BITS);
+        let shear = shift_product(2 * normal * shift, tangent, TANGENT_BITS);
+        // 2 d tan t / 3 + s in Q40.
+        let arm = shift_product(normal, tangent, TANGENT_BITS - 17).div_euclid(3) + (shift << 16);
         Load {
             normal: Newtons::from_bits(self.signed_force(square + shear + shift * shift, 0)),
             tangential: Newtons::from_bits(self.signed_force(lean + 2 * normal * shift, 0)),
-            moment: NewtonMillimetres::from_bits(self.signed_force(shift_product(square, arm, 30), 2)),
+            moment: NewtonMillimetres::from_bits(self.signed_force(shift_product(square, arm, 40), 2)),
         }
     }
 
@@ -70,9 +74,9 @@ impl Tip {
     /// What is outside the ranges of [`Displacement`] counts as the nearest value inside.
     pub fn energy(&self, displacement: Displacement) -> NewtonMillimetres {
         let Pose { normal, shift, tangent, square } = self.pose(displacement);
-        // d tan t + s in Q30.
-        let lean = shift_product(normal, tangent, 24) + (shift << 6);
-        let sum = square / 3 + shift_product(lean, shift, 6);
+        // d tan t + s in Q40.
+        let lean = shift_product(normal, tangent, TANGENT_BITS - 16) + (shift << 16);
+        let sum = square / 3 + shift_product(lean, shift, 16);
         NewtonMillimetres::from_bits(self.signed_force(shift_product(sum, normal, 24), 2))
     }
 
@@ -81,7 +85,7 @@ impl Tip {
     /// It may be beyond the -a/2 to a/2 that [`Displacement`] covers.
     pub fn free_shift(&self, normal: Millimetres, tilt: Radians) -> Millimetres {
         let pose = self.pose(Displacement { normal, shift: Millimetres::ZERO, tilt });
-        Millimetres::from_bits(-shift_product(pose.normal, pose.tangent, 31) as i32)
+        Millimetres::from_bits(-shift_product(pose.normal, pose.tangent, TANGENT_BITS + 1) as i32)
     }
 
     fn pose(&self, displacement: Displacement) -> Pose {
@@ -91,10 +95,10 @@ impl Tip {
         let tilt = displacement.tilt.to_bits().clamp(-1 << 24, 1 << 24);
         let (sine, cosine) = sine_cosine(tilt.unsigned_abs());
         // The cosine of 1 rad is 0.54.
-        let steepness = ((u64::from(sine) << 30) / u64::from(cosine.max(1 << 30))) as i64;
+        let steepness = nearest_long_quotient(u128::from(sine) << TANGENT_BITS, cosine.max(1 << 62)) as i64;
         let tangent = if tilt < 0 { -steepness } else { steepness };
-        let stretch = (1 << 30) + shift_product(tangent, tangent, 30);
-        Pose { normal, shift, tangent, square: shift_product(normal * normal, stretch, 30) }
+        let stretch = (1 << TANGENT_BITS) + shift_product(tangent, tangent, TANGENT_BITS);
+        Pose { normal, shift, tangent, square: shift_product(normal * normal, stretch, TANGENT_BITS) }
     }
 
     /// `pi Y` times a signed Q48 number, with `drop` bits less after the point than a force has.

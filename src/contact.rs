@@ -60,8 +60,8 @@ impl Effort {
 
 /// A contact with less confidence than this is not a hemisphere on a plane.
 pub const CONFIDENCE_LEAST: u8 = 128;
-/// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 2.7 %.
-const RESIDUAL_MAX: u32 = 442;
+/// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 2.8 %.
+const RESIDUAL_MAX: u32 = 459;
 /// A first step that moves farther than this, Q24 of the radius, is followed by another: 1/32.
 const FAR: u32 = 1 << (CENTRE_BITS - 5);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
@@ -90,7 +90,7 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
         return sums;
     };
     // The sum over the peak is about half of the number of taxels that see the contact.
-    let which = if effort == Effort::One && picture.sum / LARGE > picture.peak { Taxels::Half } else { Taxels::All };
+    let which = if effort == Effort::One && picture.sum / LARGE > picture.peak { Taxels::HALF } else { Taxels::ALL };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     let pressed = Pressed::new(&guess, &view, geometry);
     if covered(&guess, &pressed, picture, geometry) {
@@ -98,7 +98,8 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
         return Contact { confidence: confidence(&misfit, &view), ..sums };
     }
     let start = start::plane(&view, which, geometry).unwrap_or(guess);
-    let (guess, misfit) = refine(start, effort, which, &view, geometry);
+    let guess = refine(start, effort, which, &view, geometry);
+    let misfit = step::compare(&Pressed::new(&guess, &view, geometry), &view, which);
     let confidence = confidence(&misfit, &view);
     if misfit.taxels < TAXELS_MIN {
         return Contact { confidence, ..sums };
@@ -136,17 +137,16 @@ fn covered(guess: &Guess, pressed: &Pressed, picture: &Picture, geometry: &Geome
 }
 
 /// Refines a guess as often as the effort allows.
-fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
+fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &Geometry) -> Guess {
     let (mut quick, mut close) = effort.steps();
     let mut guess = start;
-    let mut misfit = Misfit::default();
     let mut again = true;
     while quick + close > 0 {
         let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
         let equations = step::equations(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
-        let (next, promised) = equations.solve(&guess, rim.is_some(), view, geometry);
+        let next = equations.solve(&guess, view, geometry);
         let moved = distance(&guess, &next);
-        (guess, misfit) = (next, promised);
+        guess = next;
         if quick > 0 {
             // A start from few taxels can be far off; few taxels are also quick.
             if moved > FAR && again {
@@ -161,7 +161,7 @@ fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &G
             }
         }
     }
-    (guess, misfit)
+    guess
 }
 
 /// The largest change of a coordinate, Q24.

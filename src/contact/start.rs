@@ -54,14 +54,14 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(view: &View, which: Taxels) -> Self {
+    fn of(view: &View, mut which: Taxels) -> Self {
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
         let inverse_modulus = (view.inverse_modulus >> (24 - view.modulus_shift)) as i32;
         let mut y = 1 - ROWS as i32;
-        for (row, taxels) in view.picture.taxels.iter().enumerate() {
+        for taxels in &view.picture.taxels {
             let (mut n, mut sx, mut sxx, mut sxxx, mut z, mut zx) = (0, 0, 0, 0, 0, 0);
-            let (mut column, stride) = which.columns(row);
+            let (mut column, stride) = which.row();
             while column < COLUMNS {
                 let x = 2 * column as i32 + 1 - COLUMNS as i32;
                 let share = view.share(taxels[column]).min(1 << PEAK_BITS);

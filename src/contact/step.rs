@@ -25,7 +25,7 @@ const GUARD_BITS: u32 = 14;
 /// How far the model and the picture are apart; squares count 2^-24 of the peak's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Misfit {
-    /// Sum of the squared residuals, weighted, of live taxels within the model's contact.
+    /// Sum of the squared residuals of live taxels within the model's contact.
     pub inside: i32,
     /// How many these are.
     pub taxels: i32,
@@ -63,31 +63,34 @@ pub(super) struct Equations {
     pub misfit: Misfit,
 }
 
-/// Which taxels a pass looks at.
+/// Which taxels a pass looks at: every so many in a row, shifted by one from row to row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Taxels {
-    /// All.
-    All,
-    /// Every other one, like a chessboard's white fields.
-    Half,
+pub(super) struct Taxels {
+    /// The first one of the first row, less than the stride.
+    first: usize,
+    stride: usize,
 }
 
 impl Taxels {
-    /// The first column and the distance to the next.
+    /// All.
+    pub const ALL: Self = Self { first: 0, stride: 1 };
+    /// Every other one, like a chessboard's white fields.
+    pub const HALF: Self = Self { first: 0, stride: 2 };
+
+    /// The first column and the distance to the next, and what the next row looks at.
     #[inline(always)]
-    pub const fn columns(self, row: usize) -> (usize, usize) {
-        match self {
-            Self::All => (0, 1),
-            Self::Half => (row & 1, 2),
-        }
+    pub const fn row(&mut self) -> (usize, usize) {
+        let first = self.first;
+        self.first = if first + 1 < self.stride { first + 1 } else { 0 };
+        (first, self.stride)
     }
 }
 
 /// How far the model and the picture are apart, where it is not to be refined.
-pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
+pub(super) fn compare(pressed: &Pressed, view: &View, mut which: Taxels) -> Misfit {
     let mut misfit = Misfit::default();
     for row in 0..ROWS {
-        let (mut column, stride) = which.columns(row);
+        let (mut column, stride) = which.row();
         let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
         let dy_square = square(pressed.dy[row]);
         let (mut inside, mut outside) = (0, 0);
@@ -99,7 +102,7 @@ pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
                     let felt = pressed.felt(at);
                     misfit.taxels += 1;
                     let residual = residual(share - felt.pressure);
-                    inside += ((weight(felt.pressure) * residual) >> SLOPE_BITS) * residual;
+                    inside += residual * residual;
                 } else {
                     misfit.others += 1;
                     outside += residual(share) * residual(share);
@@ -115,10 +118,10 @@ pub(super) fn compare(pressed: &Pressed, view: &View, which: Taxels) -> Misfit {
 }
 
 /// Sets up the normal equations; with a rim, the taxels under it are worked out by it.
-pub(super) fn equations(pressed: &Pressed, view: &View, which: Taxels, rim: Option<&Rim>) -> Equations {
+pub(super) fn equations(pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>) -> Equations {
     let mut all = Equations::default();
     for row in 0..ROWS {
-        let (mut column, stride) = which.columns(row);
+        let (mut column, stride) = which.row();
         let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
         let dy_square = square(dy);
         let mut sums = Row::default();
@@ -133,8 +136,8 @@ pub(super) fn equations(pressed: &Pressed, view: &View, which: Taxels, rim: Opti
                         felt.pressure = rim.pressure(dx, dy);
                     }
                     all.misfit.taxels += 1;
-                    let weights = [weight(felt.pressure), if rim.is_some() { noise_weight(felt.pressure) } else { 0 }];
-                    sums.add(&felt, dx, residual(share - felt.pressure), weights);
+                    let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
+                    sums.add(&felt, dx, residual(share - felt.pressure), weight);
                 } else {
                     all.misfit.others += 1;
                     sums.outside += residual(share) * residual(share);
@@ -170,9 +173,7 @@ fn noise_weight(pressure: i32) -> i32 {
 
 impl Row {
     #[inline(always)]
-    fn add(&mut self, felt: &Felt, dx: i32, residual: i32, weights: [i32; 2]) {
-        let [own, noise] = weights;
-        let weight = if noise > 0 { noise } else { own };
+    fn add(&mut self, felt: &Felt, dx: i32, residual: i32, weight: i32) {
         let rest = (weight * felt.by_rest) >> SLOPE_BITS;
         let square = (weight * felt.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
@@ -186,7 +187,7 @@ impl Row {
         self.rest += rest * residual;
         self.square += square * residual;
         self.x += weighted_x * residual;
-        self.inside += ((own * residual) >> SLOPE_BITS) * residual;
+        self.inside += residual * residual;
     }
 }
 
@@ -209,8 +210,8 @@ impl Equations {
         self.misfit.outside += row.outside >> ROW_DROP;
     }
 
-    /// The next guess, and the misfit that the linearised model promises there.
-    pub fn solve(&self, guess: &Guess, close: bool, view: &View, geometry: &Geometry) -> (Guess, Misfit) {
+    /// The next guess.
+    pub fn solve(&self, guess: &Guess, view: &View, geometry: &Geometry) -> Guess {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
         let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());
@@ -240,8 +241,6 @@ impl Equations {
             let wide = (i64::from(rest_square) * i64::from(scaled(step))) >> (56 - CENTRE_BITS);
             centre + within(wide, CENTRE_STEP)
         };
-        let next = Guess::new(rest, moved(guess.x, x_step), moved(guess.y, y_step), geometry);
-        let promised = if close { 0 } else { times(rest_step, s) + times(x_step, x) + times(y_step, y) };
-        (next, Misfit { inside: (self.misfit.inside - promised).max(0), ..self.misfit })
+        Guess::new(rest, moved(guess.x, x_step), moved(guess.y, y_step), geometry)
     }
 }

@@ -3,8 +3,18 @@
 use crate::board::FingerBoard;
 use crate::error::Error;
 use crate::rig::Rig;
-use rigless::emulator::{Host, Stop};
+use rigless::emulator::{Access, AccessKind, Host, Stop};
 use rigless::session::Session;
+use rigless::soc::Width;
+
+/// DMA1's flags of streams 4 to 7, and the registers of stream 5, which receives the bus.
+const DMA1_HIFCR: u64 = 0x4002_600c;
+const DMA1_S5CR: u64 = 0x4002_6088;
+const DMA1_S5M0AR: u64 = 0x4002_6094;
+const STREAM_5_FLAGS: u64 = 0x3d << 6;
+const ENABLE: u64 = 1;
+/// Where nothing answers.
+const NOWHERE: u64 = 0xd000_0000;
 
 /// A defect of the board or the microcontroller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +27,8 @@ pub enum Fault {
     ScanInterruptLost,
     /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
     CoreHangs,
+    /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of the driver.
+    BusMemoryLost,
     /// The core's next access to these addresses is a bus error: a hard fault.
     BusError {
         /// The first address.
@@ -33,6 +45,18 @@ impl Fault {
             Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
             Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
             Self::CoreHangs => host.hold(defect),
+            Self::BusMemoryLost if defect => {
+                let mut access = |kind, address, value| {
+                    let access = Access::new(kind, address, Width::W32, value).at(stop.instruction_count, stop.at);
+                    session.access(access, host).0
+                };
+                let control = access(AccessKind::Read, DMA1_S5CR, 0);
+                access(AccessKind::Write, DMA1_S5CR, control & !ENABLE);
+                access(AccessKind::Write, DMA1_HIFCR, STREAM_5_FLAGS);
+                access(AccessKind::Write, DMA1_S5M0AR, NOWHERE);
+                access(AccessKind::Write, DMA1_S5CR, control | ENABLE);
+            }
+            Self::BusMemoryLost => {}
             Self::BusError { from, to } if defect => session.fail_next(from, to),
             Self::BusError { .. } => {}
         }

@@ -2,17 +2,14 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
+mod common;
+
+use common::{WAIT_NS, image};
 use host_tests::plant::{Setup, World};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
-use std::path::PathBuf;
 use virtual_board::flash::SECTOR;
 use virtual_board::{Fault, Options, Rig};
-
-fn image() -> PathBuf {
-    let path = std::env::var_os("FINGERTIP_IMAGE");
-    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
-}
 
 /// A board that has run for 20 ms.
 fn running(options: &Options) -> Rig {
@@ -24,8 +21,6 @@ fn running(options: &Options) -> Rig {
 fn frames(rig: &mut Rig) -> u64 {
     rig.scan_counts().expect("it runs").frames
 }
-
-const WAIT_NS: u64 = 5_000_000;
 
 #[test]
 fn converters_stall_and_go_on() {

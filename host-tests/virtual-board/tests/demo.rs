@@ -2,13 +2,10 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use std::path::PathBuf;
-use virtual_board::demo::{self, Plan, pictures, table};
+mod common;
 
-fn image() -> PathBuf {
-    let path = std::env::var_os("FINGERTIP_IMAGE");
-    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
-}
+use common::image;
+use virtual_board::demo::{self, Plan, pictures, table};
 
 #[test]
 fn every_bound_holds_and_the_pictures_are_drawn() {

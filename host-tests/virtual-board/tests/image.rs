@@ -2,14 +2,11 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use host_tests::plant::{Setup, World};
-use std::path::PathBuf;
-use virtual_board::{Options, Rig};
+mod common;
 
-fn image() -> PathBuf {
-    let path = std::env::var_os("FINGERTIP_IMAGE");
-    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
-}
+use common::{WAIT_NS, image};
+use host_tests::plant::{Setup, World};
+use virtual_board::{Options, Rig};
 
 fn rig() -> Rig {
     let mut setup = Setup::default();
@@ -19,8 +16,6 @@ fn rig() -> Rig {
 
 /// An instruction packet that asks ID 1 whether it is there.
 const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
-const WAIT_NS: u64 = 5_000_000;
-
 /// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle.
 fn eventful(rig: &mut Rig) {
     let write = |rig: &mut Rig, address, value| {

@@ -2,62 +2,20 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
+mod common;
+
+use common::{WAIT_NS, holding, image, read_u8, write_goal, write_u8};
 use fingertip::link::table::address;
 use fingertip::safety::Fault as Number;
 use host_tests::plant::{Row, Setup, Taxel, World};
-use std::path::PathBuf;
-use std::sync::OnceLock;
 use virtual_board::{Fault, Options, Rig};
 
-const WAIT_NS: u64 = 5_000_000;
 /// Two frames of 99.8 us. A taxel that fails just after it was read is read again a frame later; the step at that frame's end
 /// would be too late for the first rows, the glance in its middle is not.
 const TWO_FRAMES_US: f64 = 199.5;
 /// Where in a frame a fault of the array begins: every 9 us, so in each slot.
 const PHASES_US: std::ops::Range<u64> = 0..11;
 const PHASE_STEP_US: u64 = 9;
-
-fn image() -> PathBuf {
-    let path = std::env::var_os("FINGERTIP_IMAGE");
-    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
-}
-
-fn write_u8(rig: &mut Rig, register: u16, value: u8) {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
-    written.expect("the client runs").expect("the image obeys");
-}
-
-fn write_goal(rig: &mut Rig, goal_mn: u32) {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, address::GOAL_FORCE_MN, goal_mn).map(drop));
-    written.expect("the client runs").expect("the image obeys");
-}
-
-fn read_u8(rig: &mut Rig, register: u16) -> u8 {
-    let read = rig.client(WAIT_NS, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
-    read.expect("the client runs").expect("the image answers")
-}
-
-/// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
-fn holding() -> Rig {
-    static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
-    let snapshot = SNAPSHOT.get_or_init(|| {
-        let mut setup = Setup::default();
-        setup.wall.distance_mm = 0.5;
-        let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
-        rig.run_until_ns(20_000_000).expect("it runs");
-        write_u8(&mut rig, address::TARE, 1);
-        rig.run_ms(20).expect("it runs");
-        write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-        write_goal(&mut rig, 1_000);
-        rig.run_ms(150).expect("it runs");
-        let force_n = rig.world(|world| world.force_n()).expect("it runs");
-        assert!((0.99..1.01).contains(&force_n), "{force_n} N");
-        let path = std::env::temp_dir().join(format!("virtual-board-holding-{}.snapshot", std::process::id()));
-        rig.snapshot(&path).expect("a snapshot is taken");
-        path
-    });
-    Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored")
-}
 
 /// Microseconds from now to the bridge's being off, within `limit_ms`.
 fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
@@ -117,13 +75,9 @@ fn all_taxels_saturate() {
 #[test]
 fn twelve_taxels_die_or_short() {
     // All over the array, or as near to each other as they can be: read first, last or in the middle of a frame.
-    for (state, first, apart) in [
-        (Taxel::Dead, 0, 7),
-        (Taxel::Shorted, 0, 7),
-        (Taxel::Dead, 0, 1),
-        (Taxel::Dead, 40, 1),
-        (Taxel::Dead, 88, 1),
-    ] {
+    for (state, first, apart) in
+        [(Taxel::Dead, 0, 7), (Taxel::Shorted, 0, 7), (Taxel::Dead, 0, 1), (Taxel::Dead, 40, 1), (Taxel::Dead, 88, 1)]
+    {
         let name = format!("12 taxels {state:?} from {first}, {apart} apart");
         break_and_time(&name, &[Number::ArrayBroken], TWO_FRAMES_US, |rig| {
             world(rig, move |world| {
@@ -182,6 +136,41 @@ fn a_starved_watchdog_resets_to_off_and_leaves_a_record() {
     assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 3, "hang");
     assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0);
     assert!(!rig.bridge_edges().expect("it runs").last().expect("it was on").on);
+}
+
+#[test]
+fn a_panic_or_a_hard_fault_resets_to_off_and_leaves_a_record() {
+    // TIM5 is the frame guard, which control reads in every frame.
+    let bus_error = Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 };
+    for (fault, cause, limit_us) in [(Fault::BusMemoryLost, 1, TWO_FRAMES_US), (bus_error, 2, TWO_FRAMES_US)] {
+        let mut rig = holding();
+        rig.inject(fault).expect("it runs");
+        // A byte for the stream that has lost its memory.
+        rig.send(&[0]).expect("it runs");
+        let off_us = until_off_us(&mut rig, 60);
+        println!("{fault:?}: bridge off after {off_us:.1} us");
+        assert!(off_us <= limit_us, "{off_us} us");
+        rig.run_ms(20).expect("it runs");
+        assert_eq!(rig.resets().expect("it runs").len(), 1);
+        assert_eq!(read_u8(&mut rig, address::FAULT), Number::Crash as u8);
+        assert_eq!(read_u8(&mut rig, address::RESET_CAUSE), 4, "software");
+        assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), cause);
+        assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0);
+        assert!(!rig.bridge_edges().expect("it runs").last().expect("it was on").on);
+    }
+}
+
+#[test]
+fn damaged_parameters_are_a_fault_that_the_bus_tells() {
+    let presets = vec![(virtual_board::flash::SECTOR.start, vec![0x55; 64])];
+    let options = Options { presets, ..Options::default() };
+    let mut rig = Rig::new(&image(), World::new(&Setup::default()), &options).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), Number::BrokenParameters as u8);
+    let refused = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::TORQUE_ENABLE, 1).map(drop));
+    assert!(refused.expect("the client runs").is_err(), "torque stays off in a fault");
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), 5);
+    assert!(rig.bridge_edges().expect("it runs").iter().all(|edge| !edge.on));
 }
 
 /// Random bytes, and every other stretch of 16 a write of a goal with one byte changed; the same in every run.

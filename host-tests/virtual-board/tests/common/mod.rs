@@ -1,0 +1,54 @@
+//! What the tests of the flash image share.
+#![allow(dead_code, reason = "each test takes what it needs")]
+
+use fingertip::link::table::address;
+use host_tests::plant::{Setup, World};
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use virtual_board::{Options, Rig};
+
+/// Virtual time that an answer may take.
+pub const WAIT_NS: u64 = 5_000_000;
+
+/// The flash image under test.
+pub fn image() -> PathBuf {
+    let path = std::env::var_os("FINGERTIP_IMAGE");
+    path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
+}
+
+pub fn write_u8(rig: &mut Rig, register: u16, value: u8) {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+}
+
+pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, address::GOAL_FORCE_MN, goal_mn).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+}
+
+pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
+    let read = rig.client(WAIT_NS, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
+    read.expect("the client runs").expect("the image answers")
+}
+
+/// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
+pub fn holding() -> Rig {
+    static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
+    let snapshot = SNAPSHOT.get_or_init(|| {
+        let mut setup = Setup::default();
+        setup.wall.distance_mm = 0.5;
+        let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+        rig.run_until_ns(20_000_000).expect("it runs");
+        write_u8(&mut rig, address::TARE, 1);
+        rig.run_ms(20).expect("it runs");
+        write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+        write_goal(&mut rig, 1_000);
+        rig.run_ms(150).expect("it runs");
+        let force_n = rig.world(|world| world.force_n()).expect("it runs");
+        assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+        let path = std::env::temp_dir().join(format!("virtual-board-holding-{}.snapshot", std::process::id()));
+        rig.snapshot(&path).expect("a snapshot is taken");
+        path
+    });
+    Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored")
+}

@@ -4,7 +4,7 @@
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
 use crate::contact::Geometry;
-use crate::model::Tip;
+use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
 use crate::units::{Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
@@ -31,9 +31,23 @@ pub enum ConfigError {
     Param(ParamError),
     /// The scan cannot be timed so.
     Scan(ScanError),
-    /// Two contradict each other: the first must be below the second.
-    Order(&'static str, &'static str),
+    /// Two contradict each other, by name and value: the first must be below the second.
+    Order([(&'static str, i32); 2]),
 }
+
+impl core::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Param(error) => error.fmt(f),
+            Self::Scan(error) => error.fmt(f),
+            Self::Order([(low, low_value), (high, high_value)]) => {
+                write!(f, "{low} of {low_value}: below {high}, which is {high_value}, is allowed")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
 
 /// What the loop derives from [`Params`].
 #[derive(Clone, Debug)]
@@ -120,7 +134,7 @@ impl Config {
             (p.supply_min_mv, p.supply_max_mv, ("supply_min_mv", "supply_max_mv")),
         ] {
             if low >= high {
-                return Err(ConfigError::Order(names.0, names.1));
+                return Err(ConfigError::Order([(names.0, low), (names.1, high)]));
             }
         }
         let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16).map_err(ConfigError::Scan)?;
@@ -190,9 +204,12 @@ impl Config {
 
 fn tip(p: &Params) -> Result<Tip, ConfigError> {
     let modulus = Kilopascals(I16F16::from_bits(thousandths(p.modulus_pa, 16)));
-    Tip::new(millimetres(p.tip_radius_um), modulus).map_err(|_| {
-        let (name, value) = ("tip_radius_um", p.tip_radius_um);
-        ConfigError::Param(ParamError { name, value, min: 4_000, max: 16_000 })
+    Tip::new(millimetres(p.tip_radius_um), modulus).map_err(|error| {
+        let (name, value, min, max) = match error {
+            TipError::Radius(_) => ("tip_radius_um", p.tip_radius_um, 4_000, 16_000),
+            TipError::Modulus(_) => ("modulus_pa", p.modulus_pa, 20_000, 2_000_000),
+        };
+        ConfigError::Param(ParamError { name, value, min, max })
     })
 }
 

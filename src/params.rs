@@ -16,6 +16,15 @@ pub struct ParamError {
     pub max: i32,
 }
 
+impl core::fmt::Display for ParamError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { name, value, min, max } = self;
+        write!(f, "{name} of {value}: {min} to {max} are allowed")
+    }
+}
+
+impl core::error::Error for ParamError {}
+
 macro_rules! params {
     ($($(#[doc = $doc:literal])+ $name:ident = $default:literal in $min:literal ..= $max:literal;)*) => {
         /// The stored parameters, in the units that their names end with.

@@ -35,6 +35,21 @@ pub enum ScanError {
     },
 }
 
+impl core::fmt::Display for ScanError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::SampleCycles(cycles) => {
+                write!(f, "sample_cycles of {cycles}: 3, 15, 28, 56, 84, 112, 144 and 480 are allowed")
+            }
+            Self::SlotTooLong { ticks } => {
+                write!(f, "settle_ns and sample_cycles make a slot of {ticks} ticks: {} are allowed", u16::MAX)
+            }
+        }
+    }
+}
+
+impl core::error::Error for ScanError {}
+
 impl ScanTiming {
     /// A settle time of 2.4 us and 15 cycles of sampling: 10 kHz.
     pub const DEFAULT_SETTLE_NS: u32 = 2_400;

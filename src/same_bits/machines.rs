@@ -171,7 +171,7 @@ pub const MADE: [Make; 2] = [
         }
         Err(ConfigError::Param(error)) => mix.add(error.value),
         Err(ConfigError::Scan(_)) => mix.add(-1),
-        Err(ConfigError::Order(first, _)) => mix.add(first.len() as u32),
+        Err(ConfigError::Order([(_, low), (_, high)])) => mix.add(low - high),
     }),
     ("Relaxation::new", |m, source, mix| {
         let period_us = source.up_to(2_000);

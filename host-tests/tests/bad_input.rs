@@ -1,0 +1,79 @@
+//! What constructors refuse: each error names the parameter, its value and its range.
+
+use fingertip::config::{Config, ConfigError};
+use fingertip::model::{Relaxation, RelaxationError, RelaxationTerm, Tip};
+use fingertip::params::{ParamError, Params};
+use fingertip::scan::{ScanError, ScanTiming};
+use fingertip::units::{Kilopascals, Millimetres, Ratio};
+
+fn refused(params: &Params) -> ConfigError {
+    Config::new(params).map(drop).expect_err("refused")
+}
+
+#[test]
+fn each_parameter_on_both_sides_of_its_range() {
+    for (place, (name, _, min, max)) in Params::RANGES.into_iter().enumerate() {
+        for value in [i32::MIN, min - 1, max + 1, i32::MAX] {
+            let mut values = Params::DEFAULT.to_array();
+            values[place] = value;
+            let error = refused(&Params::from_array(&values));
+            assert_eq!(error, ConfigError::Param(ParamError { name, value, min, max }));
+            assert_eq!(error.to_string(), format!("{name} of {value}: {min} to {max} are allowed"));
+        }
+    }
+}
+
+#[test]
+fn two_parameters_that_contradict_each_other() {
+    let default = Params::DEFAULT;
+    let cases = [
+        (Params { contact_on_mn: 15, ..default }, ["contact_off_mn of 15", "contact_on_mn, which is 15"]),
+        (Params { force_fault_mn: 6_999, ..default }, ["force_max_mn of 7000", "force_fault_mn, which is 6999"]),
+        (Params { supply_min_mv: 8_500, ..default }, ["supply_min_mv of 8500", "supply_max_mv, which is 8500"]),
+    ];
+    for (params, [low, high]) in cases {
+        assert_eq!(refused(&params).to_string(), format!("{low}: below {high}, is allowed"));
+    }
+    assert!(Config::new(&Params { contact_on_mn: 16, force_fault_mn: 7_001, supply_min_mv: 8_499, ..default }).is_ok());
+}
+
+#[test]
+fn a_scan_that_the_hardware_cannot_time() {
+    let params = Params { sample_cycles: 16, ..Params::DEFAULT };
+    assert_eq!(refused(&params), ConfigError::Scan(ScanError::SampleCycles(16)));
+    assert_eq!(refused(&params).to_string(), "sample_cycles of 16: 3, 15, 28, 56, 84, 112, 144 and 480 are allowed");
+    let error = ScanTiming::new(400_000, 15).unwrap_err();
+    assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68320 ticks: 65535 are allowed");
+}
+
+#[test]
+fn a_tip_by_each_of_its_two() {
+    let tip = |mm: i32, kpa: i32| Tip::new(Millimetres::from_bits(mm << 24), Kilopascals::from_bits(kpa << 16));
+    assert_eq!(tip(17, 250).unwrap_err().to_string(), "tip radius of 17 mm: 4 to 16 mm are covered");
+    assert_eq!(tip(10, 19).unwrap_err().to_string(), "Young's modulus of 19 kPa: 20 to 2000 kPa are covered");
+    // The ends themselves are covered.
+    assert!(tip(4, 20).is_ok() && tip(16, 2_000).is_ok());
+}
+
+#[test]
+fn a_relaxation_by_each_of_its_parts() {
+    let term = |share: i32, time_constant_us: u32| RelaxationTerm { share: Ratio::from_bits(share), time_constant_us };
+    let sound = term(1 << 14, 1_000);
+    let refused =
+        |period_us: u32, terms: [RelaxationTerm; 2]| Relaxation::new(period_us, &terms).map(drop).expect_err("refused");
+    assert_eq!(refused(0, [sound; 2]), RelaxationError::Period);
+    let cases = [
+        (refused(0, [sound; 2]), "a period of 0 us: at least 1 us is needed"),
+        (refused(100, [sound, term(-1, 1_000)]), "term 1 has the share -0.00002: 0 to 1 are covered"),
+        (refused(100, [term(65_537, 1_000), sound]), "term 0 has the share 1.00002: 0 to 1 are covered"),
+        (refused(100, [term(1 << 15, 1_000), term((1 << 15) + 1, 1_000)]), "the shares add up to 65537/65536"),
+        (refused(100, [sound, term(1, 99)]), "term 1 has a time constant of 99 us: 100 to 104857600 us are covered"),
+        (
+            refused(100, [term(1, 104_857_601), sound]),
+            "term 0 has a time constant of 104857601 us: 100 to 104857600 us are covered",
+        ),
+    ];
+    for (error, text) in cases {
+        assert!(error.to_string().starts_with(text), "{error}");
+    }
+}

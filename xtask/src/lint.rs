@@ -11,7 +11,13 @@ use std::{path::PathBuf, process::Command};
 /// The version is part of the promise that a passing check passes tomorrow.
 const CARGO_DENY: &str = "cargo-deny@0.20.2";
 /// Every feature set that is flashed, emulated or linked as a proof.
-const IMAGES: [(&str, &str); 3] = [("firmware", "firmware"), ("qemu", "qemu"), ("panic-free", "proof")];
+const IMAGES: [(&str, &str); 5] = [
+    ("firmware", "firmware"),
+    ("qemu", "qemu"),
+    ("panic-free", "proof"),
+    ("timing", "timing"),
+    ("timing-check", "timing"),
+];
 
 /// Runs all checks that are no tests.
 ///
@@ -21,6 +27,9 @@ pub fn run(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| console.run(console::cargo("fmt").args(["--all", "--check"])));
     stages.stage("lints, host", |console| console.run(&mut clippy(&["--workspace", "--all-targets"])));
+    stages.stage("lints, plugin", |console| {
+        console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))
+    });
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");

@@ -16,6 +16,7 @@ mod python;
 mod qemu;
 mod size;
 mod test;
+mod timing;
 mod toolchain;
 
 use clap::{Parser, Subcommand};
@@ -49,6 +50,8 @@ enum Command {
     Flash(flash::Args),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
     Qemu(qemu::Args),
+    /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
+    Timing(timing::Args),
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
     Size,
     /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
@@ -89,6 +92,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),
+        Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
         Command::Model => model::answer(console),
         Command::Prove(args) => model::prove(args, console),
@@ -104,6 +108,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
 /// Everything that the commands install when they need it, at once.
 fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     toolchain::ensure(choice, console)?;
+    timing::ensure(console)?;
     qemu::ensure(console)?;
     python::ensure(console)?;
     lint::ensure_deny(console)?;

@@ -4,6 +4,7 @@ use crate::{
     console::{self, Stages},
     demo, image, proof, python, qemu,
     size::Sizes,
+    timing,
     toolchain::Choice,
 };
 use anyhow::{Context, Result};
@@ -33,6 +34,7 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("panic-free proof", |console| proof::run(choice, console));
     stages.stage("emulated Cortex-M4F against this machine", |console| qemu::test(choice, console));
+    stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
         let mut command = demo::virtual_board("test");

@@ -1,0 +1,238 @@
+//! The core's timing rules, without wait states: what each instruction costs after the one before it.
+//!
+//! Every rule gives three figures: the fewest cycles it can be, an estimate, and the most. `docs/timing.md` lists the
+//! rules with their sources.
+
+use crate::instruction::{CoreSet, Instruction, Kind, PC, bit};
+use std::ops::{Add, AddAssign};
+
+/// Cycles of an instruction or of many.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cycles {
+    /// The fewest.
+    pub low: u64,
+    /// The estimate.
+    pub estimate: u64,
+    /// The most.
+    pub high: u64,
+}
+
+impl Cycles {
+    /// The three figures.
+    pub const fn new(low: u64, estimate: u64, high: u64) -> Self {
+        Self { low, estimate, high }
+    }
+
+    /// A cost that is sure.
+    pub const fn sure(cycles: u64) -> Self {
+        Self::new(cycles, cycles, cycles)
+    }
+}
+
+impl Add for Cycles {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self::new(self.low + other.low, self.estimate + other.estimate, self.high + other.high)
+    }
+}
+
+impl AddAssign for Cycles {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+/// An instruction that was executed, and what is known of how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Executed {
+    /// The instruction.
+    pub instruction: Instruction,
+    /// Its address.
+    pub address: u32,
+    /// Its condition did not hold.
+    pub skipped: bool,
+    /// Significant bits of a division's quotient.
+    pub quotient_bits: u32,
+    /// The first access to memory that it made.
+    pub touched: Option<Touched>,
+}
+
+/// An access to memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Touched {
+    /// Its address.
+    pub address: u32,
+    /// Its length in bytes.
+    pub bytes: u32,
+}
+
+impl Executed {
+    /// An instruction at an address, with its condition holding.
+    pub const fn new(instruction: Instruction, address: u32) -> Self {
+        Self { instruction, address, skipped: false, quotient_bits: 0, touched: None }
+    }
+}
+
+/// Where execution went on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Next {
+    /// The next instruction's address.
+    pub address: u32,
+    /// It is 32 bits long.
+    pub wide: bool,
+}
+
+/// Refill of the pipeline by a branch to an address in the instruction, to one in a register, and to one from memory.
+const REFILL_DIRECT: u64 = 1;
+const REFILL_REGISTER: u64 = 2;
+const REFILL_MEMORY: u64 = 3;
+/// A conditional branch of 32 bits.
+const REFILL_WIDE: u64 = 2;
+const REFILL_MIN: u64 = 1;
+const REFILL_MAX: u64 = 3;
+/// An FPU division or square root; other instructions may go on meanwhile.
+const FLOAT_DIVIDE: u64 = 14;
+/// 32-bit instructions that straddle words, in a row, after which the fetch can fall behind.
+const STRADDLING: u32 = 3;
+
+/// What the core remembers from one instruction to the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Core {
+    /// Registers that a load just before wrote, with its base where that was written back.
+    loaded: Option<CoreSet>,
+    /// Registers that another instruction just before wrote.
+    computed: CoreSet,
+    /// FPU registers that the instruction just before wrote.
+    float: u64,
+    /// The instruction just before was of 16 bits.
+    narrow: bool,
+    /// Cycles for which the FPU still divides.
+    dividing: u64,
+    /// 32-bit instructions in a row that straddle words.
+    straddling: u32,
+}
+
+impl Core {
+    /// What an executed instruction cost, now that it is known what came next.
+    #[inline(always)]
+    pub fn retire(&mut self, executed: &Executed, next: Next) -> Cycles {
+        let instruction = &executed.instruction;
+        let mut cost = if executed.skipped { Cycles::sure(1) } else { self.alone(executed, next) };
+        if !executed.skipped {
+            cost += self.float_wait(instruction);
+            cost += self.address_wait(instruction);
+        }
+        cost.high += self.fetch_wait(executed);
+        self.dividing = self.dividing.saturating_sub(cost.estimate);
+        self.remember(executed);
+        cost
+    }
+
+    /// Without waiting for what came before.
+    fn alone(&self, executed: &Executed, next: Next) -> Cycles {
+        let went_on = next.address == executed.address.wrapping_add(executed.instruction.size());
+        let words = |count: u8| 1 + u64::from(count);
+        match executed.instruction.kind {
+            Kind::Alu | Kind::Multiply | Kind::Float => Cycles::sure(1),
+            Kind::Divide { .. } => {
+                let steps = u64::from((10 * executed.quotient_bits).div_ceil(32));
+                Cycles::new(2, 2 + steps, 12)
+            }
+            Kind::IfThen { .. } => Cycles::new(0, u64::from(!self.narrow), 1),
+            // A branch not taken that was fetched late costs one more.
+            Kind::Branch { conditional: true } if went_on => Cycles::new(1, 1, 2),
+            Kind::Branch { conditional } => {
+                let wide = conditional && executed.instruction.wide;
+                Cycles::sure(1) + refill(if wide { REFILL_WIDE } else { REFILL_DIRECT }, next)
+            }
+            Kind::Jump => Cycles::sure(1) + refill(REFILL_REGISTER, next),
+            Kind::Table => Cycles::sure(2) + refill(REFILL_MEMORY, next),
+            Kind::Load => {
+                Cycles::new(1, if self.pipelines(&executed.instruction) { 1 } else { 2 }, 2) + split(executed)
+            }
+            Kind::LoadPc => Cycles::new(1, 2, 2) + refill(REFILL_MEMORY, next),
+            Kind::LoadMany(count) => {
+                let jumps = executed.instruction.writes & bit(PC) != 0;
+                let refill = if jumps { refill(REFILL_MEMORY, next) } else { Cycles::default() };
+                Cycles::sure(words(count)) + refill
+            }
+            Kind::StoreMany(count) => Cycles::sure(words(count)),
+            Kind::Store => Cycles::new(1, 1, 2) + split(executed),
+            Kind::StoreIndexed => Cycles::new(1, 2, 2) + split(executed),
+            Kind::FloatAccumulate => Cycles::sure(3),
+            // The result takes longer: see `float_wait`.
+            Kind::FloatDivide => Cycles::new(1, 1, FLOAT_DIVIDE),
+            Kind::FloatMove(count) => Cycles::new(count.into(), 1 + u64::from(count.min(1)), words(count)),
+            Kind::FloatLoad => Cycles::new(1, 2, 2),
+            Kind::FloatStore => Cycles::new(1, 2, 2),
+            Kind::FloatLoadMany(count) | Kind::FloatStoreMany(count) => Cycles::sure(words(count)),
+            Kind::Special => Cycles::new(1, 2, 2),
+            Kind::Barrier => Cycles::new(1, 4, 7),
+            Kind::Begin | Kind::End | Kind::Untimed => Cycles::default(),
+        }
+    }
+
+    /// Loads one after the other overlap, unless the first makes the address of the second.
+    fn pipelines(&self, instruction: &Instruction) -> bool {
+        self.loaded.is_some_and(|loaded| loaded & instruction.address == 0)
+    }
+
+    /// An address made by the computation just before comes a cycle late.
+    fn address_wait(&self, instruction: &Instruction) -> Cycles {
+        let late = u64::from(self.computed & instruction.address != 0);
+        Cycles::new(0, late, late)
+    }
+
+    /// An FPU result is ready a cycle late; a division keeps the FPU to itself.
+    fn float_wait(&mut self, instruction: &Instruction) -> Cycles {
+        let uses_float = instruction.float_reads | instruction.float_writes != 0;
+        let late = u64::from(self.float & instruction.float_reads != 0);
+        let wait = if uses_float { self.dividing } else { 0 };
+        if instruction.kind == Kind::FloatDivide {
+            // Once it starts, behind what it waits for itself.
+            self.dividing = wait + late + FLOAT_DIVIDE;
+        }
+        Cycles::new(wait, wait.max(late), late)
+    }
+
+    /// 32-bit instructions that straddle words need two fetches each: behind several in a row the core can run dry.
+    fn fetch_wait(&mut self, executed: &Executed) -> u64 {
+        let straddles = executed.instruction.wide && executed.address & 2 != 0;
+        self.straddling = if straddles { self.straddling + 1 } else { 0 };
+        u64::from(self.straddling == STRADDLING)
+    }
+
+    fn remember(&mut self, executed: &Executed) {
+        let instruction = &executed.instruction;
+        self.narrow = !instruction.wide;
+        (self.loaded, self.computed, self.float) = if executed.skipped {
+            (None, 0, 0)
+        } else if matches!(instruction.kind, Kind::Load) {
+            (Some(instruction.writes), 0, 0)
+        } else {
+            let computes = !instruction.accesses_memory();
+            (None, if computes { instruction.writes } else { 0 }, instruction.float_writes)
+        };
+        if instruction.kind == Kind::FloatDivide {
+            self.float = 0;
+        }
+    }
+}
+
+/// Refill of the pipeline: one more where the target is a 32-bit instruction that straddles words.
+fn refill(cycles: u64, next: Next) -> Cycles {
+    let straddles = next.wide && next.address & 2 != 0;
+    Cycles::new(REFILL_MIN, (cycles + u64::from(straddles)).min(REFILL_MAX), REFILL_MAX)
+}
+
+/// A word at an odd address takes three accesses, other unaligned ones two.
+fn split(executed: &Executed) -> Cycles {
+    let more = match executed.touched {
+        Some(Touched { address, bytes: 4 }) if address & 1 != 0 => 2,
+        Some(Touched { address, bytes: 4 }) if address & 2 != 0 => 1,
+        Some(Touched { address, bytes: 2 }) if address & 1 != 0 => 1,
+        _ => 0,
+    };
+    Cycles::new(more.min(1), more, more)
+}

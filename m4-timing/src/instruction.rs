@@ -1,0 +1,163 @@
+//! What the timing rules need to know of an instruction.
+
+/// Core registers, a bit each: r0 is bit 0, sp 13, lr 14, pc 15.
+pub type CoreSet = u16;
+/// The single-precision registers s0 to s31, and the flags of FPSCR as bit 32.
+pub type FloatSet = u64;
+
+/// The stack pointer.
+pub const SP: u8 = 13;
+/// The link register.
+pub const LR: u8 = 14;
+/// The program counter.
+pub const PC: u8 = 15;
+/// FPSCR's flags in a [`FloatSet`].
+pub const FPSCR: FloatSet = 1 << 32;
+
+/// A decoded instruction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Instruction {
+    /// What it does, as far as time goes.
+    pub kind: Kind,
+    /// 32 bits long rather than 16.
+    pub wide: bool,
+    /// Core registers that it writes.
+    pub writes: CoreSet,
+    /// Core registers that make the address of its memory access.
+    pub address: CoreSet,
+    /// FPU registers that it reads.
+    pub float_reads: FloatSet,
+    /// FPU registers that it writes.
+    pub float_writes: FloatSet,
+}
+
+/// The classes of instructions that take different times.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Data processing, shifts, extensions, saturation, packed arithmetic, hints that do nothing.
+    Alu,
+    /// Any multiplication, with or without accumulation.
+    Multiply,
+    /// Division; the registers hold the operands.
+    Divide {
+        /// Two's complement.
+        signed: bool,
+        /// The dividend's register.
+        numerator: u8,
+        /// The divisor's register.
+        denominator: u8,
+    },
+    /// If-then: the condition of the first instruction, and the mask of the others.
+    IfThen {
+        /// Condition and mask as the core keeps them in ITSTATE.
+        state: u8,
+    },
+    /// A branch to a place in the instruction.
+    Branch {
+        /// Taken or not by the flags or by a register.
+        conditional: bool,
+    },
+    /// A branch to where a register says.
+    Jump,
+    /// A branch by a table of bytes or halfwords.
+    Table,
+    /// One load.
+    Load,
+    /// One load into the program counter.
+    LoadPc,
+    /// A load of that many words; into the program counter too where it is written.
+    LoadMany(u8),
+    /// One store at a register and an offset in the instruction.
+    Store,
+    /// One store at the sum of two registers.
+    StoreIndexed,
+    /// A store of that many words.
+    StoreMany(u8),
+    /// An FPU operation of one cycle.
+    Float,
+    /// An FPU multiplication with accumulation.
+    FloatAccumulate,
+    /// An FPU division or square root.
+    FloatDivide,
+    /// Between core and FPU registers, that many words.
+    FloatMove(u8),
+    /// One FPU load of a single.
+    FloatLoad,
+    /// One FPU store of a single.
+    FloatStore,
+    /// FPU loads of that many words.
+    FloatLoadMany(u8),
+    /// FPU stores of that many words.
+    FloatStoreMany(u8),
+    /// Access to a special register, or a change of the interrupt mask.
+    Special,
+    /// A memory or instruction barrier.
+    Barrier,
+    /// Begin of a region.
+    Begin,
+    /// End of a region.
+    End,
+    /// Known, but no time can be given: it waits, traps or calls the debugger.
+    Untimed,
+}
+
+impl Instruction {
+    /// An instruction that touches no register.
+    pub const fn new(kind: Kind, wide: bool) -> Self {
+        Self { kind, wide, writes: 0, address: 0, float_reads: 0, float_writes: 0 }
+    }
+
+    /// The same, writing these core registers.
+    #[must_use]
+    pub const fn writing(self, writes: CoreSet) -> Self {
+        Self { writes, ..self }
+    }
+
+    /// The same, with an address made of these core registers.
+    #[must_use]
+    pub const fn at(self, address: CoreSet) -> Self {
+        Self { address, ..self }
+    }
+
+    /// The same, with these FPU registers.
+    #[must_use]
+    pub const fn float(self, reads: FloatSet, writes: FloatSet) -> Self {
+        Self { float_reads: reads, float_writes: writes, ..self }
+    }
+
+    /// Length in bytes.
+    pub const fn size(&self) -> u32 {
+        if self.wide { 4 } else { 2 }
+    }
+
+    /// Whether it reads or writes memory.
+    pub const fn accesses_memory(&self) -> bool {
+        use Kind::{
+            FloatLoad, FloatLoadMany, FloatStore, FloatStoreMany, Load, LoadMany, LoadPc, Store, StoreIndexed,
+            StoreMany, Table,
+        };
+        matches!(
+            self.kind,
+            Load | LoadPc
+                | LoadMany(_)
+                | Store
+                | StoreIndexed
+                | StoreMany(_)
+                | Table
+                | FloatLoad
+                | FloatStore
+                | FloatLoadMany(_)
+                | FloatStoreMany(_)
+        )
+    }
+
+    /// Whether the next instruction can lie elsewhere.
+    pub const fn branches(&self) -> bool {
+        self.writes & bit(PC) != 0
+    }
+}
+
+/// The set of one core register.
+pub const fn bit(register: u8) -> CoreSet {
+    1 << (register & 15)
+}

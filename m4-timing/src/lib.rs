@@ -1,0 +1,19 @@
+//! Estimated cycles of code on a Cortex-M4F: an instruction decoder, the core's timing rules, the STM32F4's flash
+//! accelerator, and a plugin that feeds them with what QEMU executes.
+//!
+//! Everything but the plugin is safe, pure and independent of QEMU. `docs/timing.md` gives the rules, where they
+//! come from, and how far they agree with published measurements.
+#![deny(unsafe_code)]
+
+pub mod condition;
+pub mod core;
+pub mod decode;
+pub mod flash;
+pub mod instruction;
+pub mod meter;
+pub mod region;
+pub mod report;
+
+#[cfg(feature = "plugin")]
+#[allow(unsafe_code)]
+mod plugin;

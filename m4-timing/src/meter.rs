@@ -1,0 +1,215 @@
+//! The stopwatch: takes the executed instructions one after the other and measures what lies between the markers.
+
+use crate::condition::{IfThen, holds};
+use crate::core::{Core, Cycles, Executed, Next, Touched};
+use crate::decode::Unknown;
+use crate::flash::{Flash, Settings};
+use crate::instruction::{Instruction, Kind};
+use crate::region::{Figures, Region};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// A place in the guest's code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Site {
+    /// Its address.
+    pub address: u32,
+    /// What lies there.
+    pub code: Result<Instruction, Unknown>,
+}
+
+impl Site {
+    /// Whether a region begins or ends here.
+    pub const fn is_marker(&self) -> bool {
+        matches!(self.code, Ok(Instruction { kind: Kind::Begin | Kind::End, .. }))
+    }
+}
+
+/// What the meter needs to see of the guest before it executes an instruction.
+pub trait Registers {
+    /// A core register.
+    fn core(&mut self, number: u8) -> u32;
+    /// The program status.
+    fn xpsr(&mut self) -> u32;
+}
+
+/// Why a measurement was given up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Machine code that this core does not have.
+    Unknown(u32, Unknown),
+    /// An instruction that waits, traps or calls the debugger.
+    Untimed(u32),
+    /// Execution went elsewhere without a branch: an exception or a fault.
+    Interrupted {
+        /// After the instruction here.
+        after: u32,
+        /// To here.
+        to: u32,
+    },
+    /// A region began within a region.
+    Nested(u32),
+    /// A region ended that had not begun.
+    NotBegun(u32),
+    /// The guest ended within a region.
+    NotEnded(u32),
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown(at, code) => write!(f, "unknown instruction {code} at {at:#010x}"),
+            Self::Untimed(at) => write!(f, "the instruction at {at:#010x} waits, traps or calls the debugger"),
+            Self::Interrupted { after, to } => write!(f, "an exception after {after:#010x} went to {to:#010x}"),
+            Self::Nested(at) => write!(f, "a region begins within a region at {at:#010x}"),
+            Self::NotBegun(at) => write!(f, "a region ends that did not begin at {at:#010x}"),
+            Self::NotEnded(number) => write!(f, "the guest ended within region {number}"),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// A pass under way.
+#[derive(Clone, Debug)]
+struct Pass {
+    number: u32,
+    core: Core,
+    block: IfThen,
+    last: Option<Executed>,
+    instructions: u64,
+    cycles: Cycles,
+    flash_start: u64,
+}
+
+/// The stopwatch.
+#[derive(Clone, Debug)]
+pub struct Meter {
+    pass: Option<Pass>,
+    flash: Flash,
+    regions: BTreeMap<u32, Region>,
+}
+
+impl Meter {
+    /// Nothing measured.
+    pub fn new(settings: Settings) -> Self {
+        Self { pass: None, flash: Flash::new(settings), regions: BTreeMap::new() }
+    }
+
+    /// Whether a region is being measured: outside of one, only markers matter.
+    pub fn running(&self) -> bool {
+        self.pass.is_some()
+    }
+
+    /// The core is about to execute what lies at a place.
+    ///
+    /// # Errors
+    /// The region cannot be measured.
+    pub fn execute(&mut self, site: &Site, registers: &mut impl Registers) -> Result<(), Refusal> {
+        let address = site.address;
+        let Some(pass) = &mut self.pass else {
+            match &site.code {
+                Ok(Instruction { kind: Kind::Begin, .. }) => self.begin(registers.core(0)),
+                Ok(Instruction { kind: Kind::End, .. }) => return Err(Refusal::NotBegun(address)),
+                _ => {}
+            }
+            return Ok(());
+        };
+
+        let instruction = site.code.as_ref().map_err(|unknown| Refusal::Unknown(address, *unknown))?;
+        pass.retire(Next { address, wide: instruction.wide && !site.is_marker() }, &mut self.flash)?;
+        match instruction.kind {
+            Kind::Begin => return Err(Refusal::Nested(address)),
+            Kind::Untimed => return Err(Refusal::Untimed(address)),
+            Kind::End => {
+                self.end();
+                return Ok(());
+            }
+            _ => {}
+        }
+        self.flash.fetch(address, instruction.size());
+        pass.start(instruction, address, registers);
+        Ok(())
+    }
+
+    /// The instruction that was last executed reads or writes memory.
+    pub fn access(&mut self, touched: Touched, store: bool) {
+        let Some(pass) = &mut self.pass else { return };
+        if let Some(last) = &mut pass.last {
+            last.touched.get_or_insert(touched);
+        }
+        if !store {
+            self.flash.read(touched.address);
+        }
+    }
+
+    /// What was measured.
+    ///
+    /// # Errors
+    /// A region did not end.
+    pub fn finish(&self) -> Result<&BTreeMap<u32, Region>, Refusal> {
+        self.pass.as_ref().map_or(Ok(&self.regions), |pass| Err(Refusal::NotEnded(pass.number)))
+    }
+
+    fn begin(&mut self, number: u32) {
+        self.pass = Some(Pass {
+            number,
+            core: Core::default(),
+            block: IfThen::default(),
+            last: None,
+            instructions: 0,
+            cycles: Cycles::default(),
+            flash_start: self.flash.now(),
+        });
+    }
+
+    fn end(&mut self) {
+        let Some(pass) = self.pass.take() else { return };
+        let flash = self.flash.now() - pass.flash_start;
+        let figures = Figures { instructions: pass.instructions, cycles: pass.cycles, flash };
+        self.regions.entry(pass.number).or_default().push(&figures);
+    }
+}
+
+impl Pass {
+    /// Counts the instruction before, now that it is known where it led.
+    fn retire(&mut self, next: Next, flash: &mut Flash) -> Result<(), Refusal> {
+        let Some(last) = &self.last else { return Ok(()) };
+        let follows = last.address.wrapping_add(last.instruction.size()) == next.address;
+        if !follows && (last.skipped || !last.instruction.branches()) {
+            return Err(Refusal::Interrupted { after: last.address, to: next.address });
+        }
+        let cycles = self.core.retire(last, next);
+        self.cycles += cycles;
+        self.instructions += 1;
+        flash.pass(cycles.estimate);
+        Ok(())
+    }
+
+    fn start(&mut self, instruction: &Instruction, address: u32, registers: &mut impl Registers) {
+        let executed = self.last.insert(Executed::new(*instruction, address));
+        if let Some(condition) = self.block.advance() {
+            executed.skipped = !holds(condition, registers.xpsr());
+        }
+        if !executed.skipped {
+            match instruction.kind {
+                Kind::IfThen { state } => self.block = IfThen::new(state),
+                Kind::Divide { signed, numerator, denominator } => {
+                    executed.quotient_bits =
+                        quotient_bits(signed, registers.core(numerator), registers.core(denominator));
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Significant bits of a quotient; dividing by zero gives zero.
+fn quotient_bits(signed: bool, numerator: u32, denominator: u32) -> u32 {
+    let (numerator, denominator) = if signed {
+        ((numerator as i32).unsigned_abs(), (denominator as i32).unsigned_abs())
+    } else {
+        (numerator, denominator)
+    };
+    u32::BITS - numerator.checked_div(denominator).unwrap_or(0).leading_zeros()
+}

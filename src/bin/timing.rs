@@ -1,0 +1,298 @@
+//! The loop's kernels, each in a region of its own, for the timing model: replays a recording, and measures with real data.
+//!
+//! Not for a board: it talks to the emulator by semihosting. The command line names the recording. A line
+//! `region NUMBER NAME` on the standard output names each region; region 0 is an empty call.
+#![no_std]
+#![no_main]
+
+use core::arch::asm;
+use core::fmt::Write;
+use core::hint::black_box;
+use cortex_m_semihosting::{debug, hio, nr, syscall};
+use fingertip::config::Config;
+use fingertip::contact::{self, Effort};
+use fingertip::control::SpeedLoop;
+use fingertip::control::goal::Goal;
+use fingertip::control::profile::Reference;
+use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::params::Params;
+use fingertip::pipeline::{Contact, Pipeline, Status};
+use fingertip::pressure::{Array, Picture};
+use fingertip::record::{MAGIC, Record};
+use fingertip::safety::{Limits, Mode};
+use fingertip::units::{Duty, Millimetres};
+
+/// What the kernels read and write.
+struct Bench<'a> {
+    config: &'a Config,
+    record: Record,
+    pipeline: Pipeline,
+    outcome: (Duty, Status),
+    array: Array,
+    picture: Picture,
+    contact: Contact,
+    depth: Millimetres,
+    motion: SpeedLoop,
+    goal: Goal,
+    reference: Reference,
+    limits: Limits,
+    duty: Duty,
+}
+
+type Kernel = extern "C" fn(&mut Bench);
+
+/// When a kernel is measured.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum When {
+    /// In every frame.
+    Always,
+    /// With a contact, which the array sees as a whole.
+    Contact,
+    /// With the same contact, pushed over the array's edge.
+    Edge,
+    /// While the loop drives the motor.
+    Driving,
+}
+use When::{Always, Driving, Edge};
+
+const STEP: usize = 1;
+const KERNELS: [(&str, Kernel, When); 16] = [
+    ("an empty call", nothing, Always),
+    ("pipeline step", step, Always),
+    ("frame pass", frame_pass, Always),
+    ("indentation from force", indentation, Always),
+    ("observer", observe, Driving),
+    ("goal and profile", reference, Driving),
+    ("speed law and limits", follow, Driving),
+    ("contact, whole, sum", read_sum, When::Contact),
+    ("contact, whole, moments", read_moments, When::Contact),
+    ("contact, whole, one", read_one, When::Contact),
+    ("contact, whole, two", read_two, When::Contact),
+    ("contact, whole, full", read_full, When::Contact),
+    ("contact, over the edge, moments", read_moments, Edge),
+    ("contact, over the edge, one", read_one, Edge),
+    ("contact, over the edge, two", read_two, Edge),
+    ("contact, over the edge, full", read_full, Edge),
+];
+
+extern "C" fn nothing(_: &mut Bench) {}
+
+extern "C" fn step(bench: &mut Bench) {
+    let Record { frame, sense, command } = &bench.record;
+    bench.outcome = bench.pipeline.step(frame, sense, command);
+}
+
+extern "C" fn frame_pass(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.config);
+}
+
+extern "C" fn indentation(bench: &mut Bench) {
+    bench.depth = bench.config.tip.indentation(bench.contact.force);
+}
+
+extern "C" fn observe(bench: &mut Bench) {
+    bench.motion.observe(bench.record.sense.encoder, bench.config);
+}
+
+extern "C" fn reference(bench: &mut Bench) {
+    let Bench { config, record, contact, motion, goal, limits, .. } = bench;
+    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, config, limits);
+}
+
+extern "C" fn follow(bench: &mut Bench) {
+    let supply_mv = bench.record.sense.supply_mv;
+    bench.duty = bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
+}
+
+fn read(bench: &mut Bench, effort: Effort) {
+    bench.contact = contact::read(&bench.picture, effort, bench.config);
+}
+
+extern "C" fn read_sum(bench: &mut Bench) {
+    read(bench, Effort::Sum);
+}
+
+extern "C" fn read_moments(bench: &mut Bench) {
+    read(bench, Effort::Moments);
+}
+
+extern "C" fn read_one(bench: &mut Bench) {
+    read(bench, Effort::One);
+}
+
+extern "C" fn read_two(bench: &mut Bench) {
+    read(bench, Effort::Two);
+}
+
+extern "C" fn read_full(bench: &mut Bench) {
+    read(bench, Effort::Full);
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut line = [0; 256];
+    let recording = Recording::open(command_line(&mut line));
+    let mut head = [0; MAGIC.len() + 4];
+    recording.read(&mut head);
+    let (magic, count) = head.split_at(MAGIC.len());
+    if magic != MAGIC {
+        fail("no recording of this version");
+    }
+    let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
+    let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let mut bench = Bench {
+        config: &config,
+        record: Record::from_bytes(&[0; Record::BYTES]),
+        pipeline: Pipeline::new(&config),
+        outcome: Default::default(),
+        array: Array::new(),
+        picture: Picture::EMPTY,
+        contact: Contact::default(),
+        depth: Millimetres::ZERO,
+        motion: SpeedLoop::new(),
+        goal: Goal::default(),
+        reference: Reference::default(),
+        limits: Limits::default(),
+        duty: Duty::ZERO,
+    };
+    for _ in 0..count {
+        let mut bytes = [0; Record::BYTES];
+        recording.read(&mut bytes);
+        bench.record = Record::from_bytes(&bytes);
+        measure_frame(&mut bench);
+    }
+    for (number, (name, ..)) in KERNELS.iter().enumerate() {
+        say(format_args!("region {number} {name}"));
+    }
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+}
+
+/// The step first: the others work on what it left.
+fn measure_frame(bench: &mut Bench) {
+    measure(STEP, step, bench);
+    let (_, status) = bench.outcome;
+    let touches = status.contact.force >= bench.config.contact_on;
+    let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
+    if !drives {
+        bench.motion = SpeedLoop::new();
+    }
+    for (number, (_, kernel, when)) in KERNELS.iter().enumerate() {
+        if number == STEP {
+            continue;
+        }
+        bench.array = bench.pipeline.array().clone();
+        bench.picture = *bench.pipeline.array().picture();
+        bench.contact = status.contact;
+        let now = match when {
+            Always => true,
+            When::Contact => touches,
+            Edge => {
+                bench.picture = pushed_over_the_edge(&bench.picture);
+                touches
+            }
+            Driving => drives,
+        };
+        if now {
+            measure(number, *kernel, bench);
+        }
+    }
+}
+
+/// Runs a kernel between the markers.
+fn measure(number: usize, kernel: Kernel, bench: &mut Bench) {
+    // The compiler must neither know the kernel nor move it.
+    let kernel = black_box(kernel);
+    // SAFETY: a call by the calling convention, with every register that it may change named; the markers do nothing.
+    unsafe {
+        asm!(
+            ".inst.w 0xf3af8040",
+            "mov r0, {bench}",
+            "blx {kernel}",
+            ".inst.w 0xf3af8041",
+            bench = in(reg) &raw mut *bench,
+            kernel = in(reg) kernel,
+            inout("r0") number => _,
+            out("r1") _, out("r2") _, out("r3") _, out("r12") _, out("lr") _,
+            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
+            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
+        );
+    }
+}
+
+/// Four columns to the side, so that the contact reaches over the edge.
+fn pushed_over_the_edge(picture: &Picture) -> Picture {
+    const BY: usize = 4;
+    let mut pushed = Picture::EMPTY;
+    for row in 0..ROWS {
+        let (mut row_sum, y) = (0, 2 * row as i32 - 9);
+        for column in 0..COLUMNS - BY {
+            let value = picture.taxels[row][column + BY];
+            pushed.taxels[row][column] = value;
+            row_sum += value;
+            pushed.moment_x += value * (2 * column as i32 - 9);
+            pushed.peak = pushed.peak.max(value);
+        }
+        pushed.sum += row_sum;
+        pushed.moment_y += row_sum * y;
+    }
+    pushed
+}
+
+/// The recording's name, with a 0 at its end.
+fn command_line(line: &mut [u8; 256]) -> &[u8] {
+    let mut request = [line.as_mut_ptr() as usize, line.len()];
+    // SAFETY: the request names a buffer and its length, both valid until the call returns.
+    let error = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, request.as_mut_ptr() as usize) };
+    let length = line.iter().position(|byte| *byte == 0);
+    let (Some(length), 0) = (length, error) else { fail("no command line") };
+    &line[..=length]
+}
+
+/// A file on the host.
+struct Recording {
+    handle: usize,
+}
+
+impl Recording {
+    fn open(name: &[u8]) -> Self {
+        // SAFETY: the name is a buffer that ends with a 0, which the length leaves out.
+        let handle = unsafe { syscall!(OPEN, name.as_ptr(), nr::open::R_BINARY, name.len() - 1) };
+        if handle == usize::MAX {
+            fail("cannot open the recording")
+        }
+        Self { handle }
+    }
+
+    fn read(&self, bytes: &mut [u8]) {
+        // SAFETY: the buffer is valid for its length, and the call returns when it is filled.
+        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) };
+        if missing != 0 {
+            fail("the recording ends early")
+        }
+    }
+}
+
+fn say(text: core::fmt::Arguments) {
+    if let Ok(mut host) = hio::hstdout() {
+        // Where the host is gone, nobody is left to tell.
+        let _ = host.write_fmt(text);
+        let _ = host.write_str("\n");
+    }
+}
+
+fn fail(what: &str) -> ! {
+    say(format_args!("FAILED: {what}"));
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo) -> ! {
+    say(format_args!("FAILED: {}", info.message()));
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}

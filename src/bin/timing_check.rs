@@ -1,0 +1,152 @@
+//! Published kernels for the timing model's check: code in assembly, so the compiler has no part in the figures.
+//!
+//! Not for a board. Each kernel is a region of its own, its place in [`KERNELS`] from 1 on; `m4-timing/tests/silicon.rs`
+//! has the cycles that their authors measured, in the same order.
+#![no_std]
+#![no_main]
+
+use core::arch::{asm, global_asm};
+use core::panic::PanicInfo;
+use cortex_m_semihosting::debug;
+
+global_asm!(
+    include_str!("../../m4-timing/silicon/aes-armcortexm/aes128.s"),
+    include_str!("../../m4-timing/silicon/aes-armcortexm/aes128ctr.s"),
+    include_str!("../../m4-timing/silicon/aes-armcortexm/aes192ctr.s"),
+    include_str!("../../m4-timing/silicon/aes-armcortexm/aes256ctr.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/common.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_keyschedule_enc.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_keyschedule_enc.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_keyschedule_dec.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_encrypt.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_decrypt.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_encrypt_unrolled.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_encrypt_unrolled.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_decrypt_unrolled.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_decrypt_unrolled.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM4_DSPsBOX_AES_encrypt.s"),
+    include_str!("../../m4-timing/silicon/cortexm-aes/CM4_DSPsBOX_AES_decrypt.s"),
+    options(raw)
+);
+
+type Words = *mut u32;
+type Kernel = unsafe extern "C" fn(Words, Words, Words, usize);
+
+unsafe extern "C" {
+    fn AES_128_keyschedule(key: Words, keys: Words, _: Words, _: usize);
+    fn AES_128_encrypt(keys: Words, from: Words, to: Words, _: usize);
+    fn AES_128_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
+    fn AES_192_keyschedule(key: Words, keys: Words, _: Words, _: usize);
+    fn AES_192_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
+    fn AES_256_keyschedule(key: Words, keys: Words, _: Words, _: usize);
+    fn AES_256_encrypt_ctr(state: Words, from: Words, to: Words, bytes: usize);
+    fn CM3_1T_AES128_keyschedule_enc(keys: Words, key: Words, _: Words, _: usize);
+    fn CM3_1T_AES256_keyschedule_enc(keys: Words, key: Words, _: Words, _: usize);
+    fn CM3_1T_AES_keyschedule_dec(keys: Words, rounds: Words, _: Words, _: usize);
+    fn CM3_1T_AES_encrypt(keys: Words, from: Words, to: Words, rounds: usize);
+    fn CM3_1T_AES_decrypt(keys: Words, from: Words, to: Words, rounds: usize);
+    fn CM3_1T_AES128_encrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
+    fn CM3_1T_AES256_encrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
+    fn CM3_1T_AES128_decrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
+    fn CM3_1T_AES256_decrypt_unrolled(keys: Words, from: Words, to: Words, _: usize);
+    fn CM4_DSPsBOX_AES_encrypt(keys: Words, from: Words, to: Words, rounds: usize);
+    fn CM4_DSPsBOX_AES_decrypt(keys: Words, from: Words, to: Words, rounds: usize);
+}
+
+/// Bytes that the kernels for many blocks get.
+const BYTES: usize = 4096;
+const PASSES: u32 = 5;
+
+/// What a kernel's second argument is.
+enum Second {
+    /// The input.
+    Input,
+    /// The number of rounds.
+    Rounds(usize),
+}
+use Second::{Input, Rounds};
+
+/// Each kernel with its second and last argument.
+const KERNELS: [(Kernel, Second, usize); 25] = [
+    (AES_128_keyschedule, Input, 0),
+    (AES_128_encrypt, Input, 0),
+    (AES_128_encrypt_ctr, Input, BYTES),
+    (AES_192_keyschedule, Input, 0),
+    (AES_192_encrypt_ctr, Input, BYTES),
+    (AES_256_keyschedule, Input, 0),
+    (AES_256_encrypt_ctr, Input, BYTES),
+    (CM3_1T_AES128_keyschedule_enc, Input, 0),
+    (CM3_1T_AES256_keyschedule_enc, Input, 0),
+    (CM3_1T_AES_encrypt, Input, 10),
+    (CM3_1T_AES_encrypt, Input, 14),
+    (CM3_1T_AES128_encrypt_unrolled, Input, 0),
+    (CM3_1T_AES256_encrypt_unrolled, Input, 0),
+    (CM3_1T_AES_keyschedule_dec, Rounds(10), 0),
+    (CM3_1T_AES_keyschedule_dec, Rounds(14), 0),
+    (CM3_1T_AES_decrypt, Input, 10),
+    (CM3_1T_AES_decrypt, Input, 14),
+    (CM3_1T_AES128_decrypt_unrolled, Input, 0),
+    (CM3_1T_AES256_decrypt_unrolled, Input, 0),
+    (CM4_DSPsBOX_AES_encrypt, Input, 10),
+    (CM4_DSPsBOX_AES_encrypt, Input, 14),
+    (CM4_DSPsBOX_AES_decrypt, Input, 10),
+    (CM4_DSPsBOX_AES_decrypt, Input, 14),
+    (nothing, Input, 0),
+    (spin, Input, 0),
+];
+
+unsafe extern "C" fn nothing(_: Words, _: Words, _: Words, _: usize) {}
+
+/// Long enough to tell how fast the emulator is.
+unsafe extern "C" fn spin(data: Words, _: Words, _: Words, _: usize) {
+    for turn in 0..SPINS {
+        // SAFETY: the first word of the buffer that every kernel gets.
+        unsafe { data.write_volatile(data.read_volatile().wrapping_mul(turn | 1)) };
+    }
+}
+
+const SPINS: u32 = 1_000_000;
+
+static mut BUFFERS: [[u32; BYTES / 4 + 64]; 3] = [[0; BYTES / 4 + 64]; 3];
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let buffers = &raw mut BUFFERS;
+    // SAFETY: each is a third of the buffers; nothing else uses them.
+    let [state, from, to] = unsafe { [0, 1, 2].map(|third| (&raw mut (*buffers)[third]).cast::<u32>()) };
+    for (number, (kernel, second, last)) in (1..).zip(&KERNELS) {
+        let second = match second {
+            Input => from,
+            Rounds(rounds) => *rounds as Words,
+        };
+        for _ in 0..PASSES {
+            // SAFETY: the kernels follow the calling convention and stay within their buffers.
+            unsafe {
+                asm!(
+                    ".inst.w 0xf3af8040",
+                    "mov r0, {first}",
+                    "blx {kernel}",
+                    ".inst.w 0xf3af8041",
+                    first = in(reg) state,
+                    kernel = in(reg) *kernel,
+                    inout("r0") number => _,
+                    inout("r1") second => _,
+                    inout("r2") to => _,
+                    inout("r3") *last => _,
+                    out("r12") _,
+                    out("lr") _,
+                );
+            }
+        }
+    }
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+}
+
+#[panic_handler]
+fn panic(_: &PanicInfo) -> ! {
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
+    }
+}

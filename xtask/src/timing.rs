@@ -1,0 +1,193 @@
+//! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are worth.
+
+use crate::{
+    apt,
+    console::{self, Console},
+    image, paths,
+    toolchain::{self, Choice},
+};
+use anyhow::{Context, Result, bail};
+use m4_timing::report::{Measured, parse};
+use std::{
+    env::consts::{DLL_PREFIX, DLL_SUFFIX},
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+const PROGRAM: &str = "qemu-system-arm";
+/// The first version with the plugin interface that the plugin speaks.
+const VERSION_MIN: u32 = 9;
+const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
+/// Flags that make a plugin fast: the profile of everything that runs on this machine.
+const PROFILE: &str = "host";
+
+/// Flags of `cargo xtask timing`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask timing\n  cargo xtask timing --json kernels.json\n  \
+    cargo xtask timing --check\n  cargo xtask timing my-image.elf")]
+pub struct Args {
+    /// An image of your own with marked regions, instead of the loop's kernels
+    #[arg(conflicts_with = "check")]
+    image: Option<PathBuf>,
+    /// Write the figures to a file, an object a line
+    #[arg(long, value_name = "FILE", conflicts_with = "check")]
+    json: Option<PathBuf>,
+    /// Compare the model with published measurements instead
+    #[arg(long)]
+    check: bool,
+}
+
+/// What an image's run under the plugin gave.
+pub struct Run {
+    /// What the image wrote to its standard output.
+    pub output: String,
+    /// The regions, in order of their numbers.
+    pub regions: Vec<Measured>,
+    /// The same as text, as the plugin wrote it.
+    pub json_lines: String,
+}
+
+/// Measures the loop's kernels or an image, or checks the model.
+///
+/// # Errors
+/// Something does not build, or the image fails or cannot be measured.
+pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    if args.check {
+        return check(choice, console);
+    }
+    let run = match &args.image {
+        Some(image) => {
+            let image = fs::canonicalize(image).with_context(|| paths::shown(image))?;
+            measure(&image, None, console)?
+        }
+        None => kernels(choice, console)?,
+    };
+    console.say(&table(&run));
+    match &args.json {
+        Some(path) => fs::write(path, &run.json_lines).with_context(|| format!("cannot write {}", paths::shown(path))),
+        None => Ok(()),
+    }
+}
+
+/// Runs the tests that compare the model with published measurements.
+///
+/// # Errors
+/// Something does not build, or a test fails.
+pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
+    ensure(console)?;
+    let plugin = plugin(console)?;
+    let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
+    let mut command = console::cargo("test");
+    command.args(["--package", "m4-timing", "--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
+    console.run(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image))
+}
+
+/// Measures the loop's kernels over the recorded stimulus.
+///
+/// # Errors
+/// Something does not build, or the image fails.
+pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
+    let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
+    let recording = folder()?.join("recording.bin");
+    let mut command = console::cargo("run");
+    command.args(["--quiet", "--package", "host-tests", "--example", "recording", "--"]);
+    console.run(command.arg(&recording))?;
+    measure(&image, Some(&recording), console)
+}
+
+/// Runs an image to its end under the plugin; `argument` is what its command line says.
+///
+/// # Errors
+/// QEMU or the plugin is missing, the image fails, or a region cannot be measured.
+pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
+    ensure(console)?;
+    let plugin = plugin(console)?;
+    let file =
+        folder()?.join(format!("{}.{}.json", image.file_stem().unwrap_or_default().display(), std::process::id()));
+    let argument = argument.map_or_else(String::new, |argument| format!(",arg={}", argument.display()));
+    let mut command = Command::new(PROGRAM);
+    command.args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"]);
+    command.arg("-semihosting-config").arg(format!("enable=on,target=native{argument}"));
+    command.arg("-plugin").arg(format!("{},out={}", plugin.display(), file.display()));
+    command.arg("-kernel").arg(image).stdin(Stdio::null());
+    let ended = command.output().with_context(|| format!("cannot start {PROGRAM}"))?;
+    let output = String::from_utf8_lossy(&ended.stdout).into_owned();
+    if !ended.status.success() {
+        let errors = String::from_utf8_lossy(&ended.stderr);
+        bail!("{}: {}\n{output}{errors}", ended.status, console::show(&command));
+    }
+    let json_lines = fs::read_to_string(&file).with_context(|| format!("{} wrote no figures", paths::shown(&file)))?;
+    // Only a copy of what is returned.
+    let _ = fs::remove_file(&file);
+    let regions = parse(&json_lines).context("the plugin's figures cannot be read")?;
+    Ok(Run { output, regions, json_lines })
+}
+
+/// Makes sure of an emulator with the plugin interface.
+///
+/// # Errors
+/// It is missing and cannot be installed.
+pub fn ensure(console: &mut Console) -> Result<()> {
+    if version().is_some_and(|version| version >= VERSION_MIN) {
+        return Ok(());
+    }
+    apt::newest(&[PROGRAM], WHY, console)?;
+    match version() {
+        Some(version) if version >= VERSION_MIN => Ok(()),
+        found => {
+            let found = found.map_or("none".into(), |version| version.to_string());
+            bail!("{WHY} needs {PROGRAM} {VERSION_MIN} or newer; found {found} in PATH: install one by hand")
+        }
+    }
+}
+
+/// The emulator's major version.
+fn version() -> Option<u32> {
+    let output = Command::new(PROGRAM).arg("--version").output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    text.strip_prefix("QEMU emulator version ")?.split('.').next()?.parse().ok()
+}
+
+fn plugin(console: &mut Console) -> Result<PathBuf> {
+    let mut command = console::cargo("build");
+    command.args(["--package", "m4-timing", "--features", "plugin", "--profile", PROFILE]);
+    console.run(&mut command)?;
+    let file = paths::target().join(PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
+    fs::canonicalize(&file).with_context(|| paths::shown(&file))
+}
+
+fn folder() -> Result<PathBuf> {
+    let folder = paths::target().join("timing");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
+    fs::canonicalize(&folder).with_context(|| paths::shown(&folder))
+}
+
+/// A line for each region: cycles of a pass.
+fn table(run: &Run) -> String {
+    let name = |region: u32| {
+        let start = format!("region {region} ");
+        run.output.lines().find_map(|line| line.strip_prefix(&start)).map_or(format!("region {region}"), Into::into)
+    };
+    let mut text = format!(
+        "{:<34}{:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
+        "cycles a pass, medians", "passes", "insn", "low", "estimate", "high", "flash", "flash max"
+    );
+    for measured in &run.regions {
+        let Measured { region, passes, instructions, low, estimate, high, flash } = measured;
+        // A string takes every write.
+        let _ = writeln!(
+            text,
+            "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}",
+            name(*region),
+            instructions.median,
+            low.median,
+            estimate.median,
+            high.median,
+            flash.median,
+            flash.max
+        );
+    }
+    text
+}

@@ -1,9 +1,12 @@
 //! The model's hard cases, one test each.
 
-use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
-use fingertip::units::{Kilopascals, Millimetres};
+use fingertip::config::Config;
+use fingertip::model::{Displacement, Load, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
+use fingertip::params::Params;
+use fingertip::units::{Kilopascals, Millimetres, Radians, Ratio};
 use host_tests::prove::domain::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
 use host_tests::prove::exact;
+use host_tests::prove::reference::{Reference, error_ulp, real};
 
 /// Every function of the depth, against integers.
 fn judge_depth(tip: &Tip, d: i32) {
@@ -158,6 +161,89 @@ fn a_tip_outside_the_domain_is_refused_by_name_value_and_range() {
     assert_eq!(refused.to_string(), "tip radius of 3 mm: 4 to 16 mm are covered");
     let refused = Tip::new(RADIUS_MIN, Kilopascals::from_bits(3_000 << 16)).unwrap_err();
     assert_eq!(refused.to_string(), "Young's modulus of 3000 kPa: 20 to 2000 kPa are covered");
+}
+
+/// A code more or less on one taxel, where there is no force: as documented, 10.9 um.
+#[test]
+fn noise_of_one_count_at_no_force() {
+    let config = Config::new(&Params::DEFAULT).unwrap();
+    let newtons_of = |codes: i64| newtons(((16 * codes * config.newtons_per_sum_q48) >> 32) as i32);
+    let d_of = |codes: i64| config.tip.indentation(newtons_of(codes)).0.to_num::<f64>();
+    // 1/24 kPa on 1.5 mm by 1.5 mm are 93.75 uN, 6.14 units of the force.
+    assert_eq!(newtons_of(1).to_bits(), 6);
+    let first = d_of(1);
+    assert!((10.7e-3..10.93e-3).contains(&first), "{first}");
+    // A count below makes no force at all, and none moves d further than the first.
+    assert!(d_of(-1) == 0.0);
+    for codes in 1..20_000 {
+        let moved = d_of(codes + 1) - d_of(codes);
+        // Half a unit of force more or less at each end.
+        assert!((0.0..=first).contains(&moved), "{codes} codes: {moved}");
+    }
+}
+
+/// The cosine is near 1/20 there: what is divided by it, by its square and by its cube.
+#[test]
+fn the_rim_of_a_deep_contact_by_its_angle() {
+    for tip in boundary_tips() {
+        let (deepest, reference) = (tip.depth_max().to_bits(), Reference::new(&tip));
+        for d in [deepest, deepest - 1, deepest - deepest / 100] {
+            let rim = tip.touching_angle_max(mm(d)).to_bits();
+            for theta in [1, rim / 2, rim - rim / 100, rim - 1, rim] {
+                let (angle, exact_angle, exact_d) = (Radians::from_bits(theta), real(theta, 24), real(d, 24));
+                let results = [
+                    (tip.distance_at(angle, mm(d)).to_bits(), 24, reference.distance_at(&exact_angle, &exact_d)),
+                    (tip.distance_slope(angle, mm(d)).to_bits(), 16, reference.distance_slope(&exact_angle, &exact_d)),
+                    (tip.area_density(angle, mm(d)).to_bits(), 16, reference.area_density(&exact_angle, &exact_d)),
+                ];
+                for (place, (bits, fraction_bits, exact)) in results.into_iter().enumerate() {
+                    let error = error_ulp(bits, fraction_bits, &exact);
+                    // The angle may be rounded past the rim; r stops there.
+                    let beyond = place == 0 && bits == tip.contact_radius(mm(d)).to_bits() && error < 0.0;
+                    assert!(error.abs() <= 0.501 || beyond, "function {place}, d {d}, theta {theta}: {error}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_largest_tilt_and_shift_of_a_deep_contact() {
+    for tip in boundary_tips() {
+        let (d, reach, reference) = (tip.depth_max().to_bits(), tip.radius().to_bits() / 2, Reference::new(&tip));
+        for (shift, tilt) in [(reach, 1 << 24), (-reach, 1 << 24), (reach, -1 << 24), (1, 1), (-1, (1 << 24) - 1)] {
+            let displacement = Displacement { normal: mm(d), shift: mm(shift), tilt: Radians::from_bits(tilt) };
+            let exact = reference.load(&real(d, 24), &real(shift, 24), &real(tilt, 24));
+            let Load { normal, tangential, moment } = tip.load(displacement);
+            let energy = tip.energy(displacement);
+            let results =
+                [(normal.to_bits(), 16), (tangential.to_bits(), 16), (moment.to_bits(), 14), (energy.to_bits(), 14)];
+            for (place, ((bits, fraction_bits), exact)) in results.into_iter().zip(&exact).enumerate() {
+                let error = error_ulp(bits, fraction_bits, exact);
+                assert!(error.abs() <= 0.501, "result {place}, shift {shift}, tilt {tilt}: {error}");
+            }
+        }
+        let beyond = Displacement { normal: mm(i32::MAX), shift: mm(i32::MIN), tilt: Radians::from_bits(i32::MAX) };
+        let nearest = Displacement { normal: mm(d), shift: mm(-reach), tilt: Radians::from_bits(1 << 24) };
+        assert_eq!(tip.load(beyond), tip.load(nearest));
+    }
+}
+
+#[test]
+fn the_friction_of_a_deep_contact() {
+    for tip in boundary_tips() {
+        let reference = Reference::new(&tip);
+        for d in [tip.depth_max().to_bits(), tip.depth_max().to_bits() / 3] {
+            let exact_d = real(d, 24);
+            let limit = tip.limit_surface(mm(d), Ratio::from_bits(4 << 16));
+            let force = reference.force(&exact_d) * real(4, 0);
+            let moment = &force * reference.contact_radius(&exact_d) * reference.friction_shape(&exact_d);
+            assert!(error_ulp(limit.force.to_bits(), 16, &force).abs() <= 0.501);
+            let error = error_ulp(limit.moment.to_bits(), 14, &moment);
+            assert!(error.abs() <= 0.56, "d {d}: {error}");
+            assert_eq!(tip.limit_surface(mm(d), Ratio::from_bits(i32::MAX)), limit);
+        }
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
 use crate::identify::{Identification, Press, PressView, Refusal};
-use crate::pressure::{self, Array};
+use crate::pressure::{Array, Calibration};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
@@ -117,6 +117,15 @@ impl Pipeline {
         }
     }
 
+    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed.
+    pub fn calibrate(&mut self, calibration: &Calibration) {
+        self.array.calibrate(calibration);
+        self.tared = false;
+        if self.status.mode != Mode::Fault {
+            self.status.mode = Mode::Off;
+        }
+    }
+
     /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
     pub fn stop(&mut self, fault: Fault) -> Status {
         self.status.mode = Mode::Fault;
@@ -206,7 +215,7 @@ impl Pipeline {
     /// that frame's end.
     pub fn glance(&mut self, frame: &Frame) -> Option<Status> {
         let broken = self.watched()
-            && pressure::bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
+            && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         broken.then(|| self.stop(Fault::ArrayBroken))
     }
 

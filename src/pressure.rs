@@ -5,10 +5,13 @@
 //! tells the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
 //! taxel would show behind a perfect row driver, and m times the taxel's gain, less its tare, is its pressure.
 
+mod calibration;
 mod row;
 
+pub use calibration::{Calibration, CalibrationError};
+
 use crate::config::Config;
-use crate::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS};
+use crate::frame::{COLUMNS, Frame, ROWS};
 use row::{Columns, Row, without};
 
 /// Fractional bits of a corrected code.
@@ -27,7 +30,7 @@ pub const GAIN_MAX: u16 = (1 << 15) - 1;
 /// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// `taxels[row][column]`, zero where the taxel is dead or saturated.
+    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated.
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Sum over all taxels.
     pub sum: i32,
@@ -37,9 +40,9 @@ pub struct Picture {
     pub moment_y: i32,
     /// Largest taxel.
     pub peak: i32,
-    /// A bit for each bad column, for each row.
+    /// A bit for each column that is masked, dead or saturated, for each row.
     pub bad: [u16; ROWS],
-    /// Taxels that are dead or saturated.
+    /// Taxels that are dead or saturated, and not masked.
     pub bad_count: u8,
     /// The highest undriven column level, codes.
     pub undriven_max: u16,
@@ -65,8 +68,7 @@ pub struct Array {
     picture: Picture,
     /// Reading without contact, codes in Q16.
     tare: [[i32; COLUMNS]; ROWS],
-    /// Q14, in pairs like the codes.
-    gain: [[u32; BANK_COLUMNS]; ROWS],
+    calibration: Calibration,
     tare_frames: u32,
     baseline_row: usize,
 }
@@ -83,7 +85,7 @@ impl Array {
         Self {
             picture: Picture::EMPTY,
             tare: [[0; COLUMNS]; ROWS],
-            gain: [[lanes::pair(GAIN_ONE as i16, GAIN_ONE as i16); BANK_COLUMNS]; ROWS],
+            calibration: Calibration::NONE,
             tare_frames: 0,
             baseline_row: 0,
         }
@@ -106,15 +108,15 @@ impl Array {
         let (mut sum, mut moment_x, mut moment_y, mut peak) = (0, 0, 0, 0);
         let mut bad_count = 0;
         let mut weight = 1 - ROWS as i32;
-        let calibrations = self.tare.iter().zip(&self.gain);
+        let calibrations = self.calibration.gain.iter().zip(&self.calibration.mask);
         let places = picture.taxels.iter_mut().zip(&mut picture.bad);
-        for ((codes, (tare, gain)), (out, bad)) in rows.iter().zip(calibrations).zip(places) {
+        for (((codes, tare), (gain, mask)), (out, bad)) in rows.iter().zip(&self.tare).zip(calibrations).zip(places) {
             let mut row = Row::of(codes, undriven, config.dead_codes);
             let mut columns = Columns::default();
-            *bad = 0;
+            *bad = *mask;
             if row.suspect {
-                *bad = row.leave_out_bad(codes, config.dead_codes);
-                bad_count += bad.count_ones() as u8;
+                *bad |= row.leave_out_bad(codes, config.dead_codes);
+                bad_count += (*bad & !mask).count_ones() as u8;
                 let (tare, gain) = without(*bad, tare, gain);
                 columns.read(&row, &tare, &gain, config.sag_q32, out);
             } else {
@@ -133,6 +135,25 @@ impl Array {
         picture.bad_count = bad_count;
         picture.undriven_max = undriven.iter().fold(0, |max, pair| max.max(*pair as u16).max((*pair >> 16) as u16));
         picture
+    }
+
+    /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
+    pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
+        let [rows @ .., undriven] = &frame.pairs;
+        let mut count = 0;
+        for (codes, mask) in rows.iter().zip(&self.calibration.mask) {
+            let mut row = Row::of(codes, undriven, config.dead_codes);
+            if row.suspect {
+                count += (row.leave_out_bad(codes, config.dead_codes) & !mask).count_ones();
+            }
+        }
+        count
+    }
+
+    /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
+    pub fn calibrate(&mut self, calibration: &Calibration) {
+        self.calibration = calibration.clone();
+        self.start_tare();
     }
 
     /// Forgets the tare and starts to measure it anew.
@@ -160,19 +181,6 @@ impl Array {
             learn(tares, values, BASELINE_WEIGHT);
         }
     }
-}
-
-/// Taxels that a frame shows as dead or saturated: [`Array::read`] without the readings, and quicker.
-pub fn bad_taxels(frame: &Frame, config: &Config) -> u32 {
-    let [rows @ .., undriven] = &frame.pairs;
-    let mut count = 0;
-    for codes in rows {
-        let mut row = Row::of(codes, undriven, config.dead_codes);
-        if row.suspect {
-            count += row.leave_out_bad(codes, config.dead_codes).count_ones();
-        }
-    }
-    count
 }
 
 /// Moves each tare (Q16) by `weight` (Q16) of what the taxel now reads above it.

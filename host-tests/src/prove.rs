@@ -11,4 +11,5 @@ pub mod exhaustive;
 pub mod oracle;
 pub mod random;
 pub mod reference;
+pub mod tables;
 pub mod tally;

@@ -1,50 +1,65 @@
 //! Proves the model's error bounds over whole input ranges; `--quick` takes a thousandth of the inputs.
 //!
-//! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
+//! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold. `--write` puts
+//! these figures into `docs/model.md`, `--check` fails where they are stale there.
 
 use std::io::{self, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use host_tests::prove::domain::reference_tip;
 use host_tests::prove::tally::Tally;
-use host_tests::prove::{beyond, exhaustive, oracle, random};
+use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
+
+const USAGE: &str = "prove [--quick | --write | --check]";
+
+/// What becomes of the tables of `docs/model.md`.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Page {
+    Leave,
+    Write,
+    Check,
+}
 
 fn main() -> ExitCode {
-    let quick = match std::env::args().nth(1).as_deref() {
-        None => false,
-        Some("--quick") => true,
-        Some(other) => {
-            eprintln!("unknown argument {other}: --quick or none");
-            return ExitCode::FAILURE;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let (quick, page) = match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        [] => (false, Page::Leave),
+        ["--quick"] => (true, Page::Leave),
+        ["--write"] => (false, Page::Write),
+        ["--check"] => (false, Page::Check),
+        _ => {
+            eprintln!("usage: {USAGE}");
+            return ExitCode::from(2);
         }
     };
     let share = if quick { 1_000 } else { 1 };
-    let mut report = Report { started: Instant::now(), inputs: 0, broken: 0 };
+    let mut report = Report { started: Instant::now(), inputs: 0, broken: 0, sections: Vec::new() };
     let tip = reference_tip();
     let reach = |bits: i32| bits as u64 / share + 1;
 
-    report.section("every input of the reference tip (a = 10 mm, Y = 250 kPa), by integers", |progress| {
+    report.section("Every input of the reference tip, a = 10 mm and Y = 250 kPa, judged by integers", |progress| {
         let mut all = exhaustive::depths(&tip, 1..reach(tip.depth_max().to_bits()), progress).to_vec();
         all.extend(exhaustive::forces(&tip, 0..reach(tip.force_max().to_bits()), progress));
         all.extend(exhaustive::radii(&tip, 0..reach(tip.contact_radius(tip.depth_max()).to_bits()), progress));
         all.extend(exhaustive::peaks(&tip, 0..reach(tip.peak_pressure(tip.depth_max()).to_bits()), progress));
         all
     });
-    report.section("grid of the reference tip, by integers", |progress| {
+    report.section("A grid of the reference tip, by integers", |progress| {
         exhaustive::pressures(&tip, 4_000 / share, 2_500, progress).to_vec()
     });
-    report.section("grid of the reference tip, in arbitrary precision", |progress| {
+    report.section("A grid of the reference tip, in arbitrary precision", |progress| {
         random::touching_angles(&tip, 1_000_000 / share, progress).to_vec()
     });
-    report.section("boundaries of the domain, in arbitrary precision and by integers", |progress| {
+    report.section("Boundaries of the whole domain, in arbitrary precision and by integers", |progress| {
         random::boundaries(progress).to_vec()
     });
-    report.section("random points of the domain, in arbitrary precision and by integers", |progress| {
+    report.section("Random points of the whole domain, in arbitrary precision and by integers", |progress| {
         random::points(0..10_000_000 / share, progress).to_vec()
     });
-    report.section("the rest of the model at random points, in arbitrary precision", |progress| {
+    report.section("The rest of the model at random points, in arbitrary precision", |progress| {
         let points = 0..200_000 / share;
         let mut all = beyond::geometry(points.clone(), progress).to_vec();
         all.extend(beyond::tilt(points.clone(), progress));
@@ -62,19 +77,22 @@ fn main() -> ExitCode {
         println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
     }
     match oracle::check() {
-        Ok(tallies) => report.section("oracle/park2003.csv", |_| tallies.to_vec()),
+        Ok(tallies) => {
+            report.section("The points of `host-tests/oracle/park2003.csv`, 25 digits each", |_| tallies.to_vec())
+        }
         Err(error) => {
             eprintln!("{}: {error}", oracle::path().display());
             report.broken += 1;
         }
     }
-    report.end()
+    report.end(page)
 }
 
 struct Report {
     started: Instant,
     inputs: u64,
     broken: u64,
+    sections: Vec<(String, Vec<Tally>)>,
 }
 
 impl Report {
@@ -98,11 +116,40 @@ impl Report {
             self.inputs += tally.inputs;
             self.broken += u64::from(!tally.holds());
         }
+        self.sections.push((title.to_owned(), tallies));
     }
 
-    fn end(&self) -> ExitCode {
+    fn end(&self, page: Page) -> ExitCode {
         let seconds = self.started.elapsed().as_secs();
         println!("{} results judged in {seconds} s; {} bounds broken", self.inputs, self.broken);
-        if self.broken == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+        if self.broken > 0 {
+            return ExitCode::FAILURE;
+        }
+        match renew(&tables::markdown(&self.sections), page) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                eprintln!("error: {error}");
+                ExitCode::FAILURE
+            }
+        }
     }
+}
+
+fn renew(tables: &str, page: Page) -> Result<(), String> {
+    if page == Page::Leave {
+        return Ok(());
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/model.md");
+    let failed = |error| format!("docs/model.md: {error}");
+    let old = std::fs::read_to_string(&file).map_err(failed)?;
+    let new = tables::renewed(&old, tables).ok_or("docs/model.md lacks the markers of its tables")?;
+    if old == new {
+        println!("fresh    docs/model.md");
+    } else if page == Page::Check {
+        return Err("docs/model.md is stale: renew it with `cargo xtask prove --write`".into());
+    } else {
+        std::fs::write(&file, new).map_err(failed)?;
+        println!("written  docs/model.md");
+    }
+    Ok(())
 }

@@ -12,7 +12,7 @@ pub use calibration::{Calibration, CalibrationError};
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
-use row::{Columns, Row, without};
+use row::{Columns, Row};
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = 4;
@@ -111,17 +111,16 @@ impl Array {
         let calibrations = self.calibration.gain.iter().zip(&self.calibration.mask);
         let places = picture.taxels.iter_mut().zip(&mut picture.bad);
         for (((codes, tare), (gain, mask)), (out, bad)) in rows.iter().zip(&self.tare).zip(calibrations).zip(places) {
-            let mut row = Row::of(codes, undriven, config.dead_codes);
-            let mut columns = Columns::default();
-            *bad = *mask;
-            if row.suspect {
-                *bad |= row.leave_out_bad(codes, config.dead_codes);
-                bad_count += (*bad & !mask).count_ones() as u8;
-                let (tare, gain) = without(*bad, tare, gain);
-                columns.read(&row, &tare, &gain, config.sag_q32, out);
+            let row = Row::of(codes, undriven, config.dead_codes);
+            let columns = if row.suspect {
+                let (columns, found) = row::read_suspect(codes, undriven, tare, gain, *mask, config, out);
+                *bad = found | mask;
+                bad_count += (found & !mask).count_ones() as u8;
+                columns
             } else {
-                columns.read(&row, tare, gain, config.sag_q32, out);
-            }
+                *bad = *mask;
+                Columns::read(&row, tare, gain, config.sag_q32, out)
+            };
             peak = i32::max(peak, columns.peak);
             sum += columns.sum();
             moment_x += columns.moment();

@@ -1,5 +1,6 @@
 //! One driven row: ten codes as five pairs, two taxels an instruction where the target has such.
 
+use crate::config::Config;
 use crate::frame::{BANK_COLUMNS, COLUMNS, SATURATED};
 
 /// Five pairs: columns 0 to 4 in the low halves, 5 to 9 in the high ones.
@@ -36,8 +37,6 @@ impl Row {
     }
 
     /// Holds every net code to what a converter can mean, and tells the bad columns, a bit each.
-    #[cold]
-    #[inline(never)]
     pub fn leave_out_bad(&mut self, codes: &Pairs, dead_codes: u16) -> u16 {
         let mut bad = 0;
         self.sum = 0;
@@ -76,7 +75,8 @@ pub(super) struct Columns {
 impl Columns {
     /// Writes the taxels of a row in sixteenths of a corrected code.
     #[inline(always)]
-    pub fn read(&mut self, row: &Row, tare: &[i32; COLUMNS], gain: &Pairs, sag_q32: u32, out: &mut [i32; COLUMNS]) {
+    pub fn read(row: &Row, tare: &[i32; COLUMNS], gain: &Pairs, sag_q32: u32, out: &mut [i32; COLUMNS]) -> Self {
+        let mut columns = Self::default();
         let boost = row.sag_boost(sag_q32);
         each(|place| {
             let (net, gain) = (row.net[place], gain[place]);
@@ -84,12 +84,13 @@ impl Columns {
             let right = taxel(lanes::high(net), lanes::high(gain), boost, tare[place + BANK_COLUMNS]);
             out[place] = left;
             out[place + BANK_COLUMNS] = right;
-            self.peak = self.peak.max(left).max(right);
-            self.right += right;
-            self.both += left + right;
-            self.weighted += (left + right) * place as i32;
+            columns.peak = columns.peak.max(left).max(right);
+            columns.right += right;
+            columns.both += left + right;
+            columns.weighted += (left + right) * place as i32;
             0
         });
+        columns
     }
 
     /// Sum of the taxels.
@@ -114,20 +115,34 @@ fn taxel(net: i16, gain: i16, boost_q22: i32, tare_q16: i32) -> i32 {
     boosted as i32 - (tare_q16 >> (super::TARE_BITS - super::CODE_BITS))
 }
 
-/// Tare and gain of a row with zeros for its bad columns, so that these read as nothing.
+/// Reads a row with a dead or saturated taxel in it; also tells these, a bit each.
+///
+/// Apart from the others, so that the common way keeps its numbers in registers.
 #[cold]
 #[inline(never)]
-pub(super) fn without(bad: u16, tare: &[i32; COLUMNS], gain: &Pairs) -> ([i32; COLUMNS], Pairs) {
+pub(super) fn read_suspect(
+    codes: &Pairs,
+    undriven: &Pairs,
+    tare: &[i32; COLUMNS],
+    gain: &Pairs,
+    mask: u16,
+    config: &Config,
+    out: &mut [i32; COLUMNS],
+) -> (Columns, u16) {
+    let mut row = Row::of(codes, undriven, config.dead_codes);
+    let bad = row.leave_out_bad(codes, config.dead_codes);
+    // With zeros for tare and gain these taxels read as nothing.
+    let left_out = bad | mask;
     let (mut tare, mut gain) = (*tare, *gain);
     for (column, tare) in tare.iter_mut().enumerate() {
-        *tare *= i32::from(bad >> column & 1 == 0);
+        *tare *= i32::from(left_out >> column & 1 == 0);
     }
     for (place, gain) in gain.iter_mut().enumerate() {
-        let low = if bad >> place & 1 != 0 { 0 } else { 0xffff };
-        let high = if bad >> (place + BANK_COLUMNS) & 1 != 0 { 0 } else { 0xffff_0000 };
+        let low = if left_out >> place & 1 != 0 { 0 } else { 0xffff };
+        let high = if left_out >> (place + BANK_COLUMNS) & 1 != 0 { 0 } else { 0xffff_0000 };
         *gain &= low | high;
     }
-    (tare, gain)
+    (Columns::read(&row, &tare, &gain, config.sag_q32, out), bad)
 }
 
 /// Every place in turn, written out: the compiler would keep the loop where it builds for size.

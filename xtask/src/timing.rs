@@ -45,8 +45,28 @@ pub struct Run {
     pub output: String,
     /// The regions, in order of their numbers.
     pub regions: Vec<Measured>,
-    /// The same as text, as the plugin wrote it.
-    pub json_lines: String,
+    /// The same as the plugin wrote it.
+    json_lines: String,
+}
+
+impl Run {
+    /// What the image calls a region, in a line `region NUMBER NAME` of its output; the number where it does not say.
+    pub fn name(&self, region: u32) -> String {
+        let start = format!("region {region} ");
+        let name = self.output.lines().find_map(|line| line.strip_prefix(&start));
+        name.map_or(format!("region {region}"), Into::into)
+    }
+
+    /// An object a line, as the plugin writes them, with the names.
+    pub fn json_lines(&self) -> String {
+        let mut text = String::new();
+        for (line, measured) in self.json_lines.lines().zip(&self.regions) {
+            let name = self.name(measured.region).replace(['"', '\\'], "'");
+            // A string takes every write.
+            let _ = writeln!(text, "{{\"name\":\"{name}\",{}", line.trim_start_matches('{'));
+        }
+        text
+    }
 }
 
 /// Measures the loop's kernels or an image, or checks the model.
@@ -66,7 +86,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     };
     console.say(&table(&run));
     match &args.json {
-        Some(path) => fs::write(path, &run.json_lines).with_context(|| format!("cannot write {}", paths::shown(path))),
+        Some(path) => fs::write(path, run.json_lines()).with_context(|| format!("cannot write {}", paths::shown(path))),
         None => Ok(()),
     }
 }
@@ -166,10 +186,6 @@ fn folder() -> Result<PathBuf> {
 
 /// A line for each region: cycles of a pass.
 fn table(run: &Run) -> String {
-    let name = |region: u32| {
-        let start = format!("region {region} ");
-        run.output.lines().find_map(|line| line.strip_prefix(&start)).map_or(format!("region {region}"), Into::into)
-    };
     let mut text = format!(
         "{:<34}{:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}\n",
         "cycles a pass, medians", "passes", "insn", "low", "estimate", "high", "flash", "flash max"
@@ -180,7 +196,7 @@ fn table(run: &Run) -> String {
         let _ = writeln!(
             text,
             "{:<34}{passes:>8}{:>8}{:>8}{:>9}{:>8}{:>8}{:>10}",
-            name(*region),
+            run.name(*region),
             instructions.median,
             low.median,
             estimate.median,

@@ -6,6 +6,7 @@
 
 pub mod machines;
 pub mod model;
+mod pictures;
 
 use crate::config::{Config, ConfigError};
 use crate::params::Params;

@@ -1,8 +1,11 @@
-//! What has a state or a configuration: the viscoelastic filter, the loop's observer, profile and drive, the least squares.
+//! What has a state or a configuration: the viscoelastic filter, the fit, the loop's observer, profile and drive, the least
+//! squares of the modulus.
 
 use super::model::Sample;
+use super::pictures::Pictures;
 use super::{Mix, Source};
 use crate::config::{Config, ConfigError};
+use crate::contact::{self, Effort};
 use crate::control::SpeedLoop;
 use crate::control::drive::Drive;
 use crate::control::goal::Goal;
@@ -39,6 +42,7 @@ pub struct Machines {
     motion: SpeedLoop,
     goal: Goal,
     press: Press,
+    pictures: Pictures,
 }
 
 /// A press that both fits follow.
@@ -62,6 +66,7 @@ impl Machines {
             motion: SpeedLoop::new(),
             goal: Goal::default(),
             press,
+            pictures: Pictures::new(),
         }
     }
 }
@@ -95,11 +100,21 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 12] = [
+pub const STEPS: [Step; 13] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
         }
+    }),
+    ("contact::read", |m, s, mix| {
+        let effort = match s.share_q32 >> 27 {
+            0 => Effort::Full,
+            1 => Effort::Two,
+            2 => Effort::Moments,
+            3 => Effort::Sum,
+            _ => Effort::One,
+        };
+        add_contact(mix, &contact::read(m.pictures.next(s, &m.config), effort, &m.config));
     }),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
@@ -204,6 +219,17 @@ fn add_reference(mix: &mut Mix, reference: Reference) {
     mix.add(reference.acceleration.to_bits());
 }
 
+fn add_contact(mix: &mut Mix, contact: &Contact) {
+    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, bad_taxels } = *contact;
+    mix.add(force.to_bits());
+    for length in [indentation, centre_x, centre_y, radius] {
+        mix.add(length.to_bits());
+    }
+    mix.add(peak_pa);
+    mix.add(confidence);
+    mix.add(bad_taxels);
+}
+
 fn add_modulus(mix: &mut Mix, result: Result<Modulus, Refusal>) {
     match result {
         Ok(Modulus { modulus, sigma, contact, points }) => {
@@ -230,8 +256,7 @@ fn params(source: &mut Source) -> Params {
     params
 }
 
-/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in a
-/// replay of frames.
+/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in the fit.
 fn add_config(mix: &mut Mix, config: &Config) {
     // Taken apart, so that a field cannot be forgotten.
     let Config {

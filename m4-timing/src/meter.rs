@@ -164,7 +164,10 @@ impl Meter {
     }
 
     fn end(&mut self) {
-        let Some(pass) = self.pass.take() else { return };
+        let Some(mut pass) = self.pass.take() else { return };
+        let rest = pass.core.finish();
+        pass.cycles += rest;
+        self.flash.pass(rest.estimate);
         let flash = self.flash.now() - pass.flash_start;
         let figures = Figures { instructions: pass.instructions, cycles: pass.cycles, flash };
         self.regions.entry(pass.number).or_default().push(&figures);

@@ -113,6 +113,6 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     python::ensure(console)?;
     lint::ensure_deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
-    console.say("All set up: demo, test, build, qemu, size, lint and docs work offline now.");
+    console.say("All set up: demo, test, build, qemu, timing, size, lint and docs work offline now.");
     Ok(())
 }

@@ -1,10 +1,13 @@
-//! Two signed 16-bit numbers in a word, worked on at once.
+//! Instructions of the Cortex-M4F that stable Rust offers only as assembly: two signed 16-bit numbers in a word, worked on
+//! at once, and the FPU's square root.
 //!
-//! Each function is one instruction of the Cortex-M4's DSP extension, which stable Rust offers only as assembly, and
-//! the same in portable Rust ([`portable`]) everywhere else. This crate is the only place outside the board layer with
+//! Everywhere else each function is the same in portable Rust ([`portable`]). This crate is the only place outside the board layer with
 //! `unsafe`: the core forbids it. A test compares the portable functions with plain arithmetic on any host, and the
 //! emulated target's digest compares the instructions with the portable functions.
 #![no_std]
+
+#[cfg(not(target_os = "none"))]
+extern crate std;
 
 /// The sign bits of both lanes.
 pub const SIGNS: u32 = 0x8000_8000;
@@ -47,12 +50,20 @@ pub mod portable {
         let products = [low(a) as i32 * low(b) as i32, high(a) as i32 * high(b) as i32];
         sum.wrapping_add(products[0]).wrapping_add(products[1])
     }
+
+    /// See [`super::near_root`].
+    #[cfg(not(target_os = "none"))]
+    #[inline(always)]
+    pub fn near_root(x: u32) -> u32 {
+        // Each operation is rounded as IEEE 754 demands, as on the target; the scale is a power of two.
+        ((x as f32).sqrt() * 65_536.0) as u32
+    }
 }
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub use instructions::{dot, sub};
+pub use instructions::{dot, near_root, sub};
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
-pub use portable::{dot, sub};
+pub use portable::{dot, near_root, sub};
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod instructions {
@@ -79,6 +90,27 @@ mod instructions {
         }
         result
     }
+
+    /// sqrt(x) in Q16, saturated, to within 2^-23 of itself for x from 2^30 (VSQRT, in single precision).
+    #[inline(always)]
+    pub fn near_root(x: u32) -> u32 {
+        let root;
+        // SAFETY: reads and writes registers only. s0 is put back, as stable Rust cannot name it as used on this target; the
+        // FPU's sticky flags are read nowhere.
+        unsafe {
+            asm!(
+                "vmov {kept}, s0",
+                "vmov s0, {x}",
+                "vcvt.f32.u32 s0, s0",
+                "vsqrt.f32 s0, s0",
+                "vcvt.u32.f32 s0, s0, #16",
+                "vmov {x}, s0",
+                "vmov s0, {kept}",
+                x = inlateout(reg) x => root, kept = out(reg) _, options(pure, nomem, nostack),
+            );
+        }
+        root
+    }
 }
 
 #[cfg(test)]
@@ -96,5 +128,16 @@ mod tests {
                 assert_eq!(portable::dot(pair(a, c), pair(b, d), 7), exact as i32);
             }
         }
+    }
+
+    #[test]
+    fn the_near_root_is_near() {
+        let mut worst = 0.0_f64;
+        for x in (1 << 30..=u32::MAX).step_by(65_537).chain([u32::MAX]) {
+            let exact = f64::from(x).sqrt() * 65_536.0;
+            worst = worst.max((f64::from(portable::near_root(x)) - exact).abs() / exact.max(1.0));
+        }
+        assert!(worst < 1.0 / 8_388_608.0 && worst > 1.0 / 33_554_432.0, "{worst:e}");
+        assert_eq!(portable::near_root(u32::MAX), u32::MAX, "saturated");
     }
 }

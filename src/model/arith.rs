@@ -76,6 +76,6 @@ pub(super) const fn square(x: u32) -> u64 {
 }
 
 /// The square root of a Q48 number below 2^62, in Q24, rounded to nearest.
-pub(super) const fn root(square_q48: u64) -> u32 {
+pub(super) fn root(square_q48: u64) -> u32 {
     floor_sqrt(4 * square_q48).div_ceil(2)
 }

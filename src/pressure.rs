@@ -182,9 +182,10 @@ impl Array {
     }
 }
 
-/// Moves each tare (Q16) by `weight` (Q16) of what the taxel now reads above it.
+/// Moves each tare (Q16) by `weight` (Q16) of what the taxel now reads above it. It wraps only for codes that no converter of 12 bits
+/// gives.
 fn learn(tares: &mut [i32; COLUMNS], values: &[i32; COLUMNS], weight: i32) {
     for (tare, value) in tares.iter_mut().zip(values) {
-        *tare += ((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32;
+        *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
 //! model ([`model`]) and to what has a configuration or a state ([`machines`]); about a quarter of the numbers is
-//! outside the functions' domains. What is costly to make, [`machines::MADE`], is made for every 1024th input only.
+//! outside the functions' domains. What is costly to make, [`made::MADE`], is made for every 1024th input only.
 
+mod frames;
 pub mod machines;
+pub mod made;
 pub mod model;
 mod pictures;
 
@@ -17,7 +19,7 @@ use model::Sample;
 pub const INPUTS: u32 = 1_000_000;
 
 /// How many functions are compared.
-pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + machines::MADE.len();
+pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + made::MADE.len();
 
 /// A seeded source of inputs: the upper half of a linear congruential generator.
 #[derive(Clone, Debug)]
@@ -116,8 +118,8 @@ impl Comparison {
         for ((_, function), mix) in model::FUNCTIONS.iter().zip(by_model) {
             function(&self.sample, mix);
         }
-        if self.taken.is_multiple_of(machines::MADE_EVERY) {
-            for ((_, make), mix) in machines::MADE.iter().zip(by_maker) {
+        if self.taken.is_multiple_of(made::MADE_EVERY) {
+            for ((_, make), mix) in made::MADE.iter().zip(by_maker) {
                 make(&mut self.machines, &mut self.source, mix);
             }
         }
@@ -135,9 +137,9 @@ impl Comparison {
 
     /// Each function's name and digest, and how many inputs it took.
     pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64, u32)> + '_ {
-        let made_from = FUNCTIONS - machines::MADE.len();
+        let made_from = FUNCTIONS - made::MADE.len();
         names().zip(&self.mixes).enumerate().map(move |(place, (name, mix))| {
-            let inputs = if place < made_from { self.taken } else { self.taken.div_ceil(machines::MADE_EVERY) };
+            let inputs = if place < made_from { self.taken } else { self.taken.div_ceil(made::MADE_EVERY) };
             (name, mix.value(), inputs)
         })
     }
@@ -146,5 +148,5 @@ impl Comparison {
 /// The functions in the order of their digests.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let model = model::FUNCTIONS.iter().map(|(name, _)| *name);
-    model.chain(machines::STEPS.iter().map(|(name, _)| *name)).chain(machines::MADE.iter().map(|(name, _)| *name))
+    model.chain(machines::STEPS.iter().map(|(name, _)| *name)).chain(made::MADE.iter().map(|(name, _)| *name))
 }

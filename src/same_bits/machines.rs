@@ -1,48 +1,44 @@
-//! What has a state or a configuration: the viscoelastic filter, the fit, the loop's observer, profile and drive, the least
+//! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer, profile and drive, the least
 //! squares of the modulus.
 
 use super::model::Sample;
 use super::pictures::Pictures;
-use super::{Mix, Source};
-use crate::config::{Config, ConfigError};
+use super::{Mix, frames};
+use crate::config::Config;
 use crate::contact::{self, Effort};
 use crate::control::SpeedLoop;
 use crate::control::drive::Drive;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::control::profile::Reference;
+use crate::frame::Frame;
 use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
-use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm, Tip};
-use crate::params::Params;
+use crate::model::{Relaxation, RelaxationState, Tip};
 use crate::pipeline::Contact;
+use crate::pressure::{Array, Picture};
 use crate::safety::{Limits, Mode};
-use crate::scan::ScanTiming;
-use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons, Ratio};
+use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
-/// A constructor's name, and one call of it with what that adds to its digest.
-pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
-
-/// One input of so many makes new machines: each takes up to half a million instructions.
-pub const MADE_EVERY: u32 = 1_024;
 /// Points of a fit before the next one begins; the least that gives a modulus is 20.
 const FIT_POINTS: u32 = 64;
 /// The largest braking of the profile: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i32 = 1_000_000 << 8;
-const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
 
 /// The states.
 pub struct Machines {
-    config: Config,
-    filter: Option<Relaxation<3>>,
-    memory: RelaxationState<3>,
+    pub(super) config: Config,
+    pub(super) filter: Option<Relaxation<3>>,
+    pub(super) memory: RelaxationState<3>,
     observer: Observer,
     drive: Drive,
     motion: SpeedLoop,
     goal: Goal,
     press: Press,
     pictures: Pictures,
+    frame: Frame,
+    pub(super) array: Array,
 }
 
 /// A press that both fits follow.
@@ -67,6 +63,8 @@ impl Machines {
             goal: Goal::default(),
             press,
             pictures: Pictures::new(),
+            frame: frames::plausible(),
+            array: Array::new(),
         }
     }
 }
@@ -100,12 +98,23 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 13] = [
+pub const STEPS: [Step; 17] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
         }
     }),
+    ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
+    ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
+    ("Array::read", |m, s, mix| {
+        frames::change(&mut m.frame, s);
+        add_picture(mix, m.array.read(&m.frame, &m.config));
+        m.array.follow_drift();
+        if s.words[2] == 0 {
+            m.array.continue_tare();
+        }
+    }),
+    ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, &m.config))),
     ("contact::read", |m, s, mix| {
         let effort = match s.share_q32 >> 27 {
             0 => Effort::Full,
@@ -177,36 +186,6 @@ pub const STEPS: [Step; 13] = [
     }),
 ];
 
-/// What is made for every [`MADE_EVERY`]th input.
-pub const MADE: [Make; 2] = [
-    ("Config::new", |m, source, mix| match Config::new(&params(source)) {
-        Ok(config) => {
-            m.config = config;
-            add_config(mix, &m.config);
-        }
-        Err(ConfigError::Param(error)) => mix.add(error.value),
-        Err(ConfigError::Scan(_)) => mix.add(-1),
-        Err(ConfigError::Order([(_, low), (_, high)])) => mix.add(low - high),
-    }),
-    ("Relaxation::new", |m, source, mix| {
-        let period_us = source.up_to(2_000);
-        let terms = [(); 3].map(|()| RelaxationTerm {
-            share: Ratio::from_bits(source.within(0, 22_000)),
-            time_constant_us: period_us.saturating_mul(1 << source.up_to(20)),
-        });
-        match Relaxation::new(period_us, &terms) {
-            Ok(filter) => (m.filter, m.memory) = (Some(filter), RelaxationState::REST),
-            Err(RelaxationError::Sum(sum)) => mix.add(sum),
-            Err(_) => mix.add(-1),
-        }
-        // What it is made of shows in a step from rest.
-        let mut rest = RelaxationState::REST;
-        if let Some(filter) = &m.filter {
-            mix.add(filter.step(&mut rest, Newtons::from_bits(i32::MAX)).to_bits());
-        }
-    }),
-];
-
 /// The way of an input at its speed, with its braking.
 fn towards(machines: &Machines, sample: &Sample) -> Reference {
     let [way, speed, brake, _] = sample.words;
@@ -217,6 +196,13 @@ fn towards(machines: &Machines, sample: &Sample) -> Reference {
 fn add_reference(mix: &mut Mix, reference: Reference) {
     mix.add(reference.speed.to_bits());
     mix.add(reference.acceleration.to_bits());
+}
+
+fn add_picture(mix: &mut Mix, picture: &Picture) {
+    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, undriven_max } = picture;
+    taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
+    bad.iter().chain([undriven_max]).for_each(|number| mix.add(*number));
+    mix.add(*bad_count);
 }
 
 fn add_contact(mix: &mut Mix, contact: &Contact) {
@@ -240,82 +226,4 @@ fn add_modulus(mix: &mut Mix, result: Result<Modulus, Refusal>) {
         }
         Err(refusal) => mix.add(refusal as u8),
     }
-}
-
-/// Parameters within their ranges, most of them such that they do not contradict each other.
-fn params(source: &mut Source) -> Params {
-    let mut params = Params::from_array(&Params::RANGES.map(|(_, _, min, max)| source.within(min, max)));
-    params.sample_cycles = SAMPLE_CYCLES.get((source.word() & 7) as usize).map_or(0, |cycles| *cycles);
-    for (low, high) in [
-        (&mut params.contact_off_mn, &mut params.contact_on_mn),
-        (&mut params.force_max_mn, &mut params.force_fault_mn),
-        (&mut params.supply_min_mv, &mut params.supply_max_mv),
-    ] {
-        (*low, *high) = ((*low).min(*high), (*low).max(*high));
-    }
-    params
-}
-
-/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in the fit.
-fn add_config(mix: &mut Mix, config: &Config) {
-    // Taken apart, so that a field cannot be forgotten.
-    let Config {
-        params: _,
-        geometry: _,
-        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles },
-        tip,
-        sag_q32,
-        dead_codes,
-        newtons_per_sum_q48,
-        pascals_per_sum_q32,
-        half_pitch,
-        contact_on,
-        contact_off,
-        frame_s_q40,
-        mm_per_count_q40,
-        jump,
-        counts_max,
-        observer_gains: [l1, l2, l3],
-        speed_gain_per_s,
-        position_gain_per_s,
-        half_over_slope_q32,
-        half_over_slope2_q40,
-        damping_q8_per_s,
-        voltage_limit,
-        current_limit,
-        slew_limit,
-        acceleration_per_mv_q16,
-        mv_per_acceleration_q32,
-        speed_max,
-        approach,
-        travel_max,
-        clearance,
-        force_fault,
-        force_max,
-    } = config;
-    for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
-        mix.add(*ticks);
-    }
-    mix.add(*sag_q32);
-    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
-        mix.add(force.to_bits());
-    }
-    for length in [half_pitch, travel_max, clearance] {
-        mix.add(length.to_bits());
-    }
-    for number in
-        [newtons_per_sum_q48, pascals_per_sum_q32, frame_s_q40, mm_per_count_q40, jump, counts_max, l1, l2, l3]
-    {
-        mix.add(*number);
-    }
-    for gain in [speed_gain_per_s, position_gain_per_s, &speed_max.to_bits(), &approach.to_bits()] {
-        mix.add(*gain);
-    }
-    for number in
-        [half_over_slope_q32, half_over_slope2_q40, damping_q8_per_s, voltage_limit, current_limit, slew_limit]
-    {
-        mix.add(*number);
-    }
-    mix.add(*acceleration_per_mv_q16);
-    mix.add(*mv_per_acceleration_q32);
 }

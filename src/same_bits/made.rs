@@ -1,0 +1,140 @@
+//! Constructors: too costly for every input.
+
+use super::machines::Machines;
+use super::{Mix, Source, frames};
+use crate::config::{Config, ConfigError};
+use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
+use crate::params::Params;
+use crate::pressure::CalibrationError;
+use crate::scan::ScanTiming;
+use crate::units::{Newtons, Ratio};
+
+/// A constructor's name, and one call of it with what that adds to its digest.
+pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
+
+/// One input of so many makes new machines: each takes up to half a million instructions.
+pub const MADE_EVERY: u32 = 1_024;
+
+/// The sampling times that the converter has.
+const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
+
+/// What is made for every [`MADE_EVERY`]th input.
+pub const MADE: [Make; 3] = [
+    ("Config::new", |m, source, mix| match Config::new(&params(source)) {
+        Ok(config) => {
+            m.config = config;
+            add_config(mix, &m.config);
+        }
+        Err(ConfigError::Param(error)) => mix.add(error.value),
+        Err(ConfigError::Scan(_)) => mix.add(-1),
+        Err(ConfigError::Order([(_, low), (_, high)])) => mix.add(low - high),
+    }),
+    ("Calibration::new", |m, source, mix| match frames::calibration(source) {
+        // The gains show in what the array reads.
+        Ok(calibration) => m.array.calibrate(&calibration),
+        Err(CalibrationError::Gain { row, column, value }) => {
+            mix.add(row as u32);
+            mix.add(column as u32);
+            mix.add(value);
+        }
+        Err(CalibrationError::Mask { row, value }) => {
+            mix.add(row as u32);
+            mix.add(value);
+        }
+    }),
+    ("Relaxation::new", |m, source, mix| {
+        let period_us = source.up_to(2_000);
+        let terms = [(); 3].map(|()| RelaxationTerm {
+            share: Ratio::from_bits(source.within(0, 22_000)),
+            time_constant_us: period_us.saturating_mul(1 << source.up_to(20)),
+        });
+        match Relaxation::new(period_us, &terms) {
+            Ok(filter) => (m.filter, m.memory) = (Some(filter), RelaxationState::REST),
+            Err(RelaxationError::Sum(sum)) => mix.add(sum),
+            Err(_) => mix.add(-1),
+        }
+        // What it is made of shows in a step from rest.
+        let mut rest = RelaxationState::REST;
+        if let Some(filter) = &m.filter {
+            mix.add(filter.step(&mut rest, Newtons::from_bits(i32::MAX)).to_bits());
+        }
+    }),
+];
+
+/// Parameters within their ranges, most of them such that they do not contradict each other.
+fn params(source: &mut Source) -> Params {
+    let mut params = Params::from_array(&Params::RANGES.map(|(_, _, min, max)| source.within(min, max)));
+    params.sample_cycles = SAMPLE_CYCLES.get((source.word() & 7) as usize).map_or(0, |cycles| *cycles);
+    for (low, high) in [
+        (&mut params.contact_off_mn, &mut params.contact_on_mn),
+        (&mut params.force_max_mn, &mut params.force_fault_mn),
+        (&mut params.supply_min_mv, &mut params.supply_max_mv),
+    ] {
+        (*low, *high) = ((*low).min(*high), (*low).max(*high));
+    }
+    params
+}
+
+/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in the fit.
+fn add_config(mix: &mut Mix, config: &Config) {
+    // Taken apart, so that a field cannot be forgotten.
+    let Config {
+        params: _,
+        geometry: _,
+        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles },
+        tip,
+        sag_q32,
+        dead_codes,
+        newtons_per_sum_q48,
+        pascals_per_sum_q32,
+        half_pitch,
+        contact_on,
+        contact_off,
+        frame_s_q40,
+        mm_per_count_q40,
+        jump,
+        counts_max,
+        observer_gains: [l1, l2, l3],
+        speed_gain_per_s,
+        position_gain_per_s,
+        half_over_slope_q32,
+        half_over_slope2_q40,
+        damping_q8_per_s,
+        voltage_limit,
+        current_limit,
+        slew_limit,
+        acceleration_per_mv_q16,
+        mv_per_acceleration_q32,
+        speed_max,
+        approach,
+        travel_max,
+        clearance,
+        force_fault,
+        force_max,
+    } = config;
+    for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
+        mix.add(*ticks);
+    }
+    mix.add(*sag_q32);
+    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
+        mix.add(force.to_bits());
+    }
+    for length in [half_pitch, travel_max, clearance] {
+        mix.add(length.to_bits());
+    }
+    for number in
+        [newtons_per_sum_q48, pascals_per_sum_q32, frame_s_q40, mm_per_count_q40, jump, counts_max, l1, l2, l3]
+    {
+        mix.add(*number);
+    }
+    for gain in [speed_gain_per_s, position_gain_per_s, &speed_max.to_bits(), &approach.to_bits()] {
+        mix.add(*gain);
+    }
+    for number in
+        [half_over_slope_q32, half_over_slope2_q40, damping_q8_per_s, voltage_limit, current_limit, slew_limit]
+    {
+        mix.add(*number);
+    }
+    mix.add(*acceleration_per_mv_q16);
+    mix.add(*mv_per_acceleration_q32);
+}

@@ -2,9 +2,11 @@
 //!
 //! Where the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. Where it
 //! does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to the
-//! taxels that do see it. `docs/contact.md` gives the method and the measured errors.
+//! taxels that do see it: by [`Fit`] from frame to frame, by [`read`] from one picture. `docs/contact.md` gives the method and
+//! the measured errors.
 
 mod arith;
+mod follow;
 mod geometry;
 mod guess;
 mod rim;
@@ -13,16 +15,17 @@ mod step;
 mod sums;
 mod view;
 
+pub use follow::Fit;
 pub use geometry::Geometry;
 pub use sums::from_sums;
 
 use crate::config::Config;
+use crate::frame::COLUMNS;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
-use geometry::PLACE_BITS;
-use guess::{CENTRE_BITS, Guess, Pressed, square};
+use guess::{CENTRE_BITS, Guess, Pressed};
 use rim::Rim;
-use step::{Misfit, Taxels};
+use step::{Equations, Misfit, Taxels};
 use view::View;
 
 /// How much work a reading may be.
@@ -62,8 +65,8 @@ impl Effort {
 pub const CONFIDENCE_LEAST: u8 = 128;
 /// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 2.8 %.
 const RESIDUAL_MAX: u32 = 459;
-/// A first step that moves farther than this, Q24 of the radius, is followed by another: 1/32.
-const FAR: u32 = 1 << (CENTRE_BITS - 5);
+/// A first step that moves farther than this, Q24 of the radius, is followed by another: 1/128.
+const FAR: u32 = 1 << (CENTRE_BITS - 7);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
 const RESTS: u32 = 1 << (CENTRE_BITS - 14);
 /// Where the sum is more than this many peaks, the least effort looks at every other taxel.
@@ -86,20 +89,18 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
     if sums.force < config.contact_off {
         return sums;
     }
-    let Some(view) = View::new(picture, geometry) else {
+    let Some(view) = View::new(picture, picture.peak, geometry) else {
         return sums;
     };
     // The sum over the peak is about half of the number of taxels that see the contact.
     let which = if effort == Effort::One && picture.sum / LARGE > picture.peak { Taxels::HALF } else { Taxels::ALL };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
-    let pressed = Pressed::new(&guess, &view, geometry);
-    if covered(&guess, &pressed, picture, geometry) {
-        let misfit = step::compare(&pressed, &view, which);
-        return Contact { confidence: confidence(&misfit, &view), ..sums };
+    if covers(&sums, picture, config) {
+        return Contact { confidence: confidence(&misfit(&guess, which, &view, geometry), &view), ..sums };
     }
     let start = start::plane(&view, which, geometry).unwrap_or(guess);
     let guess = refine(start, effort, which, &view, geometry);
-    let misfit = step::compare(&Pressed::new(&guess, &view, geometry), &view, which);
+    let misfit = misfit(&guess, which, &view, geometry);
     let confidence = confidence(&misfit, &view);
     if misfit.taxels < TAXELS_MIN {
         return Contact { confidence, ..sums };
@@ -117,23 +118,42 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
     }
 }
 
-/// Whether the whole contact lies on good taxels of the array.
-fn covered(guess: &Guess, pressed: &Pressed, picture: &Picture, geometry: &Geometry) -> bool {
-    // The root of Q30 is Q15.
-    let rim = arith::root(guess.rim_square().unsigned_abs() << 2) << (CENTRE_BITS - PLACE_BITS);
-    let farthest = guess.x.unsigned_abs().max(guess.y.unsigned_abs());
-    let edge = 5 * (geometry.pitch.unsigned_abs() >> (geometry::SQUARE_BITS - CENTRE_BITS));
-    if farthest + rim > edge {
+/// How far a guess and the picture are apart.
+fn misfit(guess: &Guess, which: Taxels, view: &View, geometry: &Geometry) -> Misfit {
+    let mut misfit = Misfit::NONE;
+    step::compare(&mut misfit, &Pressed::new(guess, view, geometry), view, which);
+    misfit
+}
+
+/// Whether the whole contact that the sums tell of lies on good taxels of the array.
+fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
+    // 24 bits hold 128 mm: half a unit of these is 8 nm, and nothing overflows.
+    let [x, y, radius, half_pitch] =
+        [sums.centre_x, sums.centre_y, sums.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
+    if x.abs().max(y.abs()) + radius > COLUMNS as i32 * half_pitch {
         return false;
     }
     if picture.bad_count == 0 {
         return true;
     }
-    let mut rows = picture.bad.iter().zip(&pressed.dy);
-    rows.all(|(bad, dy)| {
-        let mut columns = pressed.dx.iter().enumerate();
-        *bad == 0 || columns.all(|(column, dx)| bad >> column & 1 == 0 || square(*dx) + square(*dy) >= pressed.outside)
-    })
+    // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.
+    let reach = radius + half_pitch + (half_pitch >> 1);
+    for (row, bad) in picture.bad.iter().enumerate() {
+        let mut bad = *bad;
+        let dy = (2 * row as i32 + 1 - COLUMNS as i32) * half_pitch - y;
+        let mut column = 0;
+        while bad != 0 {
+            if bad & 1 != 0 {
+                let dx = (2 * column + 1 - COLUMNS as i32) * half_pitch - x;
+                if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
+                    return false;
+                }
+            }
+            bad >>= 1;
+            column += 1;
+        }
+    }
+    true
 }
 
 /// Refines a guess as often as the effort allows.
@@ -143,7 +163,8 @@ fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &G
     let mut again = true;
     while quick + close > 0 {
         let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
-        let equations = step::equations(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
+        let mut equations = Equations::NONE;
+        equations.take(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
         let next = equations.solve(&guess, view, geometry);
         let moved = distance(&guess, &next);
         guess = next;

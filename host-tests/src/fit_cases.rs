@@ -250,8 +250,8 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// The picture of pressures, and how many live taxels see the contact: those with pressure before noise.
-    pub fn picture(&self, pressures: &Pressures, rng: &mut Rng) -> (Picture, usize) {
+    /// Dead taxels, drawn at random: a bit for each column, for each row.
+    pub fn dead(&self, rng: &mut Rng) -> [u16; ROWS] {
         let mut bad = [0_u16; ROWS];
         let mut left = self.dead;
         while left > 0 {
@@ -259,6 +259,12 @@ impl Reading {
             left -= usize::from(bad[row] >> column & 1 == 0);
             bad[row] |= 1 << column;
         }
+        bad
+    }
+
+    /// The picture of pressures on the taxels that are not bad, and how many of these see the contact: those with pressure
+    /// before noise.
+    pub fn picture(&self, pressures: &Pressures, bad: [u16; ROWS], rng: &mut Rng) -> (Picture, usize) {
         let peak = pressures.iter().flatten().fold(0.0, |peak: f64, kpa| peak.max(*kpa));
         let mut seen = 0;
         let mut taxels = [[0; COLUMNS]; ROWS];

@@ -3,10 +3,10 @@
 //! Case number n of a series is drawn from n alone, so every effort sees the very same pictures and the figures do not
 //! depend on the number of threads.
 
-use crate::fit_cases::{Noise, PITCHES_MM, Reading, Scene, Steps};
+use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
 use fingertip::config::Config;
-use fingertip::contact::{self, CONFIDENCE_LEAST, Effort};
+use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Fit};
 use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,8 +18,15 @@ pub const TAXELS_MIN: usize = 12;
 /// One reading's noise: whoever looks at the taxels with 1 % of noise cannot tell a smaller change of the seen force, spread
 /// over the taxels, from noise.
 pub const CUT_MIN: f64 = 0.01;
-/// The efforts that are judged. [`Effort::Moments`] is the plain sum with the moments' centre.
+/// Ways to read a contact: the four efforts on one picture, then [`Fit`] over [`FRAMES`] of them.
+/// [`Effort::Moments`] is the plain sum with the moments' centre.
+pub const WAYS: usize = EFFORTS.len() + 1;
+/// The efforts that are judged.
 pub const EFFORTS: [Effort; 4] = [Effort::Moments, Effort::One, Effort::Two, Effort::Full];
+/// Frames, each with its own noise, that [`Fit`] sees of a case.
+pub const FRAMES: usize = 90;
+/// Frames after which [`Fit`] is judged besides.
+pub const EARLIER: [usize; 5] = [6, 12, 24, 36, 48];
 
 /// Pictures of one kind.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +75,8 @@ pub const BAD: [Series; 6] = [
 pub struct Case {
     /// The contact.
     pub scene: Scene,
+    /// What it presses on the taxels.
+    pub pressures: Pressures,
     /// What the array shows of it.
     pub picture: Picture,
     /// Share of the seen force that an edge takes; 0 without one.
@@ -86,7 +95,8 @@ impl Series {
         loop {
             let scene = (self.scene)(&mut rng);
             let pressures = scene.pressures();
-            let (picture, seen) = self.reading.picture(&pressures, &mut rng);
+            let bad = self.reading.dead(&mut rng);
+            let (picture, seen) = self.reading.picture(&pressures, bad, &mut rng);
             if seen < TAXELS_MIN {
                 too_few += 1;
                 continue;
@@ -96,7 +106,7 @@ impl Series {
                 invisible += 1;
                 continue;
             }
-            return Case { scene, picture, cut: cut.unwrap_or(0.0), too_few, invisible };
+            return Case { scene, pressures, picture, cut: cut.unwrap_or(0.0), too_few, invisible };
         }
     }
 }
@@ -127,7 +137,7 @@ impl Configs {
     }
 }
 
-/// How one effort did on one case.
+/// How one way did on one case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outcome {
     /// Error of the force in units of its bound.
@@ -140,8 +150,7 @@ pub struct Outcome {
 
 impl Outcome {
     /// Compares a reading with the truth of a plane contact.
-    pub fn of(contact: &Contact, case: &Case, noisy: bool) -> Self {
-        let scene = &case.scene;
+    pub fn of(contact: &Contact, scene: &Scene, noisy: bool) -> Self {
         let truth = scene.force_n();
         let bound = if noisy { 0.03 * truth + 0.02 } else { 0.01 * truth + 0.005 };
         let apart =
@@ -154,23 +163,78 @@ impl Outcome {
     }
 }
 
-/// What came of a series: each case with an outcome for each effort.
-pub type Judged = Vec<(Case, [Outcome; EFFORTS.len()])>;
+/// A case and what came of it.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The case.
+    pub case: Case,
+    /// What each way made of it.
+    pub outcomes: [Outcome; WAYS],
+    /// What [`Fit`] made of it after so many frames as [`EARLIER`] says.
+    pub earlier: [Outcome; EARLIER.len()],
+}
+
+/// What came of a series.
+pub type Judged = Vec<Verdict>;
+
+impl Verdict {
+    /// Judges the case of this number.
+    pub fn of(series: &Series, number: usize, configs: &Configs) -> Self {
+        let case = series.case(number);
+        let config = configs.of(&case.scene);
+        let noisy = series.reading.noise != Noise::None;
+        let mut rng = Rng::with_seed(0xf7a3_0000_0000 + number as u64);
+        let mut fit = Fit::new();
+        let mut last = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
+        let mut earlier = [last; EARLIER.len()];
+        for frame in 1..=FRAMES {
+            let (picture, _) = series.reading.picture(&case.pressures, case.picture.bad, &mut rng);
+            last = Outcome::of(&fit.read(&picture, config), &case.scene, noisy);
+            if let Some(place) = EARLIER.iter().position(|at| *at == frame) {
+                earlier[place] = last;
+            }
+        }
+        let read = |effort| Outcome::of(&contact::read(&case.picture, effort, config), &case.scene, noisy);
+        let [moments, one, two, full] = EFFORTS.map(read);
+        Self { case, outcomes: [moments, one, two, full, last], earlier }
+    }
+}
+
+/// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error of the
+/// force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
+pub fn pressed(number: usize, um_per_frame: f64, configs: &Configs) -> Outcome {
+    let [clean, ..] = GOOD;
+    let mut scene = clean.case(number).scene;
+    let (config, end) = (configs.of(&scene), scene.d_mm);
+    let mut rng = Rng::with_seed(number as u64);
+    let mut fit = Fit::new();
+    let mut worst = Outcome { force: 0.0, centre: 0.0, flagged: false };
+    let mut settled = 0;
+    scene.d_mm = 0.1;
+    while scene.d_mm < end {
+        let (picture, seen) = clean.reading.picture(&scene.pressures(), [0; fingertip::frame::ROWS], &mut rng);
+        let outcome = Outcome::of(&fit.read(&picture, config), &scene, false);
+        settled = if seen < TAXELS_MIN || scene.d_mm < 0.3 { 0 } else { settled + 1 };
+        if settled > FRAMES {
+            worst.force = worst.force.max(outcome.force);
+            worst.centre = worst.centre.max(outcome.centre);
+            worst.flagged |= outcome.flagged;
+        }
+        scene.d_mm += 1e-3 * um_per_frame;
+    }
+    worst
+}
 
 /// Judges `cases` cases of a series on all threads; `progress` hears how many are done.
 pub fn judge(series: &Series, cases: usize, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let configs = Configs::default();
-    let noisy = series.reading.noise != Noise::None;
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get()).min(cases.max(1));
     let done = AtomicUsize::new(0);
     let part = |range: std::ops::Range<usize>| -> Judged {
         let one = |number| {
-            let case = series.case(number);
-            let config = configs.of(&case.scene);
-            let outcomes =
-                EFFORTS.map(|effort| Outcome::of(&contact::read(&case.picture, effort, config), &case, noisy));
+            let verdict = Verdict::of(series, number, &configs);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-            (case, outcomes)
+            verdict
         };
         range.map(one).collect()
     };

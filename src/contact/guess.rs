@@ -111,15 +111,15 @@ impl<'a> Pressed<'a> {
         let widened = guess.rim_square() + high(geometry.pitch, geometry.pitch) / 12 * 16;
         let middle = root((widened as u32) << 2) as i32;
         let half = geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1);
-        let reach = |place: i32| square(place.max(0)).min(SQUARE_MAX);
+        let square_of = |place: i32| square(place.max(0)).min(SQUARE_MAX);
         let from = |centre: i32| geometry.places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)));
         let dx = from(guess.x);
         Self {
             geometry,
             rest: guess.rest,
             rest_cube_q27: high(guess.rest_square(), guess.rest) << 3,
-            inside: reach(middle - half),
-            outside: reach(middle + half),
+            inside: square_of(middle - half),
+            outside: square_of(middle + half),
             twice_modulus: 2 * view.modulus,
             modulus: view.modulus << view.modulus_shift,
             modulus_shift: view.modulus_shift,
@@ -148,11 +148,12 @@ impl<'a> Pressed<'a> {
         let wet = (length - self.rest).max(0);
         // (L1 - s) / (h r), Q14, below 8.
         let ratio = high(wet, between(low.inverse_spread, up.inverse_spread, share)).min((8 << 14) - 1);
-        let by_rest = high(ratio << 3, self.rest).min(3 << (SLOPE_BITS - 1));
+        // Under the rim the column is hardly longer than s, so both slopes are taken for the same.
+        let slope = high(ratio << 3, self.rest).min(3 << (SLOPE_BITS - 1));
         Felt {
             pressure: high(high(wet, self.modulus), ratio << 14) >> (self.modulus_shift - 7),
-            by_rest,
-            by_square: by_rest * (self.rest >> SLOPE_BITS) / (length >> SLOPE_BITS).max(1),
+            by_rest: slope,
+            by_square: slope,
         }
     }
 }

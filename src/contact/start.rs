@@ -58,10 +58,10 @@ impl Sums {
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
         let inverse_modulus = (view.inverse_modulus >> (24 - view.modulus_shift)) as i32;
-        let mut y = 1 - ROWS as i32;
-        for taxels in &view.picture.taxels {
+        while let Some((row, mut column, stride)) = which.next_row() {
+            let taxels = &view.picture.taxels[row];
+            let y = 2 * row as i32 + 1 - ROWS as i32;
             let (mut n, mut sx, mut sxx, mut sxxx, mut z, mut zx) = (0, 0, 0, 0, 0, 0);
-            let (mut column, stride) = which.row();
             while column < COLUMNS {
                 let x = 2 * column as i32 + 1 - COLUMNS as i32;
                 let share = view.share(taxels[column]).min(1 << PEAK_BITS);
@@ -92,7 +92,6 @@ impl Sums {
             all.z += z;
             all.zx += zx;
             all.zy += z * y;
-            y += 2;
         }
         all
     }

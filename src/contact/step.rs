@@ -18,7 +18,7 @@ const SHARE_BITS: u32 = 24;
 /// The farthest that ln(s) moves in one step, Q28: 1/8.
 const REST_STEP: i32 = 1 << 25;
 /// The farthest that a centre moves along one axis, Q24: 1/4 of the radius.
-const CENTRE_STEP: i32 = 1 << 22;
+const CENTRE_STEP: i32 = 1 << 21;
 /// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
@@ -33,6 +33,11 @@ pub(super) struct Misfit {
     pub outside: i32,
     /// How many these are.
     pub others: i32,
+}
+
+impl Misfit {
+    /// Of no taxels.
+    pub const NONE: Self = Self { inside: 0, taxels: 0, outside: 0, others: 0 };
 }
 
 /// Sums over a row: rest is `a`, square times weight is `k`, of which the place makes the centre's slope.
@@ -63,34 +68,46 @@ pub(super) struct Equations {
     pub misfit: Misfit,
 }
 
-/// Which taxels a pass looks at: every so many in a row, shifted by one from row to row.
+/// Which taxels a pass looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Taxels {
-    /// The first one of the first row, less than the stride.
+    /// The next row.
+    row: usize,
+    /// From row to row.
+    rows: usize,
+    /// The row's first column, less than the stride.
     first: usize,
+    /// From column to column; the next row begins one later.
     stride: usize,
 }
 
 impl Taxels {
     /// All.
-    pub const ALL: Self = Self { first: 0, stride: 1 };
+    pub const ALL: Self = Self::rows(0, 1);
     /// Every other one, like a chessboard's white fields.
-    pub const HALF: Self = Self { first: 0, stride: 2 };
+    pub const HALF: Self = Self { stride: 2, ..Self::ALL };
 
-    /// The first column and the distance to the next, and what the next row looks at.
+    /// All in every so many-th row from this one on.
+    pub const fn rows(row: usize, rows: usize) -> Self {
+        Self { row, rows, first: 0, stride: 1 }
+    }
+
+    /// The next row, its first column and the distance to the next column.
     #[inline(always)]
-    pub const fn row(&mut self) -> (usize, usize) {
-        let first = self.first;
+    pub const fn next_row(&mut self) -> Option<(usize, usize, usize)> {
+        let (row, first) = (self.row, self.first);
+        if row >= ROWS {
+            return None;
+        }
+        self.row += self.rows;
         self.first = if first + 1 < self.stride { first + 1 } else { 0 };
-        (first, self.stride)
+        Some((row, first, self.stride))
     }
 }
 
 /// How far the model and the picture are apart, where it is not to be refined.
-pub(super) fn compare(pressed: &Pressed, view: &View, mut which: Taxels) -> Misfit {
-    let mut misfit = Misfit::default();
-    for row in 0..ROWS {
-        let (mut column, stride) = which.row();
+pub(super) fn compare(misfit: &mut Misfit, pressed: &Pressed, view: &View, mut which: Taxels) {
+    while let Some((row, mut column, stride)) = which.next_row() {
         let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
         let dy_square = square(pressed.dy[row]);
         let (mut inside, mut outside) = (0, 0);
@@ -114,41 +131,6 @@ pub(super) fn compare(pressed: &Pressed, view: &View, mut which: Taxels) -> Misf
         misfit.inside += inside >> ROW_DROP;
         misfit.outside += outside >> ROW_DROP;
     }
-    misfit
-}
-
-/// Sets up the normal equations; with a rim, the taxels under it are worked out by it.
-pub(super) fn equations(pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>) -> Equations {
-    let mut all = Equations::default();
-    for row in 0..ROWS {
-        let (mut column, stride) = which.row();
-        let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
-        let dy_square = square(dy);
-        let mut sums = Row::default();
-        while column < COLUMNS {
-            if bad & 1 == 0 {
-                let at = pressed.dx_square[column] + dy_square;
-                let share = view.share(taxels[column]);
-                if at < pressed.outside {
-                    let dx = pressed.dx[column];
-                    let mut felt = pressed.felt(at);
-                    if let (Some(rim), true) = (rim, at >= pressed.inside) {
-                        felt.pressure = rim.pressure(dx, dy);
-                    }
-                    all.misfit.taxels += 1;
-                    let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
-                    sums.add(&felt, dx, residual(share - felt.pressure), weight);
-                } else {
-                    all.misfit.others += 1;
-                    sums.outside += residual(share) * residual(share);
-                }
-            }
-            column += stride;
-            bad >>= stride;
-        }
-        all.add(&sums, dy);
-    }
-    all
 }
 
 /// A residual, stopped at half of the peak.
@@ -160,7 +142,7 @@ fn residual(of: i32) -> i32 {
 /// The weight of the quick model and of the residual: 1 less 3/4 of the model's pressure over the peak, Q13.
 #[inline(always)]
 fn weight(pressure: i32) -> i32 {
-    (1 << SLOPE_BITS) - ((3 * pressure.max(0).min((1 << PEAK_BITS) - 1)) >> 3)
+    (1 << SLOPE_BITS) - ((3 * pressure.min(1 << PEAK_BITS)) >> 3)
 }
 
 /// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak, Q13.
@@ -192,6 +174,40 @@ impl Row {
 }
 
 impl Equations {
+    /// Without a taxel.
+    pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
+
+    /// Takes in taxels; with a rim, those under it are worked out by it.
+    pub fn take(&mut self, pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>) {
+        while let Some((row, mut column, stride)) = which.next_row() {
+            let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
+            let dy_square = square(dy);
+            let mut sums = Row::default();
+            while column < COLUMNS {
+                if bad & 1 == 0 {
+                    let at = pressed.dx_square[column] + dy_square;
+                    let share = view.share(taxels[column]);
+                    if at < pressed.outside {
+                        let dx = pressed.dx[column];
+                        let mut felt = pressed.felt(at);
+                        if let (Some(rim), true) = (rim, at >= pressed.inside) {
+                            felt.pressure = rim.pressure(dx, dy);
+                        }
+                        self.misfit.taxels += 1;
+                        let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
+                        sums.add(&felt, dx, residual(share - felt.pressure), weight);
+                    } else {
+                        self.misfit.others += 1;
+                        sums.outside += residual(share) * residual(share);
+                    }
+                }
+                column += stride;
+                bad >>= stride;
+            }
+            self.add(&sums, dy);
+        }
+    }
+
     fn add(&mut self, row: &Row, dy: i32) {
         // A row within reach lies within two radii, so this fits; elsewhere the sums are 0.
         let dy = dy << (32 - PLACE_BITS - ROW_DROP);

@@ -1,6 +1,6 @@
 //! The picture in shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
 
-use super::arith::reciprocal;
+use super::arith::{high, reciprocal};
 use super::geometry::Geometry;
 use crate::pressure::{CODE_BITS, Picture};
 
@@ -29,12 +29,12 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// None where the peak is too low for the model.
-    pub fn new(picture: &'a Picture, geometry: &Geometry) -> Option<Self> {
-        if picture.peak < PEAK_MIN {
+    /// In shares of this peak; None where it is too low for the model.
+    pub fn new(picture: &'a Picture, peak: i32, geometry: &Geometry) -> Option<Self> {
+        if peak < PEAK_MIN {
             return None;
         }
-        let divisor = picture.peak.min(PEAK_MAX).unsigned_abs();
+        let divisor = peak.min(PEAK_MAX).unsigned_abs();
         let (whole, rest) = (geometry.modulus_q8 / divisor, geometry.modulus_q8 % divisor);
         if whole >= MODULUS_MAX >> (PEAK_BITS - 8) {
             return None;
@@ -50,10 +50,10 @@ impl<'a> View<'a> {
         })
     }
 
-    /// A taxel as a share of the peak, Q14.
+    /// A taxel as a share of the peak, Q14; a taxel of less than -2^18 has no meaning.
     #[inline(always)]
     pub fn share(&self, taxel: i32) -> i32 {
-        ((i64::from(taxel) * i64::from(self.inverse_peak)) >> (34 - PEAK_BITS)) as i32
+        high(taxel << (PEAK_BITS - 2), self.inverse_peak)
     }
 
     /// The square of what the converter's steps do to a share: a third of a code's square.

@@ -98,7 +98,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 17] = [
+pub const STEPS: [Step; 18] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -106,6 +106,7 @@ pub const STEPS: [Step; 17] = [
     }),
     ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
     ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
+    ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
     ("Array::read", |m, s, mix| {
         frames::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));

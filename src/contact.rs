@@ -133,7 +133,7 @@ fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
     if x.abs().max(y.abs()) + radius > COLUMNS as i32 * half_pitch {
         return false;
     }
-    if picture.bad_count == 0 {
+    if picture.bad.iter().all(|bad| *bad == 0) {
         return true;
     }
     // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.

@@ -1,7 +1,7 @@
 //! One frame's way from codes to duty.
 
 use crate::config::Config;
-use crate::contact;
+use crate::contact::Fit;
 use crate::control::SpeedLoop;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
@@ -80,6 +80,7 @@ pub struct Status {
 pub struct Pipeline {
     config: Config,
     array: Array,
+    fit: Fit,
     motion: SpeedLoop,
     monitor: Monitor,
     goal: Goal,
@@ -97,6 +98,7 @@ impl Pipeline {
         Self {
             config: config.clone(),
             array: Array::new(),
+            fit: Fit::new(),
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
             goal: Goal::default(),
@@ -158,7 +160,7 @@ impl Pipeline {
         if let Some(fault) = monitor::broken(picture, sense, &self.config).filter(|_| watched) {
             return (Duty::ZERO, self.stop(fault));
         }
-        let contact = contact::from_sums(picture, &self.config);
+        let contact = self.fit.read(picture, &self.config);
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
         }

@@ -5,7 +5,7 @@ use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
 use crate::config::Config;
-use crate::contact::{self, Effort};
+use crate::contact::{self, Effort, Fit};
 use crate::control::SpeedLoop;
 use crate::control::drive::Drive;
 use crate::control::goal::Goal;
@@ -37,6 +37,7 @@ pub struct Machines {
     goal: Goal,
     press: Press,
     pictures: Pictures,
+    fit: Fit,
     frame: Frame,
     pub(super) array: Array,
 }
@@ -63,6 +64,7 @@ impl Machines {
             goal: Goal::default(),
             press,
             pictures: Pictures::new(),
+            fit: Fit::new(),
             frame: frames::plausible(),
             array: Array::new(),
         }
@@ -98,7 +100,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 18] = [
+pub const STEPS: [Step; 19] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -126,6 +128,7 @@ pub const STEPS: [Step; 18] = [
         };
         add_contact(mix, &contact::read(m.pictures.next(s, &m.config), effort, &m.config));
     }),
+    ("Fit::read", |m, s, mix| add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config))),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
         let [encoder, acceleration, shift, _] = s.words;

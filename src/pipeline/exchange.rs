@@ -1,0 +1,68 @@
+//! What goes into a step beside the frame, and what comes out of it beside the duty.
+
+use crate::identify::Identification;
+use crate::safety::{Fault, Limits, Mode};
+use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
+
+/// What the host asks of the loop; a snapshot, replaced as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Command {
+    /// Whether the bridge may be driven.
+    pub torque: bool,
+    /// The force to hold, 0 to let go.
+    pub goal: Newtons,
+    /// Bus watchdog in ms; 0 is off.
+    pub bus_watchdog_ms: u16,
+    /// A change of this number asks for a tare.
+    pub tare_request: u8,
+    /// A change of this number clears a fault.
+    pub clear_request: u8,
+    /// A change of this number asks for a measurement of Young's modulus.
+    pub identify_request: u8,
+}
+
+/// What a frame says of the contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Contact {
+    /// Total normal force.
+    pub force: Newtons,
+    /// Indentation of the tip, from the force by the model.
+    pub indentation: Millimetres,
+    /// Centre of pressure along the columns, from the array's middle.
+    pub centre_x: Millimetres,
+    /// Centre of pressure along the rows, from the array's middle.
+    pub centre_y: Millimetres,
+    /// Contact radius, by the model.
+    pub radius: Millimetres,
+    /// Highest taxel pressure, Pa.
+    pub peak_pa: u32,
+    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
+    pub confidence: u8,
+    /// Taxels left out because they are dead or saturated.
+    pub bad_taxels: u8,
+}
+
+/// What a step reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Status {
+    /// The frame it was made from.
+    pub sequence: u32,
+    /// Frames missed since the pipeline was made; wraps.
+    pub missed_frames: u32,
+    /// What the controller is doing.
+    pub mode: Mode,
+    /// Why it stopped, where it did.
+    pub fault: Option<Fault>,
+    /// What holds it back.
+    pub limits: Limits,
+    /// What the frame says.
+    pub contact: Contact,
+    /// Tip travel since torque was enabled.
+    pub travel: Millimetres,
+    /// Tip speed by the observer.
+    pub speed: MillimetresPerSecond,
+    /// The duty that was returned.
+    pub duty: Duty,
+    /// The measurement of Young's modulus.
+    pub identification: Identification,
+}

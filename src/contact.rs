@@ -77,7 +77,8 @@ const TAXELS_MIN: i32 = 5;
 /// Reads the contact. Any picture is taken.
 ///
 /// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps the
-/// sum's force and centre; the model then only gives the confidence.
+/// sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with no
+/// confidence at all.
 pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
     let sums = from_sums(picture, config);
     let geometry = &config.geometry;
@@ -102,7 +103,7 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
     let guess = refine(start, effort, which, &view, geometry);
     let misfit = misfit(&guess, which, &view, geometry);
     let confidence = confidence(&misfit, &view);
-    if misfit.taxels < TAXELS_MIN {
+    if misfit.taxels < TAXELS_MIN || confidence == 0 {
         return Contact { confidence, ..sums };
     }
     let indentation = guess.indentation(&config.tip);

@@ -169,8 +169,8 @@ fn a_contact_that_grows_in_over_the_edge_is_never_taken_for_a_much_larger_one() 
         let config = scene.config();
         let mut fit = Fit::new();
         let mut seen_12 = 0;
-        for frame in 1..=4_000 {
-            scene.d_mm = 0.5e-3 * f64::from(frame);
+        for frame in 1..=6_000 {
+            scene.d_mm = 0.1 + 0.3e-3 * f64::from(frame);
             let (picture, seen) = still(&scene, NONE);
             let contact = fit.read(&picture, &config);
             let (found, truth) = (newtons(contact.force), scene.force_n());

@@ -17,3 +17,4 @@ pub mod plant;
 pub mod plot;
 pub mod prove;
 pub mod stimulus;
+pub mod study;

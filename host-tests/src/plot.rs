@@ -2,10 +2,12 @@
 
 mod charts;
 mod curves;
+mod fronts;
 mod maps;
 
 pub use charts::{Panel, overview, steps};
 pub use curves::{Curve, Curves, curves};
+pub use fronts::{Dot, Front, front};
 pub use maps::{Map, maps};
 
 use plotters::prelude::*;

@@ -15,6 +15,7 @@ mod proof;
 mod python;
 mod qemu;
 mod size;
+mod study;
 mod test;
 mod timing;
 mod toolchain;
@@ -52,6 +53,8 @@ enum Command {
     Qemu(qemu::Args),
     /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
     Timing(timing::Args),
+    /// Measure what accuracy costs in time: every way to work out every kernel, with tables and pictures
+    Study(study::Args),
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
     Size,
     /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
@@ -93,6 +96,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
+        Command::Study(args) => study::run(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
         Command::Model => model::answer(console),
         Command::Prove(args) => model::prove(args, console),

@@ -1,0 +1,117 @@
+//! What accuracy costs in time: makes the study's inputs, and tables and pictures of its run.
+//!
+//! `study inputs FILE` writes the inputs for the image. `study report RUN [--check] [--json FILE] [--out DIR]` judges a
+//! run: it renews or checks `docs/study.md`, the README's table and the pictures.
+
+use host_tests::study::inputs::Inputs;
+use host_tests::study::kernels::KERNELS;
+use host_tests::study::page::Studied;
+use host_tests::study::{front, judge, output, page, pictures};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+const USAGE: &str = "usage: study inputs FILE | study report RUN [--check] [--json FILE] [--out DIR]";
+
+fn main() -> ExitCode {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
+        ["report", run, ref flags @ ..] => report(Path::new(run), flags),
+        _ => Err(USAGE.into()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn report(run: &Path, flags: &[&str]) -> Result<(), String> {
+    let (mut check, mut json, mut out) = (false, None, None);
+    let mut flags = flags.iter();
+    while let Some(flag) = flags.next() {
+        let mut value = || flags.next().map(PathBuf::from).ok_or_else(|| format!("{flag} takes a value: {USAGE}"));
+        match *flag {
+            "--check" => check = true,
+            "--json" => json = Some(value()?),
+            "--out" => out = Some(value()?),
+            _ => return Err(USAGE.into()),
+        }
+    }
+    let text = fs::read_to_string(run).map_err(|error| format!("{}: {error}", run.display()))?;
+    let (runs, inputs) = (output::parse(&text)?, Inputs::new());
+    let studied: Result<Vec<Studied>, String> =
+        KERNELS.iter().map(|kernel| Ok((kernel, judge::points(kernel, &runs, &inputs)?))).collect();
+    let studied = studied?;
+    if let Some(file) = json {
+        fs::write(&file, page::json_lines(&studied)).map_err(|error| format!("{}: {error}", file.display()))?;
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut files = Vec::new();
+    for (name, tables) in [("docs/study.md", page::markdown(&studied)), ("README.md", page::readme(&studied))] {
+        let old = fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
+        let new = page::renewed(&old, &tables).ok_or_else(|| format!("{name} lacks the markers of its tables"))?;
+        files.push((name.to_owned(), new));
+    }
+    for (kernel, points) in &studied {
+        let picture = pictures::draw(kernel, points).map_err(|error| error.to_string())?;
+        files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
+    }
+    verdicts(&studied);
+    if let Some(folder) = out {
+        return write_all(&folder, &files);
+    }
+    renew(&root, &files, check)
+}
+
+fn verdicts(studied: &[Studied]) {
+    for (kernel, points) in studied {
+        let (count, errors, cycles) = front::span(points);
+        let beaten = front::beaten_by(points);
+        let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
+        for (point, by) in firmware {
+            let place = by.map_or("on the front".into(), |by| format!("beaten by {}", points[by].name));
+            println!(
+                "{:<14} {:>6} cycles, error {:>8}: {place}; front of {count}, {} times in error, {cycles:.1} times in cycles",
+                kernel.name,
+                point.cycles(),
+                page::figure(point.error_max),
+                page::figure(errors),
+            );
+        }
+    }
+}
+
+fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {
+    fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    for (name, text) in files {
+        let file = folder.join(Path::new(name).file_name().unwrap_or_default());
+        fs::write(&file, text).map_err(|error| format!("{}: {error}", file.display()))?;
+        println!("written  {}", file.display());
+    }
+    Ok(())
+}
+
+fn renew(root: &Path, files: &[(String, String)], check: bool) -> Result<(), String> {
+    let mut stale = Vec::new();
+    for (name, text) in files {
+        let file = root.join(name);
+        if fs::read_to_string(&file).is_ok_and(|present| present == *text) {
+            println!("fresh    {name}");
+        } else if check {
+            println!("stale    {name}");
+            stale.push(name.as_str());
+        } else {
+            fs::write(&file, text).map_err(|error| format!("{name}: {error}"))?;
+            println!("written  {name}");
+        }
+    }
+    if stale.is_empty() {
+        Ok(())
+    } else {
+        Err(format!("stale: {}; write them anew with `cargo xtask study`", stale.join(", ")))
+    }
+}

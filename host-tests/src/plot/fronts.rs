@@ -1,0 +1,217 @@
+//! Error against cost on logarithmic axes, a line along the front of the best. Every point has a label of its own.
+
+use super::{Area, FAINT, FONT, INK, LABEL_PX, PlotError, TITLE_PX, failed, picture};
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+const SIZE_PX: (u32, u32) = (900, 600);
+/// Width of a letter and height of a line, generously.
+const LETTER_PX: f64 = 0.5 * LABEL_PX as f64;
+const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
+/// Half of a point's width, with a little air.
+const DOT_PX: f64 = 7.0;
+/// Distances at which a label is tried.
+const NEAR_PX: f64 = 10.0;
+const STEP_PX: f64 = 9.0;
+const RINGS: u32 = 16;
+const DIRECTIONS: u32 = 24;
+/// From here on a line leads from the label to its point.
+const FAR_PX: f64 = 14.0;
+
+/// A point.
+#[derive(Clone, Debug)]
+pub struct Dot {
+    /// Cost.
+    pub x: f64,
+    /// Error; 0 is drawn on the lower axis.
+    pub y: f64,
+    /// What stands beside it.
+    pub label: String,
+    /// Whether it is on the front: filled, on the line.
+    pub best: bool,
+    /// Whether it is drawn as a square, its label framed.
+    pub own: bool,
+}
+
+/// A picture.
+#[derive(Clone, Debug)]
+pub struct Front<'a> {
+    /// What it shows.
+    pub title: &'a str,
+    /// The horizontal axis, with its unit.
+    pub x: &'a str,
+    /// The vertical axis, with its unit.
+    pub y: &'a str,
+    /// The points; those of the front in order of their cost.
+    pub dots: Vec<Dot>,
+}
+
+/// Draws it.
+///
+/// # Errors
+/// There is no point.
+pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
+    let Front { title, x, y, dots } = front;
+    let positive = |of: fn(&Dot) -> f64| dots.iter().map(of).filter(|value| *value > 0.0);
+    let (x_low, x_high) = decades(positive(|dot| dot.x))?;
+    let (y_low, y_high) = decades(positive(|dot| dot.y))?;
+    let y_low = if dots.iter().any(|dot| dot.y <= 0.0) { y_low / 10.0 } else { y_low };
+    picture(SIZE_PX, |area| {
+        let mut chart = ChartBuilder::on(area)
+            .margin(10)
+            .margin_right(20)
+            .caption(title, (FONT, TITLE_PX))
+            .x_label_area_size(42)
+            .y_label_area_size(66)
+            .build_cartesian_2d((x_low..x_high).log_scale(), (y_low..y_high).log_scale())
+            .map_err(failed)?;
+        chart
+            .configure_mesh()
+            .light_line_style(TRANSPARENT)
+            .bold_line_style(FAINT)
+            .label_style((FONT, LABEL_PX))
+            .x_desc(*x)
+            .y_desc(*y)
+            .x_label_formatter(&power)
+            .y_label_formatter(&|value| {
+                if *value < 2.0 * y_low && y_low < lowest(dots) { "0".into() } else { power(value) }
+            })
+            .draw()
+            .map_err(failed)?;
+        let place = |dot: &Dot| (dot.x.max(x_low), dot.y.max(y_low));
+        let stairs = stairs(dots, place);
+        let line: Vec<_> = stairs.iter().map(|at| chart.backend_coord(at)).collect();
+        chart.draw_series(LineSeries::new(stairs, INK.stroke_width(1))).map_err(failed)?;
+        let places: Vec<_> = dots.iter().map(|dot| chart.backend_coord(&place(dot))).collect();
+        let corners = [chart.backend_coord(&(x_low, y_high)), chart.backend_coord(&(x_high, y_low))];
+        draw_dots(area, dots, &places, &line, corners)
+    })
+}
+
+/// The smallest error that is none of 0.
+fn lowest(dots: &[Dot]) -> f64 {
+    dots.iter().map(|dot| dot.y).filter(|y| *y > 0.0).fold(f64::INFINITY, f64::min)
+}
+
+/// Powers of ten around all values, with room for labels.
+fn decades(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
+    let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return Err(PlotError("there is no point".into()));
+    }
+    let (low, high) = ((0.8 * low).log10().floor() as i32, (1.25 * high).log10().ceil() as i32);
+    Ok((10_f64.powi(low), 10_f64.powi(high)))
+}
+
+/// A power of ten by its exponent where it is long.
+fn power(value: &f64) -> String {
+    if (0.001..100_000.0).contains(value) { super::number(value) } else { format!("1e{}", value.log10().round()) }
+}
+
+/// From each point of the front at its error to the next one's cost, then down.
+fn stairs(dots: &[Dot], place: impl Fn(&Dot) -> (f64, f64)) -> Vec<(f64, f64)> {
+    let mut line: Vec<(f64, f64)> = Vec::new();
+    for (x, y) in dots.iter().filter(|dot| dot.best).map(place) {
+        if let Some((_, above)) = line.last().copied() {
+            line.push((x, above));
+        }
+        line.push((x, y));
+    }
+    line
+}
+
+type Pixel = (i32, i32);
+
+/// Left, upper, right and lower side.
+#[derive(Clone, Copy)]
+struct Box4([f64; 4]);
+
+impl Box4 {
+    fn around(x: f64, y: f64, half_width: f64, half_height: f64) -> Self {
+        Self([x - half_width, y - half_height, x + half_width, y + half_height])
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
+        l < or && ol < r && u < od && ou < d
+    }
+
+    fn lies_in(&self, other: &Self) -> bool {
+        let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
+        l >= ol && r <= or && u >= ou && d <= od
+    }
+}
+
+fn draw_dots(
+    area: &Area<'_>,
+    dots: &[Dot],
+    places: &[Pixel],
+    line: &[Pixel],
+    [upper, lower]: [Pixel; 2],
+) -> Result<(), PlotError> {
+    let frame = Box4([upper.0, upper.1, lower.0, lower.1].map(f64::from));
+    let mut taken: Vec<_> =
+        places.iter().map(|(x, y)| Box4::around(f64::from(*x), f64::from(*y), DOT_PX, DOT_PX)).collect();
+    taken.extend(line.windows(2).map(|ends| {
+        let [(ax, ay), (bx, by)] = [ends[0], ends[1]].map(|(x, y)| (f64::from(x), f64::from(y)));
+        Box4([ax.min(bx) - 1.0, ay.min(by) - 1.0, ax.max(bx) + 1.0, ay.max(by) + 1.0])
+    }));
+    let style = TextStyle::from((FONT, LABEL_PX).into_font()).pos(Pos::new(HPos::Center, VPos::Center));
+    // Points of the front choose first.
+    let order = (0..dots.len()).filter(|n| dots[*n].best).chain((0..dots.len()).filter(|n| !dots[*n].best));
+    for n in order {
+        let (dot, (x, y)) = (&dots[n], places[n]);
+        let half = (0.5 * LETTER_PX * dot.label.chars().count() as f64 + 3.0, 0.5 * LINE_PX + 2.0);
+        let label = free_place((x, y), half, &taken, &frame);
+        if let Some((far, middle)) = label {
+            let (left, up) = (middle.0 - half.0, middle.1 - half.1);
+            if far > FAR_PX {
+                let end = (
+                    f64::from(x).max(left).min(middle.0 + half.0) as i32,
+                    f64::from(y).max(up).min(middle.1 + half.1) as i32,
+                );
+                area.draw(&PathElement::new(vec![(x, y), end], BLACK.mix(0.4).stroke_width(1))).map_err(failed)?;
+            }
+            if dot.own {
+                let corners = [(left as i32, up as i32), ((middle.0 + half.0) as i32, (middle.1 + half.1) as i32)];
+                area.draw(&Rectangle::new(corners, BLACK.stroke_width(1))).map_err(failed)?;
+            }
+            let at = (middle.0 as i32, middle.1 as i32);
+            area.draw(&Text::new(dot.label.clone(), at, style.clone())).map_err(failed)?;
+            taken.push(Box4::around(middle.0, middle.1, half.0, half.1));
+        } else {
+            return Err(PlotError(format!("no room for the label {}", dot.label)));
+        }
+    }
+    for (dot, (x, y)) in dots.iter().zip(places) {
+        let fill = if dot.best { INK.filled() } else { WHITE.filled() };
+        if dot.own {
+            let corners = [(x - 5, y - 5), (x + 5, y + 5)];
+            area.draw(&Rectangle::new(corners, fill)).map_err(failed)?;
+            area.draw(&Rectangle::new(corners, INK.stroke_width(2))).map_err(failed)?;
+        } else {
+            area.draw(&Circle::new((*x, *y), 4, fill)).map_err(failed)?;
+            area.draw(&Circle::new((*x, *y), 4, INK.stroke_width(1))).map_err(failed)?;
+        }
+    }
+    Ok(())
+}
+
+/// The nearest place for a label where it covers nothing: its distance from the point, and its middle.
+fn free_place((x, y): Pixel, half: (f64, f64), taken: &[Box4], frame: &Box4) -> Option<(f64, (f64, f64))> {
+    let (x, y) = (f64::from(x), f64::from(y));
+    for ring in 0..RINGS {
+        let far = NEAR_PX + STEP_PX * f64::from(ring);
+        for n in 0..DIRECTIONS {
+            // Beside first, then around.
+            let turn = f64::from(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
+            let (sin, cos) = (core::f64::consts::TAU * turn / f64::from(DIRECTIONS)).sin_cos();
+            let middle = (x + cos * (far + half.0), y - sin * (far + half.1));
+            let label = Box4::around(middle.0, middle.1, half.0, half.1);
+            if label.lies_in(frame) && !taken.iter().any(|other| label.meets(other)) {
+                return Some((far, middle));
+            }
+        }
+    }
+    None
+}

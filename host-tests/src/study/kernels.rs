@@ -1,0 +1,82 @@
+//! What is studied: each kernel with its error, and why the firmware's variant is where it is.
+
+use super::inputs::{Inputs, Pair};
+use super::judge::input;
+use crate::prove::reference::{Real, Reference};
+
+/// A kernel.
+pub struct Kernel {
+    /// As the image calls it.
+    pub name: &'static str,
+    /// As the page calls it.
+    pub title: &'static str,
+    /// What is worked out from what, and over which inputs.
+    pub text: &'static str,
+    /// The error with its unit, as the picture's axis calls it.
+    pub error: &'static str,
+    /// Another error, if the kernel has one.
+    pub other: Option<&'static str>,
+    /// How the errors are found.
+    pub measure: Measure,
+    /// Why the firmware takes a variant that another beats; empty where none does.
+    pub why: &'static str,
+}
+
+/// How a kernel's errors are found.
+#[derive(Clone, Copy)]
+pub enum Measure {
+    /// One number from one or two.
+    Scalar {
+        /// The inputs.
+        section: fn(&Inputs) -> &[Pair],
+        /// The exact result.
+        exact: fn(&Reference, &Pair) -> Real,
+        /// Whether the error counts as a share of the result.
+        relative: bool,
+    },
+}
+
+/// All of them.
+pub const KERNELS: &[Kernel] = &[
+    Kernel {
+        name: "root",
+        title: "Square root",
+        text: "sqrt(x) for 512 numbers from 0.01 to 32767, as many in each octave.",
+        error: "relative error",
+        other: None,
+        measure: Measure::Scalar {
+            section: |inputs| &inputs.root,
+            exact: |_, [x, _]| input(*x).sqrt(),
+            relative: true,
+        },
+        why: "The loop takes 32 exact bits of the root of 64: an indentation of 8 mm to its unit of 2^-24 mm, which single \
+            precision does not hold. Its error here is that of a Q48 number whose root is cut to Q24.",
+    },
+    Kernel {
+        name: "force",
+        title: "Force from indentation",
+        text: "F = pi Y d^2 for 512 indentations from 0.01 to 9.5 mm, a = 10 mm, Y = 250 kPa.",
+        error: "force error, N",
+        other: None,
+        measure: Measure::Scalar {
+            section: |inputs| &inputs.force,
+            exact: |reference, [d, _]| reference.force(&input(*d)),
+            relative: false,
+        },
+        why: "The loop holds no floating-point number. The cheaper integer way is made for this range; the model's is correctly \
+            rounded for every radius from 4 to 16 mm and every modulus from 20 to 2000 kPa, which is proven.",
+    },
+    Kernel {
+        name: "indentation",
+        title: "Indentation from force",
+        text: "d = sqrt(F / (pi Y)) for 512 forces from 1 mN to 70 N.",
+        error: "indentation error, mm",
+        other: None,
+        measure: Measure::Scalar {
+            section: |inputs| &inputs.indentation,
+            exact: |reference, [force, _]| reference.indentation(&input(*force)),
+            relative: false,
+        },
+        why: "",
+    },
+];

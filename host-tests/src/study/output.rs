@@ -1,0 +1,151 @@
+//! What the image said and what the timing model counted.
+
+use crate::prove::reference::{PRECISION, Real};
+use std::collections::BTreeMap;
+
+/// A number as a variant returned it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Number {
+    /// An integer over 2 to some power.
+    Fixed(i64, u32),
+    /// Single or double precision.
+    Float(f64),
+}
+
+impl Number {
+    /// Its exact value; none where it is no number.
+    pub fn real(self) -> Option<Real> {
+        let exact = match self {
+            Self::Fixed(bits, fraction_bits) => Real::from_parts(bits.into(), -(fraction_bits as isize)),
+            Self::Float(value) => Real::try_from(value).ok()?,
+        };
+        // Infinity has no value either.
+        exact.repr().is_finite().then(|| exact.with_precision(PRECISION).value())
+    }
+
+    /// The nearest double.
+    pub fn to_f64(self) -> f64 {
+        match self {
+            Self::Fixed(bits, fraction_bits) => bits as f64 / 2_f64.powi(fraction_bits as i32),
+            Self::Float(value) => value,
+        }
+    }
+}
+
+/// Smallest, middle and largest of the passes are not all needed: these two are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Passes {
+    /// Half of the passes take no more.
+    pub median: i64,
+    /// No pass takes more.
+    pub max: i64,
+}
+
+/// The cost of a call: instructions and cycles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Executed, exact.
+    pub instructions: Passes,
+    /// The fewest cycles, without wait states.
+    pub low: Passes,
+    /// The estimate, without wait states.
+    pub estimate: Passes,
+    /// The most cycles, without wait states.
+    pub high: Passes,
+    /// The estimate with the flash's wait states.
+    pub flash: Passes,
+}
+
+impl Cost {
+    /// Without what an empty call takes.
+    fn net(mut self, empty: &Self) -> Self {
+        let pairs = [
+            (&mut self.instructions, empty.instructions),
+            (&mut self.low, empty.low),
+            (&mut self.estimate, empty.estimate),
+            (&mut self.high, empty.high),
+            (&mut self.flash, empty.flash),
+        ];
+        for (figure, empty) in pairs {
+            figure.median -= empty.median;
+            figure.max -= empty.median;
+        }
+        self
+    }
+}
+
+/// A variant's run.
+#[derive(Clone, Debug, Default)]
+pub struct Ran {
+    /// Its kernel.
+    pub kernel: String,
+    /// Its name.
+    pub name: String,
+    /// Whether it is the firmware's.
+    pub firmware: bool,
+    /// What it returned for each input.
+    pub returned: Vec<Vec<Number>>,
+    /// What a call costs, an empty one taken off.
+    pub cost: Cost,
+}
+
+/// Reads a report: the image's output, then a line `cost REGION` with ten figures for each region.
+///
+/// # Errors
+/// A line cannot be read, or a region is missing.
+pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
+    let mut runs: BTreeMap<u32, Ran> = BTreeMap::new();
+    let (mut current, mut costs) = (None, BTreeMap::new());
+    for line in text.lines() {
+        let failed = || format!("the study's run says: {line}");
+        let (word, rest) = line.split_once(' ').ok_or_else(failed)?;
+        match word {
+            "region" => {
+                let (region, name) = rest.split_once(' ').ok_or_else(failed)?;
+                let (kernel, name) = name.split_once(": ").ok_or_else(failed)?;
+                let region = region.parse().map_err(|_| failed())?;
+                let plain = name.replace("**", "");
+                let ran = Ran { kernel: kernel.into(), firmware: plain != name, name: plain, ..Ran::default() };
+                runs.insert(region, ran);
+                current = Some(region);
+            }
+            "cost" => {
+                let numbers: Result<Vec<i64>, _> = rest.split(' ').map(str::parse).collect();
+                let (region, cost) = numbers.ok().and_then(|numbers| cost(&numbers)).ok_or_else(failed)?;
+                costs.insert(region, cost);
+            }
+            _ => {
+                let ran = current.and_then(|region| runs.get_mut(&region)).ok_or_else(failed)?;
+                ran.returned.push(numbers(line).ok_or_else(failed)?);
+            }
+        }
+    }
+    let empty = costs.get(&0).ok_or("the empty call was not measured")?;
+    let with_cost = |(region, ran): (u32, Ran)| {
+        let cost = costs.get(&region).ok_or_else(|| format!("{}: {} was not measured", ran.kernel, ran.name))?;
+        Ok(Ran { cost: cost.net(empty), ..ran })
+    };
+    runs.into_iter().filter(|(region, _)| *region != 0).map(with_cost).collect()
+}
+
+fn cost(numbers: &[i64]) -> Option<(u32, Cost)> {
+    let [region, figures @ ..] = numbers else { return None };
+    let mut passes = figures.chunks_exact(2).map(|pair| Passes { median: pair[0], max: pair[1] });
+    let mut next = || passes.next();
+    let cost = Cost { instructions: next()?, low: next()?, estimate: next()?, high: next()?, flash: next()? };
+    Some((u32::try_from(*region).ok()?, cost))
+}
+
+/// Pairs of a format and a number: `i16 -5`, `f 3f800000`, `d 3ff0000000000000`.
+fn numbers(line: &str) -> Option<Vec<Number>> {
+    let words: Vec<_> = line.split(' ').collect();
+    words.chunks(2).map(|pair| number(pair.first()?, pair.get(1)?)).collect()
+}
+
+fn number(format: &str, digits: &str) -> Option<Number> {
+    Some(match format {
+        "f" => Number::Float(f32::from_bits(u32::from_str_radix(digits, 16).ok()?).into()),
+        "d" => Number::Float(f64::from_bits(u64::from_str_radix(digits, 16).ok()?)),
+        _ => Number::Fixed(digits.parse().ok()?, format.strip_prefix('i')?.parse().ok()?),
+    })
+}

@@ -1,0 +1,52 @@
+//! Every variant of every kernel of the study, over fixed inputs, for the timing model: says what each returned.
+//!
+//! Not for a board: it talks to the emulator by semihosting. The command line names the file of inputs. A line
+//! `region NUMBER KERNEL: VARIANT` begins a variant, a line for each input follows; `docs/study.md` has the results.
+#![no_std]
+#![no_main]
+
+#[path = "../study/call.rs"]
+mod call;
+#[path = "../study/force.rs"]
+mod force;
+#[path = "../study/host.rs"]
+mod host;
+#[path = "../study/root.rs"]
+mod root;
+#[path = "../study/scalar.rs"]
+mod scalar;
+
+use cortex_m_semihosting::debug;
+use fingertip::config::Config;
+use fingertip::params::Params;
+use host::{Inputs, fail, say};
+use scalar::Tools;
+
+/// Only returns.
+#[unsafe(naked)]
+extern "C" fn nothing(_: &mut ()) {
+    core::arch::naked_asm!("bx lr")
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut inputs = Inputs::open();
+    let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let tools = Tools::new(&config);
+    say(format_args!("region 0 nothing: an empty call"));
+    for _ in 0..4 {
+        call::pass_on(0, nothing, &mut ());
+    }
+    let region = &mut 1;
+    for (kernel, variants) in [("root", root::VARIANTS), ("force", force::FORCE), ("indentation", force::INDENTATION)] {
+        scalar::run(kernel, variants, region, &tools, &mut inputs);
+    }
+    loop {
+        debug::exit(debug::EXIT_SUCCESS);
+    }
+}
+
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    fail("panic")
+}

@@ -1,0 +1,143 @@
+//! Kernels of one or two numbers: the same inputs for every variant, each in the variant's own format.
+
+use super::call::{Registers, pass};
+use super::host::{Inputs, say};
+use fingertip::config::Config;
+use fingertip::model::Tip;
+use fixed::types::I16F16;
+
+/// Fractional bits of the inputs; they have at most 24 significant bits, so every format holds them exactly.
+const INPUT_BITS: u32 = 16;
+
+/// The tip in a format: a in mm, Y in N/mm^2.
+pub struct Constants<T> {
+    /// The radius a.
+    pub radius: T,
+    /// Young's modulus Y.
+    pub modulus: T,
+    /// pi.
+    pub pi: T,
+    /// pi Y.
+    pub pi_y: T,
+    /// 1 / (pi Y).
+    pub inverse: T,
+}
+
+/// What a variant may use, in RAM.
+pub struct Tools {
+    /// The firmware's own model.
+    pub tip: Tip,
+    /// In single precision.
+    pub single: Constants<f32>,
+    /// In double precision, by software.
+    pub double: Constants<f64>,
+    /// In Q16.
+    pub fixed: Constants<I16F16>,
+    /// pi Y in Q30.
+    pub pi_y_q30: u32,
+    /// 1 / (pi Y) in Q30.
+    pub inverse_q30: u32,
+}
+
+impl Tools {
+    /// Of the firmware's default tip.
+    pub fn new(config: &Config) -> Self {
+        let (radius, modulus, pi) = (10.0_f64, 0.25_f64, core::f64::consts::PI);
+        let (pi_y, inverse) = (pi * modulus, 1.0 / (pi * modulus));
+        let q16 = |value: f64| I16F16::from_bits((value * 65_536.0 + 0.5) as i32);
+        Self {
+            tip: config.tip,
+            single: Constants {
+                radius: radius as f32,
+                modulus: modulus as f32,
+                pi: pi as f32,
+                pi_y: pi_y as f32,
+                inverse: inverse as f32,
+            },
+            double: Constants { radius, modulus, pi, pi_y, inverse },
+            fixed: Constants {
+                radius: q16(radius),
+                modulus: q16(modulus),
+                pi: q16(pi),
+                pi_y: q16(pi_y),
+                inverse: q16(inverse),
+            },
+            pi_y_q30: (pi_y * (1_u32 << 30) as f64 + 0.5) as u32,
+            inverse_q30: (inverse * (1_u32 << 30) as f64 + 0.5) as u32,
+        }
+    }
+}
+
+/// How a variant is called: fractional bits before and after where it is fixed-point.
+#[derive(Clone, Copy)]
+pub enum Call {
+    /// In 32 bits.
+    Fixed(extern "C" fn(i32, i32, &Tools) -> i32, u32, u32),
+    /// From 64 bits to 32.
+    Wide(extern "C" fn(u64, &Tools) -> u32, u32, u32),
+    /// In single precision.
+    Single(extern "C" fn(f32, f32, &Tools) -> f32),
+    /// In double precision.
+    Double(extern "C" fn(f64, f64, &Tools) -> f64),
+}
+
+/// A way to work a kernel out.
+pub type Variant = (&'static str, Call);
+
+/// Measures all variants of a kernel over the next section of inputs; the regions count on from `region`.
+pub fn run(kernel: &str, variants: &[Variant], region: &mut u32, tools: &Tools, inputs: &mut Inputs) {
+    let [count] = inputs.words();
+    let start = inputs.place();
+    for (name, call) in variants {
+        say(format_args!("region {region} {kernel}: {name}"));
+        inputs.seek(start);
+        for _ in 0..count {
+            let input = inputs.words();
+            measure(*region, *call, input, tools);
+        }
+        *region += 1;
+    }
+}
+
+fn measure(region: u32, call: Call, [x, y]: [i32; 2], tools: &Tools) {
+    let tools = &raw const *tools as u32;
+    let mut registers = Registers::default();
+    let double = |value: i32| {
+        let bits = (f64::from(value) / 65_536.0).to_bits();
+        [bits as u32, (bits >> 32) as u32]
+    };
+    let single = |value: i32| (value as f32 / 65_536.0).to_bits();
+    let kernel = match call {
+        Call::Fixed(kernel, from, _) => {
+            let fixed = |value: i32| {
+                if from < INPUT_BITS { value >> (INPUT_BITS - from) } else { value << (from - INPUT_BITS) }
+            };
+            registers.core = [fixed(x) as u32, fixed(y) as u32, tools, 0];
+            kernel as *const ()
+        }
+        Call::Wide(kernel, from, _) => {
+            let x = (x as u64) << (from - INPUT_BITS);
+            registers.core = [x as u32, (x >> 32) as u32, tools, 0];
+            kernel as *const ()
+        }
+        Call::Single(kernel) => {
+            registers.core = [tools, 0, 0, 0];
+            registers.single = [single(x), single(y), 0, 0];
+            kernel as *const ()
+        }
+        Call::Double(kernel) => {
+            let ([x0, x1], [y0, y1]) = (double(x), double(y));
+            registers.core = [tools, 0, 0, 0];
+            registers.single = [x0, x1, y0, y1];
+            kernel as *const ()
+        }
+    };
+    pass(region, kernel, &mut registers);
+    let Registers { core, single } = registers;
+    match call {
+        Call::Fixed(_, _, to) => say(format_args!("i{to} {}", core[0] as i32)),
+        Call::Wide(_, _, to) => say(format_args!("i{to} {}", core[0])),
+        Call::Single(_) => say(format_args!("f {:x}", single[0])),
+        Call::Double(_) => say(format_args!("d {:x}", u64::from(single[1]) << 32 | u64::from(single[0]))),
+    }
+}

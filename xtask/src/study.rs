@@ -1,0 +1,63 @@
+//! What accuracy costs in time: every variant of every kernel on the emulated Cortex-M4F, judged on this machine.
+
+use crate::{
+    console::{self, Console},
+    image, paths, timing,
+    toolchain::{self, Choice},
+};
+use anyhow::{Context, Result};
+use std::{fmt::Write as _, fs, path::PathBuf, process::Command};
+
+/// Flags of `cargo xtask study`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask study\n  cargo xtask study --check\n  \
+    cargo xtask study --json study.json --out /tmp/study")]
+pub struct Args {
+    /// Change nothing; fail where a figure of docs/study.md, the README or a picture is stale
+    #[arg(long, conflicts_with = "out")]
+    check: bool,
+    /// Write the figures to a file, an object a line
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write pages and pictures to a folder instead of the documentation
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the study and renews or checks its page, its table in the README and its pictures.
+///
+/// # Errors
+/// Something does not build, a variant cannot be measured, or a figure is stale.
+pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    let image = image::build(toolchain::ensure(choice, console)?, "study", "study", console)?;
+    let folder = paths::target().join("study");
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
+    let folder = fs::canonicalize(&folder).with_context(|| paths::shown(&folder))?;
+    let (inputs, report) = (folder.join("inputs.bin"), folder.join("run.txt"));
+    console.run(judge().arg("inputs").arg(&inputs))?;
+    let run = timing::measure(&image, Some(&inputs), console)?;
+    let mut text = run.output;
+    for measured in &run.regions {
+        // A string takes every write.
+        let _ = write!(text, "cost {}", measured.region);
+        for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {
+            let _ = write!(text, " {} {}", figure.median, figure.max);
+        }
+        text.push('\n');
+    }
+    fs::write(&report, text).with_context(|| format!("cannot write {}", paths::shown(&report)))?;
+    let mut command = judge();
+    command.arg("report").arg(&report).args(args.check.then_some("--check"));
+    for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
+        if let Some(path) = path {
+            command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);
+        }
+    }
+    console.run(&mut command)
+}
+
+fn judge() -> Command {
+    let mut command = console::cargo("run");
+    command.args(["--quiet", "--profile", "host", "--package", "host-tests", "--bin", "study", "--"]);
+    command
+}

@@ -11,6 +11,12 @@ mod call;
 mod force;
 #[path = "../study/host.rs"]
 mod host;
+#[path = "../study/number.rs"]
+mod number;
+#[path = "../study/pressure.rs"]
+mod pressure;
+#[path = "../study/rings.rs"]
+mod rings;
 #[path = "../study/root.rs"]
 mod root;
 #[path = "../study/scalar.rs"]
@@ -38,7 +44,13 @@ fn main() -> ! {
         call::pass_on(0, nothing, &mut ());
     }
     let region = &mut 1;
-    for (kernel, variants) in [("root", root::VARIANTS), ("force", force::FORCE), ("indentation", force::INDENTATION)] {
+    for (kernel, variants) in [
+        ("root", root::VARIANTS),
+        ("force", force::FORCE),
+        ("indentation", force::INDENTATION),
+        ("pressure", pressure::VARIANTS),
+        ("rings", rings::VARIANTS),
+    ] {
         scalar::run(kernel, variants, region, &tools, &mut inputs);
     }
     loop {

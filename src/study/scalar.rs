@@ -68,6 +68,20 @@ impl Tools {
     }
 }
 
+/// The FPU's root, for use inside other kernels.
+#[inline(always)]
+pub fn root_f32(x: f32) -> f32 {
+    let bits: u32;
+    // SAFETY: reads and writes registers only. s0 is put back, as stable Rust cannot name it as used on this target.
+    unsafe {
+        core::arch::asm!(
+            "vmov {kept}, s0", "vmov s0, {x}", "vsqrt.f32 s0, s0", "vmov {x}, s0", "vmov s0, {kept}",
+            x = inlateout(reg) x.to_bits() => bits, kept = out(reg) _, options(pure, nomem, nostack),
+        );
+    }
+    f32::from_bits(bits)
+}
+
 /// How a variant is called: fractional bits before and after where it is fixed-point.
 #[derive(Clone, Copy)]
 pub enum Call {

@@ -73,7 +73,7 @@ fn verdicts(studied: &[Studied]) {
         let beaten = front::beaten_by(points);
         let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);
         for (point, by) in firmware {
-            let place = by.map_or("on the front".into(), |by| format!("beaten by {}", points[by].name));
+            let place = page::verdict(point, by.map(|by| &points[by]));
             println!(
                 "{:<14} {:>6} cycles, error {:>8}: {place}; front of {count}, {} times in error, {cycles:.1} times in cycles",
                 kernel.name,

@@ -4,7 +4,11 @@ use super::{Area, FAINT, FONT, INK, LABEL_PX, PlotError, TITLE_PX, failed, pictu
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-const SIZE_PX: (u32, u32) = (900, 600);
+const WIDTH_PX: u32 = 900;
+const HEIGHT_PX: u32 = 560;
+/// More points than this make the picture higher, by so much each.
+const POINTS_MAX: usize = 12;
+const POINT_PX: u32 = 12;
 /// Width of a letter and height of a line, generously.
 const LETTER_PX: f64 = 0.5 * LABEL_PX as f64;
 const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
@@ -12,8 +16,8 @@ const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
 const DOT_PX: f64 = 7.0;
 /// Distances at which a label is tried.
 const NEAR_PX: f64 = 10.0;
-const STEP_PX: f64 = 9.0;
-const RINGS: u32 = 16;
+const STEP_PX: f64 = 5.0;
+const RINGS: u32 = 50;
 const DIRECTIONS: u32 = 24;
 /// From here on a line leads from the label to its point.
 const FAR_PX: f64 = 14.0;
@@ -53,10 +57,12 @@ pub struct Front<'a> {
 pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     let Front { title, x, y, dots } = front;
     let positive = |of: fn(&Dot) -> f64| dots.iter().map(of).filter(|value| *value > 0.0);
-    let (x_low, x_high) = decades(positive(|dot| dot.x))?;
-    let (y_low, y_high) = decades(positive(|dot| dot.y))?;
-    let y_low = if dots.iter().any(|dot| dot.y <= 0.0) { y_low / 10.0 } else { y_low };
-    picture(SIZE_PX, |area| {
+    let (x_low, x_high) = range(positive(|dot| dot.x))?;
+    let (y_low, y_high) = range(positive(|dot| dot.y))?;
+    let has_zero = dots.iter().any(|dot| dot.y <= 0.0);
+    let y_low = if has_zero { y_low / 10.0 } else { y_low };
+    let more = dots.len().saturating_sub(POINTS_MAX) as u32;
+    picture((WIDTH_PX, HEIGHT_PX + POINT_PX * more), |area| {
         let mut chart = ChartBuilder::on(area)
             .margin(10)
             .margin_right(20)
@@ -73,9 +79,7 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
             .x_desc(*x)
             .y_desc(*y)
             .x_label_formatter(&power)
-            .y_label_formatter(&|value| {
-                if *value < 2.0 * y_low && y_low < lowest(dots) { "0".into() } else { power(value) }
-            })
+            .y_label_formatter(&|value| if has_zero && *value < 2.0 * y_low { "0".into() } else { power(value) })
             .draw()
             .map_err(failed)?;
         let place = |dot: &Dot| (dot.x.max(x_low), dot.y.max(y_low));
@@ -88,19 +92,13 @@ pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     })
 }
 
-/// The smallest error that is none of 0.
-fn lowest(dots: &[Dot]) -> f64 {
-    dots.iter().map(|dot| dot.y).filter(|y| *y > 0.0).fold(f64::INFINITY, f64::min)
-}
-
-/// Powers of ten around all values, with room for labels.
-fn decades(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
+/// A range around all values, with room for labels.
+fn range(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
     let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
     if low > high {
         return Err(PlotError("there is no point".into()));
     }
-    let (low, high) = ((0.8 * low).log10().floor() as i32, (1.25 * high).log10().ceil() as i32);
-    Ok((10_f64.powi(low), 10_f64.powi(high)))
+    Ok((0.5 * low, 2.5 * high))
 }
 
 /// A power of ten by its exponent where it is long.
@@ -136,6 +134,21 @@ impl Box4 {
         l < or && ol < r && u < od && ou < d
     }
 
+    /// Whether a straight line meets it.
+    fn is_crossed(&self, from: (f64, f64), to: (f64, f64)) -> bool {
+        // Enough places along the line to miss nothing of a label's size.
+        (0..=40).map(|n| f64::from(n) / 40.0).any(|t| {
+            let (x, y) = (from.0 + t * (to.0 - from.0), from.1 + t * (to.1 - from.1));
+            self.meets(&Self::around(x, y, 1.0, 1.0))
+        })
+    }
+
+    /// Its place nearest to another.
+    fn nearest(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        let Self([left, up, right, down]) = *self;
+        (x.max(left).min(right), y.max(up).min(down))
+    }
+
     fn lies_in(&self, other: &Self) -> bool {
         let (Self([l, u, r, d]), Self([ol, ou, or, od])) = (self, other);
         l >= ol && r <= or && u >= ou && d <= od
@@ -159,29 +172,30 @@ fn draw_dots(
     let style = TextStyle::from((FONT, LABEL_PX).into_font()).pos(Pos::new(HPos::Center, VPos::Center));
     // Points of the front choose first.
     let order = (0..dots.len()).filter(|n| dots[*n].best).chain((0..dots.len()).filter(|n| !dots[*n].best));
+    let mut leaders = Vec::new();
     for n in order {
-        let (dot, (x, y)) = (&dots[n], places[n]);
+        let dot = &dots[n];
+        let at = (f64::from(places[n].0), f64::from(places[n].1));
         let half = (0.5 * LETTER_PX * dot.label.chars().count() as f64 + 3.0, 0.5 * LINE_PX + 2.0);
-        let label = free_place((x, y), half, &taken, &frame);
-        if let Some((far, middle)) = label {
-            let (left, up) = (middle.0 - half.0, middle.1 - half.1);
-            if far > FAR_PX {
-                let end = (
-                    f64::from(x).max(left).min(middle.0 + half.0) as i32,
-                    f64::from(y).max(up).min(middle.1 + half.1) as i32,
-                );
-                area.draw(&PathElement::new(vec![(x, y), end], BLACK.mix(0.4).stroke_width(1))).map_err(failed)?;
-            }
-            if dot.own {
-                let corners = [(left as i32, up as i32), ((middle.0 + half.0) as i32, (middle.1 + half.1) as i32)];
-                area.draw(&Rectangle::new(corners, BLACK.stroke_width(1))).map_err(failed)?;
-            }
-            let at = (middle.0 as i32, middle.1 as i32);
-            area.draw(&Text::new(dot.label.clone(), at, style.clone())).map_err(failed)?;
-            taken.push(Box4::around(middle.0, middle.1, half.0, half.1));
-        } else {
-            return Err(PlotError(format!("no room for the label {}", dot.label)));
+        // Where points crowd, a line to a label may cross what a label may not.
+        let found =
+            free_place(at, half, &taken, &leaders, &frame).or_else(|| free_place(at, half, &taken, &[], &frame));
+        let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
+        let label = Box4::around(middle.0, middle.1, half.0, half.1);
+        if far > FAR_PX {
+            let end = label.nearest(at);
+            let line = vec![places[n], (end.0 as i32, end.1 as i32)];
+            area.draw(&PathElement::new(line, BLACK.mix(0.5).stroke_width(1))).map_err(failed)?;
+            leaders.push((at, end));
         }
+        if dot.own {
+            let Box4([left, up, right, down]) = label;
+            let corners = [(left as i32, up as i32), (right as i32, down as i32)];
+            area.draw(&Rectangle::new(corners, BLACK.stroke_width(1))).map_err(failed)?;
+        }
+        let text = Text::new(dot.label.clone(), (middle.0 as i32, middle.1 as i32), style.clone());
+        area.draw(&text).map_err(failed)?;
+        taken.push(label);
     }
     for (dot, (x, y)) in dots.iter().zip(places) {
         let fill = if dot.best { INK.filled() } else { WHITE.filled() };
@@ -197,18 +211,32 @@ fn draw_dots(
     Ok(())
 }
 
-/// The nearest place for a label where it covers nothing: its distance from the point, and its middle.
-fn free_place((x, y): Pixel, half: (f64, f64), taken: &[Box4], frame: &Box4) -> Option<(f64, (f64, f64))> {
-    let (x, y) = (f64::from(x), f64::from(y));
+type Place = (f64, f64);
+
+/// The nearest place for a label where it and the line to it cover nothing: its distance from the point, and its middle.
+fn free_place(
+    at: Place,
+    half: (f64, f64),
+    taken: &[Box4],
+    leaders: &[(Place, Place)],
+    frame: &Box4,
+) -> Option<(f64, Place)> {
+    let own = Box4::around(at.0, at.1, 1.0, 1.0);
     for ring in 0..RINGS {
         let far = NEAR_PX + STEP_PX * f64::from(ring);
         for n in 0..DIRECTIONS {
             // Beside first, then around.
             let turn = f64::from(n / 2) * if n % 2 == 0 { 1.0 } else { -1.0 };
             let (sin, cos) = (core::f64::consts::TAU * turn / f64::from(DIRECTIONS)).sin_cos();
-            let middle = (x + cos * (far + half.0), y - sin * (far + half.1));
+            let middle = (at.0 + cos * (far + half.0), at.1 - sin * (far + half.1));
             let label = Box4::around(middle.0, middle.1, half.0, half.1);
-            if label.lies_in(frame) && !taken.iter().any(|other| label.meets(other)) {
+            let end = label.nearest(at);
+            let covers = taken.iter().any(|other| label.meets(other))
+                || leaders.iter().any(|(from, to)| label.is_crossed(*from, *to))
+                || (!leaders.is_empty()
+                    && far > FAR_PX
+                    && taken.iter().any(|other| !other.meets(&own) && other.is_crossed(at, end)));
+            if label.lies_in(frame) && !covers {
                 return Some((far, middle));
             }
         }

@@ -25,8 +25,16 @@ impl Point {
         self.cost.estimate.median
     }
 
+    /// Whether it competes with the others; a closed form among sums does not.
+    pub fn competes(&self) -> bool {
+        !self.name.contains("closed form")
+    }
+
     /// Whether it is no worse in error and in time, and better in one.
     fn beats(&self, other: &Self) -> bool {
+        if !(self.competes() && other.competes()) {
+            return false;
+        }
         let no_worse = self.cycles() <= other.cycles() && self.error_max <= other.error_max;
         no_worse && (self.cycles() < other.cycles() || self.error_max < other.error_max)
     }
@@ -44,7 +52,12 @@ pub fn beaten_by(points: &[Point]) -> Vec<Option<usize>> {
 /// How far the front reaches: points on it, its errors' ratio, its cycles' ratio.
 pub fn span(points: &[Point]) -> (usize, f64, f64) {
     let beaten = beaten_by(points);
-    let front: Vec<_> = points.iter().zip(beaten).filter(|(_, by)| by.is_none()).map(|(point, _)| point).collect();
+    let front: Vec<_> = points
+        .iter()
+        .zip(beaten)
+        .filter(|(point, by)| by.is_none() && point.competes())
+        .map(|(point, _)| point)
+        .collect();
     let ratio = |of: &dyn Fn(&Point) -> f64| {
         let values = || front.iter().map(|point| of(point)).filter(|value| *value > 0.0);
         values().fold(0.0, f64::max) / values().fold(f64::INFINITY, f64::min)

@@ -17,6 +17,10 @@ pub struct Inputs {
     pub force: Vec<Pair>,
     /// Forces, 1 mN to 70 N.
     pub indentation: Vec<Pair>,
+    /// Distances from the centre, up to a little beyond the rim, and indentations, 0.01 to 9.5 mm.
+    pub pressure: Vec<Pair>,
+    /// Indentations, 0.5 to 5 mm.
+    pub rings: Vec<Pair>,
 }
 
 impl Inputs {
@@ -27,13 +31,18 @@ impl Inputs {
             root: spread(&mut rng, 512, 656, i32::MAX),
             force: spread(&mut rng, 512, 656, 622_592),
             indentation: spread(&mut rng, 512, 66, 70 << 16),
+            pressure: spread(&mut rng, 512, 656, 622_592)
+                .into_iter()
+                .map(|[d, _]| [distance(&mut rng, d), d])
+                .collect(),
+            rings: spread(&mut rng, 32, 32_768, 327_680),
         }
     }
 
     /// As the image reads them.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
-        for section in [&self.root, &self.force, &self.indentation] {
+        for section in [&self.root, &self.force, &self.indentation, &self.pressure, &self.rings] {
             bytes.extend((section.len() as u32).to_le_bytes());
             bytes.extend(section.iter().flatten().flat_map(|word| word.to_le_bytes()));
         }
@@ -45,6 +54,12 @@ impl Default for Inputs {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// A distance of 0 to 1.05 contact radii.
+fn distance(rng: &mut Rng, d: i32) -> i32 {
+    let rim = (i64::from(d) * (20 * 65_536 - i64::from(d))).isqrt();
+    rng.i64(0..=rim * 21 / 20).min(10 * 65_536 - 1) as i32
 }
 
 /// As many from each octave of a range, uniformly within it.

@@ -79,4 +79,33 @@ pub const KERNELS: &[Kernel] = &[
         },
         why: "",
     },
+    Kernel {
+        name: "pressure",
+        title: "Pressure at a distance from the centre",
+        text: "p = Y dL/L, 0 from the rim on, for 512 indentations from 0.01 to 9.5 mm and distances up to 1.05 contact radii. \
+            *Textbook* is Y (L - (a - d)) / L; *no cancellation* is Y (r_c^2 - r^2) / (L (L + a - d)).",
+        error: "pressure error, kPa",
+        other: None,
+        measure: Measure::Scalar {
+            section: |inputs| &inputs.pressure,
+            exact: |reference, [r, d]| reference.pressure(&input(*r), &input(*d)),
+            relative: false,
+        },
+        why: "The loop itself takes no pressure by radius: the fit has its own arithmetic. The model's function is there for hosts \
+            and tests, is correctly rounded everywhere and holds no floating-point number.",
+    },
+    Kernel {
+        name: "rings",
+        title: "Equation 14 by rings",
+        text: "F = integral of p dS as a sum over 4 to 64 rings, by the midpoint rule in r or in u = r^2, against the closed form \
+            pi Y d^2, for 32 indentations from 0.5 to 5 mm. The front is that of the sums alone: nothing sums what has a closed form. `fixed` is I16F16, *Tip* the model's `force_by_rings`.",
+        error: "relative error of the force",
+        other: None,
+        measure: Measure::Scalar {
+            section: |inputs| &inputs.rings,
+            exact: |reference, [d, _]| reference.force(&input(*d)),
+            relative: true,
+        },
+        why: "",
+    },
 ];

@@ -54,7 +54,7 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         .to_vec();
         let errors = [[*error_max, *error_rms]].into_iter().chain(*other);
         cells.extend(errors.flatten().map(|error| figure(error)));
-        let verdict = by.map_or("front".into(), |by| format!("beaten by {}", points[by].name));
+        let verdict = verdict(point, by.map(|by| &points[by]));
         let _ = writeln!(page, "| {bold}{name}{bold} | {} | {verdict} |", cells.join(" | "));
     }
     let beats_firmware = points.iter().zip(&beaten).any(|(point, by)| point.firmware && by.is_some());
@@ -68,6 +68,15 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
             "\nThe front has {count} points, {} times apart in error and {cycles:.1} times in cycles.",
             figure(errors)
         );
+    }
+}
+
+/// Where a variant stands.
+pub fn verdict(point: &Point, by: Option<&Point>) -> String {
+    match by {
+        Some(by) => format!("beaten by {}", by.name),
+        None if point.competes() => "front".into(),
+        None => "apart".into(),
     }
 }
 
@@ -93,7 +102,7 @@ pub fn readme(studied: &[Studied]) -> String {
         let beaten = beaten_by(points);
         for (point, by) in points.iter().zip(beaten).filter(|(point, _)| point.firmware) {
             let Cost { instructions, estimate, flash, .. } = point.cost;
-            let place = if by.is_none() { "on the front" } else { "beaten: [why](docs/study.md)" };
+            let place = if by.is_none() { "front" } else { "beaten: [why](docs/study.md)" };
             let _ = writeln!(
                 table,
                 "| {} | {} | {} | {} | {} | {} ({}) | {place} |",

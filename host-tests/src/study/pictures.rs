@@ -14,13 +14,18 @@ pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
         x: point.cycles().max(1) as f64,
         y: point.error_max,
         label: point.name.replace('`', ""),
-        best: by.is_none(),
+        best: by.is_none() && point.competes(),
         own: point.firmware,
     };
     front(&Front {
         title: &format!("{}: filled points are the front, the square is the firmware's", kernel.title),
         x: "estimated cycles on a Cortex-M4F, median, without wait states",
         y: &format!("largest {}", kernel.error),
-        dots: points.iter().zip(beaten_by(points)).map(dot).collect(),
+        dots: points
+            .iter()
+            .zip(beaten_by(points))
+            .filter(|(point, _)| point.competes() || point.firmware)
+            .map(dot)
+            .collect(),
     })
 }

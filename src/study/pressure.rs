@@ -1,0 +1,103 @@
+//! Ways to the pressure at a distance from the contact's centre, p = Y dL/L in kPa, 0 from the rim on.
+
+use super::number::Number;
+use super::root::hardware_q16;
+use super::scalar::{Call, Tools, Variant};
+use fingertip::units::Millimetres;
+use fixed::types::I16F16;
+use micromath::F32Ext;
+
+/// All of them; the first number is r, the second d.
+pub const VARIANTS: &[Variant] = &[
+    ("f32, textbook", Call::Single(textbook_single)),
+    ("f32, no cancellation", Call::Single(sound_single)),
+    ("f32, micromath", Call::Single(micro)),
+    ("f64, textbook", Call::Double(textbook_double)),
+    ("f64, no cancellation", Call::Double(sound_double)),
+    ("I16F16, textbook, `fixed`", Call::Fixed(textbook_fixed, 16, 16)),
+    ("I16F16, no cancellation, `fixed`", Call::Fixed(sound_fixed, 16, 16)),
+    ("Q16, VSQRT and UDIV", Call::Fixed(integers, 16, 16)),
+    ("**Q24 to Q16, Tip::pressure**", Call::Fixed(firmware, 24, 16)),
+];
+
+/// Y (L - (a - d)) / L, in N/mm^2.
+#[inline(always)]
+pub fn textbook<T: Number>(square: T, d: T, tools: &Tools) -> T {
+    let tip = T::constants(tools);
+    let length = (tip.radius * tip.radius - square).root();
+    let compression = length - (tip.radius - d);
+    if compression > T::from_small(0) { tip.modulus * compression / length } else { T::from_small(0) }
+}
+
+/// Y (r_c^2 - r^2) / (L (L + a - d)), in N/mm^2.
+#[inline(always)]
+pub fn sound<T: Number>(square: T, d: T, tools: &Tools) -> T {
+    let tip = T::constants(tools);
+    let inside = d * (tip.radius + tip.radius - d) - square;
+    if inside > T::from_small(0) {
+        let length = (tip.radius * tip.radius - square).root();
+        tip.modulus * inside / (length * (length + tip.radius - d))
+    } else {
+        T::from_small(0)
+    }
+}
+
+extern "C" fn textbook_single(r: f32, d: f32, tools: &Tools) -> f32 {
+    textbook(r * r, d, tools) * 1000.0
+}
+
+extern "C" fn sound_single(r: f32, d: f32, tools: &Tools) -> f32 {
+    sound(r * r, d, tools) * 1000.0
+}
+
+extern "C" fn micro(r: f32, d: f32, tools: &Tools) -> f32 {
+    let tip = &tools.single;
+    let inside = d * (tip.radius + tip.radius - d) - r * r;
+    if inside > 0.0 {
+        let length = F32Ext::sqrt(tip.radius * tip.radius - r * r);
+        1000.0 * tip.modulus * inside * F32Ext::recip(length * (length + tip.radius - d))
+    } else {
+        0.0
+    }
+}
+
+extern "C" fn textbook_double(r: f64, d: f64, tools: &Tools) -> f64 {
+    textbook(r * r, d, tools) * 1000.0
+}
+
+extern "C" fn sound_double(r: f64, d: f64, tools: &Tools) -> f64 {
+    sound(r * r, d, tools) * 1000.0
+}
+
+extern "C" fn textbook_fixed(r: i32, d: i32, tools: &Tools) -> i32 {
+    let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
+    (textbook(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+}
+
+extern "C" fn sound_fixed(r: i32, d: i32, tools: &Tools) -> i32 {
+    let (r, d) = (I16F16::from_bits(r), I16F16::from_bits(d));
+    (sound(r * r, d, tools) * I16F16::from_small(1000)).to_bits()
+}
+
+/// By the textbook: the only rounding that counts is that of L.
+#[inline(always)]
+pub fn strain(square_q16: i32, d: i32, tools: &Tools) -> (u32, u32) {
+    let radius = tools.fixed.radius.to_bits();
+    // a^2 in Q16.
+    let radius_square = (radius >> 8) * (radius >> 8);
+    let length = hardware_q16(radius_square - square_q16, 0, tools);
+    let compression = (length - (radius - d)).max(0) as u32;
+    let shift = compression.leading_zeros().min(31);
+    ((compression << shift) / length.max(1) as u32, shift)
+}
+
+extern "C" fn integers(r: i32, d: i32, tools: &Tools) -> i32 {
+    let square = ((i64::from(r) * i64::from(r)) >> 16) as i32;
+    let (quotient, shift) = strain(square, d, tools);
+    // 250 kPa in Q16.
+    ((u64::from(quotient) * (250 << 16)) >> shift) as i32
+}
+
+extern "C" fn firmware(r: i32, d: i32, tools: &Tools) -> i32 {
+    tools.tip.pressure(Millimetres::from_bits(r), Millimetres::from_bits(d)).to_bits()
+}

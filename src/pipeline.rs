@@ -33,6 +33,14 @@ pub struct Pipeline {
     identify_request: u8,
 }
 
+/// Requests that a command brings.
+#[derive(Clone, Copy)]
+struct Asked {
+    tare: bool,
+    clear: bool,
+    identify: bool,
+}
+
 impl Pipeline {
     /// A pipeline in the mode off.
     pub fn new(config: &Config) -> Self {
@@ -94,6 +102,7 @@ impl Pipeline {
     /// One frame's way from codes to duty. Infallible: any frame, any sense, any command.
     pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
         let mut limits = self.count_frames(frame.sequence);
+        let asked = self.take_requests(command);
 
         // What the array feels, where it can be trusted: the bridge does not wait for the rest.
         let watched = self.watched();
@@ -127,7 +136,7 @@ impl Pipeline {
         }
 
         // What to do about it.
-        let mode = self.next_mode(command, &contact, sense);
+        let mode = self.next_mode(asked, command, &contact, sense);
         self.status.mode = mode;
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
@@ -171,6 +180,20 @@ impl Pipeline {
         !matches!(self.status.mode, Mode::Off | Mode::Fault)
     }
 
+    /// What is newly asked for. A request counts in the frame in which it comes, whatever else that brings.
+    fn take_requests(&mut self, command: &Command) -> Asked {
+        let identifying = self.status.mode == Mode::Identify;
+        let asked = Asked {
+            tare: command.tare_request != self.tare_request,
+            clear: command.clear_request != self.clear_request,
+            identify: command.identify_request != self.identify_request && !identifying,
+        };
+        self.tare_request = command.tare_request;
+        self.clear_request = command.clear_request;
+        self.identify_request = command.identify_request;
+        asked
+    }
+
     /// Counts missed frames from the gap in the sequence.
     fn count_frames(&mut self, sequence: u32) -> Limits {
         let mut limits = Limits::default();
@@ -184,18 +207,10 @@ impl Pipeline {
     }
 
     /// The mode table of [`crate::safety`], with what each change of mode prepares.
-    fn next_mode(&mut self, command: &Command, contact: &Contact, sense: &Sense) -> Mode {
-        let tare_asked = command.tare_request != self.tare_request;
-        let clear_asked = command.clear_request != self.clear_request;
-        self.tare_request = command.tare_request;
-        self.clear_request = command.clear_request;
-        let identifying = self.status.mode == Mode::Identify;
-        let identify_asked = command.identify_request != self.identify_request && !identifying;
-        self.identify_request = command.identify_request;
-
+    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sense: &Sense) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
         let mode = match self.status.mode {
-            Mode::Fault if clear_asked && !command.torque => {
+            Mode::Fault if asked.clear && !command.torque => {
                 self.status.fault = None;
                 Mode::Off
             }
@@ -204,7 +219,7 @@ impl Pipeline {
                 self.tared = self.array.continue_tare();
                 if self.tared { Mode::Off } else { Mode::Tare }
             }
-            Mode::Off if tare_asked => {
+            Mode::Off if asked.tare => {
                 self.array.start_tare();
                 self.tared = false;
                 Mode::Tare
@@ -222,7 +237,7 @@ impl Pipeline {
             }
             Mode::Off => Mode::Off,
             Mode::Identify if self.press.running() => Mode::Identify,
-            Mode::Approach | Mode::Force | Mode::Release if identify_asked => {
+            Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
                 self.press.start(&self.motion);
                 Mode::Identify
             }
@@ -233,7 +248,7 @@ impl Pipeline {
                 wanted
             }
         };
-        if identify_asked && mode != Mode::Identify {
+        if asked.identify && mode != Mode::Identify {
             self.press.refuse(Refusal::NotReady);
         }
         mode

@@ -104,6 +104,7 @@ impl Array {
     /// Reads a frame. Any codes are taken: what a sound array cannot show becomes a bad taxel.
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
         let [rows @ .., undriven] = &frame.pairs;
+        let levels = &undriven.map(row::held);
         let picture = &mut self.picture;
         let (mut sum, mut moment_x, mut moment_y, mut peak) = (0, 0, 0, 0);
         let mut bad_count = 0;
@@ -111,9 +112,9 @@ impl Array {
         let calibrations = self.calibration.gain.iter().zip(&self.calibration.mask);
         let places = picture.taxels.iter_mut().zip(&mut picture.bad);
         for (((codes, tare), (gain, mask)), (out, bad)) in rows.iter().zip(&self.tare).zip(calibrations).zip(places) {
-            let row = Row::of(codes, undriven, config.dead_codes);
+            let row = Row::of(codes, levels, config.dead_codes);
             let columns = if row.suspect {
-                let (columns, found) = row::read_suspect(codes, undriven, tare, gain, *mask, config, out);
+                let (columns, found) = row::read_suspect(codes, levels, tare, gain, *mask, config, out);
                 *bad = found | mask;
                 bad_count += (found & !mask).count_ones() as u8;
                 columns
@@ -139,9 +140,10 @@ impl Array {
     /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
     pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
         let [rows @ .., undriven] = &frame.pairs;
+        let levels = &undriven.map(row::held);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.calibration.mask) {
-            let mut row = Row::of(codes, undriven, config.dead_codes);
+            let mut row = Row::of(codes, levels, config.dead_codes);
             if row.suspect {
                 count += (row.leave_out_bad(codes, config.dead_codes) & !mask).count_ones();
             }

@@ -9,6 +9,11 @@ type Pairs = [u32; BANK_COLUMNS];
 /// One in both lanes: what sums a pair.
 const ONES: u32 = lanes::pair(1, 1);
 
+/// Holds the levels of a pair of columns to what a converter can show, so that no net code exceeds its code.
+pub(super) const fn held(levels: u32) -> u32 {
+    levels & 0x0fff_0fff
+}
+
 /// A row before calibration.
 pub(super) struct Row {
     /// Codes above the columns' undriven levels.

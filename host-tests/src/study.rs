@@ -3,6 +3,7 @@
 //! The image runs every variant on the emulated Cortex-M4F and says what each returned; errors are worked out here,
 //! against arbitrary precision, so they are exactly the target's.
 
+pub mod frames;
 pub mod front;
 pub mod inputs;
 pub mod judge;

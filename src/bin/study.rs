@@ -9,10 +9,14 @@
 mod call;
 #[path = "../study/force.rs"]
 mod force;
+#[path = "../study/frame.rs"]
+mod frame;
 #[path = "../study/host.rs"]
 mod host;
 #[path = "../study/number.rs"]
 mod number;
+#[path = "../study/packed.rs"]
+mod packed;
 #[path = "../study/pressure.rs"]
 mod pressure;
 #[path = "../study/rings.rs"]
@@ -40,7 +44,7 @@ fn main() -> ! {
     let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
     let tools = Tools::new(&config);
     say(format_args!("region 0 nothing: an empty call"));
-    for _ in 0..4 {
+    for _ in 0..256 {
         call::pass_on(0, nothing, &mut ());
     }
     let region = &mut 1;
@@ -53,6 +57,7 @@ fn main() -> ! {
     ] {
         scalar::run(kernel, variants, region, &tools, &mut inputs);
     }
+    frame::run(region, &config, &mut inputs);
     loop {
         debug::exit(debug::EXIT_SUCCESS);
     }

@@ -3,10 +3,20 @@
 use crate::{
     console::{self, Console},
     image, paths, timing,
-    toolchain::{self, Choice},
+    toolchain::{self, Choice, Toolchain},
 };
 use anyhow::{Context, Result};
-use std::{fmt::Write as _, fs, path::PathBuf, process::Command};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+/// The image and its feature.
+const NAME: &str = "study";
+/// The profile of everything but the firmware's own code.
+const PROFILE: &str = "study";
 
 /// Flags of `cargo xtask study`.
 #[derive(clap::Args)]
@@ -29,13 +39,37 @@ pub struct Args {
 /// # Errors
 /// Something does not build, a variant cannot be measured, or a figure is stale.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    let image = image::build(toolchain::ensure(choice, console)?, "study", "study", console)?;
+    let toolchain = toolchain::ensure(choice, console)?;
     let folder = paths::target().join("study");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
     let folder = fs::canonicalize(&folder).with_context(|| paths::shown(&folder))?;
-    let (inputs, report) = (folder.join("inputs.bin"), folder.join("run.txt"));
+    let inputs = folder.join("inputs.bin");
     console.run(judge().arg("inputs").arg(&inputs))?;
-    let run = timing::measure(&image, Some(&inputs), console)?;
+    let shipped = image::build(toolchain, NAME, NAME, console)?;
+    let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
+    let quick = measured(&build_quick(toolchain, console)?, &inputs, &folder.join("quick.txt"), console)?;
+    let mut command = judge();
+    command.arg("report").arg(&shipped).arg(&quick).args(args.check.then_some("--check"));
+    for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
+        if let Some(path) = path {
+            command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);
+        }
+    }
+    console.run(&mut command)
+}
+
+/// The image as quick as the compiler makes it, without what keeps the firmware's small.
+fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
+    let mut command = toolchain.cargo("build");
+    command.args(["--profile", PROFILE, "--package", "fingertip", "--bin", NAME, "--features", NAME]);
+    // Instead of the flags that `.cargo/config.toml` has for the target.
+    console.run(command.env("RUSTFLAGS", "-C opt-level=3"))?;
+    Ok(toolchain.images().with_file_name(PROFILE).join(NAME))
+}
+
+/// Runs an image; what it said and what it cost, in a file.
+fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> Result<PathBuf> {
+    let run = timing::measure(image, Some(inputs), console)?;
     let mut text = run.output;
     for measured in &run.regions {
         // A string takes every write.
@@ -45,15 +79,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         }
         text.push('\n');
     }
-    fs::write(&report, text).with_context(|| format!("cannot write {}", paths::shown(&report)))?;
-    let mut command = judge();
-    command.arg("report").arg(&report).args(args.check.then_some("--check"));
-    for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
-        if let Some(path) = path {
-            command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);
-        }
-    }
-    console.run(&mut command)
+    fs::write(file, text).with_context(|| format!("cannot write {}", paths::shown(file)))?;
+    Ok(file.into())
 }
 
 fn judge() -> Command {

@@ -1,7 +1,7 @@
 //! What accuracy costs in time: makes the study's inputs, and tables and pictures of its run.
 //!
-//! `study inputs FILE` writes the inputs for the image. `study report RUN [--check] [--json FILE] [--out DIR]` judges a
-//! run: it renews or checks `docs/study.md`, the README's table and the pictures.
+//! `study inputs FILE` writes the inputs for the image. `study report SHIPPED QUICK [--check] [--json FILE]
+//! [--out DIR]` judges two runs, of the image built as the firmware is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
 
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
@@ -11,13 +11,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: study inputs FILE | study report RUN [--check] [--json FILE] [--out DIR]";
+const USAGE: &str = "usage: study inputs FILE | study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
-        ["report", run, ref flags @ ..] => report(Path::new(run), flags),
+        ["report", shipped, quick, ref flags @ ..] => report([shipped, quick], flags),
         _ => Err(USAGE.into()),
     };
     match result {
@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     }
 }
 
-fn report(run: &Path, flags: &[&str]) -> Result<(), String> {
+fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     let (mut check, mut json, mut out) = (false, None, None);
     let mut flags = flags.iter();
     while let Some(flag) = flags.next() {
@@ -41,8 +41,9 @@ fn report(run: &Path, flags: &[&str]) -> Result<(), String> {
             _ => return Err(USAGE.into()),
         }
     }
-    let text = fs::read_to_string(run).map_err(|error| format!("{}: {error}", run.display()))?;
-    let (runs, inputs) = (output::parse(&text)?, Inputs::new());
+    let read = |file| output::parse(&fs::read_to_string(file).map_err(|error| format!("{file}: {error}"))?);
+    let [shipped, quick] = runs.map(read);
+    let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::new());
     let studied: Result<Vec<Studied>, String> =
         KERNELS.iter().map(|kernel| Ok((kernel, judge::points(kernel, &runs, &inputs)?))).collect();
     let studied = studied?;
@@ -61,6 +62,7 @@ fn report(run: &Path, flags: &[&str]) -> Result<(), String> {
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
     verdicts(&studied);
+    frame_front(&studied)?;
     if let Some(folder) = out {
         return write_all(&folder, &files);
     }
@@ -83,6 +85,18 @@ fn verdicts(studied: &[Studied]) {
             );
         }
     }
+}
+
+/// The frame's front must give a choice: four points, 10 times in error, 3 times in cycles.
+fn frame_front(studied: &[Studied]) -> Result<(), String> {
+    let frame = studied.iter().find(|(kernel, _)| kernel.name == "frame").ok_or("no frame was studied")?;
+    let (count, errors, cycles) = front::span(&frame.1);
+    let verdict = format!("{count} points, {} times in error, {cycles:.1} times in cycles", page::figure(errors));
+    if count < 4 || errors < 10.0 || cycles < 3.0 {
+        return Err(format!("the front from frame to contact is too small: {verdict}"));
+    }
+    println!("front from frame to contact: {verdict}; at least 4, 10 and 3 are asked");
+    Ok(())
 }
 
 fn write_all(folder: &Path, files: &[(String, String)]) -> Result<(), String> {

@@ -2,7 +2,9 @@
 //!
 //! From integers and the four operations alone, so that every machine makes the same.
 
+use crate::plant::{Setup, World};
 use fastrand::Rng;
+use fingertip::frame::{COLUMNS, Frame, ROWS};
 
 const SEED: u64 = 2003;
 
@@ -21,6 +23,46 @@ pub struct Inputs {
     pub pressure: Vec<Pair>,
     /// Indentations, 0.5 to 5 mm.
     pub rings: Vec<Pair>,
+    /// Frames of contacts, and the calibration.
+    pub frames: Frames,
+}
+
+/// Frames of a contact, and what the array's calibration is.
+pub struct Frames {
+    /// Q14, 0.8 to 1.2.
+    pub gains: [[u16; COLUMNS]; ROWS],
+    /// Without contact.
+    pub quiet: Frame,
+    /// Indentations of 0.1 to 5 mm, centres up to 4 mm from the array's middle on each axis.
+    pub contacts: Vec<Frame>,
+}
+
+impl Frames {
+    fn new(rng: &mut Rng) -> Self {
+        let gains = core::array::from_fn(|_| core::array::from_fn(|_| rng.u16(13_107..19_661)));
+        let mut frame = |d: Option<i32>| {
+            let mut setup = Setup::default();
+            let distance_mm = setup.wall.distance_mm;
+            (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (8.0 * rng.f64() - 4.0, 8.0 * rng.f64() - 4.0);
+            let mut world = World::new(&setup);
+            if let Some(d) = d {
+                world.place(distance_mm + f64::from(d) / 65_536.0);
+            }
+            let mut frame = Frame::EMPTY;
+            world.fill_frame(&mut frame);
+            frame
+        };
+        let quiet = frame(None);
+        let depths = spread(&mut Rng::with_seed(SEED), 256, 6_554, 327_680);
+        Self { gains, quiet, contacts: depths.into_iter().map(|[d, _]| frame(Some(d))).collect() }
+    }
+
+    fn to_bytes(&self) -> Vec<u8> {
+        let gains = self.gains.iter().flatten().map(|gain| u32::from(*gain));
+        let frames = [&self.quiet].into_iter().chain(&self.contacts);
+        let words = [self.contacts.len() as u32].into_iter().chain(gains);
+        words.chain(frames.flat_map(|frame| frame.pairs.into_iter().flatten())).flat_map(u32::to_le_bytes).collect()
+    }
 }
 
 impl Inputs {
@@ -36,6 +78,7 @@ impl Inputs {
                 .map(|[d, _]| [distance(&mut rng, d), d])
                 .collect(),
             rings: spread(&mut rng, 32, 32_768, 327_680),
+            frames: Frames::new(&mut rng),
         }
     }
 
@@ -46,6 +89,7 @@ impl Inputs {
             bytes.extend((section.len() as u32).to_le_bytes());
             bytes.extend(section.iter().flatten().flat_map(|word| word.to_le_bytes()));
         }
+        bytes.extend(self.frames.to_bytes());
         bytes
     }
 }

@@ -1,9 +1,10 @@
 //! Errors of what the variants returned, against arbitrary precision.
 
+use super::frames;
 use super::front::Point;
 use super::inputs::{Inputs, Pair};
 use super::kernels::{Kernel, Measure};
-use super::output::{Number, Ran};
+use super::output::Ran;
 use crate::figures::tip;
 use crate::prove::reference::{Real, Reference, real};
 
@@ -48,6 +49,10 @@ fn point(kernel: &Kernel, ran: &Ran, inputs: &Inputs) -> Result<Point, String> {
         Measure::Scalar { section, exact, relative } => {
             (scalar(ran, section(inputs), exact, relative).ok_or_else(|| incomplete(ran))?, None)
         }
+        Measure::Frames => {
+            let [force, centre] = frames::errors(&ran.returned, &inputs.frames).ok_or_else(|| incomplete(ran))?;
+            (force, Some(centre))
+        }
     };
     let Ran { name, firmware, cost, .. } = ran.clone();
     Ok(Point { name, firmware, cost, error_max, error_rms, other })
@@ -77,9 +82,4 @@ fn scalar(ran: &Ran, inputs: &[Pair], exact: fn(&Reference, &Pair) -> Real, rela
 /// The value of an input.
 pub fn input(bits: i32) -> Real {
     real(bits, 16)
-}
-
-/// The double nearest to what was returned.
-pub fn nearest(returned: &[Number], place: usize) -> f64 {
-    returned.get(place).map_or(f64::NAN, |number| number.to_f64())
 }

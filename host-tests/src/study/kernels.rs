@@ -34,6 +34,8 @@ pub enum Measure {
         /// Whether the error counts as a share of the result.
         relative: bool,
     },
+    /// Sum and moments of a frame.
+    Frames,
 }
 
 /// All of them.
@@ -107,5 +109,17 @@ pub const KERNELS: &[Kernel] = &[
             relative: true,
         },
         why: "",
+    },
+    Kernel {
+        name: "frame",
+        title: "Frame to force, centre and flags",
+        text: "100 taxels: offset, gain, the driven row's sag, tare, then sum, moments, peak, and whether a taxel is dead or saturated; \
+            256 frames of a simulated array with gains of 0.8 to 1.2, indentations of 0.1 to 5 mm. The error is that of the arithmetic: force and \
+            centre by the sums, against those by exact sums of the same codes, gains and tare.",
+        error: "force error, N",
+        other: Some("centre error, mm"),
+        measure: Measure::Frames,
+        why: "The packed sums keep no taxel. `Array::read` leaves a reading of each, which the fit, the tare, the drift's filter, the \
+            bus and the check of the picture need; and it leaves dead and saturated taxels out, not only flags them.",
     },
 ];

@@ -128,6 +128,23 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
     runs.into_iter().filter(|(region, _)| *region != 0).map(with_cost).collect()
 }
 
+/// The firmware's variants as they are shipped, the others as quick as the compiler makes them.
+///
+/// # Errors
+/// The runs are not of the same variants, or one returned something else than the other.
+pub fn merged(shipped: Vec<Ran>, quick: Vec<Ran>) -> Result<Vec<Ran>, String> {
+    if shipped.len() != quick.len() {
+        return Err("the two images have not the same variants".into());
+    }
+    let pick = |(shipped, quick): (Ran, Ran)| {
+        if (&shipped.kernel, &shipped.name, &shipped.returned) != (&quick.kernel, &quick.name, &quick.returned) {
+            return Err(format!("{}: {} returns something else when built for speed", shipped.kernel, shipped.name));
+        }
+        Ok(if shipped.firmware { shipped } else { quick })
+    };
+    shipped.into_iter().zip(quick).map(pick).collect()
+}
+
 fn cost(numbers: &[i64]) -> Option<(u32, Cost)> {
     let [region, figures @ ..] = numbers else { return None };
     let mut passes = figures.chunks_exact(2).map(|pair| Passes { median: pair[0], max: pair[1] });

@@ -1,0 +1,302 @@
+//! From a frame to the sums that force and centre are read from, the peak, and whether a taxel is dead or saturated.
+
+use super::call::pass_on;
+use super::host::{Inputs, fail, say};
+use super::packed;
+use fingertip::config::Config;
+use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
+use fingertip::pressure::{Array, Calibration, TARE_FRAMES};
+use fixed::types::I16F16;
+
+/// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
+#[derive(Clone, Copy, Default)]
+pub struct Sums<T> {
+    /// All taxels.
+    pub sum: T,
+    /// Weighted along the columns.
+    pub moment_x: T,
+    /// Weighted along the rows.
+    pub moment_y: T,
+    /// The largest taxel.
+    pub peak: T,
+}
+
+/// What the variants read and write.
+pub struct Bench {
+    /// The firmware's constants.
+    pub config: Config,
+    /// The firmware's own reading.
+    pub array: Array,
+    /// The frame.
+    pub frame: Frame,
+    /// Q14, in pairs as the codes are.
+    pub gain: [[u32; BANK_COLUMNS]; ROWS],
+    /// The gains weighted along the columns, Q11.
+    pub weighted: [[u32; BANK_COLUMNS]; ROWS],
+    /// Tare, sixteenths of a code.
+    pub tare: [[i32; COLUMNS]; ROWS],
+    /// Sums of the tare, sixteenths of a code.
+    pub tare_sums: Sums<i32>,
+    /// The same where gains are left out.
+    pub plain_tare: Sums<i32>,
+    /// In single precision.
+    pub single: Float<f32>,
+    /// In double precision.
+    pub double: Float<f64>,
+    /// In I16F16, of 32 codes.
+    pub fixed: Float<I16F16>,
+    /// In sixteenths of a code, or finer.
+    pub out: Sums<i32>,
+    /// In codes.
+    pub out_single: Sums<f32>,
+    /// In codes.
+    pub out_double: Sums<f64>,
+    /// Whether a taxel is dead or saturated.
+    pub suspect: bool,
+}
+
+/// Calibration in a format, tare in codes.
+pub struct Float<T> {
+    gain: [[T; COLUMNS]; ROWS],
+    tare: [[T; COLUMNS]; ROWS],
+    sag: T,
+}
+
+#[derive(Clone, Copy)]
+enum Format {
+    /// Fractional bits of a code.
+    Fixed(u32),
+    Single,
+    Double,
+}
+
+type Kernel = extern "C" fn(&mut Bench);
+
+const VARIANTS: [(&str, Kernel, Format); 9] = [
+    ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
+    ("packed, gains", packed::gains, Format::Fixed(4)),
+    ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
+    ("packed, gains, sag by rows", packed::by_rows, Format::Fixed(10)),
+    ("plain integers", integers, Format::Fixed(4)),
+    ("f32", single, Format::Single),
+    ("f64", double, Format::Double),
+    ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
+    ("**Array::read**", firmware, Format::Fixed(4)),
+];
+
+/// Measures all variants over the next section of inputs: gains, the frame without contact, frames.
+pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
+    let [count] = inputs.words();
+    let mut bench = bench(config, inputs);
+    let start = inputs.place();
+    for (name, kernel, format) in VARIANTS {
+        say(format_args!("region {region} frame: {name}"));
+        inputs.seek(start);
+        for _ in 0..count {
+            bench.frame = read(inputs);
+            pass_on(*region, kernel, &mut bench);
+            if bench.suspect {
+                fail("a sound frame is flagged");
+            }
+            let Bench { out, out_single, out_double, .. } = &bench;
+            match format {
+                Format::Fixed(bits) => {
+                    say(format_args!("i{bits} {} i{bits} {} i{bits} {}", out.sum, out.moment_x, out.moment_y));
+                }
+                Format::Single => {
+                    let [s, x, y] = [out_single.sum, out_single.moment_x, out_single.moment_y].map(f32::to_bits);
+                    say(format_args!("f {s:x} f {x:x} f {y:x}"));
+                }
+                Format::Double => {
+                    let [s, x, y] = [out_double.sum, out_double.moment_x, out_double.moment_y].map(f64::to_bits);
+                    say(format_args!("d {s:x} d {x:x} d {y:x}"));
+                }
+            }
+        }
+        // What a flag is for: the same frame with a saturated, then with a dead taxel.
+        for code in [SATURATED, bench.frame.code(ROWS, 4)] {
+            let sound = bench.frame;
+            bench.frame.set_code(3, 4, code);
+            kernel(&mut bench);
+            if !bench.suspect {
+                fail("a bad taxel is not flagged");
+            }
+            bench.frame = sound;
+        }
+        *region += 1;
+    }
+}
+
+fn read(inputs: &mut Inputs) -> Frame {
+    let mut frame = Frame::EMPTY;
+    for pair in frame.pairs.iter_mut().flatten() {
+        let [word] = inputs.words();
+        *pair = word as u32;
+    }
+    frame
+}
+
+fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
+    let mut gains = [[0_u16; COLUMNS]; ROWS];
+    gains.iter_mut().flatten().for_each(|gain| {
+        let [word] = inputs.words();
+        *gain = word as u16;
+    });
+    let quiet = read(inputs);
+    let Ok(calibration) = Calibration::new(&gains, &[0; ROWS]) else { fail("the gains are refused") };
+    let mut array = Array::new();
+    array.calibrate(&calibration);
+    for _ in 0..TARE_FRAMES {
+        array.read(&quiet, config);
+        array.continue_tare();
+    }
+    let mut tare = [[0; COLUMNS]; ROWS];
+    tare.iter_mut().flatten().zip(array.tare()).for_each(|(place, tare)| *place = tare);
+    let weight = |place: usize| 2 * place as i32 - 9;
+    let pairs = |of: &dyn Fn(usize, usize) -> i32| {
+        core::array::from_fn(|row| {
+            core::array::from_fn(|place| lanes::pair(of(row, place) as i16, of(row, place + BANK_COLUMNS) as i16))
+        })
+    };
+    let sums = |of: &dyn Fn(usize, usize) -> i32| {
+        let mut sums = Sums::default();
+        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+            sums.sum += of(row, column);
+            sums.moment_x += of(row, column) * weight(column);
+            sums.moment_y += of(row, column) * weight(row);
+        }
+        sums
+    };
+    let net = |row, column| i32::from(quiet.code(row, column)) - i32::from(quiet.code(ROWS, column));
+    let sag = f64::from(config.sag_q32) / 4_294_967_296.0;
+    Bench {
+        config: config.clone(),
+        frame: quiet,
+        gain: pairs(&|row, column| gains[row][column].into()),
+        weighted: pairs(&|row, column| (i32::from(gains[row][column]) * weight(column) + 4) >> 3),
+        tare_sums: sums(&|row, column| tare[row][column]),
+        plain_tare: sums(&|row, column| 16 * net(row, column)),
+        single: Float {
+            gain: gains.map(|row| row.map(|gain| f32::from(gain) / 16_384.0)),
+            tare: tare.map(|row| row.map(|tare| tare as f32 / 16.0)),
+            sag: sag as f32,
+        },
+        double: Float {
+            gain: gains.map(|row| row.map(|gain| f64::from(gain) / 16_384.0)),
+            tare: tare.map(|row| row.map(|tare| f64::from(tare) / 16.0)),
+            sag,
+        },
+        fixed: Float {
+            gain: gains.map(|row| row.map(|gain| I16F16::from_bits(i32::from(gain) << 2))),
+            tare: tare.map(|row| row.map(|tare| I16F16::from_bits(tare << 7))),
+            sag: I16F16::from_bits((sag * 32.0 * 65_536.0 + 0.5) as i32),
+        },
+        array,
+        tare,
+        out: Sums::default(),
+        out_single: Sums::default(),
+        out_double: Sums::default(),
+        suspect: false,
+    }
+}
+
+extern "C" fn firmware(bench: &mut Bench) {
+    let picture = bench.array.read(&bench.frame, &bench.config);
+    bench.out = Sums { sum: picture.sum, moment_x: picture.moment_x, moment_y: picture.moment_y, peak: picture.peak };
+    bench.suspect = picture.bad_count > 0;
+}
+
+/// Taxel by taxel, in 32 and 64 bits.
+extern "C" fn integers(bench: &mut Bench) {
+    let mut out = Sums::<i32>::default();
+    let mut bad = 0_u32;
+    for row in 0..ROWS {
+        let mut nets = [0; COLUMNS];
+        let mut total = 0;
+        for (column, net) in nets.iter_mut().enumerate() {
+            let code = bench.frame.code(row, column);
+            *net = (i32::from(code) - i32::from(bench.frame.code(ROWS, column))).max(0);
+            bad += u32::from(code >= SATURATED || *net < i32::from(bench.config.dead_codes));
+            total += *net;
+        }
+        // 1 / (1 - rho N) in Q22.
+        let remaining = (u32::MAX - (total as u32).saturating_mul(bench.config.sag_q32)) >> 16;
+        let boost = ((u32::MAX / remaining.max(1 << 15)) << 6) as i32;
+        for (column, net) in nets.into_iter().enumerate() {
+            let pair = bench.gain[row][column % BANK_COLUMNS];
+            let gain = if column < BANK_COLUMNS { lanes::low(pair) } else { lanes::high(pair) };
+            let boosted = (i64::from(net * i32::from(gain)) * i64::from(boost) + (1 << 31)) >> 32;
+            let value = boosted as i32 - bench.tare[row][column];
+            out.sum += value;
+            out.moment_x += value * (2 * column as i32 - 9);
+            out.moment_y += value * (2 * row as i32 - 9);
+            out.peak = out.peak.max(value);
+        }
+    }
+    bench.out = out;
+    bench.suspect = bad > 0;
+}
+
+macro_rules! floating {
+    ($name:ident, $type:ty, $constants:ident, $out:ident) => {
+        extern "C" fn $name(bench: &mut Bench) {
+            let mut out = Sums::<$type>::default();
+            let mut bad = 0_u32;
+            for row in 0..ROWS {
+                let mut nets = [0.0; COLUMNS];
+                let mut total = 0.0;
+                for (column, net) in nets.iter_mut().enumerate() {
+                    let code = bench.frame.code(row, column);
+                    let above = i32::from(code) - i32::from(bench.frame.code(ROWS, column));
+                    bad += u32::from(code >= SATURATED || above < i32::from(bench.config.dead_codes));
+                    *net = <$type>::from(above as i16);
+                    total += *net;
+                }
+                let boost = 1.0 / (1.0 - bench.$constants.sag * total);
+                for (column, net) in nets.into_iter().enumerate() {
+                    let value = net * bench.$constants.gain[row][column] * boost - bench.$constants.tare[row][column];
+                    out.sum += value;
+                    out.moment_x += value * <$type>::from(2 * column as i16 - 9);
+                    out.moment_y += value * <$type>::from(2 * row as i16 - 9);
+                    if value > out.peak {
+                        out.peak = value;
+                    }
+                }
+            }
+            bench.$out = out;
+            bench.suspect = bad > 0;
+        }
+    };
+}
+floating!(single, f32, single, out_single);
+floating!(double, f64, double, out_double);
+
+extern "C" fn saturating(bench: &mut Bench) {
+    let mut out = Sums::<I16F16>::default();
+    let mut bad = 0_u32;
+    for row in 0..ROWS {
+        let mut nets = [I16F16::ZERO; COLUMNS];
+        let mut total = I16F16::ZERO;
+        for (column, net) in nets.iter_mut().enumerate() {
+            let code = bench.frame.code(row, column);
+            let above = i32::from(code).saturating_sub(i32::from(bench.frame.code(ROWS, column))).max(0);
+            bad += u32::from(code >= SATURATED || above < i32::from(bench.config.dead_codes));
+            *net = I16F16::from_bits(above << 11);
+            total = total.saturating_add(*net);
+        }
+        let remaining = I16F16::ONE.saturating_sub(bench.fixed.sag.saturating_mul(total));
+        let boost = I16F16::ONE.saturating_div(remaining.max(I16F16::DELTA));
+        for (column, net) in nets.into_iter().enumerate() {
+            let value = net.saturating_mul(bench.fixed.gain[row][column]).saturating_mul(boost);
+            let value = value.saturating_sub(bench.fixed.tare[row][column]);
+            out.sum = out.sum.saturating_add(value);
+            out.moment_x = out.moment_x.saturating_add(value.saturating_mul_int(2 * column as i32 - 9));
+            out.moment_y = out.moment_y.saturating_add(value.saturating_mul_int(2 * row as i32 - 9));
+            out.peak = out.peak.max(value);
+        }
+    }
+    let Sums { sum, moment_x, moment_y, peak } = out;
+    let [sum, moment_x, moment_y, peak] = [sum, moment_x, moment_y, peak].map(I16F16::to_bits);
+    bench.out = Sums { sum, moment_x, moment_y, peak };
+    bench.suspect = bad > 0;
+}

@@ -131,8 +131,10 @@ fn used(sector: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     sector.chunks_exact(SLOT_BYTES).enumerate().rev().skip_while(|(_, slot)| is_blank(slot))
 }
 
+/// Word by word: a blank sector has 32,768 of them.
 fn is_blank(slot: &[u8]) -> bool {
-    slot.iter().all(|&byte| byte == BLANK)
+    let (words, rest) = slot.as_chunks::<4>();
+    words.iter().all(|word| *word == [BLANK; 4]) && rest.iter().all(|byte| *byte == BLANK)
 }
 
 fn decode(slot: &[u8]) -> Result<Record, Damage> {

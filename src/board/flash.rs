@@ -66,10 +66,8 @@ impl Store {
         let slot = store::encode(record);
         self.flash.blocking_write(SECTOR_OFFSET + offset as u32, &slot).map_err(SaveError::Write)?;
         drop_cached_data();
-        match self.latest() {
-            Ok(Some(stored)) if stored == *record => Ok(()),
-            _ => Err(SaveError::Verify),
-        }
+        let written = self.sector().get(offset..offset + slot.len());
+        if written == Some(&slot[..]) { Ok(()) } else { Err(SaveError::Verify) }
     }
 
     fn sector(&self) -> &[u8] {

@@ -114,13 +114,13 @@ impl Array {
         for (((codes, tare), (gain, mask)), (out, bad)) in rows.iter().zip(&self.tare).zip(calibrations).zip(places) {
             let row = Row::of(codes, levels, config.dead_codes);
             let columns = if row.suspect {
-                let (columns, found) = row::read_suspect(codes, levels, tare, gain, *mask, config, out);
+                let (columns, found) = row::read_suspect([codes, levels], *mask, tare, gain, config, out);
                 *bad = found | mask;
                 bad_count += (found & !mask).count_ones() as u8;
                 columns
             } else {
                 *bad = *mask;
-                Columns::read(&row, tare, gain, config.sag_q32, out)
+                Columns::read(&row, 0, tare, gain, config.sag_q32, out)
             };
             peak = i32::max(peak, columns.peak);
             sum += columns.sum();
@@ -143,9 +143,9 @@ impl Array {
         let levels = &undriven.map(row::held);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.calibration.mask) {
-            let mut row = Row::of(codes, levels, config.dead_codes);
+            let row = Row::of(codes, levels, config.dead_codes);
             if row.suspect {
-                count += (row.leave_out_bad(codes, config.dead_codes) & !mask).count_ones();
+                count += (row.bad(codes, config.dead_codes) & !mask).count_ones();
             }
         }
         count

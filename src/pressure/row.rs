@@ -28,33 +28,29 @@ impl Row {
     /// Without a branch for each taxel: a sign bit a lane collects what is wrong with any of them.
     #[inline(always)]
     pub fn of(codes: &Pairs, undriven: &Pairs, dead_codes: u16) -> Self {
-        let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
-        let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
-        let mut signs = 0;
+        let mut wrong = 0;
         let mut sum = 0;
         let net = each(|place| {
             let net = lanes::sub(codes[place], undriven[place]);
-            signs |= lanes::sub(net, dead) | lanes::sub(sound, codes[place]);
+            wrong |= signs(net, codes[place], dead_codes);
             sum = lanes::dot(net, ONES, sum);
             net
         });
-        Self { net, sum, suspect: signs & lanes::SIGNS != 0 }
+        Self { net, sum, suspect: wrong & lanes::SIGNS != 0 }
     }
 
-    /// Holds every net code to what a converter can mean, and tells the bad columns, a bit each.
-    pub fn leave_out_bad(&mut self, codes: &Pairs, dead_codes: u16) -> u16 {
+    /// The bad columns, a bit each.
+    #[inline(always)]
+    pub fn bad(&self, codes: &Pairs, dead_codes: u16) -> u16 {
         let mut bad = 0;
-        self.sum = 0;
-        for (place, (net, codes)) in self.net.iter_mut().zip(codes).enumerate() {
-            let held = |net: i16| net.max(0).min(0xfff);
-            let (low, high) = (held(lanes::low(*net)), held(lanes::high(*net)));
-            *net = lanes::pair(low, high);
-            self.sum += i32::from(low) + i32::from(high);
-            let is_bad = |code: u16, net: i16| u16::from(code >= SATURATED || (net as u16) < dead_codes);
-            bad |= is_bad(*codes as u16, low) << place;
-            bad |= is_bad((*codes >> 16) as u16, high) << (place + BANK_COLUMNS);
-        }
-        bad
+        each(|place| {
+            // The low lane's sign to bit 0, the high lane's to bit 5.
+            let wrong = signs(self.net[place], codes[place], dead_codes) & lanes::SIGNS;
+            bad |= (wrong >> 15 | wrong >> (31 - BANK_COLUMNS)) << place;
+            0
+        });
+        // What the shifts leave beyond: the high lane's sign at bit 16 and up.
+        bad as u16 & ((1 << COLUMNS) - 1)
     }
 
     /// 1 / (1 - rho N) in Q22, at most 2: a row that loses half its voltage is broken, not sagging.
@@ -63,6 +59,14 @@ impl Row {
         let remaining = (u32::MAX - self.sum.unsigned_abs().saturating_mul(sag_q32)) >> 16;
         ((u32::MAX / remaining.max(1 << 15)) << 6) as i32
     }
+}
+
+/// The sign bit of each lane tells whether its taxel is dead or saturated.
+#[inline(always)]
+fn signs(net: u32, codes: u32, dead_codes: u16) -> u32 {
+    let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
+    let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
+    lanes::sub(net, dead) | lanes::sub(sound, codes)
 }
 
 /// A row's taxels, summed up.
@@ -78,15 +82,24 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// Writes the taxels of a row in sixteenths of a corrected code.
+    /// Writes the taxels of a row in sixteenths of a corrected code; zero where the column is bad.
     #[inline(always)]
-    pub fn read(row: &Row, tare: &[i32; COLUMNS], gain: &Pairs, sag_q32: u32, out: &mut [i32; COLUMNS]) -> Self {
+    pub fn read(
+        row: &Row,
+        bad: u16,
+        tare: &[i32; COLUMNS],
+        gain: &Pairs,
+        sag_q32: u32,
+        out: &mut [i32; COLUMNS],
+    ) -> Self {
         let mut columns = Self::default();
         let boost = row.sag_boost(sag_q32);
         each(|place| {
             let (net, gain) = (row.net[place], gain[place]);
-            let left = taxel(lanes::low(net), lanes::low(gain), boost, tare[place]);
-            let right = taxel(lanes::high(net), lanes::high(gain), boost, tare[place + BANK_COLUMNS]);
+            let kept = |column: usize| i32::from(bad >> column & 1) - 1;
+            let left = taxel(lanes::low(net), lanes::low(gain), boost, tare[place]) & kept(place);
+            let right = taxel(lanes::high(net), lanes::high(gain), boost, tare[place + BANK_COLUMNS])
+                & kept(place + BANK_COLUMNS);
             out[place] = left;
             out[place + BANK_COLUMNS] = right;
             columns.peak = columns.peak.max(left).max(right);
@@ -120,34 +133,22 @@ fn taxel(net: i16, gain: i16, boost_q22: i32, tare_q16: i32) -> i32 {
     boosted as i32 - (tare_q16 >> (super::TARE_BITS - super::CODE_BITS))
 }
 
-/// Reads a row with a dead or saturated taxel in it; also tells these, a bit each.
+/// Reads a row that is suspect; also tells its bad columns.
 ///
-/// Apart from the others, so that the common way keeps its numbers in registers.
+/// Apart from the others and from its codes on, so that the common way needs no mask and keeps its numbers in registers.
 #[cold]
 #[inline(never)]
 pub(super) fn read_suspect(
-    codes: &Pairs,
-    undriven: &Pairs,
+    [codes, undriven]: [&Pairs; 2],
+    mask: u16,
     tare: &[i32; COLUMNS],
     gain: &Pairs,
-    mask: u16,
     config: &Config,
     out: &mut [i32; COLUMNS],
 ) -> (Columns, u16) {
-    let mut row = Row::of(codes, undriven, config.dead_codes);
-    let bad = row.leave_out_bad(codes, config.dead_codes);
-    // With zeros for tare and gain these taxels read as nothing.
-    let left_out = bad | mask;
-    let (mut tare, mut gain) = (*tare, *gain);
-    for (column, tare) in tare.iter_mut().enumerate() {
-        *tare *= i32::from(left_out >> column & 1 == 0);
-    }
-    for (place, gain) in gain.iter_mut().enumerate() {
-        let low = if left_out >> place & 1 != 0 { 0 } else { 0xffff };
-        let high = if left_out >> (place + BANK_COLUMNS) & 1 != 0 { 0 } else { 0xffff_0000 };
-        *gain &= low | high;
-    }
-    (Columns::read(&row, &tare, &gain, config.sag_q32, out), bad)
+    let row = Row::of(codes, undriven, config.dead_codes);
+    let bad = row.bad(codes, config.dead_codes);
+    (Columns::read(&row, bad | mask, tare, gain, config.sag_q32, out), bad)
 }
 
 /// Every place in turn, written out: the compiler would keep the loop where it builds for size.

@@ -7,6 +7,10 @@
 
 #[path = "../study/call.rs"]
 mod call;
+#[path = "../study/control.rs"]
+mod control;
+#[path = "../study/fit.rs"]
+mod fit;
 #[path = "../study/force.rs"]
 mod force;
 #[path = "../study/frame.rs"]
@@ -25,6 +29,8 @@ mod rings;
 mod root;
 #[path = "../study/scalar.rs"]
 mod scalar;
+#[path = "../study/step.rs"]
+mod step;
 
 use cortex_m_semihosting::debug;
 use fingertip::config::Config;
@@ -58,6 +64,10 @@ fn main() -> ! {
         scalar::run(kernel, variants, region, &tools, &mut inputs);
     }
     frame::run(region, &config, &mut inputs);
+    fit::run("fit-clean", region, &mut inputs);
+    fit::run("fit-noise", region, &mut inputs);
+    control::run(region, &mut inputs);
+    step::run(region, &config, &mut inputs);
     loop {
         debug::exit(debug::EXIT_SUCCESS);
     }

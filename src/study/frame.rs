@@ -85,6 +85,7 @@ const VARIANTS: [(&str, Kernel, Format); 9] = [
 ];
 
 /// Measures all variants over the next section of inputs: gains, the frame without contact, frames.
+#[inline(never)]
 pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let mut bench = bench(config, inputs);

@@ -51,7 +51,11 @@ impl Frame {
             row.moment = lanes::dot(net, second[place], row.moment);
         };
         // Written out: the compiler would keep a loop where it builds for size.
-        (take(0), take(1), take(2), take(3), take(4));
+        take(0);
+        take(1);
+        take(2);
+        take(3);
+        take(4);
         row
     }
 

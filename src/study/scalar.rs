@@ -99,6 +99,7 @@ pub enum Call {
 pub type Variant = (&'static str, Call);
 
 /// Measures all variants of a kernel over the next section of inputs; the regions count on from `region`.
+#[inline(never)]
 pub fn run(kernel: &str, variants: &[Variant], region: &mut u32, tools: &Tools, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let start = inputs.place();

@@ -11,12 +11,13 @@ use std::{path::PathBuf, process::Command};
 /// The version is part of the promise that a passing check passes tomorrow.
 const CARGO_DENY: &str = "cargo-deny@0.20.2";
 /// Every feature set that is flashed, emulated or linked as a proof.
-const IMAGES: [(&str, &str); 5] = [
+const IMAGES: [(&str, &str); 6] = [
     ("firmware", "firmware"),
     ("qemu", "qemu"),
     ("panic-free", "proof"),
     ("timing", "timing"),
     ("timing-check", "timing"),
+    ("study", "study"),
 ];
 
 /// Runs all checks that are no tests.

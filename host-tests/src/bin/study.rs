@@ -57,7 +57,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
         let new = page::renewed(&old, &tables).ok_or_else(|| format!("{name} lacks the markers of its tables"))?;
         files.push((name.to_owned(), new));
     }
-    for (kernel, points) in &studied {
+    for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
         let picture = pictures::draw(kernel, points).map_err(|error| error.to_string())?;
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
@@ -70,7 +70,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
 }
 
 fn verdicts(studied: &[Studied]) {
-    for (kernel, points) in studied {
+    for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
         let (count, errors, cycles) = front::span(points);
         let beaten = front::beaten_by(points);
         let firmware = points.iter().zip(beaten).filter(|(point, _)| point.firmware);

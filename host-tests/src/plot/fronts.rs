@@ -98,11 +98,16 @@ fn range(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
     if low > high {
         return Err(PlotError("there is no point".into()));
     }
-    Ok((0.5 * low, 2.5 * high))
+    Ok((0.3 * low, 4.0 * high))
 }
 
 /// A power of ten by its exponent where it is long.
 fn power(value: &f64) -> String {
+    let leading = value / 10_f64.powf(value.log10().floor());
+    // Between the decades only 2 and 5 have room.
+    if [1.0, 2.0, 5.0, 10.0].iter().all(|shown| (leading - shown).abs() > 1e-3) {
+        return String::new();
+    }
     if (0.001..100_000.0).contains(value) { super::number(value) } else { format!("1e{}", value.log10().round()) }
 }
 
@@ -178,8 +183,10 @@ fn draw_dots(
         let at = (f64::from(places[n].0), f64::from(places[n].1));
         let half = (0.5 * LETTER_PX * dot.label.chars().count() as f64 + 3.0, 0.5 * LINE_PX + 2.0);
         // Where points crowd, a line to a label may cross what a label may not.
-        let found =
-            free_place(at, half, &taken, &leaders, &frame).or_else(|| free_place(at, half, &taken, &[], &frame));
+        let others: Vec<_> =
+            places.iter().map(|(x, y)| (f64::from(*x), f64::from(*y))).filter(|other| *other != at).collect();
+        let strict = free_place(at, half, &taken, &leaders, &others, &frame);
+        let found = strict.or_else(|| free_place(at, half, &taken, &[], &[], &frame));
         let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
         let label = Box4::around(middle.0, middle.1, half.0, half.1);
         if far > FAR_PX {
@@ -213,12 +220,18 @@ fn draw_dots(
 
 type Place = (f64, f64);
 
-/// The nearest place for a label where it and the line to it cover nothing: its distance from the point, and its middle.
+fn apart(a: Place, b: Place) -> f64 {
+    (a.0 - b.0).hypot(a.1 - b.1)
+}
+
+/// The nearest place for a label where it and the line to it cover nothing, nearer to its point than to another: its distance
+/// from the point, and its middle.
 fn free_place(
     at: Place,
     half: (f64, f64),
     taken: &[Box4],
     leaders: &[(Place, Place)],
+    others: &[Place],
     frame: &Box4,
 ) -> Option<(f64, Place)> {
     let own = Box4::around(at.0, at.1, 1.0, 1.0);
@@ -233,7 +246,8 @@ fn free_place(
             let end = label.nearest(at);
             let covers = taken.iter().any(|other| label.meets(other))
                 || leaders.iter().any(|(from, to)| label.is_crossed(*from, *to))
-                || (!leaders.is_empty()
+                || others.iter().any(|other| apart(label.nearest(*other), *other) < 1.5 * apart(end, at))
+                || (!others.is_empty()
                     && far > FAR_PX
                     && taken.iter().any(|other| !other.meets(&own) && other.is_crossed(at, end)));
             if label.lies_in(frame) && !covers {

@@ -27,7 +27,8 @@ pub fn errors(returned: &[Vec<Number>], frames: &Frames) -> Option<[[f64; 2]; 2]
         let [sum, x, y] = returned[..] else { return None };
         let ([Some(sum), Some(x), Some(y)], [exact_sum, exact_x, exact_y]) = ([sum, x, y].map(Number::real), exact)
         else {
-            (force.add(f64::NAN), centre.add(f64::NAN));
+            force.add(f64::NAN);
+            centre.add(f64::NAN);
             continue;
         };
         force.add((&sum - &exact_sum).to_f64().value() * NEWTONS_PER_CODE);

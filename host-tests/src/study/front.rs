@@ -25,9 +25,9 @@ impl Point {
         self.cost.estimate.median
     }
 
-    /// Whether it competes with the others; a closed form among sums does not.
+    /// Whether it competes with the others; a closed form among sums does not, nor what has no error.
     pub fn competes(&self) -> bool {
-        !self.name.contains("closed form")
+        !self.name.contains("closed form") && !self.error_max.is_nan()
     }
 
     /// Whether it is no worse in error and in time, and better in one.

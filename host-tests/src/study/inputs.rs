@@ -2,9 +2,14 @@
 //!
 //! From integers and the four operations alone, so that every machine makes the same.
 
+use crate::fit_cases::Scene;
+use crate::fit_statistics::{FRAMES, GOOD, Series};
 use crate::plant::{Setup, World};
+use crate::stimulus;
 use fastrand::Rng;
 use fingertip::frame::{COLUMNS, Frame, ROWS};
+use fingertip::pressure::Picture;
+use fingertip::record::Record;
 
 const SEED: u64 = 2003;
 
@@ -25,6 +30,63 @@ pub struct Inputs {
     pub rings: Vec<Pair>,
     /// Frames of contacts, and the calibration.
     pub frames: Frames,
+    /// Contacts without noise and with it, seen over and over.
+    pub fits: [Vec<Seen>; 2],
+    /// A controller's errors, -1 to 1.
+    pub control: Vec<Pair>,
+    /// The recorded stimulus.
+    pub records: Vec<Record>,
+}
+
+/// A contact and its pictures, each with noise of its own.
+pub struct Seen {
+    /// The truth.
+    pub scene: Scene,
+    /// What the array shows.
+    pub pictures: Vec<Picture>,
+}
+
+/// The series of `docs/contact.md` that are studied: none and 1 % of each reading.
+const SERIES: [usize; 2] = [0, 3];
+/// Contacts of a series.
+const CONTACTS: usize = 64;
+
+fn seen(series: &Series) -> Vec<Seen> {
+    let one = |number| {
+        let case = series.case(number);
+        let mut rng = Rng::with_seed(SEED + number as u64);
+        let mut another = || series.reading.picture(&case.pressures, case.picture.bad, &mut rng).0;
+        let pictures = (0..FRAMES).map(|frame| if frame == 0 { case.picture } else { another() }).collect();
+        Seen { scene: case.scene, pictures }
+    };
+    let mut seen: Vec<_> = (0..CONTACTS).map(one).collect();
+    seen.sort_by(|a, b| a.scene.pitch_mm.total_cmp(&b.scene.pitch_mm));
+    seen
+}
+
+/// For each pitch its cases.
+fn seen_to_bytes(seen: &[Seen]) -> Vec<u8> {
+    let mut words = vec![seen.len() as i32, FRAMES as i32];
+    for same in seen.chunk_by(|a, b| a.scene.pitch_mm == b.scene.pitch_mm) {
+        words.extend(same.first().map(|seen| (seen.scene.pitch_mm * 1e3).round() as i32));
+        words.push(same.len() as i32);
+        let pictures = same.iter().flat_map(|seen| &seen.pictures);
+        words.extend(pictures.flat_map(|picture| picture.taxels.into_iter().flatten()));
+    }
+    words.into_iter().flat_map(i32::to_le_bytes).collect()
+}
+
+/// A disturbed first-order error, so that the output runs into its slew and its limits now and then.
+fn control(rng: &mut Rng) -> Vec<Pair> {
+    let (mut error, mut push) = (0, 0);
+    let mut next = |n: usize| {
+        if n.is_multiple_of(64) {
+            push = rng.i32(-3_000..=3_000);
+        }
+        error += (push * 8 - error) / 16 + rng.i32(-300..=300);
+        [error, 0]
+    };
+    (0..2_048).map(&mut next).collect()
 }
 
 /// Frames of a contact, and what the array's calibration is.
@@ -79,6 +141,9 @@ impl Inputs {
                 .collect(),
             rings: spread(&mut rng, 32, 32_768, 327_680),
             frames: Frames::new(&mut rng),
+            fits: SERIES.map(|series| seen(&GOOD[series])),
+            control: control(&mut rng),
+            records: stimulus::records(),
         }
     }
 
@@ -86,10 +151,13 @@ impl Inputs {
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         for section in [&self.root, &self.force, &self.indentation, &self.pressure, &self.rings] {
-            bytes.extend((section.len() as u32).to_le_bytes());
-            bytes.extend(section.iter().flatten().flat_map(|word| word.to_le_bytes()));
+            bytes.extend(pairs_to_bytes(section));
         }
         bytes.extend(self.frames.to_bytes());
+        self.fits.iter().for_each(|seen| bytes.extend(seen_to_bytes(seen)));
+        bytes.extend(pairs_to_bytes(&self.control));
+        bytes.extend((self.records.len() as u32).to_le_bytes());
+        bytes.extend(self.records.iter().flat_map(Record::to_bytes));
         bytes
     }
 }
@@ -98,6 +166,11 @@ impl Default for Inputs {
     fn default() -> Self {
         Self::new()
     }
+}
+
+fn pairs_to_bytes(pairs: &[Pair]) -> Vec<u8> {
+    let words = [pairs.len() as i32].into_iter().chain(pairs.iter().flatten().copied());
+    words.flat_map(i32::to_le_bytes).collect()
 }
 
 /// A distance of 0 to 1.05 contact radii.

@@ -22,6 +22,13 @@ pub struct Kernel {
     pub why: &'static str,
 }
 
+impl Kernel {
+    /// Whether there is an error to lay against the time.
+    pub fn has_error(&self) -> bool {
+        !matches!(self.measure, Measure::Cost)
+    }
+}
+
 /// How a kernel's errors are found.
 #[derive(Clone, Copy)]
 pub enum Measure {
@@ -36,6 +43,15 @@ pub enum Measure {
     },
     /// Sum and moments of a frame.
     Frames,
+    /// A contact from pictures.
+    Fit {
+        /// Whether the pictures have noise.
+        noisy: bool,
+    },
+    /// A controller's output.
+    Control,
+    /// Only the time is of interest.
+    Cost,
 }
 
 /// All of them.
@@ -121,5 +137,46 @@ pub const KERNELS: &[Kernel] = &[
         measure: Measure::Frames,
         why: "The packed sums keep no taxel. `Array::read` leaves a reading of each, which the fit, the tare, the drift's filter, the \
             bus and the check of the picture need; and it leaves dead and saturated taxels out, not only flags them.",
+    },
+    Kernel {
+        name: "fit-clean",
+        title: "Contact from a picture, no noise",
+        text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, without noise, read to a sixteenth of a code. The efforts see one picture; \
+            *Fit* sees 90 and is judged on the last. The error is that against the simulated truth. All are the firmware's.",
+        error: "force error, N",
+        other: Some("centre error, mm"),
+        measure: Measure::Fit { noisy: false },
+        why: "",
+    },
+    Kernel {
+        name: "fit-noise",
+        title: "Contact from a picture, 1 % of noise",
+        text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, each taxel with noise of 1 % of its reading. The efforts see one picture; \
+            *Fit* sees 90 and is judged on the last. The error is that against the simulated truth. All are the firmware's.",
+        error: "force error, N",
+        other: Some("centre error, mm"),
+        measure: Measure::Fit { noisy: true },
+        why: "*One*, *Two* and *Full* read a single picture, where nothing went before. Where pictures follow each other, *Fit* takes \
+            several into each refinement: less noise for less time a frame.",
+    },
+    Kernel {
+        name: "control",
+        title: "Controller step",
+        text: "A proportional and integral controller by increments with a slew limit and an output limit that wind nothing up, y = y1 + 1.591 e - 1.53 e1, \
+            2048 steps. The error is that against the same law in arbitrary precision. What the firmware does instead, an \
+            observer and a law for the reference finger, is among the parts of the step below.",
+        error: "output error, share of the range",
+        other: None,
+        measure: Measure::Control,
+        why: "",
+    },
+    Kernel {
+        name: "step",
+        title: "The step and its parts",
+        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, and its parts over the first 3,000.",
+        error: "",
+        other: None,
+        measure: Measure::Cost,
+        why: "",
     },
 ];

@@ -31,6 +31,9 @@ pub fn markdown(studied: &[Studied]) -> String {
 
 fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
     let Kernel { name, title, text, error, other, .. } = kernel;
+    if !kernel.has_error() {
+        return costs(page, kernel, points);
+    }
     // A string takes every write.
     let _ = write!(page, "\n## {title}\n\n{text}\n\n![{title}: {error} over cycles](pictures/study-{name}.svg)\n\n");
     let (more, rule) = other.map_or((String::new(), ""), |other| (format!(" {other}, max | rms |"), " --- | --- |"));
@@ -53,7 +56,7 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
         .map(|(left, right)| format!("{left} | {right}"))
         .to_vec();
         let errors = [[*error_max, *error_rms]].into_iter().chain(*other);
-        cells.extend(errors.flatten().map(|error| figure(error)));
+        cells.extend(errors.flatten().map(figure));
         let verdict = verdict(point, by.map(|by| &points[by]));
         let _ = writeln!(page, "| {bold}{name}{bold} | {} | {verdict} |", cells.join(" | "));
     }
@@ -67,6 +70,32 @@ fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {
             page,
             "\nThe front has {count} points, {} times apart in error and {cycles:.1} times in cycles.",
             figure(errors)
+        );
+    }
+}
+
+/// A table without errors.
+fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
+    let _ = write!(
+        page,
+        "\n## {}\n\n{}\n\n\
+        | part | instructions | max | cycles: low | estimate | high | max | with flash | max |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        kernel.title, kernel.text
+    );
+    for Point { name, cost, .. } in points.iter().rev() {
+        let Cost { instructions, low, estimate, high, flash } = cost;
+        let _ = writeln!(
+            page,
+            "| {name} | {} | {} | {} | {} | {} | {} | {} | {} |",
+            instructions.median,
+            instructions.max,
+            low.median,
+            estimate.median,
+            high.median,
+            estimate.max,
+            flash.median,
+            flash.max
         );
     }
 }
@@ -102,17 +131,28 @@ pub fn readme(studied: &[Studied]) -> String {
         let beaten = beaten_by(points);
         for (point, by) in points.iter().zip(beaten).filter(|(point, _)| point.firmware) {
             let Cost { instructions, estimate, flash, .. } = point.cost;
-            let place = if by.is_none() { "front" } else { "beaten: [why](docs/study.md)" };
+            let error = match kernel.has_error() {
+                true => format!("{} ({})", figure(point.error_max), kernel.error),
+                false => String::new(),
+            };
+            if !kernel.has_error() && point.name != "Pipeline::step" {
+                continue;
+            }
+            let place = if !kernel.has_error() {
+                ""
+            } else if by.is_none() {
+                "front"
+            } else {
+                "beaten: [why](docs/study.md)"
+            };
             let _ = writeln!(
                 table,
-                "| {} | {} | {} | {} | {} | {} ({}) | {place} |",
+                "| {} | {} | {} | {} | {} | {error} | {place} |",
                 kernel.title.to_lowercase(),
                 point.name,
                 instructions.median,
                 estimate.median,
                 flash.median,
-                figure(point.error_max),
-                kernel.error
             );
         }
     }

@@ -1,0 +1,135 @@
+//! The loop as it is, over the recorded stimulus: the whole step and its parts.
+
+use super::call::pass_on;
+use super::host::{Inputs, say};
+use fingertip::config::Config;
+use fingertip::contact;
+use fingertip::control::SpeedLoop;
+use fingertip::control::goal::Goal;
+use fingertip::control::profile::Reference;
+use fingertip::pipeline::{Contact, Pipeline, Status};
+use fingertip::pressure::{Array, Picture};
+use fingertip::record::Record;
+use fingertip::safety::{Limits, Mode};
+use fingertip::units::Duty;
+
+/// What the parts read and write.
+struct Bench<'a> {
+    config: &'a Config,
+    record: Record,
+    pipeline: Pipeline,
+    outcome: (Duty, Status),
+    array: Array,
+    picture: Picture,
+    contact: Contact,
+    motion: SpeedLoop,
+    goal: Goal,
+    reference: Reference,
+    limits: Limits,
+    wanted: i64,
+}
+
+type Kernel = extern "C" fn(&mut Bench);
+
+/// Places of parts.
+const STEP: usize = 0;
+const OBSERVER: usize = 3;
+/// Records that the parts see at most; the step sees all.
+const PART_RECORDS: i32 = 3_000;
+
+/// The part, and whether it runs only while the loop drives the motor.
+const PARTS: [(&str, Kernel, bool); 7] = [
+    ("**Pipeline::step**", step, false),
+    ("**Array::read**", read, false),
+    ("**contact::from_sums**", sums, false),
+    ("**observer**", observe, true),
+    ("**goal and profile**", reference, true),
+    ("**speed law with limits**", follow, true),
+    ("**limits alone, Drive::apply**", apply, true),
+];
+
+extern "C" fn step(bench: &mut Bench) {
+    let Record { frame, sense, command } = &bench.record;
+    bench.outcome = bench.pipeline.step(frame, sense, command);
+}
+
+extern "C" fn read(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.config);
+}
+
+extern "C" fn sums(bench: &mut Bench) {
+    bench.contact = contact::from_sums(&bench.picture, bench.config);
+}
+
+extern "C" fn observe(bench: &mut Bench) {
+    bench.motion.observe(bench.record.sense.encoder, bench.config);
+}
+
+extern "C" fn reference(bench: &mut Bench) {
+    let Bench { config, record, contact, motion, goal, limits, .. } = bench;
+    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, config, limits);
+}
+
+extern "C" fn follow(bench: &mut Bench) {
+    let supply_mv = bench.record.sense.supply_mv;
+    bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
+}
+
+extern "C" fn apply(bench: &mut Bench) {
+    let supply_mv = bench.record.sense.supply_mv;
+    bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
+}
+
+/// Replays the next section's records, once for each part.
+#[inline(never)]
+pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
+    let [count] = inputs.words();
+    let start = inputs.place();
+    for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
+        say(format_args!("region {region} step: {name}"));
+        inputs.seek(start);
+        let mut bench = Bench {
+            config,
+            record: Record::from_bytes(&[0; Record::BYTES]),
+            pipeline: Pipeline::new(config),
+            outcome: Default::default(),
+            array: Array::new(),
+            picture: Picture::EMPTY,
+            contact: Contact::default(),
+            motion: SpeedLoop::new(),
+            goal: Goal::default(),
+            reference: Reference::default(),
+            limits: Limits::default(),
+            wanted: 0,
+        };
+        let count = if part == STEP { count } else { count.min(PART_RECORDS) };
+        for n in 0..count {
+            let mut bytes = [0; Record::BYTES];
+            inputs.read(&mut bytes);
+            bench.record = Record::from_bytes(&bytes);
+            if part == STEP {
+                pass_on(*region, step, &mut bench);
+                continue;
+            }
+            step(&mut bench);
+            let (_, status) = bench.outcome;
+            let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
+            bench.array = bench.pipeline.array().clone();
+            bench.picture = *bench.pipeline.array().picture();
+            bench.contact = status.contact;
+            bench.wanted = i64::from(n) * 7_919 % 200_000_000 - 100_000_000;
+            if drives {
+                // What the measured part builds on.
+                for before in [OBSERVER, OBSERVER + 1].into_iter().filter(|before| *before != part) {
+                    PARTS[before].1(&mut bench);
+                }
+            } else {
+                bench.motion = SpeedLoop::new();
+            }
+            if drives || !driving {
+                pass_on(*region, kernel, &mut bench);
+            }
+        }
+        *region += 1;
+    }
+}

@@ -136,9 +136,12 @@ impl Scan {
 fn copy_slots(half: usize, slots: usize, frame: &mut Frame) {
     let banks = BUFFERS[0][half].iter().zip(&BUFFERS[1][half]);
     for (pairs, (bank_a, bank_b)) in frame.pairs.iter_mut().zip(banks).take(slots) {
-        for (pair, (low, high)) in pairs.iter_mut().zip(bank_a.iter().zip(bank_b)) {
-            *pair = u32::from(low.load(Ordering::Relaxed)) | u32::from(high.load(Ordering::Relaxed)) << 16;
-        }
+        // Written out: the compiler would keep a loop of five.
+        let pair = |place: usize| {
+            let (low, high) = (bank_a[place].load(Ordering::Relaxed), bank_b[place].load(Ordering::Relaxed));
+            u32::from(low) | u32::from(high) << 16
+        };
+        *pairs = [pair(0), pair(1), pair(2), pair(3), pair(4)];
     }
     fence(Ordering::Acquire);
 }

@@ -11,3 +11,5 @@ pub mod kernels;
 pub mod output;
 pub mod page;
 pub mod pictures;
+pub mod scan;
+pub mod simulation;

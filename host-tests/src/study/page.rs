@@ -3,6 +3,7 @@
 use super::front::{Point, beaten_by, span};
 use super::kernels::Kernel;
 use super::output::Cost;
+use super::{scan, simulation};
 use std::fmt::Write as _;
 
 /// Where the tables begin in `docs/study.md` and in the README.
@@ -26,7 +27,7 @@ pub fn markdown(studied: &[Studied]) -> String {
     for (kernel, points) in studied {
         section(&mut page, kernel, points);
     }
-    page
+    page + &scan::markdown() + &simulation::markdown()
 }
 
 fn section(page: &mut String, kernel: &Kernel, points: &[Point]) {

@@ -1,0 +1,103 @@
+//! What the scan's settings cost in frame rate and gain in crosstalk and noise, by the board's electrical model.
+
+use super::page::figure;
+use crate::plant::Setup;
+use crate::plant::readout::decay;
+use crate::plant::setup::Array;
+use fingertip::frame::TAXELS;
+use fingertip::scan::{ScanTiming, TICKS_PER_ADC_CYCLE, TIMER_HZ};
+use std::fmt::Write as _;
+
+/// Noise of a conversion, codes: assumed, as the simulated converters have none.
+const NOISE_CODES: f64 = 1.0;
+/// The converter's resistance and capacitance with the largest source for which 15 cycles are meant: 6 kOhm, 10 kOhm, 4 pF.
+const SAMPLING_TAU_S: f64 = (6e3 + 10e3) * 4e-12;
+/// Force of a code on a taxel, mN.
+const MN_PER_CODE: f64 = 1.5 * 1.5 / 24.0;
+
+/// Settle time in ns, sampling time in converter cycles, frames averaged.
+type Setting = (u32, u16, u32);
+const DEFAULT: Setting = (ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES, 1);
+const SETTINGS: [Setting; 14] = [
+    (600, 3, 1),
+    (600, 15, 1),
+    (1_200, 15, 1),
+    (1_800, 15, 1),
+    (2_400, 3, 1),
+    DEFAULT,
+    (2_400, 28, 1),
+    (2_400, 56, 1),
+    (3_600, 15, 1),
+    (4_800, 15, 1),
+    (2_400, 15, 2),
+    (2_400, 15, 4),
+    (2_400, 15, 16),
+    (4_800, 56, 16),
+];
+
+struct Row {
+    setting: Setting,
+    rate_hz: f64,
+    row: f64,
+    column: f64,
+    noise_codes: f64,
+}
+
+impl Row {
+    fn of(setting: Setting, array: &Array) -> Option<Self> {
+        let (settle_ns, sample_cycles, frames) = setting;
+        let timing = ScanTiming::new(settle_ns, sample_cycles).ok()?;
+        let cycle_s = f64::from(TICKS_PER_ADC_CYCLE) / f64::from(TIMER_HZ);
+        let sampling_s = (f64::from(sample_cycles) - 0.5) * cycle_s;
+        Some(Self {
+            setting,
+            rate_hz: 1e9 / f64::from(timing.frame_ns()) / f64::from(frames),
+            row: decay(f64::from(settle_ns) * 1e-9 / array.settle_tau_s),
+            column: decay(sampling_s / SAMPLING_TAU_S),
+            noise_codes: NOISE_CODES / f64::from(frames).sqrt(),
+        })
+    }
+
+    /// The largest error of a taxel beside a saturated one: crosstalk of a full range, and noise.
+    fn error_codes(&self) -> f64 {
+        Array::CODES * (self.row + self.column) + self.noise_codes
+    }
+
+    fn beats(&self, other: &Self) -> bool {
+        let (mine, theirs) = (self.error_codes(), other.error_codes());
+        self.rate_hz >= other.rate_hz && mine <= theirs && (self.rate_hz > other.rate_hz || mine < theirs)
+    }
+}
+
+/// The table.
+pub fn markdown() -> String {
+    let array = Setup::default().array;
+    let mut rows: Vec<_> = SETTINGS.into_iter().filter_map(|setting| Row::of(setting, &array)).collect();
+    rows.sort_by(|a, b| b.rate_hz.total_cmp(&a.rate_hz));
+    let mut page = String::from(
+        "\n## Scan settings\n\nBy the board's electrical model, not by running code: a row's edge settles with tau = 0.2 us, which leaves a share of the row \
+        before; the converter's capacitor (4 pF behind 6 kOhm and a source of 10 kOhm) keeps a share of the column before. A conversion's noise is \
+        **assumed** to be 1 code rms. *Error* is that of a taxel beside a saturated one, crosstalk and noise added; the force's noise is that of \
+        the sum of 100 taxels. Bold is the default.\n\n\
+        | settle, us | sampling, cycles | frames averaged | results a second | of the row before | of the column before | noise, codes rms | \
+        error, codes | force noise, mN rms | |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+    );
+    for row in &rows {
+        let (settle_ns, sample_cycles, frames) = row.setting;
+        let bold = if row.setting == DEFAULT { "**" } else { "" };
+        let place = if rows.iter().any(|other| other.beats(row)) { "beaten" } else { "front" };
+        // A string takes every write.
+        let _ = writeln!(
+            page,
+            "| {bold}{}{bold} | {bold}{sample_cycles}{bold} | {frames} | {:.0} | {} | {} | {} | {} | {} | {place} |",
+            f64::from(settle_ns) * 1e-3,
+            row.rate_hz,
+            figure(row.row),
+            figure(row.column),
+            figure(row.noise_codes),
+            figure(row.error_codes()),
+            figure(row.noise_codes * MN_PER_CODE * (TAXELS as f64).sqrt()),
+        );
+    }
+    page
+}

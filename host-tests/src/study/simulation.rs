@@ -1,0 +1,145 @@
+//! What the simulation's own accuracy costs: the plant's integrator and step, and the points at which a taxel's pressure is taken.
+
+use super::page::figure;
+use crate::plant::cells::Cell;
+use crate::plant::{Bridge, Setup, World};
+use core::f64::consts::TAU;
+use fingertip::frame::{COLUMNS, ROWS};
+use std::fmt::Write as _;
+use std::time::Instant;
+
+/// Steps, us; each is a divisor of [`SAMPLE_US`].
+const STEPS_US: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+/// The reference's.
+const FINEST_US: f64 = 0.1;
+const SAMPLE_US: f64 = 100.0;
+/// Instants that are compared: the tip runs into the wall, is held, is driven off.
+const SAMPLES: usize = 1_000;
+/// Points along a taxel's side.
+const POINTS: [usize; 5] = [1, 2, 4, 8, 16];
+const FINEST_POINTS: usize = 200;
+const DEPTHS_MM: [f64; 3] = [0.5, 2.0, 4.0];
+
+/// The tables; how long each took beside the usual one is only printed, as it is not the same twice.
+pub fn markdown() -> String {
+    let mut page = String::from(
+        "\n## The simulation\n\nThe plant: a tip driven into the wall, held and driven off, 100 ms. The error is that of the contact force against steps of 0.1 us. \
+        *Plant* is the simulation's own integrator, of second order; *Euler* takes speed, then angle, from the same torques. Wall time goes \
+        with the steps: `cargo xtask study` prints the ratios. Bold is what the tests use.\n\n\
+        | integrator | step, us | steps | force error, N, max |\n| --- | --- | --- | --- |\n",
+    );
+    let exact = forces(FINEST_US, plant);
+    let integrators: [(&str, Integrator); 2] = [("plant", plant), ("Euler", euler)];
+    let mut usual_s = 0.0;
+    let mut lines = Vec::new();
+    for (name, integrator) in integrators {
+        for step_us in STEPS_US {
+            let started = Instant::now();
+            let forces = forces(step_us, integrator);
+            let taken_s = started.elapsed().as_secs_f64();
+            let usual = name == "plant" && step_us == 10.0;
+            usual_s = if usual { taken_s } else { usual_s };
+            let error = largest(&forces, &exact);
+            let bold = if usual { "**" } else { "" };
+            let steps = (SAMPLES as f64 * SAMPLE_US / step_us).round();
+            // A string takes every write.
+            let _ = writeln!(page, "| {bold}{name}{bold} | {bold}{step_us}{bold} | {steps} | {} |", figure(error));
+            lines.push((format!("{name}, {step_us} us"), taken_s));
+        }
+    }
+    page.push_str(
+        "\nThe contact: the mean pressure on a taxel by n x n points, against 200 x 200, over all taxels of contacts of 0.5, 2 and 4 mm; \
+        *Gauss* is the simulation's own rule, which cuts taxels at the rim.\n\n\
+        | rule | points a taxel | error of a taxel, kPa, max | error of the force, N, max |\n| --- | --- | --- | --- |\n",
+    );
+    let exact: Vec<_> =
+        DEPTHS_MM.iter().map(|d| array(*d, &|cell, setup| sampled(cell, setup, *d, FINEST_POINTS))).collect();
+    let mut row = |name: &str, points: String, of: &dyn Fn(&Cell, &Setup, f64) -> f64| {
+        let started = Instant::now();
+        let seen: Vec<_> = DEPTHS_MM.iter().map(|d| array(*d, &|cell, setup| of(cell, setup, *d))).collect();
+        lines.push((format!("{name}, {points} points"), started.elapsed().as_secs_f64()));
+        let worst = seen.iter().zip(&exact).map(|(seen, exact)| largest(seen, exact)).fold(0.0, f64::max);
+        let force = |kpa: &[f64]| kpa.iter().sum::<f64>() * 1.5 * 1.5 * 1e-3;
+        let closed = |d: &f64| Setup::default().tip.force_n(*d);
+        // The deepest contact reaches beyond the array: only the others have a force to compare with.
+        let forces = seen.iter().zip(&DEPTHS_MM).take(2).map(|(seen, d)| (force(seen) - closed(d)).abs());
+        let _ = writeln!(page, "| {name} | {points} | {} | {} |", figure(worst), figure(forces.fold(0.0, f64::max)));
+    };
+    for points in POINTS {
+        row("midpoints", (points * points).to_string(), &|cell, setup, d| sampled(cell, setup, d, points));
+    }
+    row("**Gauss**", "9; 15 a strip at the rim".into(), &|cell, setup, d| cell.mean_kpa(&setup.tip.flattened(d)));
+    for (name, taken_s) in lines {
+        println!("{name:<40} {:>8.2} times the wall time of the plant at 10 us", taken_s / usual_s);
+    }
+    page
+}
+
+type Integrator = fn(&mut State, f64, Bridge);
+
+/// The plant's world, and the plain integrator's angle and speed.
+struct State {
+    world: World,
+    angle_rad: f64,
+    speed_rad_per_s: f64,
+}
+
+fn plant(state: &mut State, dt_s: f64, bridge: Bridge) {
+    state.world.advance(dt_s, bridge);
+}
+
+fn euler(state: &mut State, dt_s: f64, bridge: Bridge) {
+    let Bridge::Driven { duty } = bridge else { return };
+    let Setup { tip, wall, motor, transmission, supply, .. } = state.world.setup();
+    let mm_per_rad = transmission.drum_radius_mm / transmission.ratio;
+    let depth = (state.angle_rad * mm_per_rad - wall.distance_mm).max(0.0);
+    let load = tip.force_n(depth) * mm_per_rad * 1e-3;
+    let back_emf = motor.torque_nm_per_a * state.speed_rad_per_s;
+    let current = (duty * supply.source_v - back_emf) / supply.circuit_ohm(motor, duty);
+    let free = motor.torque_nm_per_a * current - load;
+    let friction = motor.friction_nm + (1.0 / transmission.efficiency - 1.0) * load;
+    let reach = friction * dt_s / motor.inertia_kg_m2;
+    let speed = state.speed_rad_per_s + free * dt_s / motor.inertia_kg_m2;
+    // Friction takes speed away, but does not turn it round.
+    state.speed_rad_per_s = speed - speed.max(-reach).min(reach);
+    state.angle_rad += state.speed_rad_per_s * dt_s;
+    state.world.place(state.angle_rad * mm_per_rad);
+}
+
+/// The contact force at each instant.
+fn forces(step_us: f64, integrator: Integrator) -> Vec<f64> {
+    let mut state = State { world: World::new(&Setup::default()), angle_rad: 0.0, speed_rad_per_s: 0.0 };
+    let steps = (SAMPLE_US / step_us).round() as usize;
+    let at = |sample: usize| {
+        let duty = match sample * 10 / SAMPLES {
+            0..5 => 0.5,
+            5..8 => 0.2,
+            _ => -0.5,
+        };
+        for _ in 0..steps {
+            integrator(&mut state, step_us * 1e-6, Bridge::Driven { duty });
+        }
+        state.world.force_n()
+    };
+    (0..SAMPLES).map(at).collect()
+}
+
+/// All taxels of a contact near the array's middle.
+fn array(d_mm: f64, of: &dyn Fn(&Cell, &Setup) -> f64) -> Vec<f64> {
+    let mut setup = Setup::default();
+    (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (d_mm / TAU, d_mm / 10.0);
+    let places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+    places.map(|(row, column)| of(&Cell::of(&setup, row, column), &setup)).collect()
+}
+
+fn sampled(cell: &Cell, setup: &Setup, d_mm: f64, points: usize) -> f64 {
+    let tip = setup.tip.flattened(d_mm);
+    let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / points as f64;
+    let places = (0..points).flat_map(|i| (0..points).map(move |j| (i, j)));
+    let sum: f64 = places.map(|(i, j)| tip.pressure_kpa(at(cell.x_mm, i).powi(2) + at(cell.y_mm, j).powi(2))).sum();
+    sum / (points * points) as f64
+}
+
+fn largest(values: &[f64], exact: &[f64]) -> f64 {
+    values.iter().zip(exact).map(|(value, exact)| (value - exact).abs()).fold(0.0, f64::max)
+}

@@ -61,6 +61,28 @@ fn no_register_takes_a_value_out_of_its_range() {
     assert!(tried > 400, "{tried} values tried");
 }
 
+/// All that two bytes can hold, not only the edges.
+#[test]
+fn no_register_of_two_bytes_takes_any_value_out_of_its_range() {
+    let mut bench = Bench::new();
+    let mut tried = 0;
+    for register in REGISTERS.iter().filter(|register| register.access != Access::ReadOnly) {
+        if register.kind.width() > 2 {
+            continue;
+        }
+        for value in -(1i64 << 15)..1 << 16 {
+            if let Some(data) = bytes(register, value)
+                && !(register.min..=register.max).contains(&value)
+            {
+                refuses(&mut bench, register.address, &data, StatusError::Range, register.name);
+                tried += 1;
+            }
+        }
+    }
+    println!("{tried} values refused");
+    assert!(tried > 1_500, "{tried} values tried");
+}
+
 #[test]
 fn no_read_only_register_takes_anything() {
     let mut bench = Bench::new();

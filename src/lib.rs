@@ -1,8 +1,9 @@
 //! The fingertip controller's core: one frame of a 10 x 10 tactile array in, one motor duty out.
 //!
 //! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
-//! Nothing here knows hardware, allocates, panics or uses floating point after configuration, so the same code runs on
-//! the host, under an emulator and on the microcontroller, and gives the same bits.
+//! Nothing here knows hardware, allocates, panics or, after configuration, uses floating point but for the first guess of a
+//! [`root`], which is then set right in integers. So the same code runs on the host, under an emulator and on the
+//! microcontroller, and gives the same bits.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

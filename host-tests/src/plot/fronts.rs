@@ -186,7 +186,9 @@ fn draw_dots(
         let others: Vec<_> =
             places.iter().map(|(x, y)| (f64::from(*x), f64::from(*y))).filter(|other| *other != at).collect();
         let strict = free_place(at, half, &taken, &leaders, &others, &frame);
-        let found = strict.or_else(|| free_place(at, half, &taken, &[], &[], &frame));
+        let found = strict
+            .or_else(|| free_place(at, half, &taken, &leaders, &[], &frame))
+            .or_else(|| free_place(at, half, &taken, &[], &[], &frame));
         let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
         let label = Box4::around(middle.0, middle.1, half.0, half.1);
         if far > FAR_PX {

@@ -4,11 +4,11 @@ use super::{Area, FAINT, FONT, INK, LABEL_PX, PlotError, TITLE_PX, failed, pictu
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-const WIDTH_PX: u32 = 900;
+const WIDTH_PX: u32 = 1_000;
 const HEIGHT_PX: u32 = 560;
 /// More points than this make the picture higher, by so much each.
 const POINTS_MAX: usize = 12;
-const POINT_PX: u32 = 12;
+const POINT_PX: u32 = 20;
 /// Width of a letter and height of a line, generously.
 const LETTER_PX: f64 = 0.5 * LABEL_PX as f64;
 const LINE_PX: f64 = 1.1 * LABEL_PX as f64;
@@ -98,7 +98,7 @@ fn range(values: impl Iterator<Item = f64>) -> Result<(f64, f64), PlotError> {
     if low > high {
         return Err(PlotError("there is no point".into()));
     }
-    Ok((0.3 * low, 4.0 * high))
+    Ok((0.2 * low, 4.0 * high))
 }
 
 /// A power of ten by its exponent where it is long.
@@ -185,10 +185,9 @@ fn draw_dots(
         // Where points crowd, a line to a label may cross what a label may not.
         let others: Vec<_> =
             places.iter().map(|(x, y)| (f64::from(*x), f64::from(*y))).filter(|other| *other != at).collect();
-        let strict = free_place(at, half, &taken, &leaders, &others, &frame);
-        let found = strict
-            .or_else(|| free_place(at, half, &taken, &leaders, &[], &frame))
-            .or_else(|| free_place(at, half, &taken, &[], &[], &frame));
+        let found = [(&others[..], Some(&leaders[..])), (&[], Some(&leaders)), (&[], None)]
+            .into_iter()
+            .find_map(|(others, lines)| free_place(at, half, &taken, lines, others, &frame));
         let (far, middle) = found.ok_or_else(|| PlotError(format!("no room for the label {}", dot.label)))?;
         let label = Box4::around(middle.0, middle.1, half.0, half.1);
         if far > FAR_PX {
@@ -232,7 +231,7 @@ fn free_place(
     at: Place,
     half: (f64, f64),
     taken: &[Box4],
-    leaders: &[(Place, Place)],
+    leaders: Option<&[(Place, Place)]>,
     others: &[Place],
     frame: &Box4,
 ) -> Option<(f64, Place)> {
@@ -247,9 +246,9 @@ fn free_place(
             let label = Box4::around(middle.0, middle.1, half.0, half.1);
             let end = label.nearest(at);
             let covers = taken.iter().any(|other| label.meets(other))
-                || leaders.iter().any(|(from, to)| label.is_crossed(*from, *to))
+                || leaders.into_iter().flatten().any(|(from, to)| label.is_crossed(*from, *to))
                 || others.iter().any(|other| apart(label.nearest(*other), *other) < 1.5 * apart(end, at))
-                || (!others.is_empty()
+                || (leaders.is_some()
                     && far > FAR_PX
                     && taken.iter().any(|other| !other.meets(&own) && other.is_crossed(at, end)));
             if label.lies_in(frame) && !covers {

@@ -1,7 +1,7 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
 use host_tests::fit_tables::{CASES, markdown, renewed};
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -40,9 +40,12 @@ fn run() -> Result<(), String> {
             other => return Err(format!("unknown argument {other}: {USAGE}")),
         }
     }
+    // A log wants the results only.
+    let live = io::stderr().is_terminal();
     let shown = Mutex::new(Instant::now());
     let tables = markdown(cases, &|name, done| {
-        if let Ok(mut shown) = shown.try_lock()
+        if live
+            && let Ok(mut shown) = shown.try_lock()
             && shown.elapsed() > Duration::from_millis(500)
         {
             *shown = Instant::now();
@@ -51,7 +54,9 @@ fn run() -> Result<(), String> {
             let _ = io::stderr().flush();
         }
     });
-    eprint!("\r{:60}\r", "");
+    if live {
+        eprint!("\r{:60}\r", "");
+    }
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/contact.md");
     let renew = || -> Result<(String, String), String> {
         let old = std::fs::read_to_string(&file).map_err(|error| format!("docs/contact.md: {error}"))?;

@@ -3,7 +3,7 @@
 //! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold. `--write` puts
 //! these figures into `docs/model.md`, `--check` fails where they are stale there.
 
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
@@ -98,9 +98,12 @@ struct Report {
 impl Report {
     fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
         println!("{title}");
+        // A log wants the results only.
+        let live = io::stderr().is_terminal();
         let shown = Mutex::new(Instant::now());
         let progress = |done: u64, of: u64| {
-            if let Ok(mut shown) = shown.try_lock()
+            if live
+                && let Ok(mut shown) = shown.try_lock()
                 && shown.elapsed() > Duration::from_millis(500)
             {
                 *shown = Instant::now();
@@ -110,7 +113,9 @@ impl Report {
             }
         };
         let tallies = judge(&progress);
-        eprint!("\r");
+        if live {
+            eprint!("\r");
+        }
         for tally in &tallies {
             println!("  {tally}");
             self.inputs += tally.inputs;

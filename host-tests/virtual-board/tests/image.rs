@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::{WAIT_NS, image};
+use common::{WAIT_NS, holding, image};
+use fingertip::link::table::{REGISTERS, address};
+use fingertip::params::Params;
 use host_tests::plant::{Setup, World};
 use virtual_board::{Options, Rig};
 
@@ -108,4 +110,24 @@ fn the_crate_dynamixel2_is_understood() {
         .expect("the client runs");
     assert_eq!(ping, 1);
     assert!(unknown, "nobody has ID 7");
+}
+
+#[test]
+fn at_least_half_of_the_stack_is_never_used() {
+    let mut rig = holding();
+    // The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a configuration, and
+    // everything saved.
+    let read = |bus: &mut virtual_board::client::Client| {
+        for register in REGISTERS {
+            bus.read(1, register.address, register.bytes()).expect("it answers");
+        }
+        bus.write_u8(1, address::TORQUE_ENABLE, 0).expect("it obeys");
+        bus.write_u32(1, address::PARAMS, Params::DEFAULT.to_array()[0].unsigned_abs()).expect("it obeys");
+        bus.write_u8(1, address::SAVE_PARAMETERS, 1).expect("it obeys");
+    };
+    rig.client(WAIT_NS, read).expect("the client runs");
+    rig.run_ms(50).expect("it runs");
+    let stack = rig.stack_use().expect("it runs").expect("the image tells where its stack lies");
+    println!("stack: {} of {} bytes used", stack.used, stack.size);
+    assert!(stack.used > 2_000 && 2 * stack.used <= stack.size, "{stack:?}");
 }

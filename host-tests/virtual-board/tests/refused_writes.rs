@@ -83,7 +83,8 @@ fn no_register_takes_a_value_out_of_its_range() {
         let mut rig = holding();
         if !torque {
             write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-            rig.run_ms(50).expect("it runs");
+            // The contact pushes the coasting tip back, and friction takes its time to stop it.
+            rig.run_ms(500).expect("it runs");
         }
         let mode = read_u8(&mut rig, address::PRESENT_MODE);
         let before = settings(&mut rig);

@@ -32,9 +32,9 @@ pub use particle::{force_on, pressure_of, strain_of};
 pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 pub use tilt::{Displacement, Load};
 
-use crate::root::floor_sqrt;
+use crate::root::{Square, nearest_root, root_below};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
-use arith::{Gain, root, square};
+use arith::{Gain, square};
 
 /// The smallest tip radius a.
 pub const RADIUS_MIN: Millimetres = Millimetres::from_bits(4 << 24);
@@ -83,8 +83,8 @@ pub struct Tip {
     force_max: Newtons,
     /// Newtons from a squared length in Q48: pi Y.
     force_gain: Gain,
-    /// Four times the squared length in Q48 from newtons: 4/(pi Y).
-    area_gain: Gain,
+    /// A sixteenth of the squared length in Q48 from newtons, Q32: 1/(16 pi Y).
+    area_gain_q32: u64,
     /// Newtons a millimetre from millimetres: 2 pi Y.
     stiffness_gain: Gain,
     /// Four times the squared stiffness from newtons: 16 pi Y.
@@ -117,7 +117,7 @@ impl Tip {
             depth_max: Millimetres::from_bits(depth_max_bits as i32),
             force_max: Newtons::ZERO,
             force_gain: Gain::new(pi_y_q98, 98 + 48),
-            area_gain: Gain::new(inverse_pi_y_q110, 110 - 48 - 2),
+            area_gain_q32: (inverse_pi_y_q110 >> (110 - 48 + 4 - 32 - 1)).div_ceil(2) as u64,
             stiffness_gain: Gain::new(pi_y_q98, 98 + 24 - 1),
             square_gain: Gain::new(pi_y_q98, 98 - 4),
         };
@@ -158,15 +158,24 @@ impl Tip {
     /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
     pub fn indentation(&self, force: Newtons) -> Millimetres {
         let force_bits = force.max(Newtons::ZERO).min(self.force_max).to_bits().unsigned_abs();
-        let twice = floor_sqrt(self.area_gain.floor(u64::from(force_bits)));
-        Millimetres::from_bits(twice.div_ceil(2) as i32).min(self.depth_max)
+        let [gain, gain_fraction] = [(self.area_gain_q32 >> 32) as u32, self.area_gain_q32 as u32];
+        // A sixteenth of d^2, modulo 2^32, with 32 bits after the point.
+        let fraction = u64::from(force_bits) * u64::from(gain_fraction);
+        let sixteenth = force_bits.wrapping_mul(gain).wrapping_add((fraction >> 32) as u32);
+        let last = sixteenth << 4 | fraction as u32 >> 28;
+        let root = nearest_root(root_below(force_bits, gain), Square { sixteenth, last });
+        Millimetres::from_bits(root as i32).min(self.depth_max)
     }
 
     /// Radius of the contact, `r_c = sqrt(d (2a - d))` (eq. 5, 6).
     ///
     /// Correctly rounded for every input. `d` counts as within 0 to [`Tip::depth_max`].
     pub fn contact_radius(&self, d: Millimetres) -> Millimetres {
-        Millimetres::from_bits(root(self.contact_square(self.depth(d))) as i32)
+        let depth = self.depth(d);
+        let other = 2 * self.radius.to_bits().unsigned_abs() - depth;
+        let square = u64::from(depth) * u64::from(other);
+        let square = Square { sixteenth: (square >> 4) as u32, last: square as u32 };
+        Millimetres::from_bits(nearest_root(root_below(depth, other) >> 2, square) as i32)
     }
 
     /// Stiffness at an indentation, `k = dF/dd = 2 pi Y d`.

@@ -58,12 +58,19 @@ pub mod portable {
         // Each operation is rounded as IEEE 754 demands, as on the target; the scale is a power of two.
         ((x as f32).sqrt() * 65_536.0) as u32
     }
+
+    /// See [`super::near_root_of_product`].
+    #[cfg(not(target_os = "none"))]
+    #[inline(always)]
+    pub fn near_root_of_product(x: u32, y: u32) -> u32 {
+        (x as f32 * y as f32).sqrt() as u32
+    }
 }
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub use instructions::{dot, near_root, sub};
+pub use instructions::{dot, near_root, near_root_of_product, sub};
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
-pub use portable::{dot, near_root, sub};
+pub use portable::{dot, near_root, near_root_of_product, sub};
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod instructions {
@@ -95,18 +102,36 @@ mod instructions {
     #[inline(always)]
     pub fn near_root(x: u32) -> u32 {
         let root;
-        // SAFETY: reads and writes registers only. s0 is put back, as stable Rust cannot name it as used on this target; the
-        // FPU's sticky flags are read nowhere.
+        // SAFETY: reads and writes registers only; s0 is named as changed. The FPU's sticky flags are read nowhere.
         unsafe {
             asm!(
-                "vmov {kept}, s0",
                 "vmov s0, {x}",
                 "vcvt.f32.u32 s0, s0",
                 "vsqrt.f32 s0, s0",
                 "vcvt.u32.f32 s0, s0, #16",
                 "vmov {x}, s0",
-                "vmov s0, {kept}",
-                x = inlateout(reg) x => root, kept = out(reg) _, options(pure, nomem, nostack),
+                x = inlateout(reg) x => root, out("s0") _, options(pure, nomem, nostack),
+            );
+        }
+        root
+    }
+
+    /// sqrt(x y), to within 2.5 x 2^-24 of itself and rounded down to an integer (VMUL and VSQRT, in single precision).
+    #[inline(always)]
+    pub fn near_root_of_product(x: u32, y: u32) -> u32 {
+        let root;
+        // SAFETY: as above, with s1.
+        unsafe {
+            asm!(
+                "vmov s0, {x}",
+                "vmov s1, {y}",
+                "vcvt.f32.u32 s0, s0",
+                "vcvt.f32.u32 s1, s1",
+                "vmul.f32 s0, s0, s1",
+                "vsqrt.f32 s0, s0",
+                "vcvt.u32.f32 s0, s0",
+                "vmov {x}, s0",
+                x = inlateout(reg) x => root, y = in(reg) y, out("s0") _, out("s1") _, options(pure, nomem, nostack),
             );
         }
         root
@@ -139,5 +164,20 @@ mod tests {
         }
         assert!(worst < 1.0 / 8_388_608.0 && worst > 1.0 / 33_554_432.0, "{worst:e}");
         assert_eq!(portable::near_root(u32::MAX), u32::MAX, "saturated");
+    }
+
+    #[test]
+    fn the_near_root_of_a_product_is_near() {
+        let mut worst = 0.0_f64;
+        for x in (1 << 30..=u32::MAX).step_by(6_555_537).chain([u32::MAX]) {
+            for y in (1 << 26..=u32::MAX).step_by(6_550_537).chain([u32::MAX]) {
+                let exact = (f64::from(x) * f64::from(y)).sqrt();
+                let [low, high] = [0.0, 1.0].map(|more| (f64::from(portable::near_root_of_product(x, y)) + more - exact) / exact);
+                worst = worst.max(low).max(-high);
+            }
+        }
+        let unit = 1.0 / 16_777_216.0;
+        assert!(worst < 2.5 * unit && worst > unit, "{worst:e}");
+        assert_eq!([(0, 9), (9, 0), (3, 3), (3, 5)].map(|(x, y)| portable::near_root_of_product(x, y)), [0, 0, 3, 3]);
     }
 }

@@ -32,7 +32,7 @@ pub use particle::{force_on, pressure_of, strain_of};
 pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 pub use tilt::{Displacement, Load};
 
-use crate::root::{Square, nearest_root, root_below};
+use crate::root::{nearest_root, root_below};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
 use arith::{Gain, square};
 
@@ -81,6 +81,8 @@ pub struct Tip {
     modulus: Kilopascals,
     depth_max: Millimetres,
     force_max: Newtons,
+    /// The indentation at `force_max`; past `depth_max` by the rounding of that at most, and cut to it.
+    deepest: Millimetres,
     /// Newtons from a squared length in Q48: pi Y.
     force_gain: Gain,
     /// A sixteenth of the squared length in Q48 from newtons, Q32: 1/(16 pi Y).
@@ -116,12 +118,14 @@ impl Tip {
             modulus,
             depth_max: Millimetres::from_bits(depth_max_bits as i32),
             force_max: Newtons::ZERO,
+            deepest: Millimetres::ZERO,
             force_gain: Gain::new(pi_y_q98, 98 + 48),
             area_gain_q32: (inverse_pi_y_q110 >> (110 - 48 + 4 - 32 - 1)).div_ceil(2) as u64,
             stiffness_gain: Gain::new(pi_y_q98, 98 + 24 - 1),
             square_gain: Gain::new(pi_y_q98, 98 - 4),
         };
         tip.force_max = tip.force(tip.depth_max);
+        tip.deepest = tip.indentation_within(tip.force_max).min(tip.depth_max);
         Ok(tip)
     }
 
@@ -157,14 +161,20 @@ impl Tip {
     /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of force
     /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
     pub fn indentation(&self, force: Newtons) -> Millimetres {
-        let force_bits = force.max(Newtons::ZERO).min(self.force_max).to_bits().unsigned_abs();
-        let [gain, gain_fraction] = [(self.area_gain_q32 >> 32) as u32, self.area_gain_q32 as u32];
-        // A sixteenth of d^2, modulo 2^32, with 32 bits after the point.
-        let fraction = u64::from(force_bits) * u64::from(gain_fraction);
-        let sixteenth = force_bits.wrapping_mul(gain).wrapping_add((fraction >> 32) as u32);
-        let last = sixteenth << 4 | fraction as u32 >> 28;
-        let root = nearest_root(root_below(force_bits, gain), Square { sixteenth, last });
-        Millimetres::from_bits(root as i32).min(self.depth_max)
+        if force >= self.force_max {
+            return self.deepest;
+        }
+        self.indentation_within(force)
+    }
+
+    /// [`Tip::indentation`] of a force within the domain.
+    #[inline(always)]
+    fn indentation_within(&self, force: Newtons) -> Millimetres {
+        let force_bits = force.max(Newtons::ZERO).to_bits().cast_unsigned();
+        let gain = self.area_gain_q32;
+        let (quarter, sixteenth_q32) = root_below(force_bits, (gain >> 32) as u32, gain);
+        let root = nearest_root(quarter, (sixteenth_q32 >> 32) as u32, (sixteenth_q32 >> 28) as u32);
+        Millimetres::from_bits(root.cast_signed())
     }
 
     /// Radius of the contact, `r_c = sqrt(d (2a - d))` (eq. 5, 6).
@@ -172,10 +182,9 @@ impl Tip {
     /// Correctly rounded for every input. `d` counts as within 0 to [`Tip::depth_max`].
     pub fn contact_radius(&self, d: Millimetres) -> Millimetres {
         let depth = self.depth(d);
-        let other = 2 * self.radius.to_bits().unsigned_abs() - depth;
-        let square = u64::from(depth) * u64::from(other);
-        let square = Square { sixteenth: (square >> 4) as u32, last: square as u32 };
-        Millimetres::from_bits(nearest_root(root_below(depth, other) >> 2, square) as i32)
+        let other = 2 * self.radius.to_bits().cast_unsigned() - depth;
+        let (root, square) = root_below(depth, other, other.into());
+        Millimetres::from_bits(nearest_root(root >> 2, (square >> 4) as u32, square as u32).cast_signed())
     }
 
     /// Stiffness at an indentation, `k = dF/dd = 2 pi Y d`.
@@ -192,7 +201,7 @@ impl Tip {
 
     /// The indentation within its domain, in units of the last place.
     fn depth(&self, d: Millimetres) -> u32 {
-        d.max(Millimetres::ZERO).min(self.depth_max).to_bits().unsigned_abs()
+        d.max(Millimetres::ZERO).min(self.depth_max).to_bits().cast_unsigned()
     }
 
     /// `r_c^2 = d (2a - d)` in Q48, exact.

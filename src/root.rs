@@ -37,36 +37,27 @@ pub fn floor_sqrt(x: u64) -> u32 {
     root >> (shift / 2)
 }
 
-/// sqrt(x y), rounded down and too small by less than 7 x 2^-24 of itself and a unit, for a `y` from 2^24.
+/// A quarter of the root, sqrt(x y), too small by less than 7 x 2^-24 of itself and a unit, for a `y` from 2^24; and x times the gain.
 #[inline(always)]
-pub(crate) fn root_below(x: u32, y: u32) -> u32 {
+pub(crate) fn root_below(x: u32, y: u32, gain: u64) -> (u32, u64) {
     // The estimate is within 2.5 x 2^-24; a factor less 2^-21 of itself puts it below the exact one.
-    lanes::near_root_of_product(x, y - (y >> 21))
+    lanes::root_and_product(x, y - (y >> 21), gain)
 }
 
-/// The nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`]. A square may have a
-/// fraction.
+/// The nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`].
 ///
-/// Remainders fit 32 bits, so only the last bits of the squares are computed. That makes it twice as quick as [`floor_sqrt`].
+/// `sixteenth` is the square without its last four bits, `last` its integer part, both modulo 2^32: remainders fit 32 bits, so
+/// only the last bits of squares are computed. That makes it twice as quick as [`floor_sqrt`].
 #[inline(always)]
-pub(crate) fn nearest_root(quarter: u32, square: Square) -> u32 {
-    // So the remainder is positive and below 2^32: the quarter is too small by less than 28.
-    let rest = square.sixteenth.wrapping_sub(quarter.wrapping_mul(quarter));
-    // Twice the remainder over the quarter, and not quite a half: the nearest integer or the one below.
-    let rounding = (quarter >> 2) - (quarter >> 8);
-    let near = 4 * quarter + rest.wrapping_add(rounding) / (quarter >> 1 | 1);
-    // The next one is nearer where the square is above (near + 1/2)^2, in integers above near^2 + near.
-    let beyond = near.wrapping_mul(near).wrapping_add(near).wrapping_sub(square.last);
+pub(crate) fn nearest_root(quarter: u32, sixteenth: u32, last: u32) -> u32 {
+    // The quarter is too small by less than 28, so the remainder is positive and below 2^32.
+    let rest = sixteenth.wrapping_sub(quarter.wrapping_mul(quarter));
+    // Twice the remainder over the quarter: right to a small part of a unit, then rounded down.
+    let near = 4 * quarter + rest / (quarter >> 1 | 1);
+    // So it is the nearest integer or the one below: the next one is nearer where the square is above (near + 1/2)^2, in
+    // integers above near^2 + near.
+    let beyond = near.wrapping_mul(near).wrapping_add(near).wrapping_sub(last);
     near + (beyond >> 31)
-}
-
-/// A square for [`nearest_root`], modulo 2^32.
-#[derive(Clone, Copy)]
-pub(crate) struct Square {
-    /// A sixteenth of it.
-    pub(crate) sixteenth: u32,
-    /// Its integer part.
-    pub(crate) last: u32,
 }
 
 /// n - root^2.

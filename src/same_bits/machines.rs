@@ -100,7 +100,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 19] = [
+pub const STEPS: [Step; 20] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -109,6 +109,12 @@ pub const STEPS: [Step; 19] = [
     ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
     ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
+    ("lanes::root_and_product", |_, s, mix| {
+        let [x, y, high, low] = s.words.map(i32::cast_unsigned);
+        let (root, product) = lanes::root_and_product(x, y, u64::from(high) << 32 | u64::from(low));
+        mix.add(root);
+        mix.add(product.cast_signed());
+    }),
     ("Array::read", |m, s, mix| {
         frames::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));

@@ -4,6 +4,7 @@
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
 use crate::contact::Geometry;
+use crate::control::BRAKE_SHARE_Q8;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
@@ -19,6 +20,8 @@ const POSITION_TO_SPEED: f32 = 3.0;
 /// Poles of the observer, in frames: 1 / (2 T), 2.5 times faster than the speed loop that it serves.
 const OBSERVER_FRAMES: f32 = 2.0;
 
+/// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
+const BRAKE_MAX: i64 = 1_000_000 << 8;
 /// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,
 const JUMP_FRAMES: f32 = 4.0;
 /// and at least this far, mm.
@@ -76,32 +79,34 @@ pub struct Config {
     /// See [`Params::contact_off_mn`].
     pub contact_off: Newtons,
 
-    /// Frame time in s, Q40.
-    pub frame_s_q40: i64,
+    /// Frame time in s, Q39.
+    pub frame_s_q39: i32,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
     /// Error of the travel that is not motion but a jump of the encoder, Q24 mm.
-    pub jump: i64,
-    /// Encoder counts at which the travel reaches the end of its type.
-    pub counts_max: i64,
-    /// l1 (Q32), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
-    pub observer_gains: [i64; 3],
+    pub jump: u32,
+    /// Encoder counts that the travel can hold.
+    pub counts_max: i32,
+    /// l1 (Q31), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
+    pub observer_gains: [i32; 3],
     /// k_v in 1/s.
     pub speed_gain_per_s: i32,
     /// k in 1/s.
     pub position_gain_per_s: i32,
     /// 1 / (2 k) in s, Q32.
-    pub half_over_slope_q32: i64,
+    pub half_over_slope_q32: i32,
     /// 1 / (2 k^2) in s^2, Q40.
-    pub half_over_slope2_q40: i64,
+    pub half_over_slope2_q40: i32,
     /// c in 1/s, Q8.
-    pub damping_q8_per_s: i64,
+    pub damping_q8_per_s: i32,
     /// g V_max, Q8 mm/s^2.
-    pub voltage_limit: i64,
+    pub voltage_limit: i32,
     /// g R i_max, Q8 mm/s^2.
-    pub current_limit: i64,
+    pub current_limit: i32,
     /// Largest change of g V in a frame, Q8 mm/s^2.
-    pub slew_limit: i64,
+    pub slew_limit: i32,
+    /// Least, usual and largest deceleration that the profile counts on, Q8 mm/s^2.
+    pub brake: [i32; 3],
     /// g in mm/s^2 for a mV, Q16.
     pub acceleration_per_mv_q16: i64,
     /// 1 / g in mV for a mm/s^2, Q32.
@@ -161,6 +166,9 @@ impl Config {
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
+        let mm_per_count_q40 = wide(mm_per_count * exp2(40));
+        let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
+        let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         Ok(Self {
             params: *p,
             timing,
@@ -173,23 +181,25 @@ impl Config {
             half_pitch: millimetres(p.pitch_um / 2),
             contact_on: newtons(p.contact_on_mn),
             contact_off: newtons(p.contact_off_mn),
-            frame_s_q40: wide(frame_s * exp2(40)),
-            mm_per_count_q40: wide(mm_per_count * exp2(40)),
-            jump: wide((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24)),
-            counts_max: wide(exp2(31) / (mm_per_count * exp2(24)) + 1.0),
+            frame_s_q39: narrow(frame_s * exp2(39)),
+            mm_per_count_q40,
+            jump: narrow((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24))
+                .cast_unsigned(),
+            counts_max: ((i64::from(i32::MAX) << 16) / mm_per_count_q40.max(1)).min(i32::MAX.into()) as i32,
             observer_gains: [
-                wide((1.0 - beta * beta * beta) * exp2(32)),
-                wide(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
-                wide(gap * gap * gap / (frame_s * frame_s)),
+                narrow((1.0 - beta * beta * beta) * exp2(31)),
+                narrow(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
+                narrow(gap * gap * gap / (frame_s * frame_s)),
             ],
             speed_gain_per_s: speed_gain as i32,
             position_gain_per_s: slope as i32,
-            half_over_slope_q32: wide(0.5 / slope * exp2(32)),
-            half_over_slope2_q40: wide(0.5 / (slope * slope) * exp2(40)),
+            half_over_slope_q32: narrow(0.5 / slope * exp2(32)),
+            half_over_slope2_q40: narrow(0.5 / (slope * slope) * exp2(40)),
             damping_q8_per_s: narrow(c * exp2(8)),
-            voltage_limit: narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8)),
-            current_limit: narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8)),
+            voltage_limit,
+            current_limit,
             slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            brake: brake(current_limit.min(voltage_limit)),
             acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
             mv_per_acceleration_q32: wide(1e3 / g * exp2(32)),
             speed_max: speed(p.speed_max_um_per_s),
@@ -224,8 +234,15 @@ fn wide(value: f32) -> i64 {
 }
 
 /// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
-fn narrow(value: f32) -> i64 {
-    wide(value).min(i64::from(i32::MAX))
+fn narrow(value: f32) -> i32 {
+    wide(value).min(i64::from(i32::MAX)) as i32
+}
+
+/// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a quarter and
+/// twice of that.
+fn brake(motor: i32) -> [i32; 3] {
+    let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
+    [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]
 }
 
 /// `value / 1000` in units of 2^-bits, rounded.

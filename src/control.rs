@@ -21,6 +21,7 @@
 //! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so a
 //! change of mode is bumpless.
 
+mod arith;
 pub mod drive;
 pub mod goal;
 pub mod observer;
@@ -29,14 +30,13 @@ pub mod profile;
 use crate::config::Config;
 use crate::safety::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond2};
+use arith::product;
 use drive::Drive;
 use observer::Observer;
 use profile::Reference;
 
 /// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
-const BRAKE_SHARE_Q8: i64 = 218;
-/// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
-const BRAKE_MAX: i64 = 1_000_000 << 8;
+pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
 
 /// The state of the speed loop.
 #[derive(Clone, Debug)]
@@ -56,13 +56,14 @@ impl SpeedLoop {
     /// The duty that makes the tip follow a speed reference.
     pub fn follow(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         let speed = self.observer.speed.to_bits();
-        let lag = i64::from(reference.speed.to_bits()) - i64::from(speed);
+        // c v, the acceleration that the back-EMF takes away (Q8).
+        let back_emf = product(speed, config.damping_q8_per_s, 16);
         // k_v in 1/s (Q0) times Q16 speed, to Q8 acceleration.
-        let wanted = ((lag * i64::from(config.speed_gain_per_s)) >> 8)
-            + i64::from(reference.acceleration.to_bits())
-            + self.back_emf(config)
-            - i64::from(self.observer.disturbance.to_bits());
-        self.drive.apply(wanted, self.back_emf(config), supply_mv, config, limits)
+        let wanted = product(reference.speed.to_bits().saturating_sub(speed), config.speed_gain_per_s, 8)
+            .saturating_add(reference.acceleration.to_bits())
+            .saturating_add(back_emf)
+            .saturating_sub(self.observer.disturbance.to_bits());
+        self.drive.apply(wanted, back_emf, supply_mv, config, limits)
     }
 
     /// Takes the encoder's count of this frame into the observer, which then stands at this instant.
@@ -80,16 +81,11 @@ impl SpeedLoop {
     ///
     /// The contact force brakes a tip that presses in and drives one that lets go: the disturbance says how much.
     pub fn brake(&self, way: Millimetres, config: &Config) -> MillimetresPerSecond2 {
-        let disturbance = i64::from(self.observer.disturbance.to_bits());
-        let helping = if way >= Millimetres::ZERO { -disturbance } else { disturbance };
-        let motor = config.current_limit.min(config.voltage_limit);
-        let whole = (motor + helping).max(motor / 4).min(2 * motor);
-        MillimetresPerSecond2::from_bits(((whole * BRAKE_SHARE_Q8) >> 8).min(BRAKE_MAX) as i32)
-    }
-
-    /// c v, the acceleration that the back-EMF takes away (Q8).
-    fn back_emf(&self, config: &Config) -> i64 {
-        (i64::from(self.observer.speed.to_bits()) * config.damping_q8_per_s) >> 16
+        let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
+        let [least, usual, most] = config.brake;
+        let pressing = way >= Millimetres::ZERO;
+        let whole = if pressing { usual.saturating_sub(disturbance) } else { usual.saturating_add(disturbance) };
+        MillimetresPerSecond2::from_bits(whole.max(least).min(most))
     }
 }
 

@@ -160,6 +160,7 @@ impl Tip {
     ///
     /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of force
     /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
+    #[inline(always)]
     pub fn indentation(&self, force: Newtons) -> Millimetres {
         if force >= self.force_max {
             return self.deepest;
@@ -180,6 +181,7 @@ impl Tip {
     /// Radius of the contact, `r_c = sqrt(d (2a - d))` (eq. 5, 6).
     ///
     /// Correctly rounded for every input. `d` counts as within 0 to [`Tip::depth_max`].
+    #[inline(always)]
     pub fn contact_radius(&self, d: Millimetres) -> Millimetres {
         let depth = self.depth(d);
         let other = 2 * self.radius.to_bits().cast_unsigned() - depth;

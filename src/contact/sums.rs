@@ -14,16 +14,16 @@ const RATIO_BITS: u32 = 11;
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
 /// never below zero. The centre is that of the pressure, zero where there is no force.
 pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
-    let force_bits = (i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32;
-    let force = Newtons(I16F16::from_bits(force_bits.clamp(0, i64::from(i32::MAX)) as i32));
+    // The product is positive: its upper half is below 2^31.
+    let force_bits = ((i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
+    let force = Newtons(I16F16::from_bits(force_bits.max(0)));
     let indentation = config.tip.indentation(force);
-    let touching = force >= config.contact_off;
-    let centre = |moment| if touching { centre(moment, picture.sum, config) } else { Millimetres::ZERO };
+    let [centre_x, centre_y] = if force >= config.contact_off { centre(picture, config) } else { Default::default() };
     Contact {
         force,
         indentation,
-        centre_x: centre(picture.moment_x),
-        centre_y: centre(picture.moment_y),
+        centre_x,
+        centre_y,
         radius: config.tip.contact_radius(indentation),
         peak_pa: ((i64::from(picture.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32,
         confidence: 255,
@@ -31,13 +31,15 @@ pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
     }
 }
 
-/// moment / sum in half pitches, as a length; the resolution is 1/2048 of half a pitch.
-fn centre(moment: i32, sum: i32, config: &Config) -> Millimetres {
-    // Both are shifted alike so that the sum keeps 16 bits and the moment, at most nine times as large, 20.
-    let shift = (32 - sum.leading_zeros()).saturating_sub(16);
-    let sum = (sum >> shift).clamp(1, 0xffff);
-    let moment = (moment >> shift).clamp(-9 * sum, 9 * sum);
-    let half_pitches = (moment << RATIO_BITS) / sum;
-    let bits = (i64::from(half_pitches) * i64::from(config.half_pitch.to_bits())) >> RATIO_BITS;
-    Millimetres(I8F24::from_bits(bits as i32))
+/// Moments over sum in half pitches, as lengths; the resolution is 1/2048 of half a pitch.
+fn centre(picture: &Picture, config: &Config) -> [Millimetres; 2] {
+    // All are shifted alike so that the sum keeps 16 bits and the moment, at most nine times as large, 20.
+    let shift = (32 - picture.sum.leading_zeros()).saturating_sub(16);
+    let sum = (picture.sum >> shift).max(1).min(0xffff);
+    [picture.moment_x, picture.moment_y].map(|moment| {
+        let moment = (moment >> shift).max(-9 * sum).min(9 * sum);
+        let half_pitches = (moment << RATIO_BITS) / sum;
+        let bits = (i64::from(half_pitches) * i64::from(config.half_pitch.to_bits())) >> RATIO_BITS;
+        Millimetres(I8F24::from_bits(bits as i32))
+    })
 }

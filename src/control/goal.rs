@@ -90,6 +90,6 @@ pub(crate) fn within_travel(way: Millimetres, motion: &SpeedLoop, config: &Confi
 
 /// How far the tip moved since the middle of the scan: half a frame.
 fn since_scan(speed: MillimetresPerSecond, config: &Config) -> I8F24 {
-    let bits = (i64::from(speed.to_bits()) * config.frame_s_q40) >> 33;
+    let bits = (i64::from(speed.to_bits()) * i64::from(config.frame_s_q39)) >> 32;
     I8F24::from_bits(bits as i32)
 }

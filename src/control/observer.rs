@@ -12,6 +12,7 @@
 //! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts anew at the new place, at
 //! rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
 
+use super::arith::{nearest_product, nearest_share};
 use crate::config::Config;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
@@ -43,42 +44,34 @@ impl Observer {
         Self { origin: encoder, ..Self::new() }
     }
 
-    /// Travel that an encoder count means, Q24 mm, held to the type's range.
+    /// Travel that an encoder count means, held to the type's range but for a count.
     pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
-        let counts = i64::from(encoder.wrapping_sub(self.origin)).max(-config.counts_max).min(config.counts_max);
-        Millimetres::from_bits(saturate((counts * config.mm_per_count_q40) >> 16))
+        let counts = encoder.wrapping_sub(self.origin).max(-config.counts_max).min(config.counts_max);
+        Millimetres::from_bits(((i64::from(counts) * config.mm_per_count_q40) >> 16) as i32)
     }
 
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
-    pub fn update(&mut self, encoder: i32, acceleration: i64, config: &Config) {
-        let total = i64::from(saturate(acceleration + i64::from(self.disturbance.to_bits())));
-        let speed_before = i64::from(self.speed.to_bits());
-        let gained = round_shift(total * config.frame_s_q40, 32);
-        // Mean speed over the frame, Q16, times T (Q40), to Q24 mm.
-        let moved = round_shift((speed_before + gained / 2) * config.frame_s_q40, 32);
-        let travel = i64::from(self.travel.to_bits()) + moved;
-        let speed = speed_before + gained;
+    pub fn update(&mut self, encoder: i32, acceleration: i32, config: &Config) {
+        // Q8 mm/s^2 times T (Q39) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
+        let gained = nearest_share(acceleration.saturating_add(self.disturbance.to_bits()), config.frame_s_q39);
+        let before = self.speed.to_bits();
+        let moved = nearest_share(before.saturating_add(gained / 2), config.frame_s_q39);
+        let travel = self.travel.to_bits().saturating_add(moved);
+        let speed = before.saturating_add(gained);
 
         let measured = self.measured(encoder, config);
-        let error = i64::from(measured.to_bits()) - travel;
-        if error.abs() > config.jump {
+        let error = measured.to_bits().saturating_sub(travel);
+        if error.unsigned_abs() > config.jump {
             *self = Self { travel: measured, origin: self.origin, ..Self::new() };
             return;
         }
-        let [l1_q32, l2_per_s_q16, l3_per_s2] = config.observer_gains;
-        self.travel = Millimetres::from_bits(saturate(travel + round_shift(error * l1_q32, 32)));
-        self.speed = MillimetresPerSecond::from_bits(saturate(speed + round_shift(error * l2_per_s_q16, 24)));
-        self.disturbance = MillimetresPerSecond2::from_bits(saturate(
-            i64::from(self.disturbance.to_bits()) + round_shift(error * l3_per_s2, 16),
+        let [l1_q31, l2_per_s_q16, l3_per_s2] = config.observer_gains;
+        let corrected = |value: i32, by: i32| value.saturating_add(by);
+        self.travel = Millimetres::from_bits(corrected(travel, nearest_share(error, l1_q31)));
+        self.speed = MillimetresPerSecond::from_bits(corrected(speed, nearest_product(error, l2_per_s_q16, 24)));
+        self.disturbance = MillimetresPerSecond2::from_bits(corrected(
+            self.disturbance.to_bits(),
+            nearest_product(error, l3_per_s2, 16),
         ));
     }
-}
-
-/// `value / 2^shift`, rounded to nearest.
-fn round_shift(value: i64, shift: u32) -> i64 {
-    (value + (1 << (shift - 1))) >> shift
-}
-
-fn saturate(value: i64) -> i32 {
-    value.clamp(i64::from(i32::MIN), i64::from(i32::MAX)) as i32
 }

@@ -10,8 +10,8 @@
 //!
 //! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
 
+use super::arith::product;
 use crate::config::Config;
-use crate::root::floor_sqrt;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// What the speed loop is to follow.
@@ -24,31 +24,31 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`.
+    /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`: up to 1000 m/s^2.
     pub fn towards(
         way: Millimetres,
         speed: MillimetresPerSecond,
         brake: MillimetresPerSecond2,
         config: &Config,
     ) -> Self {
-        let way_bits = i64::from(way.to_bits());
-        let brake_bits = i64::from(brake.to_bits().max(1));
-        let speed_bits = i64::from(speed.to_bits());
-        let slope = i64::from(config.position_gain_per_s);
+        let (way_bits, speed_bits) = (way.to_bits(), speed.to_bits());
+        let brake_bits = brake.to_bits().max(1);
+        let slope = config.position_gain_per_s;
         // a / (2 k^2): Q8 to Q24 mm.
-        let linear = (brake_bits * config.half_over_slope2_q40) >> 24;
-        let (reference, acceleration) = if way_bits.abs() <= linear {
-            ((way_bits * slope) >> 8, -((speed_bits * slope) >> 8))
+        let linear = (i64::from(brake_bits) * i64::from(config.half_over_slope2_q40)) >> 24;
+        let (reference, acceleration) = if i64::from(way_bits.unsigned_abs()) <= linear {
+            (product(way_bits, slope, 8), product(speed_bits, slope, 8))
         } else {
-            // Q8 mm/s^2 times Q24 mm is Q32 mm^2/s^2; its root is Q16 mm/s.
-            let root = i64::from(floor_sqrt((2 * brake_bits * way_bits.abs()).unsigned_abs()));
-            let magnitude = root - ((brake_bits * config.half_over_slope_q32) >> 24);
-            let share = share_q12(speed_bits, root);
-            (magnitude * way_bits.signum(), -((brake_bits * share) >> 12))
+            // Q8 mm/s^2 times Q24 mm is Q32 mm^2/s^2; its root is Q16 mm/s, and good enough as the FPU gives it.
+            let (root, _) = lanes::root_and_product(2 * brake_bits.cast_unsigned(), way_bits.unsigned_abs(), 0);
+            let root = root.cast_signed();
+            let magnitude = root.wrapping_sub(product(brake_bits, config.half_over_slope_q32, 24));
+            let reference = if way_bits < 0 { magnitude.wrapping_neg() } else { magnitude };
+            (reference, product(brake_bits, share_q12(speed_bits, root), 12))
         };
         Self {
-            speed: MillimetresPerSecond::from_bits(reference.clamp(i32::MIN.into(), i32::MAX.into()) as i32),
-            acceleration: MillimetresPerSecond2::from_bits(acceleration.clamp(i32::MIN.into(), i32::MAX.into()) as i32),
+            speed: MillimetresPerSecond::from_bits(reference),
+            acceleration: MillimetresPerSecond2::from_bits(acceleration.saturating_neg()),
         }
     }
 
@@ -60,8 +60,10 @@ impl Reference {
 }
 
 /// speed / root in Q12, held to +-1.25, by one 32-bit division.
-fn share_q12(speed: i64, root: i64) -> i64 {
-    let root = ((root >> 10).clamp(1, i64::from(i32::MAX))) as i32;
-    let speed = (speed << 2).clamp(i64::from(i32::MIN) + 1, i64::from(i32::MAX)) as i32;
-    i64::from((speed / root).clamp(-5120, 5120))
+#[inline(always)]
+fn share_q12(speed: i32, root: i32) -> i32 {
+    let speed = speed.max(-1 << 29).min((1 << 29) - 1) << 2;
+    // Never 0, nor the -1 by which a division can overflow.
+    let root = (root.cast_unsigned() >> 10 | 1).cast_signed();
+    (speed / root).max(-5120).min(5120)
 }

@@ -89,7 +89,7 @@ impl Monitor {
             self.stalled_ns = 0;
         } else if touching && distance(view.contact.indentation, self.indentation) > BLIND_INDENTATION {
             return Some(Fault::EncoderFrozen);
-        } else if !touching && view.motion.drive.acceleration().abs() > config.current_limit / 8 {
+        } else if !touching && view.motion.drive.acceleration().saturating_abs() > config.current_limit / 8 {
             self.stalled_ns += config.timing.frame_ns();
             if self.stalled_ns > STALL_NS {
                 return Some(Fault::EncoderFrozen);

@@ -137,8 +137,7 @@ pub const STEPS: [Step; 20] = [
     ("Fit::read", |m, s, mix| add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config))),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
-        let [encoder, acceleration, shift, _] = s.words;
-        let acceleration = i64::from(acceleration) << (shift & 15);
+        let [encoder, acceleration, ..] = s.words;
         m.observer.update(encoder >> 24, acceleration, &m.config);
         mix.add(m.observer.travel.to_bits());
         mix.add(m.observer.speed.to_bits());
@@ -150,10 +149,9 @@ pub const STEPS: [Step; 20] = [
         add_reference(mix, towards(m, s).limited(limit));
     }),
     ("Drive::apply", |m, s, mix| {
-        let [wanted, back_emf, supply_mv, shift] = s.words;
-        let wanted = i64::from(wanted) << (shift & 15);
+        let [wanted, back_emf, supply_mv, _] = s.words;
         let mut limits = Limits::default();
-        let duty = m.drive.apply(wanted, back_emf.into(), supply_mv as u16, &m.config, &mut limits);
+        let duty = m.drive.apply(wanted, back_emf, supply_mv as u16, &m.config, &mut limits);
         mix.add(duty.0);
         mix.add(limits.0);
         mix.add(m.drive.acceleration());

@@ -90,7 +90,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         half_pitch,
         contact_on,
         contact_off,
-        frame_s_q40,
+        frame_s_q39,
         mm_per_count_q40,
         jump,
         counts_max,
@@ -103,6 +103,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         voltage_limit,
         current_limit,
         slew_limit,
+        brake: [brake_least, brake_usual, brake_most],
         acceleration_per_mv_q16,
         mv_per_acceleration_q32,
         speed_max,
@@ -123,18 +124,23 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(length.to_bits());
     }
     for number in
-        [newtons_per_sum_q48, pascals_per_sum_q32, frame_s_q40, mm_per_count_q40, jump, counts_max, l1, l2, l3]
+        [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40, acceleration_per_mv_q16, mv_per_acceleration_q32]
     {
         mix.add(*number);
     }
-    for gain in [speed_gain_per_s, position_gain_per_s, &speed_max.to_bits(), &approach.to_bits()] {
-        mix.add(*gain);
+    mix.add(*jump);
+    for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_per_s, position_gain_per_s] {
+        mix.add(*number);
+    }
+    for speed in [speed_max, approach] {
+        mix.add(speed.to_bits());
     }
     for number in
         [half_over_slope_q32, half_over_slope2_q40, damping_q8_per_s, voltage_limit, current_limit, slew_limit]
     {
         mix.add(*number);
     }
-    mix.add(*acceleration_per_mv_q16);
-    mix.add(*mv_per_acceleration_q32);
+    for number in [brake_least, brake_usual, brake_most] {
+        mix.add(*number);
+    }
 }

@@ -26,7 +26,7 @@ struct Bench<'a> {
     goal: Goal,
     reference: Reference,
     limits: Limits,
-    wanted: i64,
+    wanted: i32,
 }
 
 type Kernel = extern "C" fn(&mut Bench);
@@ -117,7 +117,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
             bench.array = bench.pipeline.array().clone();
             bench.picture = *bench.pipeline.array().picture();
             bench.contact = status.contact;
-            bench.wanted = i64::from(n) * 7_919 % 200_000_000 - 100_000_000;
+            bench.wanted = (i64::from(n) * 7_919 % 200_000_000) as i32 - 100_000_000;
             if drives {
                 // What the measured part builds on.
                 for before in [OBSERVER, OBSERVER + 1].into_iter().filter(|before| *before != part) {

@@ -84,10 +84,10 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
         ("the encoder at its other end", [(i32::MIN, -limit); 2]),
         ("one count in turns", [(0, 0), (1, 0)]),
         ("the current limit in turns", [(0, limit), (0, -limit)]),
-        ("the encoder's ends in turns", [(i32::MIN, i64::from(i32::MAX)), (i32::MAX, i64::from(i32::MIN))]),
-        ("accelerations beyond the type in turns", [(0, 1 << 60), (1, -(1 << 60))]),
+        ("the encoder's ends in turns", [(i32::MIN, i32::MAX), (i32::MAX, i32::MIN)]),
+        ("the ends of the acceleration's type in turns", [(0, i32::MAX), (1, i32::MIN)]),
     ];
-    let machine = |(input, pair): (&str, [(i32, i64); 2])| {
+    let machine = |(input, pair): (&str, [(i32, i32); 2])| {
         let config = config.clone();
         Machine {
             name: format!("observer, {scan} scan, {input}"),
@@ -108,10 +108,10 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
 
 /// The wanted acceleration, held or in turns.
 fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
-    let far = 1 << 46;
+    let far = i32::MAX;
     let inputs =
         [("nothing", [0; 2]), ("all", [far; 2]), ("all in turns", [far, -far]), ("the least in turns", [1, -1])];
-    let machine = |(input, pair): (&str, [i64; 2])| {
+    let machine = |(input, pair): (&str, [i32; 2])| {
         let config = config.clone();
         Machine {
             name: format!("drive, {scan} scan, {input} wanted"),
@@ -122,7 +122,7 @@ fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
                     drive.apply(wanted, 0, SUPPLY_MV, &config, &mut Limits::default());
                 }
             }),
-            outputs: vec![("acceleration", |drive| drive.acceleration(), 0)],
+            outputs: vec![("acceleration", |drive| drive.acceleration().into(), 0)],
         }
     };
     inputs.map(machine).into()
@@ -152,7 +152,7 @@ fn loops(scan: &str, config: &Config) -> Vec<Machine<(Observer, Drive)>> {
                 ("travel", |state| state.0.travel.to_bits().into(), TRAVEL_SWING),
                 ("speed", |state| state.0.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |state| state.0.disturbance.to_bits().into(), DISTURBANCE_SWING),
-                ("acceleration", |state| state.1.acceleration(), DISTURBANCE_SWING),
+                ("acceleration", |state| state.1.acceleration().into(), DISTURBANCE_SWING),
             ],
         }
     };

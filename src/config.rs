@@ -8,7 +8,7 @@ use crate::control::BRAKE_SHARE_Q8;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
-use crate::units::{Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
+use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I8F24, I16F16};
 
 /// Bandwidth of the speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the encoder was
@@ -109,8 +109,10 @@ pub struct Config {
     pub brake: [i32; 3],
     /// g in mm/s^2 for a mV, Q16.
     pub acceleration_per_mv_q16: i64,
-    /// 1 / g in mV for a mm/s^2, Q32.
-    pub mv_per_acceleration_q32: i64,
+    /// Left shift that takes [`Config::voltage_limit`] to 31 bits.
+    pub voltage_shift: u32,
+    /// Duty (Q15) for a g V shifted so, Q31, times the supply in mV.
+    pub duty_gain: u32,
     /// See [`Params::speed_max_um_per_s`].
     pub speed_max: MillimetresPerSecond,
     /// See [`Params::approach_um_per_s`].
@@ -169,6 +171,9 @@ impl Config {
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
         let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
         let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
+        let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
+        // The full duty for the supply's voltage: 32767 for a mV at 1 mV.
+        let duty_gain = f32::from(Duty::FULL) * exp2(23) / exp2(voltage_shift) * 1e3 / g;
         Ok(Self {
             params: *p,
             timing,
@@ -201,7 +206,8 @@ impl Config {
             slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             brake: brake(current_limit.min(voltage_limit)),
             acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
-            mv_per_acceleration_q32: wide(1e3 / g * exp2(32)),
+            voltage_shift,
+            duty_gain: wide(duty_gain).min(u32::MAX.into()) as u32,
             speed_max: speed(p.speed_max_um_per_s),
             approach: speed(p.approach_um_per_s),
             travel_max: millimetres(p.travel_max_um),

@@ -54,6 +54,7 @@ impl SpeedLoop {
     }
 
     /// The duty that makes the tip follow a speed reference.
+    #[inline(always)]
     pub fn follow(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         let speed = self.observer.speed.to_bits();
         // c v, the acceleration that the back-EMF takes away (Q8).
@@ -67,6 +68,7 @@ impl SpeedLoop {
     }
 
     /// Takes the encoder's count of this frame into the observer, which then stands at this instant.
+    #[inline(always)]
     pub fn observe(&mut self, encoder: i32, config: &Config) {
         self.observer.update(encoder, self.drive.acceleration(), config);
     }
@@ -80,6 +82,7 @@ impl SpeedLoop {
     /// The deceleration that the motor can surely give to a motion in the direction of `way`.
     ///
     /// The contact force brakes a tip that presses in and drives one that lets go: the disturbance says how much.
+    #[inline(always)]
     pub fn brake(&self, way: Millimetres, config: &Config) -> MillimetresPerSecond2 {
         let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
         let [least, usual, most] = config.brake;

@@ -174,7 +174,7 @@ impl Tip {
         let force_bits = force.max(Newtons::ZERO).to_bits().cast_unsigned();
         let gain = self.area_gain_q32;
         let (quarter, sixteenth_q32) = root_below(force_bits, (gain >> 32) as u32, gain);
-        let root = nearest_root(quarter, (sixteenth_q32 >> 32) as u32, (sixteenth_q32 >> 28) as u32);
+        let root = nearest_root(quarter, (sixteenth_q32 >> 32) as u32, (sixteenth_q32 >> 26) as u32);
         Millimetres::from_bits(root.cast_signed())
     }
 
@@ -186,7 +186,7 @@ impl Tip {
         let depth = self.depth(d);
         let other = 2 * self.radius.to_bits().cast_unsigned() - depth;
         let (root, square) = root_below(depth, other, other.into());
-        Millimetres::from_bits(nearest_root(root >> 2, (square >> 4) as u32, square as u32).cast_signed())
+        Millimetres::from_bits(nearest_root(root >> 2, (square >> 4) as u32, (square << 2) as u32).cast_signed())
     }
 
     /// Stiffness at an indentation, `k = dF/dd = 2 pi Y d`.

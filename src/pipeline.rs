@@ -141,17 +141,16 @@ impl Pipeline {
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
         }
-        let duty = match mode {
-            Mode::Off | Mode::Tare | Mode::Fault => self.motion.coast(),
+        let reference = match mode {
+            Mode::Off | Mode::Tare | Mode::Fault => None,
             Mode::Approach | Mode::Force | Mode::Release => {
-                let reference =
-                    self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits);
-                self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
+                Some(self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits))
             }
-            Mode::Identify => {
-                let reference = self.press.reference(&self.motion, &self.config, &mut limits);
-                self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits)
-            }
+            Mode::Identify => Some(self.press.reference(&self.motion, &self.config, &mut limits)),
+        };
+        let duty = match reference {
+            Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
+            None => self.motion.coast(),
         };
         if !self.tared {
             limits.set(Limits::NOT_TARED);

@@ -46,17 +46,16 @@ pub(crate) fn root_below(x: u32, y: u32, gain: u64) -> (u32, u64) {
 
 /// The nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`].
 ///
-/// `sixteenth` is the square without its last four bits, `last` its integer part, both modulo 2^32: remainders fit 32 bits, so
-/// only the last bits of squares are computed. That makes it twice as quick as [`floor_sqrt`].
+/// `sixteenth` is the square without its last four bits, `fourfold` four times the square, both rounded down and modulo 2^32:
+/// remainders fit 32 bits, so only the last bits of squares are computed. That makes it twice as quick as [`floor_sqrt`].
 #[inline(always)]
-pub(crate) fn nearest_root(quarter: u32, sixteenth: u32, last: u32) -> u32 {
+pub(crate) fn nearest_root(quarter: u32, sixteenth: u32, fourfold: u32) -> u32 {
     // The quarter is too small by less than 28, so the remainder is positive and below 2^32.
     let rest = sixteenth.wrapping_sub(quarter.wrapping_mul(quarter));
     // Twice the remainder over the quarter: right to a small part of a unit, then rounded down.
     let near = 4 * quarter + rest / (quarter >> 1 | 1);
-    // So it is the nearest integer or the one below: the next one is nearer where the square is above (near + 1/2)^2, in
-    // integers above near^2 + near.
-    let beyond = near.wrapping_mul(near).wrapping_add(near).wrapping_sub(last);
+    // So it is the nearest integer or the one below: the next one is nearer where four squares are above (2 near + 1)^2.
+    let beyond = near.wrapping_mul(near + 1).wrapping_mul(4).wrapping_sub(fourfold);
     near + (beyond >> 31)
 }
 

@@ -1,5 +1,6 @@
 //! Between the law and the bridge: voltage, current and slew limits, and the supply.
 
+use super::arith::nearest_share;
 use crate::config::Config;
 use crate::safety::Limits;
 use crate::units::Duty;
@@ -27,6 +28,7 @@ impl Drive {
     /// Cuts the wanted g V to what slew, current and voltage allow, and gives the duty that makes it from this supply.
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
+    #[inline(always)]
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         let slewed = near(wanted, self.voltage, config.slew_limit);
         let within_current = near(slewed, back_emf, config.current_limit);
@@ -47,6 +49,7 @@ impl Drive {
 
 /// The value nearest to `value` that is no further than `reach` from `middle`. (`clamp` would have to prove that the
 /// bounds are in order.)
+#[inline(always)]
 fn near(value: i32, middle: i32, reach: i32) -> i32 {
     value.max(middle.saturating_sub(reach)).min(middle.saturating_add(reach))
 }
@@ -62,14 +65,13 @@ fn voltage_limit(supply_mv: u16, config: &Config) -> i32 {
     supply.min(config.voltage_limit.into()) as i32
 }
 
-/// V / V_supply by one 32-bit division; g V in Q8, within the supply, V = g V / g.
+/// V / V_supply by one 32-bit division, for a g V that the supply can make.
 #[inline(always)]
 fn duty(voltage: i32, supply_mv: u16, config: &Config) -> Duty {
-    // mV in Q8: 48 V are 24 bits.
-    let millivolts_q8 = ((i64::from(voltage) * config.mv_per_acceleration_q32) >> 32) as i32;
-    // The whole supply is the full duty.
-    let share_q31 = ((u32::from(Duty::FULL.unsigned_abs()) << 16) / u32::from(supply_mv.max(1))) as i32;
-    // Q8 mV times Q31 / mV is Q39; the duty is Q15.
-    let duty = ((i64::from(millivolts_q8) * i64::from(share_q31) + (1 << 23)) >> 24) as i32;
+    // Below 2 mV the gain would not fit 31 bits.
+    let supply_mv = u32::from(supply_mv.max(2));
+    // Its rounding costs half a unit of the duty at most.
+    let gain = (config.duty_gain.wrapping_add(supply_mv / 2) / supply_mv).cast_signed();
+    let duty = nearest_share(voltage.wrapping_shl(config.voltage_shift), gain);
     Duty(duty.max(i16::MIN.into()).min(i16::MAX.into()) as i16)
 }

@@ -23,6 +23,7 @@ impl Goal {
     /// The speed to follow in a mode that drives the bridge.
     ///
     /// Approach and force follow the same curve, d_goal - d; an approach is only slower. So contact changes nothing but a limit.
+    #[inline(always)]
     pub fn reference(
         &mut self,
         mode: Mode,

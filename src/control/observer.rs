@@ -51,6 +51,7 @@ impl Observer {
     }
 
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
+    #[inline(always)]
     pub fn update(&mut self, encoder: i32, acceleration: i32, config: &Config) {
         // Q8 mm/s^2 times T (Q39) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
         let gained = nearest_share(acceleration.saturating_add(self.disturbance.to_bits()), config.frame_s_q39);

@@ -25,6 +25,7 @@ pub struct Reference {
 
 impl Reference {
     /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`: up to 1000 m/s^2.
+    #[inline(always)]
     pub fn towards(
         way: Millimetres,
         speed: MillimetresPerSecond,
@@ -53,6 +54,7 @@ impl Reference {
     }
 
     /// The same, held to speeds up to `limit`; beyond it there is no curve to stay on.
+    #[inline(always)]
     pub fn limited(self, limit: MillimetresPerSecond) -> Self {
         let held = self.speed.max(MillimetresPerSecond::from_bits(limit.to_bits().saturating_neg())).min(limit);
         if held == self.speed { self } else { Self { speed: held, acceleration: MillimetresPerSecond2::ZERO } }

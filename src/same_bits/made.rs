@@ -105,7 +105,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
         slew_limit,
         brake: [brake_least, brake_usual, brake_most],
         acceleration_per_mv_q16,
-        mv_per_acceleration_q32,
+        voltage_shift,
+        duty_gain,
         speed_max,
         approach,
         travel_max,
@@ -123,12 +124,12 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for length in [half_pitch, travel_max, clearance] {
         mix.add(length.to_bits());
     }
-    for number in
-        [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40, acceleration_per_mv_q16, mv_per_acceleration_q32]
-    {
+    for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40, acceleration_per_mv_q16] {
         mix.add(*number);
     }
-    mix.add(*jump);
+    for number in [jump, voltage_shift, duty_gain] {
+        mix.add(*number);
+    }
     for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_per_s, position_gain_per_s] {
         mix.add(*number);
     }

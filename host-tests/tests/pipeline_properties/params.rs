@@ -65,13 +65,10 @@ pub fn any_params() -> impl Strategy<Value = Params> {
 pub fn config(params: &Params) -> Config {
     let config = Config::new(params).expect("allowed");
     assert!(config.speed_gain_per_s >= 1 && config.position_gain_per_s >= 1, "{params:?}");
-    let positive = [
-        config.mm_per_count_q40,
-        config.newtons_per_sum_q48,
-        config.pascals_per_sum_q32,
-        config.mv_per_acceleration_q32,
-    ];
+    let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
+    // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
+    assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_limit == 0, "{config:?}");
     let positive = [config.frame_s_q39, config.half_over_slope_q32, config.half_over_slope2_q40, config.counts_max];
     // Below what their type holds: they were not cut to fit.
     assert!(positive.iter().chain(&config.observer_gains).all(|value| (1..i32::MAX).contains(value)), "{config:?}");

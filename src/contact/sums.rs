@@ -32,14 +32,18 @@ pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
 }
 
 /// Moments over sum in half pitches, as lengths; the resolution is 1/2048 of half a pitch.
+#[inline(always)]
 fn centre(picture: &Picture, config: &Config) -> [Millimetres; 2] {
     // All are shifted alike so that the sum keeps 16 bits and the moment, at most nine times as large, 20.
     let shift = (32 - picture.sum.leading_zeros()).saturating_sub(16);
-    let sum = (picture.sum >> shift).max(1).min(0xffff);
-    [picture.moment_x, picture.moment_y].map(|moment| {
-        let moment = (moment >> shift).max(-9 * sum).min(9 * sum);
-        let half_pitches = (moment << RATIO_BITS) / sum;
-        let bits = (i64::from(half_pitches) * i64::from(config.half_pitch.to_bits())) >> RATIO_BITS;
-        Millimetres(I8F24::from_bits(bits as i32))
-    })
+    let sum = (picture.sum >> shift).max(1);
+    let half_pitch = i64::from(config.half_pitch.to_bits());
+    // Two divisions one after the other; the compiler would make a loop of a closure over both.
+    [along(picture.moment_x >> shift, sum, half_pitch), along(picture.moment_y >> shift, sum, half_pitch)]
+}
+
+#[inline(always)]
+fn along(moment: i32, sum: i32, half_pitch: i64) -> Millimetres {
+    let half_pitches = (moment.max(-9 * sum).min(9 * sum) << RATIO_BITS) / sum;
+    Millimetres(I8F24::from_bits(((i64::from(half_pitches) * half_pitch) >> RATIO_BITS) as i32))
 }

@@ -67,12 +67,9 @@ impl Observer {
             return;
         }
         let [l1_q31, l2_per_s_q16, l3_per_s2] = config.observer_gains;
-        let corrected = |value: i32, by: i32| value.saturating_add(by);
-        self.travel = Millimetres::from_bits(corrected(travel, nearest_share(error, l1_q31)));
-        self.speed = MillimetresPerSecond::from_bits(corrected(speed, nearest_product(error, l2_per_s_q16, 24)));
-        self.disturbance = MillimetresPerSecond2::from_bits(corrected(
-            self.disturbance.to_bits(),
-            nearest_product(error, l3_per_s2, 16),
-        ));
+        let disturbance = self.disturbance.to_bits().saturating_add(nearest_product(error, l3_per_s2, 16));
+        self.travel = Millimetres::from_bits(travel.saturating_add(nearest_share(error, l1_q31)));
+        self.speed = MillimetresPerSecond::from_bits(speed.saturating_add(nearest_product(error, l2_per_s_q16, 24)));
+        self.disturbance = MillimetresPerSecond2::from_bits(disturbance);
     }
 }

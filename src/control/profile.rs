@@ -64,8 +64,8 @@ impl Reference {
 /// speed / root in Q12, held to +-1.25, by one 32-bit division.
 #[inline(always)]
 fn share_q12(speed: i32, root: i32) -> i32 {
-    let speed = speed.max(-1 << 29).min((1 << 29) - 1) << 2;
+    let speed = speed.clamp(-1 << 29, (1 << 29) - 1) << 2;
     // Never 0, nor the -1 by which a division can overflow.
     let root = (root.cast_unsigned() >> 10 | 1).cast_signed();
-    (speed / root).max(-5120).min(5120)
+    (speed / root).clamp(-5120, 5120)
 }

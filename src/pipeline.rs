@@ -47,7 +47,7 @@ impl Pipeline {
         Self {
             config: config.clone(),
             array: Array::new(),
-            fit: Fit::new(),
+            fit: Fit::default(),
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
             goal: Goal::default(),

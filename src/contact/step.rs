@@ -8,7 +8,7 @@ use super::arith::{Divisor, high, within};
 use super::geometry::{Geometry, PLACE_BITS};
 use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
 use super::rim::Rim;
-use super::view::{PEAK_BITS, View};
+use super::view::{PEAK_BITS, Scale, View};
 use crate::frame::{COLUMNS, ROWS};
 
 /// A residual stops at half of the peak.
@@ -106,7 +106,7 @@ impl Taxels {
 }
 
 /// How far the model and the picture are apart, where it is not to be refined.
-pub(super) fn compare(misfit: &mut Misfit, pressed: &Pressed, view: &View, mut which: Taxels) {
+pub(super) fn compare(misfit: &mut Misfit, pressed: &Pressed, view: &View, mut which: Taxels, geometry: &Geometry) {
     while let Some((row, mut column, stride)) = which.next_row() {
         let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
         let dy_square = square(pressed.dy[row]);
@@ -116,7 +116,7 @@ pub(super) fn compare(misfit: &mut Misfit, pressed: &Pressed, view: &View, mut w
                 let at = pressed.dx_square[column] + dy_square;
                 let share = view.share(taxels[column]);
                 if at < pressed.outside {
-                    let felt = pressed.felt(at);
+                    let felt = pressed.felt(at, &geometry.nodes);
                     misfit.taxels += 1;
                     let residual = residual(share - felt.pressure);
                     inside += residual * residual;
@@ -178,7 +178,7 @@ impl Equations {
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
     /// Takes in taxels; with a rim, those under it are worked out by it.
-    pub fn take(&mut self, pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>) {
+    pub fn take(&mut self, pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>, geometry: &Geometry) {
         while let Some((row, mut column, stride)) = which.next_row() {
             let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
             let dy_square = square(dy);
@@ -189,7 +189,7 @@ impl Equations {
                     let share = view.share(taxels[column]);
                     if at < pressed.outside {
                         let dx = pressed.dx[column];
-                        let mut felt = pressed.felt(at);
+                        let mut felt = pressed.felt(at, &geometry.nodes);
                         if let (Some(rim), true) = (rim, at >= pressed.inside) {
                             felt.pressure = rim.pressure(dx, dy);
                         }
@@ -227,7 +227,7 @@ impl Equations {
     }
 
     /// The next guess.
-    pub fn solve(&self, guess: &Guess, view: &View, geometry: &Geometry) -> Guess {
+    pub fn solve(&self, guess: &Guess, scale: &Scale, geometry: &Geometry) -> Guess {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
         let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());
@@ -248,8 +248,8 @@ impl Equations {
         let rest_step = by_ss.divide((s - times(x_step, sx) - times(y_step, sy)).into(), SHARE_BITS);
 
         // Slopes count Y and residuals the peak, so the solution is divided by Y over the peak.
-        let drop = 62 - view.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
-        let scaled = |step: i32| within((i64::from(step) * i64::from(view.inverse_modulus)) >> drop, i32::MAX);
+        let drop = 62 - scale.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
+        let scaled = |step: i32| within((i64::from(step) * i64::from(scale.inverse_modulus)) >> drop, i32::MAX);
         let change = within(scaled(rest_step).into(), REST_STEP);
         let rest = guess.rest + (high(guess.rest, change) << 4);
         let rest_square = guess.rest_square();

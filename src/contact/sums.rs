@@ -1,4 +1,4 @@
-//! Efforts 0 and 1: the contact read off the sums.
+//! The contact read off the sums.
 
 use crate::config::Config;
 use crate::pipeline::Contact;
@@ -14,16 +14,27 @@ const RATIO_BITS: u32 = 11;
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
 /// never below zero. The centre is that of the pressure, zero where there is no force.
 pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
-    let force_bits = (i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32;
-    let force = Newtons(I16F16::from_bits(force_bits.clamp(0, i64::from(i32::MAX)) as i32));
-    let indentation = config.tip.indentation(force);
+    let force = force(picture, config);
     let touching = force >= config.contact_off;
     let centre = |moment| if touching { centre(moment, picture.sum, config) } else { Millimetres::ZERO };
+    of_force(force, [centre(picture.moment_x), centre(picture.moment_y)], picture, config)
+}
+
+/// The sum of the taxels times their area.
+pub(super) fn force(picture: &Picture, config: &Config) -> Newtons {
+    let force_bits = (i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32;
+    Newtons(I16F16::from_bits(force_bits.clamp(0, i64::from(i32::MAX)) as i32))
+}
+
+/// A contact of this force: indentation and radius by the model, the rest by the picture.
+pub(super) fn of_force(force: Newtons, centre: [Millimetres; 2], picture: &Picture, config: &Config) -> Contact {
+    let indentation = config.tip.indentation(force);
+    let [centre_x, centre_y] = centre;
     Contact {
         force,
         indentation,
-        centre_x: centre(picture.moment_x),
-        centre_y: centre(picture.moment_y),
+        centre_x,
+        centre_y,
         radius: config.tip.contact_radius(indentation),
         peak_pa: ((i64::from(picture.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32,
         confidence: 255,

@@ -5,8 +5,9 @@
 //! taxels over those frames: 1 where the array sees all of it. That ratio changes slowly, while the sum follows every
 //! frame. So the force is the sum times the last ratio, as quick as the sum itself.
 
-use super::arith::Divisor;
+use super::arith::{Divisor, within};
 use super::effort::Effort;
+use super::geometry::ONE;
 use super::guess::{Guess, Pressed};
 use super::step::{self, Equations, Taxels};
 use super::sums::{self, from_sums};
@@ -39,6 +40,11 @@ pub struct Rows {
     pub stride: usize,
 }
 
+/// Fractional bits of what the indentation follows the force by.
+const FOLLOWS_BITS: u32 = 12;
+/// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
+const FOLLOWS_MAX: i32 = ONE / 16;
+
 /// A contact's fit between frames.
 #[derive(Clone, Debug)]
 pub struct Fit {
@@ -53,8 +59,12 @@ pub struct Fit {
     pressed: Pressed,
     /// By the peak of the first frame.
     scale: Scale,
-    /// The sum's force over the frames, in its smallest units.
+    /// The sum's force at the first of them.
+    force: Newtons,
+    /// Over all of them, in its smallest units.
     forces: i64,
+    /// How far the indentation follows the sum's force: d over twice that force.
+    follows: i32,
     equations: Equations,
     confidence: u8,
     /// Refinements without any confidence since the last that had some.
@@ -89,7 +99,9 @@ impl Fit {
             guess: Guess { rest: 0, x: 0, y: 0 },
             pressed: Pressed::NONE,
             scale: Scale::NONE,
+            force: Newtons::ZERO,
             forces: 0,
+            follows: 0,
             equations: Equations::NONE,
             confidence: 255,
             astray: 0,
@@ -138,7 +150,7 @@ impl Fit {
             self.take(rows, force, picture, config);
         }
         if rows.first >= ROWS || rows.stride == 1 {
-            self.refine(config);
+            self.refine(force, config);
         }
         let contact = match self.fitted {
             Some(Fitted { ratio, centre }) => {
@@ -166,7 +178,9 @@ impl Fit {
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
         self.pressed = Pressed::new(&self.guess, &scale, &config.geometry);
         self.scale = scale;
-        self.forces = 0;
+        (self.force, self.forces) = (sums.force, 0);
+        self.follows = Divisor::new(2 * u64::from(sums.force.to_bits().unsigned_abs()))
+            .divide((ONE - self.guess.rest).into(), FOLLOWS_BITS);
         self.equations = Equations::NONE;
         true
     }
@@ -175,6 +189,7 @@ impl Fit {
     fn take(&mut self, rows: Rows, force: Newtons, picture: &Picture, config: &Config) {
         let view = View { picture, scale: self.scale };
         let taxels = Taxels::rows(rows.first, rows.stride);
+        self.pressed.rest = self.followed(&self.guess, force);
         if self.covered {
             step::compare(&mut self.equations.misfit, &self.pressed, &view, taxels, &config.geometry);
         } else {
@@ -184,8 +199,15 @@ impl Fit {
         self.frames += 1;
     }
 
+    /// What is left between the plane and the hemisphere's centre, where the sum's force has become this one: d goes with the root of
+    /// the force.
+    fn followed(&self, guess: &Guess, force: Newtons) -> i32 {
+        let more = i64::from(force.to_bits()) - i64::from(self.force.to_bits());
+        guess.rest.saturating_sub(within((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
+    }
+
     /// Ends a refinement.
-    fn refine(&mut self, config: &Config) {
+    fn refine(&mut self, force: Newtons, config: &Config) {
         let frames = core::mem::take(&mut self.frames);
         self.confidence = confidence(&self.equations.misfit, &self.scale);
         if self.covered {
@@ -196,10 +218,14 @@ impl Fit {
             return self.forget();
         }
         let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);
-        self.next = Some(guess);
+        self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
         if self.confidence > 0 && self.equations.misfit.taxels >= TAXELS_LEAST {
-            let force = i64::from(config.tip.force(guess.indentation(&config.tip)).to_bits());
-            let ratio = Divisor::new(self.forces.unsigned_abs()).divide(i64::from(frames) * force, RATIO_BITS);
+            // At the mean of the frames, where noise counts least.
+            let mean = Divisor::new(frames.into()).divide(self.forces, 0);
+            let rest = self.followed(&guess, Newtons::from_bits(mean));
+            let mean_guess = Guess::new(rest, guess.x, guess.y, &config.geometry);
+            let fitted = i64::from(config.tip.force(mean_guess.indentation(&config.tip)).to_bits());
+            let ratio = Divisor::new(mean.unsigned_abs().into()).divide(fitted, RATIO_BITS);
             self.fitted = Some(Fitted { ratio: ratio.max(1).min(RATIO_MAX), centre: guess.centre(&config.tip) });
         }
     }

@@ -86,7 +86,7 @@ pub(super) struct Felt {
 /// A guess worked out for all taxels.
 #[derive(Clone, Debug)]
 pub(super) struct Pressed {
-    rest: i32,
+    pub rest: i32,
     /// s^3, Q27.
     rest_cube_q27: i32,
     /// Taxels nearer than this, squared, lie inside the contact.

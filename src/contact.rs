@@ -27,7 +27,7 @@ use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use guess::{CENTRE_BITS, Guess, Pressed};
 use rim::Rim;
-use step::{Equations, Misfit, Taxels};
+use step::{Bench, Equations, Misfit, Taxels};
 use view::{Scale, View};
 
 /// How often the reading of a single picture is refined. What the loop does from frame to frame is its [`Effort`].
@@ -114,7 +114,7 @@ pub fn read(picture: &Picture, refined: Refined, config: &Config) -> Contact {
 /// How far a guess and the picture are apart.
 fn misfit(guess: &Guess, which: Taxels, view: &View, geometry: &Geometry) -> Misfit {
     let mut misfit = Misfit::NONE;
-    step::compare(&mut misfit, &Pressed::new(guess, &view.scale, geometry), view, which, geometry);
+    misfit.compare(Bench { pressed: &Pressed::new(guess, &view.scale, geometry), view, geometry }, which);
     misfit
 }
 
@@ -155,9 +155,13 @@ fn refine(start: Guess, refined: Refined, which: Taxels, view: &View, geometry: 
     let mut guess = start;
     let mut again = true;
     while quick + close > 0 {
-        let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
+        let bench = Bench { pressed: &Pressed::new(&guess, &view.scale, geometry), view, geometry };
         let mut equations = Equations::NONE;
-        equations.take(&Pressed::new(&guess, &view.scale, geometry), view, which, rim.as_ref(), geometry);
+        if quick > 0 {
+            equations.take(bench, which);
+        } else {
+            equations.take_closely(bench, &Rim::new(&guess, view, geometry));
+        }
         let next = equations.solve(&guess, &view.scale, geometry);
         let moved = distance(&guess, &next);
         guess = next;

@@ -9,7 +9,7 @@ use super::arith::{Divisor, within};
 use super::effort::Effort;
 use super::geometry::ONE;
 use super::guess::{Guess, Pressed};
-use super::step::{self, Equations, Taxels};
+use super::step::{Bench, Equations};
 use super::sums::{self, from_sums};
 use super::view::{Scale, View};
 use super::{TAXELS_MIN, confidence, covers};
@@ -141,9 +141,13 @@ impl Fit {
                 _ => from_sums(picture, config),
             };
         }
-        if self.frames == 0 && !self.start(picture, config) {
+        // At the start, and while the sums are all there is.
+        let sums = (self.frames == 0 || self.fitted.is_none()).then(|| from_sums(picture, config));
+        if let (0, Some(sums)) = (self.frames, &sums)
+            && !self.start(sums, picture, config)
+        {
             self.lose();
-            return from_sums(picture, config);
+            return *sums;
         }
         let rows = self.wants();
         if rows.first < ROWS {
@@ -152,24 +156,25 @@ impl Fit {
         if rows.first >= ROWS || rows.stride == 1 {
             self.refine(force, config);
         }
-        let contact = match self.fitted {
-            Some(Fitted { ratio, centre }) => {
+        let contact = match (self.fitted, sums) {
+            (Some(Fitted { ratio, centre }), _) => {
                 let wide = (i64::from(force.to_bits()) * i64::from(ratio)) >> RATIO_BITS;
                 let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
                 sums::of_force(force, centre, picture, config)
             }
-            None => from_sums(picture, config),
+            (None, Some(sums)) => sums,
+            // A fit given up in this frame.
+            (None, None) => from_sums(picture, config),
         };
         Contact { confidence: self.confidence, ..contact }
     }
 
     /// Begins a refinement. False where the peak is too low for the model.
-    fn start(&mut self, picture: &Picture, config: &Config) -> bool {
+    fn start(&mut self, sums: &Contact, picture: &Picture, config: &Config) -> bool {
         let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
             return false;
         };
-        let sums = from_sums(picture, config);
-        self.covered = covers(&sums, picture, config);
+        self.covered = covers(sums, picture, config);
         if self.covered {
             self.forget();
         }
@@ -188,12 +193,16 @@ impl Fit {
     /// Takes in a frame.
     fn take(&mut self, rows: Rows, force: Newtons, picture: &Picture, config: &Config) {
         let view = View { picture, scale: self.scale };
-        let taxels = Taxels::rows(rows.first, rows.stride);
         self.pressed.rest = self.followed(&self.guess, force);
-        if self.covered {
-            step::compare(&mut self.equations.misfit, &self.pressed, &view, taxels, &config.geometry);
-        } else {
-            self.equations.take(&self.pressed, &view, taxels, None, &config.geometry);
+        let bench = Bench { pressed: &self.pressed, view: &view, geometry: &config.geometry };
+        let mut row = rows.first;
+        while row < ROWS {
+            if self.covered {
+                self.equations.misfit.compare_row(bench, row);
+            } else {
+                self.equations.take_row(bench, row);
+            }
+            row += rows.stride;
         }
         self.forces += i64::from(force.to_bits());
         self.frames += 1;

@@ -1,5 +1,6 @@
 //! One frame's way from codes to duty.
 
+pub mod budget;
 mod exchange;
 
 pub use exchange::{Command, Contact, Status};
@@ -14,13 +15,16 @@ use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
+use crate::scan::answer_ticks;
 use crate::units::{Duty, Newtons};
+use budget::Budget;
 
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: Config,
     array: Array,
+    budget: Budget,
     fit: Fit,
     motion: SpeedLoop,
     monitor: Monitor,
@@ -47,6 +51,7 @@ impl Pipeline {
         Self {
             config: config.clone(),
             array: Array::new(),
+            budget: Budget::new(),
             fit: Fit::default(),
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
@@ -103,6 +108,12 @@ impl Pipeline {
     pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
+        let deadline = answer_ticks(self.config.timing.frame_ticks());
+        let effort = self.budget.next(command.effort, sense.answer_ticks, deadline);
+        self.fit.set_effort(effort);
+        if effort < command.effort {
+            limits.set(Limits::EFFORT);
+        }
 
         // What the array feels, where it can be trusted: the bridge does not wait for the rest.
         let watched = self.watched();
@@ -115,6 +126,7 @@ impl Pipeline {
             Mode::Identify => contact::from_sums(picture, &self.config),
             _ => self.fit.read(picture, &self.config),
         };
+        self.budget.note(self.status.mode != Mode::Identify && self.fit.at_work());
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
         }
@@ -158,6 +170,7 @@ impl Pipeline {
         }
 
         self.status.limits = limits;
+        self.status.effort = effort;
         self.status.contact = contact;
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;

@@ -49,6 +49,7 @@ const FOLLOWS_MAX: i32 = ONE / 16;
 #[derive(Clone, Debug)]
 pub struct Fit {
     effort: Effort,
+    at_work: bool,
     /// Frames taken in since the last refinement.
     frames: u8,
     /// Whether the array sees the whole contact, as at the first of them.
@@ -94,6 +95,7 @@ impl Fit {
     pub const fn new(effort: Effort) -> Self {
         Self {
             effort,
+            at_work: false,
             frames: 0,
             covered: true,
             guess: Guess { rest: 0, x: 0, y: 0 },
@@ -128,12 +130,18 @@ impl Fit {
         Rows { first: if rows == 1 { frame * ROW_STEP % ROWS } else { frame }, stride }
     }
 
+    /// Whether the last frame took the model.
+    pub fn at_work(&self) -> bool {
+        self.at_work
+    }
+
     /// Reads the next frame's contact. Any picture is taken.
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
     /// refinement, 255 before the first.
     pub fn read(&mut self, picture: &Picture, config: &Config) -> Contact {
         let force = sums::force(picture, config);
+        self.at_work = false;
         if self.effort.rows() == 0 || force < config.contact_off {
             self.lose();
             return match self.effort {
@@ -149,6 +157,7 @@ impl Fit {
             self.lose();
             return *sums;
         }
+        self.at_work = true;
         let rows = self.wants();
         if rows.first < ROWS {
             self.take(rows, force, picture, config);

@@ -15,6 +15,7 @@ use crate::frame::Frame;
 use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use crate::model::{Relaxation, RelaxationState, Tip};
 use crate::pipeline::Contact;
+use crate::pipeline::budget::Budget;
 use crate::pressure::{Array, Picture};
 use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
@@ -38,6 +39,7 @@ pub struct Machines {
     press: Press,
     pictures: Pictures,
     fit: Fit,
+    budget: Budget,
     frame: Frame,
     pub(super) array: Array,
 }
@@ -65,6 +67,7 @@ impl Machines {
             press,
             pictures: Pictures::new(),
             fit: Fit::default(),
+            budget: Budget::new(),
             frame: frames::plausible(),
             array: Array::new(),
         }
@@ -100,7 +103,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 20] = [
+pub const STEPS: [Step; 21] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -137,6 +140,13 @@ pub const STEPS: [Step; 20] = [
         let Rows { first, stride } = m.fit.wants();
         mix.add((first << 8 | stride) as u32);
         add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config));
+    }),
+    ("Budget::next", |m, s, mix| {
+        // A whole deadline is about 2^13 ticks; the model is now and then at work.
+        let asked = Effort::from_number((s.share_q32 >> 29) as u8);
+        let taken = s.words[0].unsigned_abs() >> 17;
+        mix.add(m.budget.next(asked, taken, 12_568) as u32);
+        m.budget.note(s.words[1] > 0);
     }),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {

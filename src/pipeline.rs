@@ -126,7 +126,9 @@ impl Pipeline {
             Mode::Identify => contact::from_sums(picture, &self.config),
             _ => self.fit.read(picture, &self.config),
         };
-        self.budget.note(self.status.mode != Mode::Identify && self.fit.at_work());
+        let fits = self.status.mode != Mode::Identify;
+        self.budget.note(fits && self.fit.at_work());
+        let modelled = fits && self.fit.found();
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
         }
@@ -135,7 +137,7 @@ impl Pipeline {
         self.motion.observe(sense.encoder, &self.config);
 
         // Whether that is sound.
-        let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
+        let view = View { picture, contact: &contact, modelled, sense, motion: &self.motion, command };
         if watched && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
             self.status.mode = Mode::Fault;
             self.status.fault = Some(fault);
@@ -240,7 +242,8 @@ impl Pipeline {
             Mode::Off if command.torque && self.tared => {
                 self.motion.observer = Observer::zeroed_at(sense.encoder);
                 self.goal.start();
-                let view = View { picture: self.array.picture(), contact, sense, motion: &self.motion, command };
+                let (picture, modelled) = (self.array.picture(), self.fit.found());
+                let view = View { picture, contact, modelled, sense, motion: &self.motion, command };
                 self.monitor.restart(&view);
                 wanted
             }

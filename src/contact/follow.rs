@@ -135,6 +135,11 @@ impl Fit {
         self.at_work
     }
 
+    /// Whether the last force was the model's, not the sum's.
+    pub fn found(&self) -> bool {
+        self.fitted.is_some()
+    }
+
     /// Reads the next frame's contact. Any picture is taken.
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last

@@ -48,14 +48,15 @@ impl Budget {
     /// What the dearest frame takes beyond one by the sums: its most and its least, cycles of the core.
     ///
     /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
-    /// (`cargo xtask timing`, `docs/study.md`): the start of a refinement or its solution 2,600 at most, a row 1,000.
+    /// (`cargo xtask timing`, `docs/study.md`): the start of a refinement 2,100 at most, its solution
+    /// 1,600, a row 1,000.
     pub const fn model_ticks(effort: Effort) -> [u32; 2] {
         match effort {
             Effort::Sum | Effort::Moments => [0, 0],
-            Effort::OneRow => [3_600, 1_500],
-            Effort::TwoRows => [4_600, 1_700],
-            Effort::FiveRows => [7_600, 2_300],
-            Effort::AllRows => [15_200, 3_600],
+            Effort::OneRow => [3_100, 1_500],
+            Effort::TwoRows => [4_100, 1_700],
+            Effort::FiveRows => [7_100, 2_300],
+            Effort::AllRows => [13_700, 3_600],
         }
     }
 

@@ -36,7 +36,7 @@ type Kernel = extern "C" fn(&mut Bench);
 const STEPS: [(&str, Effort); 6] = [
     ("Pipeline::step, effort 0", Effort::Sum),
     ("Pipeline::step, effort 1", Effort::Moments),
-    ("**Pipeline::step, effort 2**", Effort::OneRow),
+    ("**Pipeline::step**", Effort::OneRow),
     ("Pipeline::step, effort 3", Effort::TwoRows),
     ("Pipeline::step, effort 4", Effort::FiveRows),
     ("Pipeline::step, effort 5", Effort::AllRows),

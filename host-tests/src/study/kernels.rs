@@ -173,7 +173,7 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "step",
         title: "The step and its parts",
-        text: "`Pipeline::step` at each effort over the recorded stimulus of 10,000 frames, faults included, and its parts over the first 3,000.",
+        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default effort, 2, and at the others; its parts over the first 3,000.",
         error: "",
         other: None,
         measure: Measure::Cost,

@@ -25,7 +25,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 12 + 11;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 13 + 11;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -164,12 +164,12 @@ mod tests {
         bytes.iter_mut().zip(1..=250).for_each(|(byte, value)| *byte = value);
         let record = Record::from_bytes(&bytes);
         assert_eq!(record.frame.code(0, 0), 0x0201);
-        assert_eq!(record.command.identify_request, 243);
+        assert_eq!(record.command.identify_request, 248);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
-        // Bytes differ where a truth value was neither 0 nor 1, and nowhere else.
+        // Bytes differ where a truth value was neither 0 nor 1, where an effort was none, and nowhere else.
         let differing = bytes.iter().zip(&again).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
-        assert!(differing.eq([232, 233]));
+        assert!(differing.eq([232, 237, 244]));
     }
 
     #[test]

@@ -27,12 +27,13 @@ fn stretch() -> impl Strategy<Value = Stretch> {
 struct Loop {
     budget: Budget,
     taken: u32,
+    turn: u32,
     random: fastrand::Rng,
 }
 
 impl Loop {
     fn new() -> Self {
-        Self { budget: Budget::new(), taken: 1, random: fastrand::Rng::with_seed(2003) }
+        Self { budget: Budget::new(), taken: 1, turn: 0, random: fastrand::Rng::with_seed(2003) }
     }
 
     /// A frame: the effort and how long it took.
@@ -41,8 +42,9 @@ impl Loop {
         let [most, _] = Budget::model_ticks(effort);
         self.taken = with.rest + self.random.u32(0..=with.spread);
         if with.contact && most > 0 {
-            // The dearest frame is one of several; the others take a part.
-            self.taken += (most * with.model_q8 >> 8) * self.random.u32(1..=3) / 3;
+            // The dearest frame is one of several, which come in turn; the others take a part.
+            self.turn = (self.turn + 1) % 11;
+            self.taken += ((most * with.model_q8) >> 8) * (11 - self.turn) / 11;
         }
         self.budget.note(with.contact && most > 0);
         (effort, self.taken)

@@ -65,10 +65,12 @@ fn crc32(bytes: &[u8]) -> [u8; 4] {
 #[test]
 fn the_layout_is_the_documented_one() {
     let bytes = encode(&record(9));
-    let names: String = Params::RANGES.iter().map(|(name, ..)| format!("{name}\n")).collect();
+    let head = ["id", "baud_code", "return_delay_2us", "effort"].into_iter();
+    let names: String =
+        head.chain(Params::RANGES.iter().map(|(name, ..)| *name)).map(|name| format!("{name}\n")).collect();
     assert_eq!(bytes[..4], *b"FTIP");
     assert_eq!(bytes[4..8], crc32(names.as_bytes()));
-    assert_eq!(bytes[8..12], [9, 4, 7, 0]);
+    assert_eq!(bytes[8..12], [9, 4, 7, 3]);
     assert_eq!(bytes[12..16], record(9).params.tip_radius_um.to_le_bytes());
     let end = 12 + 4 * Params::COUNT;
     assert_eq!(bytes[end..end + 4], crc32(&bytes[..end]));
@@ -109,6 +111,12 @@ fn a_record_of_another_layout_or_out_of_range_is_refused() {
     assert_eq!(refused(Record { id: 253, ..record(1) }), Damage::Head);
     assert_eq!(refused(Record { baud_code: 6, ..record(1) }), Damage::Head);
     assert_eq!(refused(Record { return_delay_2us: 255, ..record(1) }), Damage::Head);
+    let mut bad = encode(&record(1));
+    bad[11] = 6;
+    let end = 12 + 4 * Params::COUNT;
+    let crc = crc32(&bad[..end]);
+    bad[end..end + 4].copy_from_slice(&crc);
+    assert_eq!(latest(&bad).expect_err("refused").damage, Damage::Head);
     let mut bad = record(1);
     bad.params.pitch_um = 0;
     assert!(matches!(refused(bad), Damage::Param(error) if error.name == "pitch_um"));

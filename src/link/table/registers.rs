@@ -19,7 +19,7 @@ use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 /// Model number: the letters FT.
 const MODEL: u16 = u16::from_le_bytes(*b"FT");
 /// Counts changes of the control table that a host must know of.
-const TABLE_VERSION: u32 = 2;
+const TABLE_VERSION: u32 = 1;
 /// Ten times the major and once the minor number of the version.
 const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
 

@@ -108,9 +108,10 @@ impl Budget {
         self.rest = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
         self.restart();
         self.wait = self.wait.saturating_sub(1);
+        // A rise needs a little more room than staying, so that what varies by a little does not undo it.
         let higher = self.effort.higher();
         let [most, _] = Self::model_ticks(higher);
-        if self.wait == 0 && self.effort < self.asked.0 && self.rest.saturating_add(most) <= usable {
+        if self.wait == 0 && self.effort < self.asked.0 && self.rest.saturating_add(most) <= usable - usable / 32 {
             self.set(higher);
         }
     }

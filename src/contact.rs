@@ -6,6 +6,7 @@
 //! the measured errors.
 
 mod arith;
+mod effort;
 mod follow;
 mod geometry;
 mod guess;
@@ -15,7 +16,8 @@ mod step;
 mod sums;
 mod view;
 
-pub use follow::Fit;
+pub use effort::Effort;
+pub use follow::{Fit, Rows};
 pub use geometry::Geometry;
 pub use sums::from_sums;
 
@@ -25,35 +27,29 @@ use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use guess::{CENTRE_BITS, Guess, Pressed};
 use rim::Rim;
-use step::{Equations, Misfit, Taxels};
-use view::View;
+use step::{Bench, Equations, Misfit, Taxels};
+use view::{Scale, View};
 
-/// How much work a reading may be.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Effort {
-    /// Force by the sum of the taxels; the centre stays at the array's middle.
-    Sum,
-    /// Force by the sum, centre by the moments.
-    Moments,
-    /// The model, one refinement.
-    #[default]
+/// How often the reading of a single picture is refined. What the loop does from frame to frame is its [`Effort`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Refined {
+    /// Once.
     One,
-    /// The model, two refinements, the second with the rim worked out closely.
+    /// Twice, the second time with the rim worked out closely.
     Two,
-    /// The model, refined until it rests, at most [`Effort::STEPS_MAX`] times, with the rim worked out closely.
+    /// Until it rests, at most [`Refined::STEPS_MAX`] times, with the rim worked out closely.
     Full,
 }
 
-impl Effort {
+impl Refined {
     /// All of them, least first.
-    pub const ALL: [Self; 5] = [Self::Sum, Self::Moments, Self::One, Self::Two, Self::Full];
-    /// Refinements of [`Effort::Full`] at most.
+    pub const ALL: [Self; 3] = [Self::One, Self::Two, Self::Full];
+    /// Refinements of [`Refined::Full`] at most.
     pub const STEPS_MAX: u32 = 6;
 
     /// Refinements with the quick rim and then with the close one.
     const fn steps(self) -> (u32, u32) {
         match self {
-            Self::Sum | Self::Moments => (0, 0),
             Self::One => (1, 0),
             Self::Two => (1, 1),
             Self::Full => (1, Self::STEPS_MAX - 1),
@@ -69,40 +65,36 @@ const RESIDUAL_MAX: u32 = 459;
 const FAR: u32 = 1 << (CENTRE_BITS - 7);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
 const RESTS: u32 = 1 << (CENTRE_BITS - 14);
-/// Where the sum is more than this many peaks, the least effort looks at every other taxel.
+/// Where the sum is more than this many peaks, a single refinement looks at every other taxel.
 const LARGE: i32 = 16;
 /// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
 const TAXELS_MIN: i32 = 5;
 
-/// Reads the contact. Any picture is taken.
+/// Reads the contact of a single picture. Any picture is taken.
 ///
 /// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps the
 /// sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with no
 /// confidence at all.
-pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
+pub fn read(picture: &Picture, refined: Refined, config: &Config) -> Contact {
     let sums = from_sums(picture, config);
     let geometry = &config.geometry;
-    match effort {
-        Effort::Sum => return Contact { centre_x: Default::default(), centre_y: Default::default(), ..sums },
-        Effort::Moments => return sums,
-        Effort::One | Effort::Two | Effort::Full => {}
-    }
     if sums.force < config.contact_off {
         return sums;
     }
-    let Some(view) = View::new(picture, picture.peak, geometry) else {
+    let Some(scale) = Scale::new(picture.peak, geometry) else {
         return sums;
     };
+    let view = View { picture, scale };
     // The sum over the peak is about half of the number of taxels that see the contact.
-    let which = if effort == Effort::One && picture.sum / LARGE > picture.peak { Taxels::HALF } else { Taxels::ALL };
+    let which = if refined == Refined::One && picture.sum / LARGE > picture.peak { Taxels::HALF } else { Taxels::ALL };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     if covers(&sums, picture, config) {
-        return Contact { confidence: confidence(&misfit(&guess, which, &view, geometry), &view), ..sums };
+        return Contact { confidence: confidence(&misfit(&guess, which, &view, geometry), &scale), ..sums };
     }
     let start = start::plane(&view, which, geometry).unwrap_or(guess);
-    let guess = refine(start, effort, which, &view, geometry);
+    let guess = refine(start, refined, which, &view, geometry);
     let misfit = misfit(&guess, which, &view, geometry);
-    let confidence = confidence(&misfit, &view);
+    let confidence = confidence(&misfit, &scale);
     if misfit.taxels < TAXELS_MIN || confidence == 0 {
         return Contact { confidence, ..sums };
     }
@@ -122,7 +114,7 @@ pub fn read(picture: &Picture, effort: Effort, config: &Config) -> Contact {
 /// How far a guess and the picture are apart.
 fn misfit(guess: &Guess, which: Taxels, view: &View, geometry: &Geometry) -> Misfit {
     let mut misfit = Misfit::NONE;
-    step::compare(&mut misfit, &Pressed::new(guess, view, geometry), view, which);
+    misfit.compare(Bench { pressed: &Pressed::new(guess, &view.scale, geometry), view, geometry }, which);
     misfit
 }
 
@@ -157,16 +149,20 @@ fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
     true
 }
 
-/// Refines a guess as often as the effort allows.
-fn refine(start: Guess, effort: Effort, which: Taxels, view: &View, geometry: &Geometry) -> Guess {
-    let (mut quick, mut close) = effort.steps();
+/// Refines a guess as often as asked for.
+fn refine(start: Guess, refined: Refined, which: Taxels, view: &View, geometry: &Geometry) -> Guess {
+    let (mut quick, mut close) = refined.steps();
     let mut guess = start;
     let mut again = true;
     while quick + close > 0 {
-        let rim = (quick == 0).then(|| Rim::new(&guess, view, geometry));
+        let bench = Bench { pressed: &Pressed::new(&guess, &view.scale, geometry), view, geometry };
         let mut equations = Equations::NONE;
-        equations.take(&Pressed::new(&guess, view, geometry), view, which, rim.as_ref());
-        let next = equations.solve(&guess, view, geometry);
+        if quick > 0 {
+            equations.take(bench, which);
+        } else {
+            equations.take_closely(bench, &Rim::new(&guess, view, geometry));
+        }
+        let next = equations.solve(&guess, &view.scale, geometry);
         let moved = distance(&guess, &next);
         guess = next;
         if quick > 0 {
@@ -194,11 +190,11 @@ fn distance(from: &Guess, to: &Guess) -> u32 {
 }
 
 /// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
-fn confidence(misfit: &Misfit, view: &View) -> u8 {
+fn confidence(misfit: &Misfit, scale: &Scale) -> u8 {
     let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
     // Squares count 2^-24, 4 bits fewer than a share's square.
     let larger = mean(misfit.inside, misfit.taxels).max(mean(misfit.outside, misfit.others));
     let mean = larger.min(u32::MAX >> 4) << 4;
-    let residual = arith::root(mean.saturating_sub(view.converter_square()));
+    let residual = arith::root(mean.saturating_sub(scale.converter_square()));
     (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
 }

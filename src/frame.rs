@@ -66,4 +66,6 @@ pub struct Sense {
     pub bus_silent_ms: u16,
     /// The bridge's driver reports a fault (its nFAULT pin, which also broke the PWM in hardware).
     pub bridge_fault: bool,
+    /// From the last frame's end to its duty, ticks of [`crate::scan::TIMER_HZ`]; 0 where that was not measured.
+    pub answer_ticks: u32,
 }

@@ -1,5 +1,6 @@
 //! One frame's way from codes to duty.
 
+pub mod budget;
 mod exchange;
 
 pub use exchange::{Command, Contact, Status};
@@ -14,13 +15,16 @@ use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
+use crate::scan::answer_ticks;
 use crate::units::{Duty, Newtons};
+use budget::Budget;
 
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: Config,
     array: Array,
+    budget: Budget,
     fit: Fit,
     motion: SpeedLoop,
     monitor: Monitor,
@@ -47,7 +51,8 @@ impl Pipeline {
         Self {
             config: config.clone(),
             array: Array::new(),
-            fit: Fit::new(),
+            budget: Budget::new(),
+            fit: Fit::default(),
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
             goal: Goal::default(),
@@ -103,6 +108,12 @@ impl Pipeline {
     pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
+        let deadline = answer_ticks(self.config.timing.frame_ticks());
+        let effort = self.budget.next(command.effort, sense.answer_ticks, deadline);
+        self.fit.set_effort(effort);
+        if effort < command.effort {
+            limits.set(Limits::EFFORT);
+        }
 
         // What the array feels, where it can be trusted: the bridge does not wait for the rest.
         let watched = self.watched();
@@ -115,6 +126,9 @@ impl Pipeline {
             Mode::Identify => contact::from_sums(picture, &self.config),
             _ => self.fit.read(picture, &self.config),
         };
+        let fits = self.status.mode != Mode::Identify;
+        self.budget.note(fits && self.fit.at_work());
+        let modelled = fits && self.fit.found();
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
         }
@@ -123,7 +137,7 @@ impl Pipeline {
         self.motion.observe(sense.encoder, &self.config);
 
         // Whether that is sound.
-        let view = View { picture, contact: &contact, sense, motion: &self.motion, command };
+        let view = View { picture, contact: &contact, modelled, sense, motion: &self.motion, command };
         if watched && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
             self.status.mode = Mode::Fault;
             self.status.fault = Some(fault);
@@ -157,6 +171,7 @@ impl Pipeline {
         }
 
         self.status.limits = limits;
+        self.status.effort = effort;
         self.status.contact = contact;
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;
@@ -226,7 +241,8 @@ impl Pipeline {
             Mode::Off if command.torque && self.tared => {
                 self.motion.observer = Observer::zeroed_at(sense.encoder);
                 self.goal.start();
-                let view = View { picture: self.array.picture(), contact, sense, motion: &self.motion, command };
+                let (picture, modelled) = (self.array.picture(), self.fit.found());
+                let view = View { picture, contact, modelled, sense, motion: &self.motion, command };
                 self.monitor.restart(&view);
                 wanted
             }

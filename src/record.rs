@@ -2,6 +2,7 @@
 //!
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
+use crate::contact::Effort;
 use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
 use crate::identify::Modulus;
 use crate::pipeline::{Command, Contact, Status};
@@ -9,7 +10,7 @@ use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x03";
+pub const MAGIC: [u8; 8] = *b"fingert\x04";
 
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +25,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 9 + 10;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 13 + 11;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -39,20 +40,21 @@ impl Record {
         };
         places().for_each(|(slot, column)| put(&frame.code(slot, column).to_le_bytes()));
         put(&frame.sequence.to_le_bytes());
-        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault } = sense;
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer_ticks } = sense;
         put(&encoder.to_le_bytes());
         put(&supply_mv.to_le_bytes());
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
-        let Command { torque, goal, bus_watchdog_ms, tare_request, clear_request, identify_request } = command;
+        put(&answer_ticks.to_le_bytes());
+        let Command { torque, goal, bus_watchdog_ms, effort, tare_request, clear_request, identify_request } = command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
         put(&bus_watchdog_ms.to_le_bytes());
-        put(&[*tare_request, *clear_request, *identify_request]);
+        put(&[*effort as u8, *tare_request, *clear_request, *identify_request]);
         bytes
     }
 
-    /// The inverse of [`Record::to_bytes`]; any byte but 0 is true.
+    /// The inverse of [`Record::to_bytes`]; any byte but 0 is true, and any number above the largest effort is that.
     pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Self {
         let mut rest = &bytes[..];
         let mut frame = Frame::EMPTY;
@@ -63,11 +65,13 @@ impl Record {
             supply_mv: u16::from_le_bytes(take(&mut rest)),
             bus_silent_ms: u16::from_le_bytes(take(&mut rest)),
             bridge_fault: take(&mut rest) != [0],
+            answer_ticks: u32::from_le_bytes(take(&mut rest)),
         };
         let command = Command {
             torque: take(&mut rest) != [0],
             goal: Newtons::from_bits(i32::from_le_bytes(take(&mut rest))),
             bus_watchdog_ms: u16::from_le_bytes(take(&mut rest)),
+            effort: Effort::from_number(u8::from_le_bytes(take(&mut rest))),
             tare_request: u8::from_le_bytes(take(&mut rest)),
             clear_request: u8::from_le_bytes(take(&mut rest)),
             identify_request: u8::from_le_bytes(take(&mut rest)),
@@ -108,6 +112,7 @@ impl Digest {
             mode,
             fault,
             limits,
+            effort,
             contact,
             travel,
             speed,
@@ -131,7 +136,7 @@ impl Digest {
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());
         self.0.update(&applied.0.to_le_bytes());
-        self.0.update(&[mode as u8, fault.map_or(0, |fault| fault as u8), confidence, bad_taxels]);
+        self.0.update(&[effort as u8, mode as u8, fault.map_or(0, |fault| fault as u8), confidence, bad_taxels]);
     }
 
     /// The digest of what was added.
@@ -159,12 +164,12 @@ mod tests {
         bytes.iter_mut().zip(1..=250).for_each(|(byte, value)| *byte = value);
         let record = Record::from_bytes(&bytes);
         assert_eq!(record.frame.code(0, 0), 0x0201);
-        assert_eq!(record.command.identify_request, 243);
+        assert_eq!(record.command.identify_request, 248);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
-        // Bytes differ where a truth value was neither 0 nor 1, and nowhere else.
+        // Bytes differ where a truth value was neither 0 nor 1, where an effort was none, and nowhere else.
         let differing = bytes.iter().zip(&again).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
-        assert!(differing.eq([232, 233]));
+        assert!(differing.eq([232, 237, 244]));
     }
 
     #[test]
@@ -188,6 +193,7 @@ mod tests {
             with(|status| status.mode = Mode::Force),
             with(|status| status.fault = Some(Fault::LostFrames)),
             with(|status| status.limits = Limits(1)),
+            with(|status| status.effort = Effort::AllRows),
             with(|status| status.travel = Millimetres::from_bits(1)),
             with(|status| status.speed = MillimetresPerSecond::from_bits(1)),
             with(|status| status.duty = Duty(1)),

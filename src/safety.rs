@@ -93,6 +93,8 @@ impl Limits {
     pub const FRAME_MISSED: u16 = 1 << 7;
     /// The voltage's slew limit holds it back.
     pub const SLEW: u16 = 1 << 8;
+    /// There is no time for the effort that was asked for; see [`crate::pipeline::budget`].
+    pub const EFFORT: u16 = 1 << 9;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

@@ -50,6 +50,11 @@ impl core::fmt::Display for ScanError {
 
 impl core::error::Error for ScanError {}
 
+/// What control has from a frame's end to its new duty; the last quarter of the frame's time is left for the tasks below it.
+pub const fn answer_ticks(frame_ticks: u32) -> u32 {
+    frame_ticks / 4 * 3
+}
+
 impl ScanTiming {
     /// A settle time of 2.4 us and 15 cycles of sampling: 10 kHz.
     pub const DEFAULT_SETTLE_NS: u32 = 2_400;

@@ -3,8 +3,8 @@
 //! | bytes | content |
 //! | --- | --- |
 //! | 0 to 3 | magic "FTIP" |
-//! | 4 to 7 | fingerprint of the layout: CRC-32 of the parameters' names in order |
-//! | 8, 9, 10, 11 | ID, baud code, return delay, 0 |
+//! | 4 to 7 | fingerprint of the layout: CRC-32 of the names of all that follows, in order |
+//! | 8, 9, 10, 11 | ID, baud code, return delay, effort |
 //! | 12 to 12 + 4 n | parameters in the order of [`Params`], 32 bits each |
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
@@ -14,6 +14,7 @@
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
+use crate::contact::Effort;
 use crate::link::packet::ID_MAX;
 use crate::link::settings::BAUD_RATES;
 use crate::params::{ParamError, Params};
@@ -21,6 +22,8 @@ use crate::params::{ParamError, Params};
 const MAGIC: [u8; 4] = *b"FTIP";
 const HEADER_BYTES: usize = 12;
 const CRC_PLACE: usize = HEADER_BYTES + 4 * Params::COUNT;
+/// The names of what stands before the parameters.
+const HEAD: &[u8] = b"id\nbaud_code\nreturn_delay_2us\neffort\n";
 const LAYOUT: [u8; 4] = fingerprint().to_le_bytes();
 /// What flash reads after an erase.
 const BLANK: u8 = 0xFF;
@@ -28,6 +31,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 const fn fingerprint() -> u32 {
     let mut digest = CRC.digest();
+    digest.update(HEAD);
     let mut place = 0;
     while place < Params::COUNT {
         digest.update(Params::RANGES[place].0.as_bytes());
@@ -49,13 +53,16 @@ pub struct Record {
     pub baud_code: u8,
     /// Pause before a reply, in units of 2 us.
     pub return_delay_2us: u8,
+    /// How much work the loop may put into a contact.
+    pub effort: Effort,
     /// The parameters.
     pub params: Params,
 }
 
 impl Record {
     /// What a blank flash stands for: ID 1, 1 Mbaud, 500 us.
-    pub const DEFAULT: Self = Self { id: 1, baud_code: 3, return_delay_2us: 250, params: Params::DEFAULT };
+    pub const DEFAULT: Self =
+        Self { id: 1, baud_code: 3, return_delay_2us: 250, effort: Effort::OneRow, params: Params::DEFAULT };
 }
 
 impl Default for Record {
@@ -79,8 +86,8 @@ pub enum Damage {
     /// It is no whole record of this layout: the write was cut short, the flash lost bits, or another firmware wrote
     /// it.
     Unreadable,
-    /// The ID, the baud code or the return delay is out of its range.
-    Bus,
+    /// The ID, the baud code, the return delay or the effort is out of its range.
+    Head,
     /// A parameter is out of its range.
     Param(ParamError),
 }
@@ -88,7 +95,7 @@ pub enum Damage {
 /// A record as it is written to flash.
 pub fn encode(record: &Record) -> [u8; SLOT_BYTES] {
     let mut slot = [BLANK; SLOT_BYTES];
-    let head = [record.id, record.baud_code, record.return_delay_2us, 0];
+    let head = [record.id, record.baud_code, record.return_delay_2us, record.effort as u8];
     let bytes = (MAGIC.into_iter())
         .chain(LAYOUT)
         .chain(head)
@@ -148,9 +155,13 @@ fn decode(slot: &[u8]) -> Result<Record, Damage> {
     if tail.first_chunk() != Some(&CRC.checksum(body).to_le_bytes()) {
         return Err(Damage::Unreadable);
     }
-    let [id, baud_code, return_delay_2us, _] = *head;
-    if id > ID_MAX || usize::from(baud_code) >= BAUD_RATES.len() || return_delay_2us == u8::MAX {
-        return Err(Damage::Bus);
+    let [id, baud_code, return_delay_2us, effort] = *head;
+    if id > ID_MAX
+        || usize::from(baud_code) >= BAUD_RATES.len()
+        || return_delay_2us == u8::MAX
+        || effort > Effort::AllRows as u8
+    {
+        return Err(Damage::Head);
     }
     let mut values = [0; Params::COUNT];
     for (value, bytes) in values.iter_mut().zip(rest.as_chunks::<4>().0) {
@@ -158,5 +169,5 @@ fn decode(slot: &[u8]) -> Result<Record, Damage> {
     }
     let params = Params::from_array(&values);
     params.check().map_err(Damage::Param)?;
-    Ok(Record { id, baud_code, return_delay_2us, params })
+    Ok(Record { id, baud_code, return_delay_2us, effort: Effort::from_number(effort), params })
 }

@@ -19,7 +19,7 @@ pub fn markdown() -> String {
         bytes from {state} fetches the whole state of the loop, all from one frame. A read may take any bytes that belong \
         to registers, 1 to {READ_MAX} of them; a write covers whole registers, and either all of it happens or nothing.\n\n\
         - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash \
-        once `save_parameters` was written.\n\
+        once `save_parameters` was written, S-any the same but writable at any time.\n\
         - **one is**: what a step of the number means, which is also its resolution.\n\n"
     );
     errors(&mut page);
@@ -92,6 +92,7 @@ fn access(access: Access) -> &'static str {
         Access::ReadWrite => "RW",
         Access::TorqueOff => "RW-off",
         Access::Stored => "S",
+        Access::StoredLive => "S-any",
     }
 }
 

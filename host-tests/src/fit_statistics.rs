@@ -6,7 +6,7 @@
 use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
 use fingertip::config::Config;
-use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Fit};
+use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Fit, Refined};
 use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -18,11 +18,9 @@ pub const TAXELS_MIN: usize = 12;
 /// One reading's noise: whoever looks at the taxels with 1 % of noise cannot tell a smaller change of the seen force, spread
 /// over the taxels, from noise.
 pub const CUT_MIN: f64 = 0.01;
-/// Ways to read a contact: the four efforts on one picture, then [`Fit`] over [`FRAMES`] of them.
-/// [`Effort::Moments`] is the plain sum with the moments' centre.
-pub const WAYS: usize = EFFORTS.len() + 1;
-/// The efforts that are judged.
-pub const EFFORTS: [Effort; 4] = [Effort::Moments, Effort::One, Effort::Two, Effort::Full];
+/// Ways to read a contact: the plain sum with the moments' centre, one picture refined so often as [`Refined::ALL`] says, and
+/// [`Fit`] over [`FRAMES`] pictures.
+pub const WAYS: usize = 1 + Refined::ALL.len() + 1;
 /// Frames, each with its own noise, that [`Fit`] sees of a case.
 pub const FRAMES: usize = 90;
 /// Frames after which [`Fit`] is judged besides.
@@ -178,14 +176,15 @@ pub struct Verdict {
 pub type Judged = Vec<Verdict>;
 
 impl Verdict {
-    /// Judges the case of this number.
-    pub fn of(series: &Series, number: usize, configs: &Configs) -> Self {
+    /// Judges the case of this number, with this effort of [`Fit`].
+    pub fn of(series: &Series, number: usize, effort: Effort, configs: &Configs) -> Self {
         let case = series.case(number);
         let config = configs.of(&case.scene);
         let noisy = series.reading.noise != Noise::None;
         let mut rng = Rng::with_seed(0xf7a3_0000_0000 + number as u64);
-        let mut fit = Fit::new();
-        let mut last = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
+        let mut fit = Fit::new(effort);
+        let sums = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
+        let mut last = sums;
         let mut earlier = [last; EARLIER.len()];
         for frame in 1..=FRAMES {
             let (picture, _) = series.reading.picture(&case.pressures, case.picture.bad, &mut rng);
@@ -194,20 +193,20 @@ impl Verdict {
                 earlier[place] = last;
             }
         }
-        let read = |effort| Outcome::of(&contact::read(&case.picture, effort, config), &case.scene, noisy);
-        let [moments, one, two, full] = EFFORTS.map(read);
-        Self { case, outcomes: [moments, one, two, full, last], earlier }
+        let read = |refined| Outcome::of(&contact::read(&case.picture, refined, config), &case.scene, noisy);
+        let [one, two, full] = Refined::ALL.map(read);
+        Self { case, outcomes: [sums, one, two, full, last], earlier }
     }
 }
 
 /// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error of the
 /// force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
-pub fn pressed(number: usize, um_per_frame: f64, configs: &Configs) -> Outcome {
+pub fn pressed(number: usize, um_per_frame: f64, effort: Effort, configs: &Configs) -> Outcome {
     let [clean, ..] = GOOD;
     let mut scene = clean.case(number).scene;
     let (config, end) = (configs.of(&scene), scene.d_mm);
     let mut rng = Rng::with_seed(number as u64);
-    let mut fit = Fit::new();
+    let mut fit = Fit::new(effort);
     let mut worst = Outcome { force: 0.0, centre: 0.0, flagged: false };
     let mut settled = 0;
     scene.d_mm = 0.1;
@@ -225,14 +224,14 @@ pub fn pressed(number: usize, um_per_frame: f64, configs: &Configs) -> Outcome {
     worst
 }
 
-/// Judges `cases` cases of a series on all threads; `progress` hears how many are done.
-pub fn judge(series: &Series, cases: usize, progress: &(impl Fn(usize) + Sync)) -> Judged {
+/// Judges `cases` cases of a series on all threads, with this effort of [`Fit`]; `progress` hears how many are done.
+pub fn judge(series: &Series, cases: usize, effort: Effort, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let configs = Configs::default();
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get()).min(cases.max(1));
     let done = AtomicUsize::new(0);
     let part = |range: std::ops::Range<usize>| -> Judged {
         let one = |number| {
-            let verdict = Verdict::of(series, number, &configs);
+            let verdict = Verdict::of(series, number, effort, &configs);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             verdict
         };

@@ -3,6 +3,7 @@
 use crate::fit_statistics::{
     BAD, Configs, EARLIER, FRAMES, GOOD, Judged, Outcome, Series, Verdict, WAYS, judge, pressed, quantile,
 };
+use fingertip::contact::Effort;
 use std::fmt::Write as _;
 
 /// Where the tables begin in `docs/contact.md`.
@@ -14,17 +15,17 @@ pub const CASES: usize = 10_000;
 /// Classes of edges by the share of the seen force that they take: the ends of each.
 const CUTS: [(f64, f64); 4] = [(0.01, 0.03), (0.03, 0.1), (0.1, 0.3), (0.3, 1.0)];
 
-/// All tables; `progress` hears a series' name and how many of its cases are done.
-pub fn markdown(cases: usize, progress: &(impl Fn(&str, usize) + Sync)) -> String {
-    let judged = |series: &Series| judge(series, cases, &|done| progress(series.name, done));
+/// All tables, with this effort of `Fit`; `progress` hears a series' name and how many of its cases are done.
+pub fn markdown(cases: usize, effort: Effort, progress: &(impl Fn(&str, usize) + Sync)) -> String {
+    let judged = |series: &Series| judge(series, cases, effort, &|done| progress(series.name, done));
     let good: Vec<_> = GOOD.iter().map(|series| (series, judged(series))).collect();
     let bad: Vec<_> = BAD.iter().map(|series| (series, judged(series))).collect();
-    let mut page = format!("{cases} cases a series.\n\n");
+    let mut page = format!("{cases} cases a series, `Fit` with effort {}.\n\n", effort as u8);
     errors(&mut page, &good);
     alarms(&mut page, &good, &bad);
     edges(&mut page, &bad);
     settling(&mut page, &good);
-    motion(&mut page, cases, progress);
+    motion(&mut page, cases, effort, progress);
     page
 }
 
@@ -109,7 +110,7 @@ fn settling(page: &mut String, good: &[(&Series, Judged)]) {
     }
 }
 
-fn motion(page: &mut String, cases: usize, progress: &(impl Fn(&str, usize) + Sync)) {
+fn motion(page: &mut String, cases: usize, effort: Effort, progress: &(impl Fn(&str, usize) + Sync)) {
     let (cases, configs) = ((cases / 100).max(1), Configs::default());
     let _ = write!(
         page,
@@ -120,7 +121,7 @@ fn motion(page: &mut String, cases: usize, progress: &(impl Fn(&str, usize) + Sy
         let outcomes: Vec<_> = (0..cases)
             .map(|number| {
                 progress("pressed in", number);
-                pressed(number, um_per_frame, &configs)
+                pressed(number, um_per_frame, effort, &configs)
             })
             .collect();
         let values = |of: fn(&Outcome) -> f64| outcomes.iter().map(of);

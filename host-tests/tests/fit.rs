@@ -1,7 +1,7 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
 use fingertip::config::Config;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort, Fit, from_sums, read};
+use fingertip::contact::{CONFIDENCE_LEAST, Effort, Fit, Refined, from_sums, read};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::Contact;
@@ -24,12 +24,18 @@ fn reference() -> Config {
     Config::new(&Params::DEFAULT).expect("the default parameters are in range")
 }
 
-/// What every effort, and a fit that has seen the picture long enough, make of it.
+/// What a single look makes of a picture, and every effort that has seen it long enough: the sums first.
 fn all_ways(picture: &Picture, config: &Config) -> Vec<Contact> {
-    let mut fit = Fit::new();
-    let followed = (0..FRAMES).map(|_| fit.read(picture, config)).last();
-    Effort::ALL.iter().map(|effort| read(picture, *effort, config)).chain(followed).collect()
+    let followed = |effort| {
+        let mut fit = Fit::new(effort);
+        (0..FRAMES).map(|_| fit.read(picture, config)).last().expect("there are frames")
+    };
+    let looks = Refined::ALL.map(|refined| read(picture, refined, config));
+    Effort::ALL.map(followed).into_iter().chain(looks).collect()
 }
+
+/// The ways that use the model, of [`all_ways`].
+const BY_MODEL: usize = Effort::OneRow as usize;
 
 fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
@@ -45,15 +51,16 @@ fn still(scene: &Scene, bad: [u16; ROWS]) -> (Picture, usize) {
     reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
 }
 
-/// Effort two and a fit after many frames keep force and centre within their bounds.
+/// Two refinements of one picture, and a fit of any effort after many frames, keep force and centre within their bounds.
 fn holds(scene: &Scene, bad: [u16; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
     let config = scene.config();
     let ways = all_ways(&picture, &config);
-    for contact in [ways[Effort::Two as usize], ways[Effort::Full as usize], ways[Effort::ALL.len()]] {
-        let outcome = Outcome::of(&contact, scene, false);
-        assert!(outcome.force <= 1.0 && outcome.centre <= 1.0 && !outcome.flagged, "{scene:?}: {outcome:?}");
+    let one = Effort::ALL.len() + Refined::One as usize;
+    for (way, contact) in ways.iter().enumerate().skip(BY_MODEL).filter(|(way, _)| *way != one) {
+        let outcome = Outcome::of(contact, scene, false);
+        assert!(outcome.force <= 1.0 && outcome.centre <= 1.0 && !outcome.flagged, "way {way}, {scene:?}: {outcome:?}");
     }
     let sum = Outcome::of(&ways[Effort::Sum as usize], scene, false);
     assert!(sum.force > 5.0, "the sum alone is right as well: {scene:?}");
@@ -96,7 +103,7 @@ fn saturated_everywhere_is_nothing_seen() {
 #[test]
 fn full_everywhere_is_flagged() {
     let picture = picture(&[[FULL; COLUMNS]; ROWS], NONE);
-    for contact in &all_ways(&picture, &reference())[2..] {
+    for contact in &all_ways(&picture, &reference())[BY_MODEL..] {
         assert!(contact.confidence < CONFIDENCE_LEAST, "{contact:?}");
     }
 }
@@ -105,7 +112,7 @@ fn full_everywhere_is_flagged() {
 fn a_checkerboard_is_flagged() {
     for high in [40 * 16, 1000 * 16, FULL] {
         let taxels = core::array::from_fn(|row| core::array::from_fn(|column| high * ((row + column) as i32 & 1)));
-        for contact in &all_ways(&picture(&taxels, NONE), &reference())[2..] {
+        for contact in &all_ways(&picture(&taxels, NONE), &reference())[BY_MODEL..] {
             assert_eq!(contact.confidence, 0, "{high}: {contact:?}");
         }
     }
@@ -115,7 +122,7 @@ fn a_checkerboard_is_flagged() {
 fn frames_between_the_extremes_leave_nothing_behind() {
     let config = reference();
     let full = picture(&[[FULL; COLUMNS]; ROWS], NONE);
-    let mut fit = Fit::new();
+    let mut fit = Fit::default();
     for _ in 0..100 {
         let contact = fit.read(&full, &config);
         assert_eq!(contact.force, from_sums(&full, &config).force, "the first frame of a contact is its sum");
@@ -124,7 +131,7 @@ fn frames_between_the_extremes_leave_nothing_behind() {
     // And a real contact after them is read as if they had never been.
     let scene = plane(1.5, 2.0, 6.0, 0.0);
     let (picture, _) = still(&scene, NONE);
-    let mut fresh = Fit::new();
+    let mut fresh = Fit::default();
     for _ in 0..FRAMES {
         assert_eq!(fit.read(&picture, &config), fresh.read(&picture, &config));
     }
@@ -167,7 +174,7 @@ fn a_contact_that_grows_in_over_the_edge_is_never_taken_for_a_much_larger_one() 
     for (x_mm, y_mm) in [(-7.974, 1.681), (-9.251, -1.865), (7.0, 7.0)] {
         let mut scene = plane(1.27, 0.0, x_mm, y_mm);
         let config = scene.config();
-        let mut fit = Fit::new();
+        let mut fit = Fit::default();
         let mut seen_12 = 0;
         for frame in 1..=6_000 {
             scene.d_mm = 0.1 + 0.3e-3 * f64::from(frame);
@@ -223,7 +230,7 @@ fn one_code_near_no_force_moves_the_indentation_by_what_is_documented() {
 const CASES: usize = 200;
 
 fn judged(series: &Series) -> Judged {
-    judge(series, CASES, &|_| {})
+    judge(series, CASES, Effort::default(), &|_| {})
 }
 
 fn values(judged: &Judged, way: usize, of: fn(&Outcome) -> f64) -> impl Iterator<Item = f64> {

@@ -1,7 +1,7 @@
 //! Any picture that the array's reading can make, under any finger's parameters: the fit ends, within its range.
 
 use fingertip::config::Config;
-use fingertip::contact::{Effort, Fit, read};
+use fingertip::contact::{Effort, Fit, Refined, read};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::Contact;
@@ -67,14 +67,16 @@ proptest! {
 
     #[test]
     fn any_pictures_are_read(config in any_config(), pictures in proptest::collection::vec(any_picture(), 1..4)) {
-        let mut fit = Fit::new();
+        let mut fits = Effort::ALL.map(Fit::new);
         for picture in &pictures {
-            for effort in Effort::ALL {
-                in_range(&read(picture, effort, &config), &config);
+            for refined in Refined::ALL {
+                in_range(&read(picture, refined, &config), &config);
             }
             // Not a whole number of refinements, so that a picture meets a guess made from another.
-            for _ in 0..10 {
-                in_range(&fit.read(picture, &config), &config);
+            for _ in 0..19 {
+                for fit in &mut fits {
+                    in_range(&fit.read(picture, &config), &config);
+                }
             }
         }
     }

@@ -10,7 +10,7 @@ use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_semihosting::{debug, hio, nr, syscall};
 use fingertip::config::Config;
-use fingertip::contact::{self, Effort};
+use fingertip::contact::{self, Fit, Refined};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
@@ -31,6 +31,8 @@ struct Bench<'a> {
     array: Array,
     picture: Picture,
     contact: Contact,
+    /// Of the whole contact, and of the one over the edge.
+    fits: [Fit; 2],
     depth: Millimetres,
     motion: SpeedLoop,
     goal: Goal,
@@ -56,7 +58,7 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 16] = [
+const KERNELS: [(&str, Kernel, When); 17] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
@@ -64,12 +66,13 @@ const KERNELS: [(&str, Kernel, When); 16] = [
     ("observer", observe, Driving),
     ("goal and profile", reference, Driving),
     ("speed law and limits", follow, Driving),
-    ("contact, whole, sum", read_sum, When::Contact),
     ("contact, whole, moments", read_moments, When::Contact),
+    ("contact, whole, followed", follow_whole, When::Contact),
     ("contact, whole, one", read_one, When::Contact),
     ("contact, whole, two", read_two, When::Contact),
     ("contact, whole, full", read_full, When::Contact),
     ("contact, over the edge, moments", read_moments, Edge),
+    ("contact, over the edge, followed", follow_edge, Edge),
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
     ("contact, over the edge, full", read_full, Edge),
@@ -104,28 +107,32 @@ extern "C" fn follow(bench: &mut Bench) {
     bench.duty = bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
 }
 
-fn read(bench: &mut Bench, effort: Effort) {
-    bench.contact = contact::read(&bench.picture, effort, bench.config);
-}
-
-extern "C" fn read_sum(bench: &mut Bench) {
-    read(bench, Effort::Sum);
+fn read(bench: &mut Bench, refined: Refined) {
+    bench.contact = contact::read(&bench.picture, refined, bench.config);
 }
 
 extern "C" fn read_moments(bench: &mut Bench) {
-    read(bench, Effort::Moments);
+    bench.contact = contact::from_sums(&bench.picture, bench.config);
+}
+
+extern "C" fn follow_whole(bench: &mut Bench) {
+    bench.contact = bench.fits[0].read(&bench.picture, bench.config);
+}
+
+extern "C" fn follow_edge(bench: &mut Bench) {
+    bench.contact = bench.fits[1].read(&bench.picture, bench.config);
 }
 
 extern "C" fn read_one(bench: &mut Bench) {
-    read(bench, Effort::One);
+    read(bench, Refined::One);
 }
 
 extern "C" fn read_two(bench: &mut Bench) {
-    read(bench, Effort::Two);
+    read(bench, Refined::Two);
 }
 
 extern "C" fn read_full(bench: &mut Bench) {
-    read(bench, Effort::Full);
+    read(bench, Refined::Full);
 }
 
 #[cortex_m_rt::entry]
@@ -148,6 +155,7 @@ fn main() -> ! {
         array: Array::new(),
         picture: Picture::EMPTY,
         contact: Contact::default(),
+        fits: [Fit::default(), Fit::default()],
         depth: Millimetres::ZERO,
         motion: SpeedLoop::new(),
         goal: Goal::default(),

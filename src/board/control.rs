@@ -11,6 +11,7 @@ use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
 use fingertip::pipeline::{Command, Pipeline};
 use fingertip::safety::{Fault, Mode};
+use fingertip::scan::answer_ticks;
 use fingertip::units::Duty;
 
 use super::bridge::{self, Bridge};
@@ -139,6 +140,8 @@ impl State {
             supply_mv: parts.supply.read_mv(),
             bus_silent_ms: self.bus.silent_ms(),
             bridge_fault: parts.bridge.fault(),
+            // Before the first frame nothing is known: not 0, which would let any effort in.
+            answer_ticks: self.report.loop_ticks.saturating_mul(guard::TICKS).max(1),
         };
         let (duty, status) = parts.pipeline.step(&self.frame, &sense, &command);
         parts.bridge.apply(status.mode, duty);
@@ -151,7 +154,7 @@ impl State {
             loop_ticks,
             loop_ticks_max: self.report.loop_ticks_max.max(loop_ticks),
         };
-        if loop_ticks <= guard::answer_ticks(frame_ticks) {
+        if loop_ticks <= answer_ticks(frame_ticks) {
             guard::restart(completed.stamp, frame_ticks);
             parts.watchdog.pet();
         } else {

@@ -12,12 +12,15 @@ use embassy_stm32::interrupt::InterruptExt;
 use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::peripherals::TIM5;
 use embassy_stm32::{Peri, pac, rcc};
-use fingertip::scan::{ScanTiming, TIMER_HZ};
+use fingertip::scan::{ScanTiming, TIMER_HZ, answer_ticks};
 
 use super::{bridge, scan};
 
 /// Ticks of the stopwatch in a second.
 pub const HZ: u32 = 84_000_000;
+
+/// Ticks of the scan's timer in one of the stopwatch.
+pub const TICKS: u32 = TIMER_HZ / HZ;
 
 const COMPARE_1: usize = 0;
 
@@ -26,12 +29,7 @@ static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// A frame's time in ticks of the stopwatch.
 pub const fn frame_ticks(timing: ScanTiming) -> u32 {
-    timing.frame_ticks() / (TIMER_HZ / HZ)
-}
-
-/// What control has from a frame's end to its new duty; the last quarter is left for the tasks below it.
-pub const fn answer_ticks(frame_ticks: u32) -> u32 {
-    frame_ticks / 4 * 3
+    timing.frame_ticks() / TICKS
 }
 
 /// Starts the stopwatch; the guard waits for [`restart`].

@@ -41,6 +41,8 @@ impl Host {
     async fn run(&mut self) {
         let mut received = [0; 256];
         let mut reply = Reply::new();
+        // What is stored of it counts before anybody asks.
+        COMMAND.set(self.server.command());
         loop {
             match self.bus.receive(&mut received).await {
                 Ok(count) => {

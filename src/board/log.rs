@@ -24,7 +24,7 @@ pub fn log_damage(error: StoreError) {
     error!("stored parameters: the record at {=usize:#x} is damaged", error.offset);
     match error.damage {
         Damage::Unreadable => error!("cut short, damaged, or written by another firmware"),
-        Damage::Bus => error!("ID, baud code or return delay out of range"),
+        Damage::Head => error!("ID, baud code, return delay or effort out of range"),
         Damage::Param(cause) => log_parameter(cause),
     }
 }

@@ -1,13 +1,18 @@
 //! A contact followed from frame to frame, with little work in each.
 //!
-//! A refinement is spread over six frames: two rows in each of five, its solution in the last. What it tells is how many times larger the contact's force
-//! is than the sum of the taxels over those frames: 1 where the array sees all of it. That ratio changes slowly, while
-//! the sum follows every frame. So the force is the sum times the last ratio, as quick as the sum itself.
+//! A refinement is spread over frames: each row of the array is taken once, so many in a frame as the effort says, and the
+//! solution comes in a frame of its own. What it tells is how many times larger the contact's force is than the sum of the
+//! taxels over those frames: 1 where the array sees all of it. That ratio changes slowly, while the sum follows every
+//! frame. So the force is the sum times the last ratio, as quick as the sum itself.
 
+use super::arith::{Divisor, within};
+use super::effort::Effort;
+use super::geometry::ONE;
 use super::guess::{Guess, Pressed};
-use super::step::{self, Equations, Taxels};
-use super::view::View;
-use super::{TAXELS_MIN, confidence, covers, from_sums};
+use super::step::{Bench, Equations};
+use super::sums::{self, from_sums};
+use super::view::{Scale, View};
+use super::{TAXELS_MIN, confidence, covers};
 use crate::config::Config;
 use crate::frame::ROWS;
 use crate::pipeline::Contact;
@@ -15,8 +20,8 @@ use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 use fixed::types::I16F16;
 
-/// Frames that are taken in for a refinement; it is solved in one more.
-const FRAMES: u8 = 5;
+/// A row a frame is taken in steps of this many rows, so that what changes meanwhile is not taken for a slope.
+const ROW_STEP: usize = 3;
 /// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be found.
 const ASTRAY_MAX: u8 = 12;
 /// With fewer live taxels than this in the model's contact there are other contacts that look the same.
@@ -24,21 +29,43 @@ const TAXELS_LEAST: i32 = 8;
 /// Fractional bits of the ratio of the force to the sum.
 const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
-const RATIO_MAX: i64 = 64 << RATIO_BITS;
+const RATIO_MAX: i32 = 64 << RATIO_BITS;
+
+/// Rows of the array: this one and every so many-th after it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rows {
+    /// The first; [`ROWS`] where there is none.
+    pub first: usize,
+    /// From row to row.
+    pub stride: usize,
+}
+
+/// Fractional bits of what the indentation follows the force by.
+const FOLLOWS_BITS: u32 = 12;
+/// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
+const FOLLOWS_MAX: i32 = ONE / 16;
 
 /// A contact's fit between frames.
 #[derive(Clone, Debug)]
 pub struct Fit {
+    effort: Effort,
+    at_work: bool,
     /// Frames taken in since the last refinement.
     frames: u8,
     /// Whether the array sees the whole contact, as at the first of them.
     covered: bool,
     /// The contact supposed.
     guess: Guess,
-    /// Its peak at the first frame.
-    peak: i32,
-    /// The sum's force over the frames, in its smallest units.
+    /// The same, worked out for the taxels.
+    pressed: Pressed,
+    /// By the peak of the first frame.
+    scale: Scale,
+    /// The sum's force at the first of them.
+    force: Newtons,
+    /// Over all of them, in its smallest units.
     forces: i64,
+    /// How far the indentation follows the sum's force: d over twice that force.
+    follows: i32,
     equations: Equations,
     confidence: u8,
     /// Refinements without any confidence since the last that had some.
@@ -53,25 +80,30 @@ pub struct Fit {
 #[derive(Clone, Copy, Debug)]
 struct Fitted {
     /// Of the force to the sum.
-    ratio: u32,
+    ratio: i32,
     centre: [Millimetres; 2],
 }
 
 impl Default for Fit {
     fn default() -> Self {
-        Self::new()
+        Self::new(Effort::default())
     }
 }
 
 impl Fit {
     /// Nothing seen yet.
-    pub const fn new() -> Self {
+    pub const fn new(effort: Effort) -> Self {
         Self {
+            effort,
+            at_work: false,
             frames: 0,
             covered: true,
             guess: Guess { rest: 0, x: 0, y: 0 },
-            peak: 0,
+            pressed: Pressed::NONE,
+            scale: Scale::NONE,
+            force: Newtons::ZERO,
             forces: 0,
+            follows: 0,
             equations: Equations::NONE,
             confidence: 255,
             astray: 0,
@@ -80,36 +112,82 @@ impl Fit {
         }
     }
 
+    /// From the next frame on. A refinement under way is begun anew; what the last one found stays.
+    pub fn set_effort(&mut self, effort: Effort) {
+        if effort != self.effort {
+            self.effort = effort;
+            self.frames = 0;
+        }
+    }
+
+    /// The rows whose taxels the next [`Fit::read`] looks at. Of the others it takes only what they add up to.
+    pub fn wants(&self) -> Rows {
+        let (rows, frame) = (self.effort.rows(), usize::from(self.frames));
+        if rows == 0 || frame * rows >= ROWS {
+            return Rows { first: ROWS, stride: ROWS };
+        }
+        let stride = ROWS / rows;
+        Rows { first: if rows == 1 { frame * ROW_STEP % ROWS } else { frame }, stride }
+    }
+
+    /// Whether the last frame took the model.
+    pub fn at_work(&self) -> bool {
+        self.at_work
+    }
+
+    /// Whether the last force was the model's, not the sum's.
+    pub fn found(&self) -> bool {
+        self.fitted.is_some()
+    }
+
     /// Reads the next frame's contact. Any picture is taken.
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
     /// refinement, 255 before the first.
     pub fn read(&mut self, picture: &Picture, config: &Config) -> Contact {
-        let sums = from_sums(picture, config);
-        if sums.force < config.contact_off {
-            *self = Self::new();
-            return sums;
+        let force = sums::force(picture, config);
+        self.at_work = false;
+        if self.effort.rows() == 0 || force < config.contact_off {
+            self.lose();
+            return match self.effort {
+                Effort::Sum => sums::of_force(force, [Millimetres::ZERO; 2], picture, config),
+                _ => from_sums(picture, config),
+            };
         }
-        if self.frames == 0 {
-            self.start(&sums, picture, config);
+        // At the start, and while the sums are all there is.
+        let sums = (self.frames == 0 || self.fitted.is_none()).then(|| from_sums(picture, config));
+        if let (0, Some(sums)) = (self.frames, &sums)
+            && !self.start(sums, picture, config)
+        {
+            self.lose();
+            return *sums;
         }
-        match View::new(picture, self.peak, &config.geometry) {
-            Some(view) if self.frames < FRAMES => self.take(&sums, &view, config),
-            Some(view) => self.refine(&view, config),
-            None => *self = Self::new(),
+        self.at_work = true;
+        let rows = self.wants();
+        if rows.first < ROWS {
+            self.take(rows, force, picture, config);
         }
-        let Some(Fitted { ratio, centre: [centre_x, centre_y] }) = self.fitted else {
-            return Contact { confidence: self.confidence, ..sums };
+        if rows.first >= ROWS || rows.stride == 1 {
+            self.refine(force, config);
+        }
+        let contact = match (self.fitted, sums) {
+            (Some(Fitted { ratio, centre }), _) => {
+                let wide = (i64::from(force.to_bits()) * i64::from(ratio)) >> RATIO_BITS;
+                let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
+                sums::of_force(force, centre, picture, config)
+            }
+            (None, Some(sums)) => sums,
+            // A fit given up in this frame.
+            (None, None) => from_sums(picture, config),
         };
-        let wide = (i64::from(sums.force.to_bits()) * i64::from(ratio)) >> RATIO_BITS;
-        let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
-        let indentation = config.tip.indentation(force);
-        let radius = config.tip.contact_radius(indentation);
-        Contact { force, indentation, centre_x, centre_y, radius, confidence: self.confidence, ..sums }
+        Contact { confidence: self.confidence, ..contact }
     }
 
-    /// Begins a refinement.
-    fn start(&mut self, sums: &Contact, picture: &Picture, config: &Config) {
+    /// Begins a refinement. False where the peak is too low for the model.
+    fn start(&mut self, sums: &Contact, picture: &Picture, config: &Config) -> bool {
+        let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
+            return false;
+        };
         self.covered = covers(sums, picture, config);
         if self.covered {
             self.forget();
@@ -117,28 +195,44 @@ impl Fit {
         self.guess = self
             .next
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
-        self.peak = picture.peak;
-        self.forces = 0;
+        self.pressed = Pressed::new(&self.guess, &scale, &config.geometry);
+        self.scale = scale;
+        (self.force, self.forces) = (sums.force, 0);
+        self.follows = Divisor::new(2 * u64::from(sums.force.to_bits().unsigned_abs()))
+            .divide((ONE - self.guess.rest).into(), FOLLOWS_BITS);
         self.equations = Equations::NONE;
+        true
     }
 
     /// Takes in a frame.
-    fn take(&mut self, sums: &Contact, view: &View, config: &Config) {
-        let pressed = Pressed::new(&self.guess, view, &config.geometry);
-        let rows = Taxels::rows(usize::from(self.frames), usize::from(FRAMES));
-        if self.covered {
-            step::compare(&mut self.equations.misfit, &pressed, view, rows);
-        } else {
-            self.equations.take(&pressed, view, rows, None);
+    fn take(&mut self, rows: Rows, force: Newtons, picture: &Picture, config: &Config) {
+        let view = View { picture, scale: self.scale };
+        self.pressed.rest = self.followed(&self.guess, force);
+        let bench = Bench { pressed: &self.pressed, view: &view, geometry: &config.geometry };
+        let mut row = rows.first;
+        while row < ROWS {
+            if self.covered {
+                self.equations.misfit.compare_row(bench, row);
+            } else {
+                self.equations.take_row(bench, row);
+            }
+            row += rows.stride;
         }
-        self.forces += i64::from(sums.force.to_bits());
+        self.forces += i64::from(force.to_bits());
         self.frames += 1;
     }
 
+    /// What is left between the plane and the hemisphere's centre, where the sum's force has become this one: d goes with the root of
+    /// the force.
+    fn followed(&self, guess: &Guess, force: Newtons) -> i32 {
+        let more = i64::from(force.to_bits()) - i64::from(self.force.to_bits());
+        guess.rest.saturating_sub(within((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
+    }
+
     /// Ends a refinement.
-    fn refine(&mut self, view: &View, config: &Config) {
-        self.frames = 0;
-        self.confidence = confidence(&self.equations.misfit, view);
+    fn refine(&mut self, force: Newtons, config: &Config) {
+        let frames = core::mem::take(&mut self.frames);
+        self.confidence = confidence(&self.equations.misfit, &self.scale);
         if self.covered {
             return;
         }
@@ -146,13 +240,23 @@ impl Fit {
         if self.equations.misfit.taxels < TAXELS_MIN || self.astray > ASTRAY_MAX {
             return self.forget();
         }
-        let guess = self.equations.solve(&self.guess, view, &config.geometry);
-        self.next = Some(guess);
+        let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);
+        self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
         if self.confidence > 0 && self.equations.misfit.taxels >= TAXELS_LEAST {
-            let force = i64::from(config.tip.force(guess.indentation(&config.tip)).to_bits());
-            let ratio = ((i64::from(FRAMES) * force) << RATIO_BITS) / self.forces.max(1);
-            self.fitted = Some(Fitted { ratio: ratio.max(1).min(RATIO_MAX) as u32, centre: guess.centre(&config.tip) });
+            // At the mean of the frames, where noise counts least.
+            let mean = Divisor::new(frames.into()).divide(self.forces, 0);
+            let rest = self.followed(&guess, Newtons::from_bits(mean));
+            let mean_guess = Guess::new(rest, guess.x, guess.y, &config.geometry);
+            let fitted = i64::from(config.tip.force(mean_guess.indentation(&config.tip)).to_bits());
+            let ratio = Divisor::new(mean.unsigned_abs().into()).divide(fitted, RATIO_BITS);
+            self.fitted = Some(Fitted { ratio: ratio.max(1).min(RATIO_MAX), centre: guess.centre(&config.tip) });
         }
+    }
+
+    /// No contact, or none that the model can say anything of.
+    fn lose(&mut self) {
+        self.forget();
+        (self.frames, self.confidence) = (0, 255);
     }
 
     /// Back to the sums.
@@ -161,4 +265,4 @@ impl Fit {
     }
 }
 
-const _: () = assert!(ROWS.is_multiple_of(FRAMES as usize));
+const _: () = assert!(ROWS == 10, "rows divide by 2, 5 and 10, and a step of 3 rows comes to each of them once");

@@ -2,7 +2,7 @@
 
 use super::arith::{between, high, root, within};
 use super::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
-use super::view::View;
+use super::view::Scale;
 use crate::frame::{COLUMNS, ROWS};
 use crate::model::Tip;
 use crate::units::Millimetres;
@@ -84,9 +84,9 @@ pub(super) struct Felt {
 }
 
 /// A guess worked out for all taxels.
-pub(super) struct Pressed<'a> {
-    geometry: &'a Geometry,
-    rest: i32,
+#[derive(Clone, Debug)]
+pub(super) struct Pressed {
+    pub rest: i32,
     /// s^3, Q27.
     rest_cube_q27: i32,
     /// Taxels nearer than this, squared, lie inside the contact.
@@ -105,8 +105,22 @@ pub(super) struct Pressed<'a> {
     pub dy: [i32; ROWS],
 }
 
-impl<'a> Pressed<'a> {
-    pub fn new(guess: &Guess, view: &View, geometry: &'a Geometry) -> Self {
+impl Pressed {
+    /// Of nothing.
+    pub const NONE: Self = Self {
+        rest: 0,
+        rest_cube_q27: 0,
+        inside: 0,
+        outside: 0,
+        twice_modulus: 0,
+        modulus: 0,
+        modulus_shift: 0,
+        dx: [0; COLUMNS],
+        dx_square: [0; COLUMNS],
+        dy: [0; ROWS],
+    };
+
+    pub fn new(guess: &Guess, scale: &Scale, geometry: &Geometry) -> Self {
         // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
         let widened = guess.rim_square() + high(geometry.pitch, geometry.pitch) / 12 * 16;
         let middle = root((widened as u32) << 2) as i32;
@@ -115,14 +129,13 @@ impl<'a> Pressed<'a> {
         let from = |centre: i32| geometry.places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)));
         let dx = from(guess.x);
         Self {
-            geometry,
             rest: guess.rest,
             rest_cube_q27: high(guess.rest_square(), guess.rest) << 3,
             inside: square_of(middle - half),
             outside: square_of(middle + half),
-            twice_modulus: 2 * view.modulus,
-            modulus: view.modulus << view.modulus_shift,
-            modulus_shift: view.modulus_shift,
+            twice_modulus: 2 * scale.modulus,
+            modulus: scale.modulus << scale.modulus_shift,
+            modulus_shift: scale.modulus_shift,
             dx,
             dx_square: dx.map(square),
             dy: from(guess.y),
@@ -131,8 +144,8 @@ impl<'a> Pressed<'a> {
 
     /// A taxel at a squared distance below [`Pressed::outside`].
     #[inline(always)]
-    pub fn felt(&self, square: u32) -> Felt {
-        let ([low, up], share) = interval(&self.geometry.nodes, square);
+    pub fn felt(&self, square: u32, nodes: &[Node; NODES]) -> Felt {
+        let ([low, up], share) = interval(nodes, square);
         if square < self.inside {
             let rise = up.mean_inverse_length - low.mean_inverse_length;
             let mean = low.mean_inverse_length + 2 * high(rise, share);

@@ -41,8 +41,8 @@ impl<'a> Rim<'a> {
             half,
             line: (half * GAUSS) >> 15,
             lift,
-            scale: (view.modulus.unsigned_abs() << view.modulus_shift) / half.unsigned_abs(),
-            scale_shift: view.modulus_shift,
+            scale: (view.scale.modulus.unsigned_abs() << view.scale.modulus_shift) / half.unsigned_abs(),
+            scale_shift: view.scale.modulus_shift,
         }
     }
 

@@ -57,7 +57,7 @@ impl Sums {
     fn of(view: &View, mut which: Taxels) -> Self {
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
-        let inverse_modulus = (view.inverse_modulus >> (24 - view.modulus_shift)) as i32;
+        let inverse_modulus = (view.scale.inverse_modulus >> (24 - view.scale.modulus_shift)) as i32;
         while let Some((row, mut column, stride)) = which.next_row() {
             let taxels = &view.picture.taxels[row];
             let y = 2 * row as i32 + 1 - ROWS as i32;

@@ -8,7 +8,7 @@ use super::arith::{Divisor, high, within};
 use super::geometry::{Geometry, PLACE_BITS};
 use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
 use super::rim::Rim;
-use super::view::{PEAK_BITS, View};
+use super::view::{PEAK_BITS, Scale, View};
 use crate::frame::{COLUMNS, ROWS};
 
 /// A residual stops at half of the peak.
@@ -52,8 +52,7 @@ struct Row {
     rest: i32,
     square: i32,
     x: i32,
-    inside: i32,
-    outside: i32,
+    misfit: Misfit,
 }
 
 /// Bits dropped from a row's sums, so that ten rows fit 32 bits.
@@ -68,14 +67,12 @@ pub(super) struct Equations {
     pub misfit: Misfit,
 }
 
-/// Which taxels a pass looks at.
+/// Which taxels a pass over a whole picture looks at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Taxels {
     /// The next row.
     row: usize,
-    /// From row to row.
-    rows: usize,
-    /// The row's first column, less than the stride.
+    /// The row's first column.
     first: usize,
     /// From column to column; the next row begins one later.
     stride: usize,
@@ -83,14 +80,9 @@ pub(super) struct Taxels {
 
 impl Taxels {
     /// All.
-    pub const ALL: Self = Self::rows(0, 1);
+    pub const ALL: Self = Self { row: 0, first: 0, stride: 1 };
     /// Every other one, like a chessboard's white fields.
     pub const HALF: Self = Self { stride: 2, ..Self::ALL };
-
-    /// All in every so many-th row from this one on.
-    pub const fn rows(row: usize, rows: usize) -> Self {
-        Self { row, rows, first: 0, stride: 1 }
-    }
 
     /// The next row, its first column and the distance to the next column.
     #[inline(always)]
@@ -99,37 +91,69 @@ impl Taxels {
         if row >= ROWS {
             return None;
         }
-        self.row += self.rows;
+        self.row += 1;
         self.first = if first + 1 < self.stride { first + 1 } else { 0 };
         Some((row, first, self.stride))
     }
 }
 
-/// How far the model and the picture are apart, where it is not to be refined.
-pub(super) fn compare(misfit: &mut Misfit, pressed: &Pressed, view: &View, mut which: Taxels) {
-    while let Some((row, mut column, stride)) = which.next_row() {
-        let (taxels, mut bad) = (&view.picture.taxels[row], view.picture.bad[row] >> column);
-        let dy_square = square(pressed.dy[row]);
-        let (mut inside, mut outside) = (0, 0);
+/// What a row's taxels are compared with.
+#[derive(Clone, Copy)]
+pub(super) struct Bench<'a> {
+    pub pressed: &'a Pressed,
+    pub view: &'a View<'a>,
+    pub geometry: &'a Geometry,
+}
+
+impl Misfit {
+    /// How far the model and the picture are apart, where it is not to be refined.
+    pub fn compare(&mut self, bench: Bench, mut which: Taxels) {
+        while let Some((row, first, stride)) = which.next_row() {
+            self.add(bench, row, first, stride);
+        }
+    }
+
+    /// The same of a row.
+    #[inline(never)]
+    pub fn compare_row(&mut self, bench: Bench, row: usize) {
+        self.add(bench, row, 0, 1);
+    }
+
+    #[inline(always)]
+    fn add(&mut self, Bench { pressed, view, geometry }: Bench, row: usize, first: usize, stride: usize) {
+        let (Some(taxels), Some(bad), Some(dy)) =
+            (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
+        else {
+            return;
+        };
+        let dy_square = square(*dy);
+        let mut bad = u32::from(*bad) >> first;
+        let mut row = Self::NONE;
+        let mut column = first;
         while column < COLUMNS {
             if bad & 1 == 0 {
                 let at = pressed.dx_square[column] + dy_square;
                 let share = view.share(taxels[column]);
                 if at < pressed.outside {
-                    let felt = pressed.felt(at);
-                    misfit.taxels += 1;
-                    let residual = residual(share - felt.pressure);
-                    inside += residual * residual;
+                    row.taxels += 1;
+                    let residual = residual(share - pressed.felt(at, &geometry.nodes).pressure);
+                    row.inside += residual * residual;
                 } else {
-                    misfit.others += 1;
-                    outside += residual(share) * residual(share);
+                    row.others += 1;
+                    row.outside += residual(share) * residual(share);
                 }
             }
             column += stride;
             bad >>= stride;
         }
-        misfit.inside += inside >> ROW_DROP;
-        misfit.outside += outside >> ROW_DROP;
+        self.add_row(&row);
+    }
+
+    fn add_row(&mut self, row: &Self) {
+        self.taxels += row.taxels;
+        self.others += row.others;
+        self.inside += row.inside >> ROW_DROP;
+        self.outside += row.outside >> ROW_DROP;
     }
 }
 
@@ -169,7 +193,7 @@ impl Row {
         self.rest += rest * residual;
         self.square += square * residual;
         self.x += weighted_x * residual;
-        self.inside += residual * residual;
+        self.misfit.inside += residual * residual;
     }
 }
 
@@ -177,35 +201,60 @@ impl Equations {
     /// Without a taxel.
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
-    /// Takes in taxels; with a rim, those under it are worked out by it.
-    pub fn take(&mut self, pressed: &Pressed, view: &View, mut which: Taxels, rim: Option<&Rim>) {
-        while let Some((row, mut column, stride)) = which.next_row() {
-            let (taxels, mut bad, dy) = (&view.picture.taxels[row], view.picture.bad[row] >> column, pressed.dy[row]);
-            let dy_square = square(dy);
-            let mut sums = Row::default();
-            while column < COLUMNS {
-                if bad & 1 == 0 {
-                    let at = pressed.dx_square[column] + dy_square;
-                    let share = view.share(taxels[column]);
-                    if at < pressed.outside {
-                        let dx = pressed.dx[column];
-                        let mut felt = pressed.felt(at);
-                        if let (Some(rim), true) = (rim, at >= pressed.inside) {
-                            felt.pressure = rim.pressure(dx, dy);
-                        }
-                        self.misfit.taxels += 1;
-                        let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
-                        sums.add(&felt, dx, residual(share - felt.pressure), weight);
-                    } else {
-                        self.misfit.others += 1;
-                        sums.outside += residual(share) * residual(share);
-                    }
-                }
-                column += stride;
-                bad >>= stride;
-            }
-            self.add(&sums, dy);
+    /// Takes in taxels.
+    pub fn take(&mut self, bench: Bench, mut which: Taxels) {
+        while let Some((row, first, stride)) = which.next_row() {
+            self.take_part(bench, row, first, stride, None);
         }
+    }
+
+    /// Takes in all taxels, and works those under the rim out by it.
+    pub fn take_closely(&mut self, bench: Bench, rim: &Rim) {
+        for row in 0..ROWS {
+            self.take_part(bench, row, 0, 1, Some(rim));
+        }
+    }
+
+    /// Takes in a row.
+    #[inline(never)]
+    pub fn take_row(&mut self, bench: Bench, row: usize) {
+        self.take_part(bench, row, 0, 1, None);
+    }
+
+    #[inline(always)]
+    fn take_part(&mut self, bench: Bench, row: usize, first: usize, stride: usize, rim: Option<&Rim>) {
+        let Bench { pressed, view, geometry } = bench;
+        let (Some(taxels), Some(bad), Some(dy)) =
+            (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
+        else {
+            return;
+        };
+        let dy_square = square(*dy);
+        let mut bad = u32::from(*bad) >> first;
+        let mut sums = Row::default();
+        let mut column = first;
+        while column < COLUMNS {
+            if bad & 1 == 0 {
+                let at = pressed.dx_square[column] + dy_square;
+                let share = view.share(taxels[column]);
+                if at < pressed.outside {
+                    let dx = pressed.dx[column];
+                    let mut felt = pressed.felt(at, &geometry.nodes);
+                    if let (Some(rim), true) = (rim, at >= pressed.inside) {
+                        felt.pressure = rim.pressure(dx, *dy);
+                    }
+                    sums.misfit.taxels += 1;
+                    let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
+                    sums.add(&felt, dx, residual(share - felt.pressure), weight);
+                } else {
+                    sums.misfit.others += 1;
+                    sums.misfit.outside += residual(share) * residual(share);
+                }
+            }
+            column += stride;
+            bad >>= stride;
+        }
+        self.add(&sums, *dy);
     }
 
     fn add(&mut self, row: &Row, dy: i32) {
@@ -222,12 +271,11 @@ impl Equations {
         *s -= row.rest >> ROW_DROP;
         *x += row.x >> ROW_DROP;
         *y += high(row.square, dy);
-        self.misfit.inside += row.inside >> ROW_DROP;
-        self.misfit.outside += row.outside >> ROW_DROP;
+        self.misfit.add_row(&row.misfit);
     }
 
     /// The next guess.
-    pub fn solve(&self, guess: &Guess, view: &View, geometry: &Geometry) -> Guess {
+    pub fn solve(&self, guess: &Guess, scale: &Scale, geometry: &Geometry) -> Guess {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;
         let divisor = |left: i32, of: i32| Divisor::new(left.max(of >> GUARD_BITS).max(1).unsigned_abs().into());
@@ -248,8 +296,8 @@ impl Equations {
         let rest_step = by_ss.divide((s - times(x_step, sx) - times(y_step, sy)).into(), SHARE_BITS);
 
         // Slopes count Y and residuals the peak, so the solution is divided by Y over the peak.
-        let drop = 62 - view.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
-        let scaled = |step: i32| within((i64::from(step) * i64::from(view.inverse_modulus)) >> drop, i32::MAX);
+        let drop = 62 - scale.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
+        let scaled = |step: i32| within((i64::from(step) * i64::from(scale.inverse_modulus)) >> drop, i32::MAX);
         let change = within(scaled(rest_step).into(), REST_STEP);
         let rest = guess.rest + (high(guess.rest, change) << 4);
         let rest_square = guess.rest_square();

@@ -1,4 +1,4 @@
-//! Efforts 0 and 1: the contact read off the sums.
+//! The contact read off the sums.
 
 use crate::config::Config;
 use crate::pipeline::Contact;
@@ -14,11 +14,22 @@ const RATIO_BITS: u32 = 11;
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
 /// never below zero. The centre is that of the pressure, zero where there is no force.
 pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
+    let force = force(picture, config);
+    let centre = if force >= config.contact_off { centre(picture, config) } else { Default::default() };
+    of_force(force, centre, picture, config)
+}
+
+/// The sum of the taxels times their area.
+pub(super) fn force(picture: &Picture, config: &Config) -> Newtons {
     // The product is positive: its upper half is below 2^31.
     let force_bits = ((i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
-    let force = Newtons(I16F16::from_bits(force_bits.max(0)));
+    Newtons(I16F16::from_bits(force_bits.max(0)))
+}
+
+/// A contact of this force: indentation and radius by the model, the rest by the picture.
+pub(super) fn of_force(force: Newtons, centre: [Millimetres; 2], picture: &Picture, config: &Config) -> Contact {
     let indentation = config.tip.indentation(force);
-    let [centre_x, centre_y] = if force >= config.contact_off { centre(picture, config) } else { Default::default() };
+    let [centre_x, centre_y] = centre;
     Contact {
         force,
         indentation,

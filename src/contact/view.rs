@@ -18,6 +18,12 @@ const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 /// A picture and its scale.
 pub(super) struct View<'a> {
     pub picture: &'a Picture,
+    pub scale: Scale,
+}
+
+/// What makes a taxel a share of the peak.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Scale {
     /// 2^34 over the peak.
     inverse_peak: i32,
     /// Y in shares of the peak, Q14.
@@ -28,9 +34,20 @@ pub(super) struct View<'a> {
     pub inverse_modulus: u32,
 }
 
-impl<'a> View<'a> {
+impl View<'_> {
+    /// A taxel as a share of the peak, Q14; a taxel of less than -2^18 has no meaning.
+    #[inline(always)]
+    pub fn share(&self, taxel: i32) -> i32 {
+        self.scale.share(taxel)
+    }
+}
+
+impl Scale {
+    /// Of nothing.
+    pub const NONE: Self = Self { inverse_peak: 0, modulus: 0, modulus_shift: 0, inverse_modulus: 0 };
+
     /// In shares of this peak; None where it is too low for the model.
-    pub fn new(picture: &'a Picture, peak: i32, geometry: &Geometry) -> Option<Self> {
+    pub fn new(peak: i32, geometry: &Geometry) -> Option<Self> {
         if peak < PEAK_MIN {
             return None;
         }
@@ -42,7 +59,6 @@ impl<'a> View<'a> {
         let modulus = ((whole << (PEAK_BITS - 8)) + (rest << (PEAK_BITS - 8)) / divisor).max(MODULUS_MIN);
         let modulus_shift = modulus.leading_zeros() - 1;
         Some(Self {
-            picture,
             inverse_peak: (reciprocal(divisor << divisor.leading_zeros()) >> (29 - divisor.leading_zeros())) as i32,
             modulus: modulus as i32,
             modulus_shift,
@@ -50,9 +66,8 @@ impl<'a> View<'a> {
         })
     }
 
-    /// A taxel as a share of the peak, Q14; a taxel of less than -2^18 has no meaning.
     #[inline(always)]
-    pub fn share(&self, taxel: i32) -> i32 {
+    fn share(&self, taxel: i32) -> i32 {
         high(taxel << (PEAK_BITS - 2), self.inverse_peak)
     }
 

@@ -139,7 +139,7 @@ impl Server {
 
     /// What the host asks of the loop.
     pub fn command(&self) -> Command {
-        self.state.settings.command
+        Command { effort: self.state.settings.record.effort, ..self.state.settings.command }
     }
 
     /// All that the host may change.

@@ -4,6 +4,8 @@
 //! and [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes straight into the
 //! reply.
 
+#[macro_use]
+mod define;
 mod registers;
 mod values;
 
@@ -32,6 +34,8 @@ pub enum Access {
     TorqueOff,
     /// The host, while torque is off; kept in flash once `save_parameters` was written.
     Stored,
+    /// The same at any time.
+    StoredLive,
 }
 
 /// How a register's bytes make a number, little-endian.

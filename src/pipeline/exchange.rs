@@ -1,5 +1,6 @@
 //! What goes into a step beside the frame, and what comes out of it beside the duty.
 
+use crate::contact::Effort;
 use crate::identify::Identification;
 use crate::safety::{Fault, Limits, Mode};
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
@@ -13,6 +14,8 @@ pub struct Command {
     pub goal: Newtons,
     /// Bus watchdog in ms; 0 is off.
     pub bus_watchdog_ms: u16,
+    /// How much work may be put into the contact.
+    pub effort: Effort,
     /// A change of this number asks for a tare.
     pub tare_request: u8,
     /// A change of this number clears a fault.
@@ -55,6 +58,8 @@ pub struct Status {
     pub fault: Option<Fault>,
     /// What holds it back.
     pub limits: Limits,
+    /// The effort in use: what was asked for, or what there is time for.
+    pub effort: Effort,
     /// What the frame says.
     pub contact: Contact,
     /// Tip travel since torque was enabled.

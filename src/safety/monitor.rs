@@ -23,6 +23,8 @@ pub struct View<'a> {
     pub picture: &'a Picture,
     /// The contact read off it.
     pub contact: &'a Contact,
+    /// Whether its force is the model's, not the sum's.
+    pub modelled: bool,
     /// Encoder, supply, bus and bridge.
     pub sense: &'a Sense,
     /// The motion estimated.
@@ -36,6 +38,7 @@ pub struct View<'a> {
 pub struct Monitor {
     encoder: i32,
     indentation: Millimetres,
+    modelled: bool,
     stalled_ns: u32,
     sums: [i32; 3],
     travel: Millimetres,
@@ -48,6 +51,7 @@ impl Monitor {
         *self = Self {
             encoder: view.sense.encoder,
             indentation: view.contact.indentation,
+            modelled: view.modelled,
             sums: sums(view.picture),
             travel: view.motion.observer.travel,
             ..Self::default()
@@ -83,6 +87,11 @@ impl Monitor {
     /// The encoder must see what the array feels, and the array what the encoder sees.
     fn motion(&mut self, view: &View, config: &Config) -> Option<Fault> {
         let touching = view.contact.force >= config.contact_off;
+        // A contact that is read in another way has not moved.
+        if view.modelled != self.modelled {
+            self.modelled = view.modelled;
+            self.indentation = view.contact.indentation;
+        }
         if view.sense.encoder != self.encoder {
             self.encoder = view.sense.encoder;
             self.indentation = view.contact.indentation;

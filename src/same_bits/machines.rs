@@ -5,7 +5,7 @@ use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
 use crate::config::Config;
-use crate::contact::{self, Effort, Fit};
+use crate::contact::{self, Effort, Fit, Refined, Rows};
 use crate::control::SpeedLoop;
 use crate::control::drive::Drive;
 use crate::control::goal::Goal;
@@ -15,6 +15,7 @@ use crate::frame::Frame;
 use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use crate::model::{Relaxation, RelaxationState, Tip};
 use crate::pipeline::Contact;
+use crate::pipeline::budget::Budget;
 use crate::pressure::{Array, Picture};
 use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
@@ -38,6 +39,7 @@ pub struct Machines {
     press: Press,
     pictures: Pictures,
     fit: Fit,
+    budget: Budget,
     frame: Frame,
     pub(super) array: Array,
 }
@@ -64,7 +66,8 @@ impl Machines {
             goal: Goal::default(),
             press,
             pictures: Pictures::new(),
-            fit: Fit::new(),
+            fit: Fit::default(),
+            budget: Budget::new(),
             frame: frames::plausible(),
             array: Array::new(),
         }
@@ -100,7 +103,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 20] = [
+pub const STEPS: [Step; 22] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -125,16 +128,32 @@ pub const STEPS: [Step; 20] = [
     }),
     ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, &m.config))),
     ("contact::read", |m, s, mix| {
-        let effort = match s.share_q32 >> 27 {
-            0 => Effort::Full,
-            1 => Effort::Two,
-            2 => Effort::Moments,
-            3 => Effort::Sum,
-            _ => Effort::One,
+        let refined = match s.share_q32 >> 27 {
+            0 => Refined::Full,
+            1 => Refined::Two,
+            _ => Refined::One,
         };
-        add_contact(mix, &contact::read(m.pictures.next(s, &m.config), effort, &m.config));
+        add_contact(mix, &contact::read(m.pictures.next(s, &m.config), refined, &m.config));
     }),
-    ("Fit::read", |m, s, mix| add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config))),
+    ("contact::from_sums", |m, s, mix| {
+        add_contact(mix, &contact::from_sums(m.pictures.next(s, &m.config), &m.config));
+    }),
+    ("Fit::read", |m, s, mix| {
+        // A change now and then, in the middle of a refinement as well.
+        if s.share_q32 >> 27 == 4 {
+            m.fit.set_effort(Effort::from_number((s.share_q32 >> 24 & 7) as u8));
+        }
+        let Rows { first, stride } = m.fit.wants();
+        mix.add((first << 8 | stride) as u32);
+        add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config));
+    }),
+    ("Budget::next", |m, s, mix| {
+        // A whole deadline is about 2^13 ticks; the model is now and then at work.
+        let asked = Effort::from_number((s.share_q32 >> 29) as u8);
+        let taken = s.words[0].unsigned_abs() >> 17;
+        mix.add(m.budget.next(asked, taken, 12_568) as u32);
+        m.budget.note(s.words[1] > 0);
+    }),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
         let [encoder, acceleration, ..] = s.words;

@@ -98,7 +98,7 @@ fn sum_up(picture: &mut Picture) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{self, Effort};
+    use crate::contact::{self, Refined};
     use crate::params::Params;
     use crate::same_bits::Source;
 
@@ -110,7 +110,7 @@ mod tests {
         for _ in 0..20_000 {
             sample.renew(&mut source);
             let picture = pictures.next(&sample, &config);
-            let contact = contact::read(picture, Effort::One, &config);
+            let contact = contact::read(picture, Refined::One, &config);
             let sums = contact::from_sums(picture, &config);
             good += u32::from(contact.confidence >= contact::CONFIDENCE_LEAST);
             fitted += u32::from(contact.force != sums.force);

@@ -1,9 +1,9 @@
-//! From a picture to a contact, at each effort, and followed from frame to frame.
+//! From a picture to a contact: from a single one, and followed from frame to frame at each effort.
 
 use super::call::pass_on;
 use super::host::{Inputs, fail, say};
 use fingertip::config::Config;
-use fingertip::contact::{self, Effort, Fit};
+use fingertip::contact::{self, Effort, Fit, Refined};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::Contact;
@@ -19,41 +19,42 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel); 5] = [
-    ("**Moments**", moments),
-    ("**One**", one),
-    ("**Two**", two),
-    ("**Full**", full),
-    ("**Fit, frame by frame**", follow),
+/// The name, the way, and of one that follows the pictures its effort.
+const VARIANTS: [(&str, Kernel, Option<Effort>); 9] = [
+    ("One", one, None),
+    ("Two", two, None),
+    ("Full", full, None),
+    ("Fit, effort 0", follow, Some(Effort::Sum)),
+    ("Fit, effort 1", follow, Some(Effort::Moments)),
+    ("**Fit, effort 2**", follow, Some(Effort::OneRow)),
+    ("Fit, effort 3", follow, Some(Effort::TwoRows)),
+    ("Fit, effort 4", follow, Some(Effort::FiveRows)),
+    ("Fit, effort 5", follow, Some(Effort::AllRows)),
 ];
 
-extern "C" fn moments(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Effort::Moments, bench.config);
-}
-
 extern "C" fn one(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Effort::One, bench.config);
+    bench.contact = contact::read(&bench.picture, Refined::One, bench.config);
 }
 
 extern "C" fn two(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Effort::Two, bench.config);
+    bench.contact = contact::read(&bench.picture, Refined::Two, bench.config);
 }
 
 extern "C" fn full(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Effort::Full, bench.config);
+    bench.contact = contact::read(&bench.picture, Refined::Full, bench.config);
 }
 
 extern "C" fn follow(bench: &mut Bench) {
     bench.contact = bench.fit.read(&bench.picture, bench.config);
 }
 
-/// Measures all over the next section: for each pitch its cases, of as many pictures each. All but the last variant see the
+/// Measures all over the next section: for each pitch its cases, of as many pictures each. Variants without an effort see the
 /// first picture only.
 #[inline(never)]
 pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
     let [count, frames] = inputs.words();
     let start = inputs.place();
-    for (place, (name, variant)) in VARIANTS.iter().enumerate() {
+    for (name, variant, effort) in VARIANTS {
         say(format_args!("region {region} {kernel}: {name}"));
         inputs.seek(start);
         let mut left = count;
@@ -62,8 +63,7 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
             let [pitch_um, cases] = inputs.words();
             let Ok(config) = Config::new(&Params { pitch_um, ..Params::DEFAULT }) else { fail("a pitch is refused") };
             for _ in 0..cases {
-                let follows = place + 1 == VARIANTS.len();
-                one_case(*region, *variant, if follows { frames } else { 1 }, frames, &config, inputs);
+                one_case(*region, variant, effort, frames, &config, inputs);
             }
             left -= cases;
         }
@@ -71,12 +71,13 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
     }
 }
 
-/// Measures the first so many pictures of all.
-fn one_case(region: u32, variant: Kernel, measured: i32, all: i32, config: &Config, inputs: &mut Inputs) {
-    let mut bench = Bench { picture: Picture::EMPTY, config, fit: Fit::new(), contact: Contact::default() };
-    for frame in 0..all {
+/// Measures a case.
+fn one_case(region: u32, variant: Kernel, effort: Option<Effort>, frames: i32, config: &Config, inputs: &mut Inputs) {
+    let fit = Fit::new(effort.unwrap_or_default());
+    let mut bench = Bench { picture: Picture::EMPTY, config, fit, contact: Contact::default() };
+    for frame in 0..frames {
         bench.picture = picture(inputs);
-        if frame < measured {
+        if frame == 0 || effort.is_some() {
             pass_on(region, variant, &mut bench);
         }
     }

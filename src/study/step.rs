@@ -1,13 +1,13 @@
-//! The loop as it is, over the recorded stimulus: the whole step and its parts.
+//! The loop as it is, over the recorded stimulus: the whole step at each effort, and its parts.
 
 use super::call::pass_on;
 use super::host::{Inputs, say};
 use fingertip::config::Config;
-use fingertip::contact;
+use fingertip::contact::{self, Effort};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
-use fingertip::pipeline::{Contact, Pipeline, Status};
+use fingertip::pipeline::{Command, Contact, Pipeline, Status};
 use fingertip::pressure::{Array, Picture};
 use fingertip::record::Record;
 use fingertip::safety::{Limits, Mode};
@@ -16,6 +16,7 @@ use fingertip::units::Duty;
 /// What the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
+    effort: Effort,
     record: Record,
     pipeline: Pipeline,
     outcome: (Duty, Status),
@@ -31,15 +32,23 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// Places of parts.
-const STEP: usize = 0;
-const OBSERVER: usize = 3;
+/// The whole step at each effort.
+const STEPS: [(&str, Effort); 6] = [
+    ("Pipeline::step, effort 0", Effort::Sum),
+    ("Pipeline::step, effort 1", Effort::Moments),
+    ("**Pipeline::step**", Effort::OneRow),
+    ("Pipeline::step, effort 3", Effort::TwoRows),
+    ("Pipeline::step, effort 4", Effort::FiveRows),
+    ("Pipeline::step, effort 5", Effort::AllRows),
+];
+
+/// The place of the first part that works on what those before it left.
+const OBSERVER: usize = 2;
 /// Records that the parts see at most; the step sees all.
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 7] = [
-    ("**Pipeline::step**", step, false),
+const PARTS: [(&str, Kernel, bool); 6] = [
     ("**Array::read**", read, false),
     ("**contact::from_sums**", sums, false),
     ("**observer**", observe, true),
@@ -50,7 +59,7 @@ const PARTS: [(&str, Kernel, bool); 7] = [
 
 extern "C" fn step(bench: &mut Bench) {
     let Record { frame, sense, command } = &bench.record;
-    bench.outcome = bench.pipeline.step(frame, sense, command);
+    bench.outcome = bench.pipeline.step(frame, sense, &Command { effort: bench.effort, ..*command });
 }
 
 extern "C" fn read(bench: &mut Bench) {
@@ -80,16 +89,11 @@ extern "C" fn apply(bench: &mut Bench) {
     bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
 }
 
-/// Replays the next section's records, once for each part.
-#[inline(never)]
-pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
-    let [count] = inputs.words();
-    let start = inputs.place();
-    for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
-        say(format_args!("region {region} step: {name}"));
-        inputs.seek(start);
-        let mut bench = Bench {
+impl<'a> Bench<'a> {
+    fn new(effort: Effort, config: &'a Config) -> Self {
+        Self {
             config,
+            effort,
             record: Record::from_bytes(&[0; Record::BYTES]),
             pipeline: Pipeline::new(config),
             outcome: Default::default(),
@@ -101,16 +105,37 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
             reference: Reference::default(),
             limits: Limits::default(),
             wanted: 0,
-        };
-        let count = if part == STEP { count } else { count.min(PART_RECORDS) };
-        for n in 0..count {
-            let mut bytes = [0; Record::BYTES];
-            inputs.read(&mut bytes);
-            bench.record = Record::from_bytes(&bytes);
-            if part == STEP {
-                pass_on(*region, step, &mut bench);
-                continue;
-            }
+        }
+    }
+}
+
+fn record(inputs: &mut Inputs) -> Record {
+    let mut bytes = [0; Record::BYTES];
+    inputs.read(&mut bytes);
+    Record::from_bytes(&bytes)
+}
+
+/// Replays the next section's records, once for each effort and part.
+#[inline(never)]
+pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
+    let [count] = inputs.words();
+    let start = inputs.place();
+    for (name, effort) in STEPS {
+        say(format_args!("region {region} step: {name}"));
+        inputs.seek(start);
+        let mut bench = Bench::new(effort, config);
+        for _ in 0..count {
+            bench.record = record(inputs);
+            pass_on(*region, step, &mut bench);
+        }
+        *region += 1;
+    }
+    for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
+        say(format_args!("region {region} step: {name}"));
+        inputs.seek(start);
+        let mut bench = Bench::new(Effort::default(), config);
+        for n in 0..count.min(PART_RECORDS) {
+            bench.record = record(inputs);
             step(&mut bench);
             let (_, status) = bench.outcome;
             let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);

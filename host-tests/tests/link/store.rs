@@ -1,5 +1,6 @@
 //! The parameter record in flash.
 
+use fingertip::contact::Effort;
 use fingertip::params::Params;
 use fingertip::store::{Damage, Record, SLOT_BYTES, StoreError, encode, latest, newest_whole, next_offset};
 use proptest::prelude::*;
@@ -10,7 +11,7 @@ const SECTOR: usize = 16 * 1024;
 fn record(id: u8) -> Record {
     let mut params = Params::DEFAULT;
     params.pitch_um = 1_000 + i32::from(id);
-    Record { id, baud_code: 4, return_delay_2us: 7, params }
+    Record { id, baud_code: 4, return_delay_2us: 7, effort: Effort::TwoRows, params }
 }
 
 /// A sector to which records were saved one after the other.
@@ -64,10 +65,12 @@ fn crc32(bytes: &[u8]) -> [u8; 4] {
 #[test]
 fn the_layout_is_the_documented_one() {
     let bytes = encode(&record(9));
-    let names: String = Params::RANGES.iter().map(|(name, ..)| format!("{name}\n")).collect();
+    let head = ["id", "baud_code", "return_delay_2us", "effort"].into_iter();
+    let names: String =
+        head.chain(Params::RANGES.iter().map(|(name, ..)| *name)).map(|name| format!("{name}\n")).collect();
     assert_eq!(bytes[..4], *b"FTIP");
     assert_eq!(bytes[4..8], crc32(names.as_bytes()));
-    assert_eq!(bytes[8..12], [9, 4, 7, 0]);
+    assert_eq!(bytes[8..12], [9, 4, 7, 3]);
     assert_eq!(bytes[12..16], record(9).params.tip_radius_um.to_le_bytes());
     let end = 12 + 4 * Params::COUNT;
     assert_eq!(bytes[end..end + 4], crc32(&bytes[..end]));
@@ -105,9 +108,15 @@ fn every_flipped_bit_is_seen() {
 #[test]
 fn a_record_of_another_layout_or_out_of_range_is_refused() {
     let refused = |record: Record| latest(&encode(&record)).expect_err("refused").damage;
-    assert_eq!(refused(Record { id: 253, ..record(1) }), Damage::Bus);
-    assert_eq!(refused(Record { baud_code: 6, ..record(1) }), Damage::Bus);
-    assert_eq!(refused(Record { return_delay_2us: 255, ..record(1) }), Damage::Bus);
+    assert_eq!(refused(Record { id: 253, ..record(1) }), Damage::Head);
+    assert_eq!(refused(Record { baud_code: 6, ..record(1) }), Damage::Head);
+    assert_eq!(refused(Record { return_delay_2us: 255, ..record(1) }), Damage::Head);
+    let mut bad = encode(&record(1));
+    bad[11] = 6;
+    let end = 12 + 4 * Params::COUNT;
+    let crc = crc32(&bad[..end]);
+    bad[end..end + 4].copy_from_slice(&crc);
+    assert_eq!(latest(&bad).expect_err("refused").damage, Damage::Head);
     let mut bad = record(1);
     bad.params.pitch_um = 0;
     assert!(matches!(refused(bad), Damage::Param(error) if error.name == "pitch_um"));
@@ -133,7 +142,7 @@ proptest! {
         for ((value, (_, _, min, max)), share) in values.iter_mut().zip(Params::RANGES).zip(&shares) {
             *value = (f64::from(min) + f64::from(max - min) * share).round() as i32;
         }
-        let record = Record { id, baud_code: id % 6, return_delay_2us: id, params: Params::from_array(&values) };
+        let record = Record { id, baud_code: id % 6, return_delay_2us: id, effort: Effort::from_number(id % 6), params: Params::from_array(&values) };
         let mut sector = sector([1]);
         save(&mut sector, &encode(&record));
         prop_assert_eq!(latest(&sector), Ok(Some(record)));

@@ -1,10 +1,11 @@
 //! The definition itself: one entry for each register, in the order of the addresses.
 //!
-//! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
+//! As [`control_table`](super::define) reads it: `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
 //! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each.
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 
+use crate::contact::Effort;
 use crate::frame::{COLUMNS, ROWS, SLOTS, TAXELS};
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
@@ -21,80 +22,6 @@ const MODEL: u16 = u16::from_le_bytes(*b"FT");
 const TABLE_VERSION: u32 = 1;
 /// Ten times the major and once the minor number of the version.
 const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
-
-macro_rules! count {
-    () => {
-        1
-    };
-    ($count:expr) => {
-        $count as u16
-    };
-}
-
-macro_rules! optional {
-    () => {
-        None
-    };
-    ($value:expr) => {
-        Some($value as i64)
-    };
-}
-
-macro_rules! control_table {
-    ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
-       $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?,
-       $get:expr $(, $set:expr)?;)*) => {
-        /// Where each register begins.
-        pub mod address {
-            $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
-            /// The parameters, in the order of [`crate::params::Params`], 4 bytes each.
-            pub const PARAMS: u16 = 512;
-        }
-
-        const FIXED: &[Register] = &[$(Register {
-            name: stringify!($name),
-            address: $address,
-            kind: Kind::$kind,
-            count: count!($($count)?),
-            access: Access::$access,
-            unit: $unit,
-            scale: $scale,
-            min: $min,
-            max: $max,
-            default: optional!($($default)?),
-            doc: concat!($($doc),+),
-        }),*];
-
-        pub(super) static CELLS: [Cell; FIXED.len()] = [
-            $(Cell { address: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
-        ];
-
-        /// The value of an element, as its low bytes; 0 where there is no such register.
-        pub(super) fn get(view: View<'_>, address: u16, element: usize) -> u32 {
-            match address {
-                $($address => {
-                    let get: fn(View<'_>, usize) -> u32 = $get;
-                    get(view, element)
-                })*
-                _ => 0,
-            }
-        }
-
-        /// Sets a register that can be written.
-        pub(super) fn set(staged: &mut Staged, address: u16, value: i64) -> Result<(), StatusError> {
-            match address {
-                $($($address => {
-                    if !($min..=$max).contains(&value) {
-                        return Err(StatusError::Range);
-                    }
-                    let set: fn(&mut Staged, i64) -> Result<(), StatusError> = $set;
-                    set(staged, value)
-                })?)*
-                _ => Err(StatusError::Access),
-            }
-        }
-    };
-}
 
 control_table! {
     /// Model number: the letters FT.
@@ -170,8 +97,8 @@ control_table! {
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 13,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
-    /// frame missed, 8 slew.
-    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FF,
+    /// frame missed, 8 slew, 9 effort held back by time.
+    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x3FF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force.
     268 PRESENT_FORCE_MN: I32 ReadOnly, "mN" * 1, -32_768_000 to 32_768_000,
@@ -288,6 +215,14 @@ control_table! {
     /// out of the model's range, 6 bad taxels, 7 array's edge, 8 no contact, 9 stalled, 10 interrupted, 11 no torque.
     366 IDENTIFY_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
         |view, _| u32::from(view.snapshot.status.identification.refusal());
+    /// How much work the loop puts into the contact of a frame: 0 force by the sum, 1 centre by the moments, 2 the model
+    /// with a row a frame, 3 with two rows, 4 with five, 5 with all rows and a solution in every frame.
+    367 EFFORT: U8 StoredLive, "" * 1, 0 to 5 = Record::DEFAULT.effort as i64,
+        |view, _| view.settings().record.effort as u32,
+        |staged, value| { staged.settings.record.effort = Effort::from_number(value as u8); Ok(()) };
+    /// The effort in use: less than asked for where the deadline leaves no time for that.
+    368 EFFORT_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
+        |view, _| view.snapshot.status.effort as u32;
     /// Pressure on each taxel, row by row.
     768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
         |view, place| element(view.snapshot.pressures_10pa, place);

@@ -31,6 +31,16 @@ pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
     read.expect("the client runs").expect("the image answers")
 }
 
+pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
+    let read = rig.client(WAIT_NS, move |bus| bus.read_u16(1, register).map(|reply| reply.data));
+    read.expect("the client runs").expect("the image answers")
+}
+
+pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
+    let read = rig.client(WAIT_NS, move |bus| bus.read_u32(1, register).map(|reply| reply.data));
+    read.expect("the client runs").expect("the image answers")
+}
+
 /// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
 pub fn holding() -> Rig {
     static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();

@@ -1,0 +1,117 @@
+//! The effort of the fit over the bus: what there is time for is used, what there is none for is held back and said, and no
+//! deadline is missed for it.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use fingertip::contact::Effort;
+use fingertip::link::table::address;
+use fingertip::params::Params;
+use fingertip::safety::Limits;
+use host_tests::plant::{Setup, World};
+use virtual_board::{Options, Rig};
+
+/// The place of a parameter.
+fn param(name: &str) -> u16 {
+    let place = Params::RANGES.iter().position(|(other, ..)| *other == name).expect("a parameter");
+    address::PARAMS + 4 * place as u16
+}
+
+/// Tares, then holds 1 N half a millimetre away, over the array's edge: its last column is centred at 6.75 mm.
+fn hold(rig: &mut Rig) {
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
+    rig.run_ms(150).expect("it runs");
+    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    assert!((0.95..1.05).contains(&force_n), "{force_n} N");
+}
+
+/// A board that holds a contact of which the array sees a half.
+fn holding_over_the_edge() -> Rig {
+    let mut setup = Setup::default();
+    (setup.wall.distance_mm, setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.5, 7.5, 1.0);
+    let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    hold(&mut rig);
+    rig
+}
+
+/// What the board says, without a fault: the effort in use, whether that is held back, and the longest loop time in us.
+fn said(rig: &mut Rig) -> (u8, bool, u16) {
+    assert_eq!(read_u8(rig, address::FAULT), 0);
+    let limits = Limits(read_u16(rig, address::LIMITS));
+    (read_u8(rig, address::EFFORT_IN_USE), limits.has(Limits::EFFORT), read_u16(rig, address::LOOP_TIME_MAX_US))
+}
+
+#[test]
+fn the_highest_effort_is_held_back_before_a_deadline_is_missed() {
+    let mut rig = holding_over_the_edge();
+    let (in_use, held_back, before_us) = said(&mut rig);
+    assert_eq!((in_use, held_back), (Effort::default() as u8, false), "the default has its time");
+    for asked in [5, 4, 3] {
+        write_u8(&mut rig, address::EFFORT, asked);
+        rig.run_ms(300).expect("it runs");
+        let (in_use, held_back, longest_us) = said(&mut rig);
+        println!("asked {asked}: in use {in_use}, longest loop time {longest_us} us ({before_us} us with the default)");
+        assert_eq!(held_back, in_use < asked, "{in_use} of {asked}");
+        assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
+        // A frame takes 99.8 us; a deadline missed would be a fault as well.
+        assert!(longest_us <= 74, "{longest_us} us");
+        if asked == 5 {
+            assert!(held_back && in_use >= 2, "{in_use}");
+        }
+    }
+    for asked in [0, 1, 2] {
+        write_u8(&mut rig, address::EFFORT, asked);
+        rig.run_ms(50).expect("it runs");
+        let (in_use, held_back, _) = said(&mut rig);
+        assert_eq!((in_use, held_back), (asked, false));
+        assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
+        let force_n = rig.world(|world| world.force_n()).expect("it runs");
+        // By the sums half of the force is not seen, so the loop presses twice as hard.
+        let expected = if asked < 2 { 1.3..3.0 } else { 0.95..1.05 };
+        assert!(expected.contains(&force_n), "effort {asked}: {force_n} N");
+    }
+}
+
+#[test]
+fn slower_frames_leave_room_for_the_highest_effort() {
+    let mut rig = holding_over_the_edge();
+    write_u8(&mut rig, address::EFFORT, 5);
+    rig.run_ms(100).expect("it runs");
+    let (in_use, held_back, _) = said(&mut rig);
+    assert!(in_use < 5 && held_back, "{in_use}");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    let settle_ns = param("settle_ns");
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, settle_ns, 12_000).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+    rig.run_ms(100).expect("it runs");
+    // The new scan has cost some.
+    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
+    hold(&mut rig);
+    let (in_use, held_back, longest_us) = said(&mut rig);
+    println!("at 5 kHz: in use {in_use}, longest loop time {longest_us} us");
+    assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), missed);
+    assert_eq!((in_use, held_back), (5, false));
+    // Longer than a frame at 10 kHz would allow, and within three quarters of one of 205 us.
+    assert!((75..153).contains(&longest_us), "{longest_us} us");
+}
+
+#[test]
+fn a_change_of_effort_does_not_stop_the_scan() {
+    let mut rig = holding_over_the_edge();
+    let frame_ns = 99_750;
+    let (from_ns, from) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
+    for asked in [0, 5, 1, 3, 2, 4, 2] {
+        write_u8(&mut rig, address::EFFORT, asked);
+    }
+    let (to_ns, to) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
+    let (scanned, stepped) = ((to_ns - from_ns) / frame_ns, u64::from(to - from));
+    assert!(stepped > 20 && scanned.abs_diff(stepped) <= 12, "{stepped} of {scanned} frames");
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), fingertip::safety::Mode::Force as u8);
+    said(&mut rig);
+}

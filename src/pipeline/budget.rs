@@ -1,0 +1,135 @@
+//! The time that the loop has, and the effort that fits it.
+//!
+//! The core has no clock: whoever calls the step measures how long the last one took. The effort that was asked for is in use
+//! as long as the dearest frame expected at it ends before the deadline, less a margin. It falls by one where that
+//! is no longer so, at once; it rises by one where the next effort is expected to fit after [`WINDOW`] frames, and after a
+//! fall only later and later, so that it does not hunt. An effort that is not expected to fit is not tried.
+
+use crate::contact::Effort;
+
+/// Frames over which the time is watched before the effort rises: two refinements at the least effort, and more.
+pub const WINDOW: u32 = 32;
+/// Windows to wait at most after a fall: 0.8 s at 10 kHz.
+pub const WAIT_MAX: u32 = 256;
+
+/// What is expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget {
+    effort: Effort,
+    /// What was asked for, and the deadline, when last looked at.
+    asked: (Effort, u32),
+    /// Whether the model was at work in the frame whose time comes next.
+    modelled: bool,
+    /// The longest time of a frame without the model, ticks.
+    rest: u32,
+    /// The longest of this window's frames.
+    longest: u32,
+    frames: u32,
+    /// Windows to let pass before the effort may rise, and after the next fall.
+    wait: u32,
+    wait_next: u32,
+}
+
+impl Budget {
+    /// Nothing measured yet: the least effort.
+    pub const fn new() -> Self {
+        Self {
+            effort: Effort::Sum,
+            asked: (Effort::Sum, 0),
+            modelled: false,
+            rest: 0,
+            longest: 0,
+            frames: 0,
+            wait: 0,
+            wait_next: 1,
+        }
+    }
+
+    /// What the dearest frame takes beyond one by the sums: its most and its least, cycles of the core.
+    ///
+    /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
+    /// (`cargo xtask timing`, `docs/study.md`): the start of a refinement 2,100 at most, its solution
+    /// 1,600, a row 1,000.
+    pub const fn model_ticks(effort: Effort) -> [u32; 2] {
+        match effort {
+            Effort::Sum | Effort::Moments => [0, 0],
+            Effort::OneRow => [3_100, 1_500],
+            Effort::TwoRows => [4_100, 1_700],
+            Effort::FiveRows => [7_100, 2_300],
+            Effort::AllRows => [13_700, 3_600],
+        }
+    }
+
+    /// Of a time, what is to be used: an eighth is left for what was never measured.
+    pub const fn usable(deadline: u32) -> u32 {
+        deadline - deadline / 8
+    }
+
+    /// The effort for the next frame, where the last one took `taken` of its deadline, both in ticks of
+    /// [`crate::scan::TIMER_HZ`]. A time of 0 was not measured: then it is the effort asked for.
+    pub fn next(&mut self, asked: Effort, taken: u32, deadline: u32) -> Effort {
+        if self.asked != (asked, deadline) {
+            self.asked = (asked, deadline);
+            (self.wait, self.wait_next) = (0, 1);
+        }
+        if taken == 0 || asked <= self.effort {
+            self.set(asked);
+        }
+        if taken != 0 {
+            self.weigh(taken, Self::usable(deadline));
+        }
+        self.effort
+    }
+
+    /// Whether the frame that was just worked on took the model.
+    pub fn note(&mut self, modelled: bool) {
+        if modelled != self.modelled {
+            self.modelled = modelled;
+            self.restart();
+        }
+    }
+
+    fn weigh(&mut self, taken: u32, usable: u32) {
+        let [most, least] = Self::model_ticks(self.effort);
+        let (expected, surely) =
+            if self.modelled { (taken, taken.saturating_sub(most)) } else { (taken.saturating_add(most), taken) };
+        self.rest = self.rest.max(surely);
+        if expected > usable && self.effort > Effort::Sum {
+            self.wait = self.wait_next;
+            self.wait_next = (2 * self.wait_next).min(WAIT_MAX);
+            return self.set(self.effort.lower());
+        }
+        self.longest = self.longest.max(taken);
+        self.frames += 1;
+        if self.frames < WINDOW {
+            return;
+        }
+        // The dearest frame of a window took at least this for the model.
+        self.rest = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
+        self.restart();
+        self.wait = self.wait.saturating_sub(1);
+        // A rise needs a little more room than staying, so that what varies by a little does not undo it.
+        let higher = self.effort.higher();
+        let [most, _] = Self::model_ticks(higher);
+        if self.wait == 0 && self.effort < self.asked.0 && self.rest.saturating_add(most) <= usable - usable / 32 {
+            self.set(higher);
+        }
+    }
+
+    fn set(&mut self, effort: Effort) {
+        if effort != self.effort {
+            self.effort = effort;
+            self.restart();
+        }
+    }
+
+    fn restart(&mut self) {
+        (self.longest, self.frames) = (0, 0);
+    }
+}
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -80,6 +80,11 @@ impl Fit {
         }
     }
 
+    /// Rows, a bit each, whose taxels the next frame's reading looks at where there is a contact.
+    pub fn rows(&self) -> u16 {
+        if self.frames < FRAMES { 1 << self.frames | 1 << (self.frames + FRAMES) } else { 0 }
+    }
+
     /// Reads the next frame's contact. Any picture is taken.
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last

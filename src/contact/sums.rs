@@ -3,8 +3,8 @@
 use crate::config::Config;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
-use crate::units::{Millimetres, Newtons};
-use fixed::types::{I8F24, I16F16};
+use crate::units::Millimetres;
+use fixed::types::I8F24;
 
 /// Fractional bits of a centre of pressure in half pitches.
 const RATIO_BITS: u32 = 11;
@@ -14,8 +14,7 @@ const RATIO_BITS: u32 = 11;
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
 /// never below zero. The centre is that of the pressure, zero where there is no force.
 pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
-    let force_bits = (i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32;
-    let force = Newtons(I16F16::from_bits(force_bits.clamp(0, i64::from(i32::MAX)) as i32));
+    let force = picture.force(config);
     let indentation = config.tip.indentation(force);
     let touching = force >= config.contact_off;
     let centre = |moment| if touching { centre(moment, picture.sum, config) } else { Millimetres::ZERO };
@@ -25,7 +24,7 @@ pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
         centre_x: centre(picture.moment_x),
         centre_y: centre(picture.moment_y),
         radius: config.tip.contact_radius(indentation),
-        peak_pa: ((i64::from(picture.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32,
+        peak_pa: picture.peak_pa(config),
         confidence: 255,
         bad_taxels: picture.bad_count,
     }

@@ -12,7 +12,7 @@ use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
 use crate::identify::{Press, PressView, Refusal};
-use crate::pressure::{Array, Calibration};
+use crate::pressure::{ALL_ROWS, Array, Calibration};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
@@ -94,6 +94,14 @@ impl Pipeline {
         self.status
     }
 
+    /// Works out every taxel of the frame last stepped with, for those who look at the whole picture: the step itself works out the
+    /// few that it needs. The peak is then that frame's, too.
+    pub fn develop(&mut self, frame: &Frame) -> Status {
+        self.array.develop(frame, ALL_ROWS);
+        self.status.contact.peak_pa = self.array.picture().peak_pa(&self.config);
+        self.status
+    }
+
     /// The array's last picture and its calibration.
     pub fn array(&self) -> &Array {
         &self.array
@@ -121,6 +129,8 @@ impl Pipeline {
         if let Some(fault) = monitor::broken(picture, sense, &self.config).filter(|_| watched) {
             return (Duty::ZERO, self.stop(fault));
         }
+        self.array.develop(frame, self.rows_wanted());
+        let picture = self.array.picture();
         // A press that measures the modulus must not lean on the configured one, as the fit does.
         let contact = match self.status.mode {
             Mode::Identify => contact::from_sums(picture, &self.config),
@@ -187,6 +197,17 @@ impl Pipeline {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         broken.then(|| self.stop(Fault::ArrayBroken))
+    }
+
+    /// Rows of which somebody looks at single taxels in this frame, a bit each.
+    fn rows_wanted(&self) -> u16 {
+        match self.status.mode {
+            Mode::Tare => ALL_ROWS,
+            Mode::Identify => 0,
+            _ if self.array.picture().force(&self.config) >= self.config.contact_off => self.fit.wants().bits(),
+            // The baseline may follow.
+            _ => self.array.drift_row(),
+        }
     }
 
     /// Whether faults count: not while the bridge is off anyhow.

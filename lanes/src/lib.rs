@@ -34,9 +34,46 @@ pub const fn high(pair: u32) -> i16 {
     (pair >> 16) as i16
 }
 
+/// The larger in each lane, both unsigned.
+#[inline(always)]
+pub fn larger(a: u32, b: u32) -> u32 {
+    // No lane carries: the sum is one of the two.
+    a.wrapping_add(excess(b, a))
+}
+
+/// Five pairs.
+pub type Pairs = [u32; 5];
+
+/// What five pairs, each less its floor, add up to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Weighed {
+    /// Each lane's sum, where no lane carries.
+    pub plain: u32,
+    /// Both lanes times the first weights.
+    pub first: i32,
+    /// Both lanes times the second weights.
+    pub second: i32,
+    /// The largest of each lane, unsigned.
+    pub largest: u32,
+}
+
 /// The same functions without the instructions.
 pub mod portable {
-    use super::{high, low, pair};
+    use super::{Pairs, Weighed, high, larger, low, pair};
+
+    /// See [`super::weigh`].
+    #[inline(always)]
+    pub fn weigh(pairs: &Pairs, floors: &Pairs, weights: &[Pairs; 2], mut sums: Weighed) -> Weighed {
+        let [first, second] = weights;
+        for (((pair, floor), first), second) in pairs.iter().zip(floors).zip(first).zip(second) {
+            let above = sub(*pair, *floor);
+            sums.plain = sums.plain.wrapping_add(above);
+            sums.first = dot(above, *first, sums.first);
+            sums.second = dot(above, *second, sums.second);
+            sums.largest = larger(sums.largest, above);
+        }
+        sums
+    }
 
     /// See [`super::sub`].
     #[inline(always)]
@@ -44,11 +81,24 @@ pub mod portable {
         pair(low(a).wrapping_sub(low(b)), high(a).wrapping_sub(high(b)))
     }
 
+    /// See [`super::excess`].
+    #[inline(always)]
+    pub const fn excess(a: u32, b: u32) -> u32 {
+        let above = [(a as u16).saturating_sub(b as u16), ((a >> 16) as u16).saturating_sub((b >> 16) as u16)];
+        above[0] as u32 | (above[1] as u32) << 16
+    }
+
     /// See [`super::dot`].
     #[inline(always)]
     pub const fn dot(a: u32, b: u32, sum: i32) -> i32 {
         let products = [low(a) as i32 * low(b) as i32, high(a) as i32 * high(b) as i32];
         sum.wrapping_add(products[0]).wrapping_add(products[1])
+    }
+
+    /// See [`super::add_high`].
+    #[inline(always)]
+    pub const fn add_high(sum: i32, a: i32, b: i32) -> i32 {
+        sum.wrapping_add(((a as i64 * b as i64) >> 32) as i32)
     }
 
     /// See [`super::near_root`].
@@ -68,13 +118,47 @@ pub mod portable {
 }
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub use instructions::{dot, near_root, root_and_product, sub};
+pub use instructions::{add_high, dot, excess, near_root, root_and_product, sub, weigh};
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
-pub use portable::{dot, near_root, root_and_product, sub};
+pub use portable::{add_high, dot, excess, near_root, root_and_product, sub, weigh};
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod instructions {
+    use super::{Pairs, Weighed};
     use core::arch::asm;
+
+    /// Adds five pairs, each less its floor, to the sums: plain, by the first and by the second weights, and the largest
+    /// (SSUB16, SMLAD, UQSUB16).
+    ///
+    /// Written out, because the compiler has too few registers for any other order of the same instructions, and keeps loading
+    /// and storing.
+    #[inline(always)]
+    pub fn weigh(pairs: &Pairs, floors: &Pairs, weights: &[Pairs; 2], sums: Weighed) -> Weighed {
+        let Weighed { mut plain, mut first, mut second, mut largest } = sums;
+        // SAFETY: reads registers and the arrays, whose lengths the types hold; writes registers only. The flag that it can set (Q) is
+        // sticky and read nowhere.
+        unsafe {
+            asm!(
+                ".irp place, 0, 4, 8, 12, 16",
+                "ldr {above}, [{pairs}, #\\place]",
+                "ldr {a}, [{floors}, #\\place]",
+                "ldr {b}, [{weights}, #\\place]",
+                "ldr {c}, [{weights}, #\\place + 20]",
+                "ssub16 {above}, {above}, {a}",
+                "smlad {first}, {above}, {b}, {first}",
+                "smlad {second}, {above}, {c}, {second}",
+                "uqsub16 {a}, {above}, {largest}",
+                "add {plain}, {plain}, {above}",
+                "add {largest}, {largest}, {a}",
+                ".endr",
+                pairs = in(reg) pairs, floors = in(reg) floors, weights = in(reg) weights,
+                plain = inout(reg) plain, first = inout(reg) first, second = inout(reg) second, largest = inout(reg) largest,
+                above = out(reg) _, a = out(reg) _, b = out(reg) _, c = out(reg) _,
+                options(pure, readonly, nostack),
+            );
+        }
+        Weighed { plain, first, second, largest }
+    }
 
     /// a - b in each lane, wrapping (SSUB16).
     #[inline(always)]
@@ -87,6 +171,15 @@ mod instructions {
         difference
     }
 
+    /// a - b in each lane, both unsigned, and 0 where b is larger (UQSUB16).
+    #[inline(always)]
+    pub fn excess(a: u32, b: u32) -> u32 {
+        let above;
+        // SAFETY: reads and writes registers only.
+        unsafe { asm!("uqsub16 {}, {}, {}", lateout(reg) above, in(reg) a, in(reg) b, options(pure, nomem, nostack)) }
+        above
+    }
+
     /// sum + a.low b.low + a.high b.high, wrapping (SMLAD).
     #[inline(always)]
     pub fn dot(a: u32, b: u32, sum: i32) -> i32 {
@@ -94,6 +187,17 @@ mod instructions {
         // SAFETY: reads and writes registers only. The flag that it can set (Q) is sticky and read nowhere.
         unsafe {
             asm!("smlad {}, {}, {}, {}", lateout(reg) result, in(reg) a, in(reg) b, in(reg) sum, options(pure, nomem, nostack));
+        }
+        result
+    }
+
+    /// sum + the upper half of a b, wrapping (SMMLA).
+    #[inline(always)]
+    pub fn add_high(sum: i32, a: i32, b: i32) -> i32 {
+        let result;
+        // SAFETY: reads and writes registers only.
+        unsafe {
+            asm!("smmla {}, {}, {}, {}", lateout(reg) result, in(reg) a, in(reg) b, in(reg) sum, options(pure, nomem, nostack));
         }
         result
     }
@@ -144,7 +248,7 @@ mod instructions {
 
 #[cfg(test)]
 mod tests {
-    use super::{high, low, pair, portable};
+    use super::{high, larger, low, pair, portable};
 
     #[test]
     fn lanes_do_not_touch_each_other() {
@@ -153,6 +257,12 @@ mod tests {
             for (c, d) in edges.iter().flat_map(|c| edges.map(|d| (*c, d))) {
                 let difference = portable::sub(pair(a, c), pair(b, d));
                 assert_eq!((low(difference), high(difference)), (a.wrapping_sub(b), c.wrapping_sub(d)));
+                let [a_bits, b_bits, c_bits, d_bits] = [a, b, c, d].map(|lane| lane as u16);
+                let above = portable::excess(pair(a, c), pair(b, d));
+                let exact = [a_bits.saturating_sub(b_bits), c_bits.saturating_sub(d_bits)];
+                assert_eq!([low(above) as u16, high(above) as u16], exact);
+                let most = larger(pair(a, c), pair(b, d));
+                assert_eq!([low(most) as u16, high(most) as u16], [a_bits.max(b_bits), c_bits.max(d_bits)]);
                 let exact = 7 + i64::from(a) * i64::from(b) + i64::from(c) * i64::from(d);
                 assert_eq!(portable::dot(pair(a, c), pair(b, d), 7), exact as i32);
             }

@@ -195,8 +195,12 @@ impl State {
     }
 
     fn publish(&mut self) {
+        let wanted = DETAIL_WANTED.swap(false, Ordering::Relaxed);
+        if wanted {
+            self.report.status = self.parts.pipeline.develop(&self.frame);
+        }
         REPORT.set(self.report);
-        if DETAIL_WANTED.swap(false, Ordering::Relaxed) {
+        if wanted {
             let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
             let array = pipeline.array();
             DETAIL.fill(|detail| {

@@ -40,6 +40,19 @@ pub struct Rows {
     pub stride: usize,
 }
 
+impl Rows {
+    /// A bit for each.
+    pub fn bits(self) -> u16 {
+        let mut bits = 0;
+        let mut row = self.first;
+        while row < ROWS {
+            bits |= 1 << row;
+            row += self.stride.max(1);
+        }
+        bits
+    }
+}
+
 /// Fractional bits of what the indentation follows the force by.
 const FOLLOWS_BITS: u32 = 12;
 /// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
@@ -145,7 +158,7 @@ impl Fit {
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
     /// refinement, 255 before the first.
     pub fn read(&mut self, picture: &Picture, config: &Config) -> Contact {
-        let force = sums::force(picture, config);
+        let force = picture.force(config);
         self.at_work = false;
         if self.effort.rows() == 0 || force < config.contact_off {
             self.lose();

@@ -4,7 +4,7 @@ use crate::config::Config;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
-use fixed::types::{I8F24, I16F16};
+use fixed::types::I8F24;
 
 /// Fractional bits of a centre of pressure in half pitches.
 const RATIO_BITS: u32 = 11;
@@ -14,16 +14,9 @@ const RATIO_BITS: u32 = 11;
 /// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
 /// never below zero. The centre is that of the pressure, zero where there is no force.
 pub fn from_sums(picture: &Picture, config: &Config) -> Contact {
-    let force = force(picture, config);
+    let force = picture.force(config);
     let centre = if force >= config.contact_off { centre(picture, config) } else { Default::default() };
     of_force(force, centre, picture, config)
-}
-
-/// The sum of the taxels times their area.
-pub(super) fn force(picture: &Picture, config: &Config) -> Newtons {
-    // The product is positive: its upper half is below 2^31.
-    let force_bits = ((i64::from(picture.sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
-    Newtons(I16F16::from_bits(force_bits.max(0)))
 }
 
 /// A contact of this force: indentation and radius by the model, the rest by the picture.
@@ -36,7 +29,7 @@ pub(super) fn of_force(force: Newtons, centre: [Millimetres; 2], picture: &Pictu
         centre_x,
         centre_y,
         radius: config.tip.contact_radius(indentation),
-        peak_pa: ((i64::from(picture.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32,
+        peak_pa: picture.peak_pa(config),
         confidence: 255,
         bad_taxels: picture.bad_count,
     }

@@ -1,7 +1,9 @@
 //! What is known of each taxel beforehand: its gain, and whether to leave it out.
 
+use super::row::weight;
 use super::{GAIN_MAX, GAIN_ONE};
 use crate::frame::{BANK_COLUMNS, COLUMNS, ROWS};
+use lanes::Pairs;
 
 /// All columns of a row.
 const ALL: u16 = (1 << COLUMNS) - 1;
@@ -43,23 +45,49 @@ impl core::error::Error for CalibrationError {}
 /// Gains of all taxels, and a mask of those that are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Calibration {
-    /// Q14, in pairs like the codes of a frame; zero where the taxel is left out.
-    pub(super) gain: [[u32; BANK_COLUMNS]; ROWS],
+    pub(super) rows: [Gains; ROWS],
     /// A bit for each column that is left out.
     pub(super) mask: [u16; ROWS],
 }
 
+/// The gains of a row, in pairs like the codes of a frame; zero where the taxel is left out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Gains {
+    /// The gains in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9, in Q10: at most 18 in 16 bits.
+    pub weights: [Pairs; 2],
+    /// Sums of both.
+    pub sums: [i32; 2],
+}
+
+impl Gains {
+    const fn new(gains: &[u16; COLUMNS]) -> Self {
+        let mut row = Self { weights: [[0; BANK_COLUMNS]; 2], sums: [0; 2] };
+        let mut place = 0;
+        while place < BANK_COLUMNS {
+            let (left, right) = (gains[place] as i32, gains[place + BANK_COLUMNS] as i32);
+            // Rounded from Q14.
+            let weighted_left = (left * weight(place) + 8) >> 4;
+            let weighted_right = (right * weight(place + BANK_COLUMNS) + 8) >> 4;
+            row.weights[0][place] = lanes::pair(left as i16, right as i16);
+            row.weights[1][place] = lanes::pair(weighted_left as i16, weighted_right as i16);
+            row.sums[0] += left + right;
+            row.sums[1] += weighted_left + weighted_right;
+            place += 1;
+        }
+        row
+    }
+}
+
 impl Calibration {
     /// Gains of one, and every taxel counts.
-    pub const NONE: Self =
-        Self { gain: [[lanes::pair(GAIN_ONE as i16, GAIN_ONE as i16); BANK_COLUMNS]; ROWS], mask: [0; ROWS] };
+    pub const NONE: Self = Self { rows: [Gains::new(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
 
     /// Takes gains in Q14 (`gains[row][column]`, [`GAIN_ONE`] is 1) and a mask with a bit for each column to leave out.
     ///
     /// # Errors
     /// Names the first taxel or row, its value and its range.
     pub fn new(gains: &[[u16; COLUMNS]; ROWS], mask: &[u16; ROWS]) -> Result<Self, CalibrationError> {
-        let mut calibration = Self::NONE;
+        let mut calibration = Self { mask: *mask, ..Self::NONE };
         for (row, (gains, mask)) in gains.iter().zip(mask).enumerate() {
             if *mask > ALL {
                 return Err(CalibrationError::Mask { row, value: *mask });
@@ -69,10 +97,9 @@ impl Calibration {
                     return Err(CalibrationError::Gain { row, column, value });
                 }
             }
-            let kept = |column: usize| if mask >> column & 1 == 0 { gains[column] as i16 } else { 0 };
-            calibration.gain[row] = core::array::from_fn(|place| lanes::pair(kept(place), kept(place + BANK_COLUMNS)));
+            let kept = core::array::from_fn(|column| if mask >> column & 1 == 0 { gains[column] } else { 0 });
+            calibration.rows[row] = Gains::new(&kept);
         }
-        calibration.mask = *mask;
         Ok(calibration)
     }
 }

@@ -1,158 +1,157 @@
-//! One driven row: ten codes as five pairs, two taxels an instruction where the target has such.
+//! One driven row's sums: ten codes as five pairs, two taxels an instruction where the target has such.
 
-use crate::config::Config;
-use crate::frame::{BANK_COLUMNS, COLUMNS, SATURATED};
+use super::{BOOST_BITS, CODE_BITS, GAIN_BITS, Line, each};
+use crate::frame::{COLUMNS, ROWS, SATURATED};
+use lanes::{Pairs, Weighed};
 
-/// Five pairs: columns 0 to 4 in the low halves, 5 to 9 in the high ones.
-type Pairs = [u32; BANK_COLUMNS];
-
-/// One in both lanes: what sums a pair.
-const ONES: u32 = lanes::pair(1, 1);
+/// What a converter of 12 bits can show.
+pub(super) const CODE_MAX: u16 = 0xfff;
+/// Fractional bits of a row's moment.
+const MOMENT_BITS: u32 = 10;
+/// Bits by which a total is coarser than a row's sum or moment: the upper half of a product with the boost.
+const COARSER: u32 = 32 - BOOST_BITS;
 
 /// Holds the levels of a pair of columns to what a converter can show, so that no net code exceeds its code.
 pub(super) const fn held(levels: u32) -> u32 {
-    levels & 0x0fff_0fff
+    levels & lanes::pair(CODE_MAX as i16, CODE_MAX as i16)
 }
 
-/// A row before calibration.
-pub(super) struct Row {
-    /// Codes above the columns' undriven levels.
-    net: Pairs,
-    /// Their sum.
-    sum: i32,
-    /// A taxel is dead or saturated.
-    pub suspect: bool,
+/// A frame's sound codes, between dead and saturated.
+pub(super) struct Sound {
+    /// The lowest of each column: its undriven level and what a dead taxel falls short of.
+    floors: Pairs,
+    /// The highest code above its floor that saturates in no column.
+    room: u32,
+    /// What the floors hold back of a row's codes.
+    held_back: u32,
+    /// The highest undriven level.
+    pub undriven_max: u16,
 }
 
-impl Row {
-    /// Without a branch for each taxel: a sign bit a lane collects what is wrong with any of them.
+impl Sound {
+    /// From the slot with nothing driven.
     #[inline(always)]
-    pub fn of(codes: &Pairs, undriven: &Pairs, dead_codes: u16) -> Self {
-        let mut wrong = 0;
-        let mut sum = 0;
-        let net = each(|place| {
-            let net = lanes::sub(codes[place], undriven[place]);
-            wrong |= signs(net, codes[place], dead_codes);
-            sum = lanes::dot(net, ONES, sum);
-            net
-        });
-        Self { net, sum, suspect: wrong & lanes::SIGNS != 0 }
-    }
-
-    /// The bad columns, a bit each.
-    #[inline(always)]
-    pub fn bad(&self, codes: &Pairs, dead_codes: u16) -> u16 {
-        let mut bad = 0;
+    pub fn new(undriven: &Pairs, dead_codes: u16) -> Self {
+        let mut highest = 0;
         each(|place| {
-            // The low lane's sign to bit 0, the high lane's to bit 5.
-            let wrong = signs(self.net[place], codes[place], dead_codes) & lanes::SIGNS;
-            bad |= (wrong >> 15 | wrong >> (31 - BANK_COLUMNS)) << place;
+            highest = lanes::larger(highest, undriven[place]);
             0
         });
-        // What the shifts leave beyond: the high lane's sign at bit 16 and up.
-        bad as u16 & ((1 << COLUMNS) - 1)
+        let undriven_max = (highest as u16).max((highest >> 16) as u16);
+        let highest = undriven_max.min(CODE_MAX).saturating_add(dead_codes);
+        // Where not every column has a sound code, a floor out of each code's reach makes every row suspect.
+        let (dead, room) = if highest < SATURATED { (dead_codes, SATURATED - 1 - highest) } else { (1 << 15, 0) };
+        let both = |lane: u16| lanes::pair(lane as i16, lane as i16);
+        let (dead, room) = (both(dead), both(room));
+        let held_back = COLUMNS as u32 * u32::from(dead_codes);
+        Self { floors: each(|place| held(undriven[place]).wrapping_add(dead)), room, held_back, undriven_max }
     }
 
-    /// 1 / (1 - rho N) in Q22, at most 2: a row that loses half its voltage is broken, not sagging.
+    /// Not 0 where a row with this largest pair has a taxel that may be dead or saturated: a code below its floor is huge as an
+    /// unsigned number.
     #[inline(always)]
-    fn sag_boost(&self, sag_q32: u32) -> i32 {
-        let remaining = (u32::MAX - self.sum.unsigned_abs().saturating_mul(sag_q32)) >> 16;
-        ((u32::MAX / remaining.max(1 << 15)) << 6) as i32
+    pub fn beyond(&self, largest: u32) -> u32 {
+        lanes::excess(largest, self.room)
     }
-}
 
-/// The sign bit of each lane tells whether its taxel is dead or saturated.
-#[inline(always)]
-fn signs(net: u32, codes: u32, dead_codes: u16) -> u32 {
-    let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
-    let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
-    lanes::sub(net, dead) | lanes::sub(sound, codes)
-}
-
-/// A row's taxels, summed up.
-#[derive(Default)]
-pub(super) struct Columns {
-    /// Columns 5 to 9.
-    right: i32,
-    both: i32,
-    /// Weighted by the place among the five.
-    weighted: i32,
-    /// The highest taxel, at least 0.
-    pub peak: i32,
-}
-
-impl Columns {
-    /// Writes the taxels of a row in sixteenths of a corrected code; zero where the column is bad.
+    /// The largest code of each lane above its floor.
     #[inline(always)]
-    pub fn read(
-        row: &Row,
-        bad: u16,
-        tare: &[i32; COLUMNS],
-        gain: &Pairs,
-        sag_q32: u32,
-        out: &mut [i32; COLUMNS],
-    ) -> Self {
-        let mut columns = Self::default();
-        let boost = row.sag_boost(sag_q32);
+    pub fn largest(&self, codes: &Pairs) -> u32 {
+        let mut largest = 0;
         each(|place| {
-            let (net, gain) = (row.net[place], gain[place]);
-            let kept = |column: usize| i32::from(bad >> column & 1) - 1;
-            let left = taxel(lanes::low(net), lanes::low(gain), boost, tare[place]) & kept(place);
-            let right = taxel(lanes::high(net), lanes::high(gain), boost, tare[place + BANK_COLUMNS])
-                & kept(place + BANK_COLUMNS);
-            out[place] = left;
-            out[place + BANK_COLUMNS] = right;
-            columns.peak = columns.peak.max(left).max(right);
-            columns.right += right;
-            columns.both += left + right;
-            columns.weighted += (left + right) * place as i32;
+            largest = lanes::larger(largest, lanes::sub(codes[place], self.floors[place]));
             0
         });
-        columns
-    }
-
-    /// Sum of the taxels.
-    #[inline(always)]
-    pub fn sum(&self) -> i32 {
-        self.both
-    }
-
-    /// Sum weighted by twice the column's distance from the middle, -9, -7 .. 9.
-    #[inline(always)]
-    pub fn moment(&self) -> i32 {
-        // 2 place - 9 on the left and 2 place + 1 on the right.
-        2 * self.weighted - 9 * self.both + 10 * self.right
+        largest
     }
 }
 
-/// Net code, gain in Q14 and boost in Q22 to sixteenths above the tare in Q16, rounded once.
-#[inline(always)]
-fn taxel(net: i16, gain: i16, boost_q22: i32, tare_q16: i32) -> i32 {
-    let gained = i32::from(net) * i32::from(gain);
-    let boosted = (i64::from(gained) * i64::from(boost_q22) + (1 << 31)) >> 32;
-    boosted as i32 - (tare_q16 >> (super::TARE_BITS - super::CODE_BITS))
+/// A sound row, summed up.
+pub(super) struct Sums {
+    /// Net codes: at most 10 times 4089.
+    pub codes: u32,
+    /// Times the gain, Q14: below 2^31, as 10 * 4089 * 2^15 is.
+    pub sum: i32,
+    /// Times the weighted gain, Q10: below 2^29, as the weights' sizes sum up to 50.
+    pub moment: i32,
+    /// The largest above the floors, in each lane.
+    pub largest: u32,
 }
 
-/// Reads a row that is suspect; also tells its bad columns.
+impl Sums {
+    /// Of any codes; they mean something where the row is sound.
+    #[inline(always)]
+    pub fn new(codes: &Pairs, sound: &Sound, line: &Line) -> Self {
+        // The sums begin with what the floors hold back of the net codes.
+        let [first, second] = line.held_back;
+        let sums = Weighed { plain: 0, first, second, largest: 0 };
+        let Weighed { plain, first, second, largest } = lanes::weigh(codes, &sound.floors, &line.gains.weights, sums);
+        Self { codes: (plain & 0xffff) + (plain >> 16) + sound.held_back, sum: first, moment: second, largest }
+    }
+}
+
+/// 1 / (1 - rho N) in Q28, at most 2: a row that loses half its voltage is broken, not sagging.
 ///
-/// Apart from the others and from its codes on, so that the common way needs no mask and keeps its numbers in registers.
-#[cold]
-#[inline(never)]
-pub(super) fn read_suspect(
-    [codes, undriven]: [&Pairs; 2],
-    mask: u16,
-    tare: &[i32; COLUMNS],
-    gain: &Pairs,
-    config: &Config,
-    out: &mut [i32; COLUMNS],
-) -> (Columns, u16) {
-    let row = Row::of(codes, undriven, config.dead_codes);
-    let bad = row.bad(codes, config.dead_codes);
-    (Columns::read(&row, bad | mask, tare, gain, config.sag_q32, out), bad)
+/// It is (1 + x)(1 + x^2)(1 + x^4)(1 + x^8), which leaves out a factor of 1 + x^16 and more: 2^-16 at half the voltage, 2^-61 at 7 %.
+#[inline(always)]
+pub(super) fn boost(codes: u32, sag_q32: u32) -> i32 {
+    // Ten codes of 12 bits and the largest sag fit 32 bits.
+    let x = codes.wrapping_mul(sag_q32).min(i32::MAX as u32) as i32;
+    let square = |x: i32| ((i64::from(x) * i64::from(x)) >> 32) as i32;
+    let x2 = square(x);
+    let x4 = square(x2);
+    let x8 = square(x4);
+    let boost = (1 << BOOST_BITS) + (x >> (32 - BOOST_BITS));
+    let boost = lanes::add_high(boost, boost, x2);
+    let boost = lanes::add_high(boost, boost, x4);
+    lanes::add_high(boost, boost, x8)
 }
 
-/// Every place in turn, written out: the compiler would keep the loop where it builds for size.
+/// What the rows add up to, the sag taken out; before the tare.
+#[derive(Default)]
+pub(super) struct Total {
+    /// Codes, Q10: 100 taxels of 4095 codes, gain 2 and boost 2 fit.
+    pub sum: i32,
+    /// Weighted by -9, -7 .. 9 along the columns, Q6.
+    pub moment_x: i32,
+    /// The sum after each row, added up, Q8: it may wrap, what is made of it fits.
+    pub running: i32,
+}
+
+impl Total {
+    /// Takes in the next row.
+    #[inline(always)]
+    pub fn add(&mut self, row: &Sums, boost: i32) {
+        self.sum = lanes::add_high(self.sum, row.sum, boost);
+        self.moment_x = lanes::add_high(self.moment_x, row.moment, boost);
+        self.running = self.running.wrapping_add(self.sum >> 2);
+    }
+
+    /// Takes in a row that was passed over, when all others are in.
+    pub fn add_late(&mut self, row: usize, sum_sixteenths: i32, moment_sixteenths: i32) {
+        let sum = sum_sixteenths.wrapping_shl(GAIN_BITS - COARSER - CODE_BITS);
+        let moment = moment_sixteenths.wrapping_shl(MOMENT_BITS - COARSER - CODE_BITS);
+        self.sum = self.sum.wrapping_add(sum);
+        self.moment_x = self.moment_x.wrapping_add(moment);
+        self.running = self.running.wrapping_add((sum >> 2).wrapping_mul((ROWS - row) as i32));
+    }
+
+    /// Sum and moments in sixteenths, rounded.
+    #[inline(always)]
+    pub fn sixteenths(&self) -> [i32; 3] {
+        let rounded = |value: i32, bits: u32| (value >> (bits - CODE_BITS - 1)).wrapping_add(1) >> 1;
+        // Row n was in the sum 10 - n times: 11 less twice that is its weight.
+        let moment_y = (self.sum >> 2).wrapping_mul(11).wrapping_sub(self.running.wrapping_mul(2));
+        [
+            rounded(self.sum, GAIN_BITS - COARSER),
+            rounded(self.moment_x, MOMENT_BITS - COARSER),
+            rounded(moment_y, GAIN_BITS - COARSER - 2),
+        ]
+    }
+}
+
+/// Twice a place's distance from the middle in pitches.
 #[inline(always)]
-fn each(mut act: impl FnMut(usize) -> u32) -> Pairs {
-    [act(0), act(1), act(2), act(3), act(4)]
+pub(super) const fn weight(place: usize) -> i32 {
+    2 * place as i32 + 1 - COLUMNS as i32
 }

@@ -19,6 +19,7 @@ use crate::pipeline::budget::Budget;
 use crate::pressure::{Array, Picture};
 use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
+use lanes::Weighed;
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
@@ -103,7 +104,7 @@ impl Press {
 }
 
 /// One step of every machine for each input.
-pub const STEPS: [Step; 22] = [
+pub const STEPS: [Step; 26] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -111,6 +112,17 @@ pub const STEPS: [Step; 22] = [
     }),
     ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
     ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
+    ("lanes::excess", |_, s, mix| mix.add(lanes::excess(s.share_q32, s.words[0].cast_unsigned()))),
+    ("lanes::add_high", |_, s, mix| mix.add(lanes::add_high(s.words[2], s.share_q32.cast_signed(), s.words[0]))),
+    ("lanes::weigh", |_, s, mix| {
+        let [first, second, third, fourth] = s.words.map(i32::cast_unsigned);
+        let pairs = [first, second, third, fourth, s.share_q32];
+        let weights = [[s.share_q32, third, first, fourth, second], [fourth, first, s.share_q32, second, third]];
+        let sums = Weighed { plain: second, first: s.words[0], second: s.words[3], largest: third & 0x0fff_0fff };
+        let Weighed { plain, first, second, largest } = lanes::weigh(&pairs, &weights[0], &weights, sums);
+        [plain, largest].into_iter().for_each(|number| mix.add(number));
+        [first, second].into_iter().for_each(|number| mix.add(number));
+    }),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
     ("lanes::root_and_product", |_, s, mix| {
         let [x, y, high, low] = s.words.map(i32::cast_unsigned);
@@ -121,6 +133,10 @@ pub const STEPS: [Step; 22] = [
     ("Array::read", |m, s, mix| {
         frames::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));
+    }),
+    ("Array::develop", |m, s, mix| {
+        m.array.develop(&m.frame, m.array.drift_row() | s.words[3] as u16);
+        add_picture(mix, m.array.picture());
         m.array.follow_drift();
         if s.words[2] == 0 {
             m.array.continue_tare();

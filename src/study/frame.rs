@@ -5,7 +5,7 @@ use super::host::{Inputs, fail, say};
 use super::packed;
 use fingertip::config::Config;
 use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
-use fingertip::pressure::{Array, Calibration, TARE_FRAMES};
+use fingertip::pressure::{Array, Calibration, Picture, TARE_FRAMES};
 use fixed::types::I16F16;
 
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
@@ -35,9 +35,9 @@ pub struct Bench {
     pub weighted: [[u32; BANK_COLUMNS]; ROWS],
     /// Tare, sixteenths of a code.
     pub tare: [[i32; COLUMNS]; ROWS],
-    /// Sums of the tare, sixteenths of a code.
+    /// Sums of the tare, Q12 of a code.
     pub tare_sums: Sums<i32>,
-    /// The same where gains are left out.
+    /// The same where gains are left out, sixteenths of a code.
     pub plain_tare: Sums<i32>,
     /// In single precision.
     pub single: Float<f32>,
@@ -72,7 +72,7 @@ enum Format {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel, Format); 9] = [
+const VARIANTS: [(&str, Kernel, Format); 10] = [
     ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
     ("packed, gains", packed::gains, Format::Fixed(4)),
     ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
@@ -82,6 +82,7 @@ const VARIANTS: [(&str, Kernel, Format); 9] = [
     ("f64", double, Format::Double),
     ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
     ("**Array::read**", firmware, Format::Fixed(4)),
+    ("**Array::read_all**", all_taxels, Format::Fixed(4)),
 ];
 
 /// Measures all variants over the next section of inputs: gains, the frame without contact, frames.
@@ -148,11 +149,18 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     let mut array = Array::new();
     array.calibrate(&calibration);
     for _ in 0..TARE_FRAMES {
-        array.read(&quiet, config);
+        array.read_all(&quiet, config);
         array.continue_tare();
     }
-    let mut tare = [[0; COLUMNS]; ROWS];
-    tare.iter_mut().flatten().zip(array.tare()).for_each(|(place, tare)| *place = tare);
+    let sag = f64::from(config.sag_q32) / 4_294_967_296.0;
+    let net = |row, column| i32::from(quiet.code(row, column)) - i32::from(quiet.code(ROWS, column));
+    let exact = |row: usize, column: usize| {
+        let total: i32 = (0..COLUMNS).map(|column| net(row, column)).sum();
+        f64::from(net(row, column)) * f64::from(gains[row][column]) / 16_384.0 / (1.0 - sag * f64::from(total))
+    };
+    let tare: [[f64; COLUMNS]; ROWS] = core::array::from_fn(|row| core::array::from_fn(|column| exact(row, column)));
+    // A power of two above 0, to the nearest.
+    let rounded = |value: f64, one: f64| (value * one + 0.5) as i32;
     let weight = |place: usize| 2 * place as i32 - 9;
     let pairs = |of: &dyn Fn(usize, usize) -> i32| {
         core::array::from_fn(|row| {
@@ -168,32 +176,26 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
         }
         sums
     };
-    let net = |row, column| i32::from(quiet.code(row, column)) - i32::from(quiet.code(ROWS, column));
-    let sag = f64::from(config.sag_q32) / 4_294_967_296.0;
     Bench {
         config: config.clone(),
         frame: quiet,
         gain: pairs(&|row, column| gains[row][column].into()),
         weighted: pairs(&|row, column| (i32::from(gains[row][column]) * weight(column) + 4) >> 3),
-        tare_sums: sums(&|row, column| tare[row][column]),
+        tare_sums: sums(&|row, column| rounded(tare[row][column], 4_096.0)),
         plain_tare: sums(&|row, column| 16 * net(row, column)),
         single: Float {
             gain: gains.map(|row| row.map(|gain| f32::from(gain) / 16_384.0)),
-            tare: tare.map(|row| row.map(|tare| tare as f32 / 16.0)),
+            tare: tare.map(|row| row.map(|tare| tare as f32)),
             sag: sag as f32,
         },
-        double: Float {
-            gain: gains.map(|row| row.map(|gain| f64::from(gain) / 16_384.0)),
-            tare: tare.map(|row| row.map(|tare| f64::from(tare) / 16.0)),
-            sag,
-        },
+        double: Float { gain: gains.map(|row| row.map(|gain| f64::from(gain) / 16_384.0)), tare, sag },
         fixed: Float {
             gain: gains.map(|row| row.map(|gain| I16F16::from_bits(i32::from(gain) << 2))),
-            tare: tare.map(|row| row.map(|tare| I16F16::from_bits(tare << 7))),
+            tare: tare.map(|row| row.map(|tare| I16F16::from_bits(rounded(tare, 2_048.0)))),
             sag: I16F16::from_bits((sag * 32.0 * 65_536.0 + 0.5) as i32),
         },
         array,
-        tare,
+        tare: tare.map(|row| row.map(|tare| rounded(tare, 16.0))),
         out: Sums::default(),
         out_single: Sums::default(),
         out_double: Sums::default(),
@@ -201,10 +203,17 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     }
 }
 
+fn seen(picture: &Picture) -> (Sums<i32>, bool) {
+    let Picture { sum, moment_x, moment_y, peak, bad_count, .. } = *picture;
+    (Sums { sum, moment_x, moment_y, peak }, bad_count > 0)
+}
+
 extern "C" fn firmware(bench: &mut Bench) {
-    let picture = bench.array.read(&bench.frame, &bench.config);
-    bench.out = Sums { sum: picture.sum, moment_x: picture.moment_x, moment_y: picture.moment_y, peak: picture.peak };
-    bench.suspect = picture.bad_count > 0;
+    (bench.out, bench.suspect) = seen(bench.array.read(&bench.frame, &bench.config));
+}
+
+extern "C" fn all_taxels(bench: &mut Bench) {
+    (bench.out, bench.suspect) = seen(bench.array.read_all(&bench.frame, &bench.config));
 }
 
 /// Taxel by taxel, in 32 and 64 bits.

@@ -59,12 +59,12 @@ impl Frame {
         row
     }
 
-    fn finish(&self, bench: &mut Bench, out: Sums<i32>, tare: &Sums<i32>, bits: u32) {
+    fn finish(&self, bench: &mut Bench, out: Sums<i32>, tare: &Sums<i32>, drop: u32) {
         let peak = i32::from(lanes::low(self.peaks).max(lanes::high(self.peaks)));
         bench.out = Sums {
-            sum: out.sum - (tare.sum << bits),
-            moment_x: out.moment_x - (tare.moment_x << bits),
-            moment_y: out.moment_y - (tare.moment_y << bits),
+            sum: out.sum - (tare.sum >> drop),
+            moment_x: out.moment_x - (tare.moment_x >> drop),
+            moment_y: out.moment_y - (tare.moment_y >> drop),
             peak,
         };
         bench.suspect = self.signs & lanes::SIGNS != 0;
@@ -99,7 +99,7 @@ fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
         weight += 2;
     }
     let tare = bench.tare_sums;
-    frame.finish(bench, out, &tare, bits);
+    frame.finish(bench, out, &tare, 8 - bits);
 }
 
 /// Every taxel counts alike.

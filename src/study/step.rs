@@ -43,13 +43,14 @@ const STEPS: [(&str, Effort); 6] = [
 ];
 
 /// The place of the first part that works on what those before it left.
-const OBSERVER: usize = 2;
+const OBSERVER: usize = 3;
 /// Records that the parts see at most; the step sees all.
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 6] = [
+const PARTS: [(&str, Kernel, bool); 7] = [
     ("**Array::read**", read, false),
+    ("**Array::develop, two rows**", develop, false),
     ("**contact::from_sums**", sums, false),
     ("**observer**", observe, true),
     ("**goal and profile**", reference, true),
@@ -64,6 +65,10 @@ extern "C" fn step(bench: &mut Bench) {
 
 extern "C" fn read(bench: &mut Bench) {
     bench.array.read(&bench.record.frame, bench.config);
+}
+
+extern "C" fn develop(bench: &mut Bench) {
+    bench.array.develop(&bench.record.frame, 1 | 1 << 5);
 }
 
 extern "C" fn sums(bench: &mut Bench) {
@@ -140,7 +145,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
             let (_, status) = bench.outcome;
             let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
             bench.array = bench.pipeline.array().clone();
-            bench.picture = *bench.pipeline.array().picture();
+            bench.picture = *bench.array.picture();
             bench.contact = status.contact;
             bench.wanted = (i64::from(n) * 7_919 % 200_000_000) as i32 - 100_000_000;
             if drives {

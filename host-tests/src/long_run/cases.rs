@@ -196,7 +196,7 @@ fn baselines() -> Vec<Machine<Array>> {
             step: Box::new(move |array: &mut Array| {
                 // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
                 for frame in frames.iter().cycle().take(ROWS) {
-                    array.read(frame, &config);
+                    array.read_all(frame, &config);
                     array.follow_drift();
                 }
             }),
@@ -209,7 +209,7 @@ fn baselines() -> Vec<Machine<Array>> {
 fn tare(array: &mut Array, frame: &Frame, config: &Config) {
     array.start_tare();
     for _ in 0..TARE_FRAMES {
-        array.read(frame, config);
+        array.read_all(frame, config);
         array.continue_tare();
     }
 }

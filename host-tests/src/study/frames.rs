@@ -7,23 +7,23 @@ use crate::prove::reference::{Real, real};
 use fingertip::config::Config;
 use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
-use fingertip::pressure::{Array, Calibration, TARE_FRAMES};
 
 /// Half of the pitch, mm.
 const HALF_PITCH_MM: f64 = 0.75;
 /// Newtons for a code on a taxel: its area over the codes for a kPa.
 const NEWTONS_PER_CODE: f64 = 1.5 * 1.5 * 1e-3 / 24.0;
 
-/// Largest and root mean square error of the force in N and of the centre in mm.
+/// Largest and root mean square error of the force in N and of the centre in mm; the tare is the exact reading of the quiet frame.
 pub fn errors(returned: &[Vec<Number>], frames: &Frames) -> Option<[[f64; 2]; 2]> {
     let config = Config::new(&Params::DEFAULT).ok()?;
-    let tare = tare(frames, &config)?;
+    let tare = sums(&frames.quiet, frames, &config);
     let (mut force, mut centre) = (Errors::default(), Errors::default());
     if returned.len() != frames.contacts.len() {
         return None;
     }
     for (frame, returned) in frames.contacts.iter().zip(returned) {
-        let exact = sums(frame, frames, &tare, &config);
+        let [exact_sum, exact_x, exact_y] = sums(frame, frames, &config);
+        let exact = [exact_sum - &tare[0], exact_x - &tare[1], exact_y - &tare[2]];
         let [sum, x, y] = returned[..] else { return None };
         let ([Some(sum), Some(x), Some(y)], [exact_sum, exact_x, exact_y]) = ([sum, x, y].map(Number::real), exact)
         else {
@@ -38,19 +38,8 @@ pub fn errors(returned: &[Vec<Number>], frames: &Frames) -> Option<[[f64; 2]; 2]
     Some([force.both(), centre.both()])
 }
 
-/// The tare that the core measures, sixteenths of a code: part of the calibration, the same for every variant.
-fn tare(frames: &Frames, config: &Config) -> Option<Vec<i32>> {
-    let mut array = Array::new();
-    array.calibrate(&Calibration::new(&frames.gains, &[0; ROWS]).ok()?);
-    for _ in 0..TARE_FRAMES {
-        array.read(&frames.quiet, config);
-        array.continue_tare();
-    }
-    Some(array.tare().collect())
-}
-
-/// Sum and moments in codes: gain times net code over 1 - rho N, less the tare.
-fn sums(frame: &Frame, frames: &Frames, tare: &[i32], config: &Config) -> [Real; 3] {
+/// Sum and moments in codes: gain times net code over 1 - rho N.
+fn sums(frame: &Frame, frames: &Frames, config: &Config) -> [Real; 3] {
     let mut sums = [(); 3].map(|()| real(0, 0));
     for row in 0..ROWS {
         let net = |column| i32::from(frame.code(row, column)) - i32::from(frame.code(ROWS, column));
@@ -58,7 +47,7 @@ fn sums(frame: &Frame, frames: &Frames, tare: &[i32], config: &Config) -> [Real;
         let remaining = real(1, 0) - real(config.sag_q32 as i32, 32) * real(total, 0);
         for column in 0..COLUMNS {
             let gained = real(net(column) * i32::from(frames.gains[row][column]), 14);
-            let value = gained / &remaining - real(tare[row * COLUMNS + column], 4);
+            let value = gained / &remaining;
             let weight = |place: usize| real(2 * place as i32 - 9, 0);
             let [sum, x, y] = sums;
             sums = [sum + &value, x + &value * weight(column), y + &value * weight(row)];

@@ -1,0 +1,136 @@
+//! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
+
+use fingertip::config::Config;
+use fingertip::frame::{COLUMNS, Frame, ROWS, SATURATED};
+use fingertip::params::Params;
+use fingertip::pressure::{Array, Calibration, GAIN_MAX, Picture, TARE_FRAMES};
+use proptest::prelude::*;
+
+/// Codes above the column's level, or any codes.
+#[derive(Clone, Debug)]
+struct Codes {
+    levels: [u16; COLUMNS],
+    above: [[u16; COLUMNS]; ROWS],
+    wild: Vec<(usize, usize, u16)>,
+}
+
+impl Codes {
+    fn frame(&self) -> Frame {
+        let mut frame = Frame::EMPTY;
+        for column in 0..COLUMNS {
+            frame.set_code(ROWS, column, self.levels[column]);
+            for row in 0..ROWS {
+                frame.set_code(row, column, self.levels[column] + self.above[row][column]);
+            }
+        }
+        for (slot, column, code) in &self.wild {
+            frame.set_code(*slot, *column, *code);
+        }
+        frame
+    }
+}
+
+/// Sound taxels, and up to so many codes that are anything up to `code_max`.
+fn codes(wild: usize, code_max: u16) -> impl Strategy<Value = Codes> {
+    let places = (0..=ROWS, 0..COLUMNS, 0..=code_max);
+    let above = proptest::array::uniform10(proptest::array::uniform10(12_u16..3_400));
+    (proptest::array::uniform10(300_u16..600), above, proptest::collection::vec(places, 0..=wild))
+        .prop_map(|(levels, above, wild)| Codes { levels, above, wild })
+}
+
+fn calibration() -> impl Strategy<Value = Calibration> {
+    let gains = proptest::array::uniform10(proptest::array::uniform10(1..=GAIN_MAX));
+    let mask = proptest::array::uniform10(prop_oneof![4 => Just(0), 1 => 0_u16..1 << COLUMNS]);
+    (gains, mask).prop_map(|(gains, mask)| Calibration::new(&gains, &mask).unwrap())
+}
+
+fn config(sag_ppb: i32, dead_codes: i32) -> Config {
+    let params = Params { row_sag_ppb_per_code: sag_ppb, dead_codes, ..Params::DEFAULT };
+    Config::new(&params).unwrap()
+}
+
+fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
+    let mut array = Array::new();
+    array.calibrate(calibration);
+    for _ in 0..TARE_FRAMES {
+        array.read_all(blank, config);
+        array.continue_tare();
+    }
+    array
+}
+
+/// The bad columns of a row by their definition.
+fn bad(frame: &Frame, row: usize, config: &Config) -> u16 {
+    let wrong = |column: usize| {
+        let (code, level) = (frame.code(row, column), frame.code(ROWS, column) & 0xfff);
+        code >= SATURATED || i32::from(code) - i32::from(level) < i32::from(config.dead_codes)
+    };
+    (0..COLUMNS).map(|column| u16::from(wrong(column)) << column).sum()
+}
+
+proptest! {
+    #[test]
+    fn the_sums_are_those_of_the_taxels(
+        blank in codes(0, 0), codes in codes(3, 4095), calibration in calibration(), sag in 0..20_001, dead in 1..13,
+    ) {
+        let config = config(sag, dead);
+        let mut array = tared(&calibration, &blank.frame(), &config);
+        let picture = *array.read_all(&codes.frame(), &config);
+        let (mut sums, mut sizes, mut peak) = ([0_i64; 3], 0, 0);
+        let tares: Vec<_> = array.tare().collect();
+        for (place, taxel) in picture.taxels.as_flattened().iter().enumerate() {
+            let weight = |place: usize| 2 * place as i64 - 9;
+            let value = i64::from(*taxel);
+            for (sum, weight) in sums.iter_mut().zip([1, weight(place % COLUMNS), weight(place / COLUMNS)]) {
+                *sum += value * weight;
+            }
+            sizes += value + i64::from(tares[place]);
+            peak = peak.max(*taxel);
+        }
+        let Picture { sum, moment_x, moment_y, .. } = picture;
+        // Taxels and their tares are rounded to sixteenths; along the columns, the weighted gains to Q10.
+        let bounds = [110, 550 + sizes / 2_048, 550];
+        for ((found, exact), bound) in [sum, moment_x, moment_y].into_iter().zip(sums).zip(bounds) {
+            prop_assert!((i64::from(found) - exact).abs() <= bound, "{found}, not {exact}, to {bound}");
+        }
+        prop_assert_eq!(picture.peak, peak);
+    }
+
+    #[test]
+    fn bad_taxels_are_those_of_the_definition(
+        codes in codes(12, 4095), calibration in calibration(), dead in prop_oneof![1..20, 1..1_001],
+    ) {
+        let (frame, config) = (codes.frame(), config(1_667, dead));
+        let mut array = Array::new();
+        array.calibrate(&calibration);
+        let masks = array.read(&Codes { wild: vec![], ..codes }.frame(), &self::config(1_667, 1)).bad;
+        let picture = *array.read_all(&frame, &config);
+        let mut count = 0;
+        for (row, mask) in masks.iter().enumerate() {
+            let expected = bad(&frame, row, &config);
+            prop_assert_eq!(picture.bad[row], expected | mask, "row {}", row);
+            count += (expected & !mask).count_ones();
+            for column in (0..COLUMNS).filter(|column| picture.bad[row] >> column & 1 != 0) {
+                prop_assert_eq!(picture.taxels[row][column], 0);
+            }
+        }
+        prop_assert_eq!(u32::from(picture.bad_count), count);
+        prop_assert_eq!(array.bad_taxels(&frame, &config), count);
+        // What was bad in one frame is not in the next.
+        prop_assert_eq!(array.read(&Codes { wild: vec![], ..codes }.frame(), &self::config(1_667, 1)).bad, masks);
+    }
+
+    #[test]
+    fn any_codes_are_taken(codes in codes(110, u16::MAX), calibration in calibration(), rows in any::<u16>()) {
+        let (frame, config) = (codes.frame(), config(20_000, 1_000));
+        let mut array = Array::new();
+        array.calibrate(&calibration);
+        array.read(&frame, &config);
+        array.develop(&frame, rows);
+        array.follow_drift();
+        array.read_all(&frame, &config);
+        array.continue_tare();
+        let count = array.read(&frame, &config).bad_count;
+        prop_assert_eq!(array.bad_taxels(&frame, &config), u32::from(count));
+    }
+}

@@ -1,0 +1,54 @@
+//! What a frame shows: sums, flags and single taxels.
+
+use crate::config::Config;
+use crate::frame::{COLUMNS, ROWS};
+use crate::units::Newtons;
+use fixed::types::I16F16;
+
+/// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated. Each row is that of the frame in which it was
+    /// last developed.
+    pub taxels: [[i32; COLUMNS]; ROWS],
+    /// Sum over all taxels.
+    pub sum: i32,
+    /// Sum weighted by twice the column's distance from the middle, in pitches: -9, -7 .. 9.
+    pub moment_x: i32,
+    /// Sum weighted by twice the row's distance from the middle, in pitches.
+    pub moment_y: i32,
+    /// Largest of the taxels as they were last developed, at least 0.
+    pub peak: i32,
+    /// A bit for each column that is masked, dead or saturated, for each row.
+    pub bad: [u16; ROWS],
+    /// Taxels that are dead or saturated, and not masked.
+    pub bad_count: u8,
+    /// The highest undriven column level, codes.
+    pub undriven_max: u16,
+}
+
+impl Picture {
+    /// Nothing seen.
+    pub const EMPTY: Self = Self {
+        taxels: [[0; COLUMNS]; ROWS],
+        sum: 0,
+        moment_x: 0,
+        moment_y: 0,
+        peak: 0,
+        bad: [0; ROWS],
+        bad_count: 0,
+        undriven_max: 0,
+    };
+
+    /// The sum as a force: the taxels' area times their pressure, never below zero.
+    pub fn force(&self, config: &Config) -> Newtons {
+        // The product is positive: its upper half is below 2^31.
+        let force_bits = ((i64::from(self.sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
+        Newtons(I16F16::from_bits(force_bits.max(0)))
+    }
+
+    /// The peak as a pressure in Pa.
+    pub fn peak_pa(&self, config: &Config) -> u32 {
+        ((i64::from(self.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32
+    }
+}

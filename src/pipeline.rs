@@ -83,7 +83,7 @@ impl Pipeline {
     }
 
     /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
-    pub fn stop(&mut self, fault: Fault) -> Status {
+    pub fn stop(&mut self, fault: Fault) -> &Status {
         self.status.mode = Mode::Fault;
         self.status.fault.get_or_insert(fault);
         if self.press.running() {
@@ -91,15 +91,20 @@ impl Pipeline {
             self.status.identification = self.press.outcome();
         }
         self.status.duty = self.motion.coast();
-        self.status
+        &self.status
     }
 
     /// Works out every taxel of the frame last stepped with, for those who look at the whole picture: the step itself works out the
     /// few that it needs. The peak is then that frame's, too.
-    pub fn develop(&mut self, frame: &Frame) -> Status {
+    pub fn develop(&mut self, frame: &Frame) -> &Status {
         self.array.develop(frame, ALL_ROWS);
         self.status.contact.peak_pa = self.array.picture().peak_pa(&self.config);
-        self.status
+        &self.status
+    }
+
+    /// What the last step reported.
+    pub fn status(&self) -> &Status {
+        &self.status
     }
 
     /// The array's last picture and its calibration.
@@ -112,8 +117,9 @@ impl Pipeline {
         &self.config
     }
 
-    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command.
-    pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
+    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy it takes as long
+    /// as the speed law.
+    pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
         let deadline = answer_ticks(self.config.timing.frame_ticks());
@@ -187,13 +193,13 @@ impl Pipeline {
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
         self.status.identification = self.press.outcome();
-        (duty, self.status)
+        (duty, &self.status)
     }
 
     /// A look at a frame that is still being scanned, filled up from the frame before: stops where its array is broken, and tells
     /// so. A taxel that fails just after it was read is seen a frame later; without this look the step would judge it only at
     /// that frame's end.
-    pub fn glance(&mut self, frame: &Frame) -> Option<Status> {
+    pub fn glance(&mut self, frame: &Frame) -> Option<&Status> {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         broken.then(|| self.stop(Fault::ArrayBroken))

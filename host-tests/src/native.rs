@@ -4,6 +4,7 @@ use crate::plant::{Bridge, Setup, World};
 use fingertip::config::Config;
 use fingertip::frame::{Frame, SLOTS, Sense};
 use fingertip::pipeline::{Command, Pipeline, Status};
+use fingertip::safety::Mode;
 use fingertip::units::Duty;
 
 /// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
@@ -63,8 +64,8 @@ impl Native {
         self.frame.sequence = self.frames as u32;
         self.sense = self.world.sense(0);
         let (duty, status) = self.pipeline.step(&self.frame, &self.sense, &self.command);
-        self.next = bridge(duty, status);
-        status
+        self.next = bridge(duty, status.mode);
+        *status
     }
 
     /// Tares, then enables torque with no goal.
@@ -78,9 +79,8 @@ impl Native {
 }
 
 /// What a duty means at the bridge: a mode that does not drive leaves it open.
-pub fn bridge(duty: Duty, status: Status) -> Bridge {
-    use fingertip::safety::Mode;
-    match status.mode {
+pub fn bridge(duty: Duty, mode: Mode) -> Bridge {
+    match mode {
         Mode::Off | Mode::Tare | Mode::Fault => Bridge::Coast,
         Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
             Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) }

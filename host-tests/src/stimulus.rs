@@ -82,7 +82,7 @@ pub fn digest(records: &[Record]) -> u64 {
     let mut digest = Digest::new();
     for Record { frame, sense, command } in records {
         let (duty, status) = pipeline.step(frame, sense, command);
-        digest.add(duty, &status);
+        digest.add(duty, status);
     }
     digest.value()
 }

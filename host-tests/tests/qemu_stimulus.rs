@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 
 fn statuses() -> Vec<Status> {
     let mut pipeline = Pipeline::new(&Config::new(&Params::DEFAULT).unwrap());
-    stimulus::records().iter().map(|record| pipeline.step(&record.frame, &record.sense, &record.command).1).collect()
+    stimulus::records().iter().map(|record| *pipeline.step(&record.frame, &record.sense, &record.command).1).collect()
 }
 
 #[test]

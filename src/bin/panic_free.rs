@@ -14,15 +14,15 @@ use fingertip::units::Duty;
 /// The step, with a pipeline and arguments of which the compiler knows nothing.
 #[unsafe(no_mangle)]
 #[inline(never)]
-fn control_step(pipeline: &mut Pipeline, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, Status) {
+fn control_step(pipeline: &mut Pipeline, frame: &Frame, sense: &Sense, command: &Command) -> Duty {
     if cfg!(feature = "proof-control-panic") {
         let codes = frame.pairs.as_flattened();
-        return (Duty(codes[command.goal.to_bits() as usize] as i16), Status::default());
+        return Duty(codes[command.goal.to_bits() as usize] as i16);
     }
     if cfg!(feature = "proof-control-float") {
-        return (Duty((f64::from(sense.supply_mv) * 0.1) as i16), Status::default());
+        return Duty((f64::from(sense.supply_mv) * 0.1) as i16);
     }
-    pipeline.step(frame, sense, command)
+    pipeline.step(frame, sense, command).0
 }
 
 #[cortex_m_rt::entry]

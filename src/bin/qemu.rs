@@ -23,6 +23,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
 use fingertip::same_bits::Comparison;
+use fingertip::units::Duty;
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
@@ -97,11 +98,9 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
         if index == count / 2 {
             inject(failure);
         }
-        let mut outcome = None;
-        let taken = ticks(syst, || outcome = Some(pipeline.step(&frame, &sense, &command)));
-        if let Some((duty, status)) = outcome {
-            digest.add(duty, &status);
-        }
+        let mut duty = Duty::ZERO;
+        let taken = ticks(syst, || duty = pipeline.step(&frame, &sense, &command).0);
+        digest.add(duty, pipeline.status());
         total += u64::from(taken);
         min = min.min(taken);
         max = max.max(taken);

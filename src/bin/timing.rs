@@ -27,7 +27,6 @@ struct Bench<'a> {
     config: &'a Config,
     record: Record,
     pipeline: Pipeline,
-    outcome: (Duty, Status),
     array: Array,
     picture: Picture,
     contact: Contact,
@@ -83,7 +82,7 @@ extern "C" fn nothing(_: &mut Bench) {}
 
 extern "C" fn step(bench: &mut Bench) {
     let Record { frame, sense, command } = &bench.record;
-    bench.outcome = bench.pipeline.step(frame, sense, command);
+    bench.duty = bench.pipeline.step(frame, sense, command).0;
 }
 
 extern "C" fn frame_pass(bench: &mut Bench) {
@@ -156,7 +155,6 @@ fn main() -> ! {
         config: &config,
         record: Record::from_bytes(&[0; Record::BYTES]),
         pipeline: Pipeline::new(&config),
-        outcome: Default::default(),
         array: Array::new(),
         picture: Picture::EMPTY,
         contact: Contact::default(),
@@ -185,7 +183,7 @@ fn main() -> ! {
 /// The step first: the others work on what it left.
 fn measure_frame(bench: &mut Bench) {
     measure(STEP, step, bench);
-    let (_, status) = bench.outcome;
+    let status = *bench.pipeline.status();
     let touches = status.contact.force >= bench.config.contact_on;
     let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
     if !drives {

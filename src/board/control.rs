@@ -125,9 +125,8 @@ impl State {
             return;
         }
         self.parts.scan.copy_so_far(&mut self.frame);
-        if let Some(status) = self.parts.pipeline.glance(&self.frame) {
+        if self.parts.pipeline.glance(&self.frame).is_some() {
             self.parts.bridge.sleep();
-            self.report.status = status;
             self.publish();
         }
     }
@@ -148,12 +147,9 @@ impl State {
 
         let frame_ticks = guard::frame_ticks(parts.pipeline.config().timing);
         let loop_ticks = guard::now().wrapping_sub(completed.stamp);
-        self.report = Report {
-            status,
-            supply_mv: sense.supply_mv,
-            loop_ticks,
-            loop_ticks_max: self.report.loop_ticks_max.max(loop_ticks),
-        };
+        self.report.supply_mv = sense.supply_mv;
+        self.report.loop_ticks = loop_ticks;
+        self.report.loop_ticks_max = self.report.loop_ticks_max.max(loop_ticks);
         if loop_ticks <= answer_ticks(frame_ticks) {
             guard::restart(completed.stamp, frame_ticks);
             parts.watchdog.pet();
@@ -182,7 +178,7 @@ impl State {
 
     fn stop(&mut self, fault: Fault) {
         self.parts.bridge.sleep();
-        self.report.status = self.parts.pipeline.stop(fault);
+        self.parts.pipeline.stop(fault);
     }
 
     fn restart_scan(&mut self) {
@@ -197,9 +193,9 @@ impl State {
     fn publish(&mut self) {
         let wanted = DETAIL_WANTED.swap(false, Ordering::Relaxed);
         if wanted {
-            self.report.status = self.parts.pipeline.develop(&self.frame);
+            self.parts.pipeline.develop(&self.frame);
         }
-        REPORT.set(self.report);
+        REPORT.set(Report { status: *self.parts.pipeline.status(), ..self.report });
         if wanted {
             let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
             let array = pipeline.array();

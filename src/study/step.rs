@@ -19,7 +19,7 @@ struct Bench<'a> {
     effort: Effort,
     record: Record,
     pipeline: Pipeline,
-    outcome: (Duty, Status),
+    duty: Duty,
     array: Array,
     picture: Picture,
     contact: Contact,
@@ -60,7 +60,7 @@ const PARTS: [(&str, Kernel, bool); 7] = [
 
 extern "C" fn step(bench: &mut Bench) {
     let Record { frame, sense, command } = &bench.record;
-    bench.outcome = bench.pipeline.step(frame, sense, &Command { effort: bench.effort, ..*command });
+    bench.duty = bench.pipeline.step(frame, sense, &Command { effort: bench.effort, ..*command }).0;
 }
 
 extern "C" fn read(bench: &mut Bench) {
@@ -101,7 +101,7 @@ impl<'a> Bench<'a> {
             effort,
             record: Record::from_bytes(&[0; Record::BYTES]),
             pipeline: Pipeline::new(config),
-            outcome: Default::default(),
+            duty: Duty::ZERO,
             array: Array::new(),
             picture: Picture::EMPTY,
             contact: Contact::default(),
@@ -142,7 +142,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
         for n in 0..count.min(PART_RECORDS) {
             bench.record = record(inputs);
             step(&mut bench);
-            let (_, status) = bench.outcome;
+            let status = *bench.pipeline.status();
             let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
             bench.array = bench.pipeline.array().clone();
             bench.picture = *bench.array.picture();

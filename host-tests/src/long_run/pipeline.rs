@@ -33,7 +33,7 @@ pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (O
     let mut shown = frame(0);
     let step = |pipeline: &mut Pipeline, command: &Command, shown: &mut Frame| {
         shown.sequence = shown.sequence.wrapping_add(1);
-        pipeline.step(shown, &sense, command).1
+        *pipeline.step(shown, &sense, command).1
     };
     for _ in 0..TARE_FRAMES + 2 {
         step(&mut pipeline, &command, &mut shown);

@@ -62,7 +62,7 @@ impl Run {
     fn step(&mut self) -> Status {
         let clear_before = core::mem::replace(&mut self.clear_seen, self.arguments.command.clear_request);
         let Arguments { frame, sense, command } = &self.arguments;
-        let (duty, status) = self.pipeline.step(frame, sense, command);
+        let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
 
         assert!(duty.0 >= -Duty::FULL, "{duty:?}");
@@ -144,7 +144,7 @@ proptest! {
     fn a_stop_from_outside_is_latched(params in any_params(), before in any_inputs(60), after in any_inputs(60)) {
         let mut run = Run::new(&params, true);
         run.take(&before);
-        let status = run.pipeline.stop(Fault::LostFrames);
+        let status = *run.pipeline.stop(Fault::LostFrames);
         prop_assert_eq!((status.mode, status.duty), (Mode::Fault, Duty::ZERO));
         prop_assert!(status.fault.is_some());
         run.before = status;

@@ -8,7 +8,7 @@
 
 use core::hint::black_box;
 use fingertip::frame::{Frame, Sense};
-use fingertip::pipeline::{Command, Pipeline, Status};
+use fingertip::pipeline::{Command, Pipeline};
 use fingertip::units::Duty;
 
 /// The step, with a pipeline and arguments of which the compiler knows nothing.

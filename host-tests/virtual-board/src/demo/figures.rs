@@ -30,6 +30,8 @@ pub struct Figures {
     pub latency_us: Range,
     /// The longest, by the board's own measure.
     pub loop_time_max_us: u16,
+    /// Instructions of the whole firmware for a frame: interrupts, executor, step, bus, log. Sleep counts none.
+    pub instructions_a_frame: f64,
     /// The first touch.
     pub touch: Touch,
     /// The force steps.
@@ -126,6 +128,7 @@ impl Figures {
             missed_frames: run.polls.last().map_or(u32::MAX, |poll| poll.missed_frames),
             latency_us: Range { least: run.latency.min_ns as f64 * 1e-3, largest: run.latency.max_ns as f64 * 1e-3 },
             loop_time_max_us: run.loop_time_max_us,
+            instructions_a_frame: (run.instructions[1] - run.instructions[0]) as f64 / frames as f64,
             touch: touch.ok_or_else(none)?,
             steps,
             release: release.ok_or_else(none)?,
@@ -152,6 +155,7 @@ impl Figures {
             Check::new("missed frames", Some(f64::from(self.missed_frames)), "", at_most(0.0)),
             Check::new("frames without a new duty", self.unanswered(run), "", at_most(0.0)),
             Check::new("last conversion to new duty", Some(self.latency_us.largest), "us", within(1.0, 60.0)),
+            Check::new("instructions a frame, all told", Some(self.instructions_a_frame), "", within(2_000.0, 8_000.0)),
             Check::new("emulator gaps not on the allow-list", count(unknown_gaps(run)), "", at_most(0.0)),
             Check::new("first touch: way before it", Some(touch.distance_mm), "mm", within(4.9, 5.1)),
             Check::new("first touch: speed", Some(touch.approach_mm_per_s), "mm/s", within(20.0, 100.0)),

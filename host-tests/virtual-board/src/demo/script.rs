@@ -100,6 +100,8 @@ pub struct Run {
     pub span_s: [f64; 2],
     /// The frames scanned at these times.
     pub scans: [ScanCounts; 2],
+    /// The instructions executed by these times.
+    pub instructions: [u64; 2],
     /// The world; from the run's last part only where a snapshot cut it.
     pub trace: Vec<Sample>,
     /// From conversion to duty.
@@ -187,7 +189,8 @@ impl Script {
             stand.bench.front_end.lock().counts
         })?;
         let now_s = rig.now_ns() as f64 * 1e-9;
-        Ok(Run { span_s: [now_s; 2], scans: [scans; 2], ..Run::default() })
+        let instructions = [rig.instructions()?; 2];
+        Ok(Run { span_s: [now_s; 2], scans: [scans; 2], instructions, ..Run::default() })
     }
 
     /// Plays one phase: writes its goal, then asks now and then how it goes.
@@ -226,6 +229,7 @@ impl Script {
     pub fn end(&self, rig: &mut Rig, run: &mut Run) -> Result<(), DemoError> {
         run.span_s[1] = rig.now_ns() as f64 * 1e-9;
         run.scans[1] = rig.scan_counts()?;
+        run.instructions[1] = rig.instructions()?;
         run.loop_time_max_us = ask(rig, "loop time", |bus| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?.data;
         run.latency = rig.latency()?;
         run.gaps = rig.gaps()?;

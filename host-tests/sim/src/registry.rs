@@ -1,0 +1,44 @@
+//! Every effect by its name. A scene is read, explained and documented by this table, and built from it.
+
+use crate::key::{Key, Values};
+
+/// An effect as the table knows it. Each stands in the file that holds its equations, as a `pub const EFFECT: Description`.
+#[derive(Clone, Copy, Debug)]
+pub struct Description {
+    /// Its name in a scene: `[effects.NAME]`.
+    pub name: &'static str,
+    /// Where it acts.
+    pub family: Family,
+    /// What it is, in a line.
+    pub about: &'static str,
+    /// Its equations, a line each, in plain text.
+    pub equations: &'static [&'static str],
+    /// The state that it adds; "none" where it has none.
+    pub state: &'static str,
+    /// Where equations and magnitudes come from.
+    pub reference: &'static str,
+    /// Its keys.
+    pub keys: &'static [Key],
+}
+
+/// Where an effect acts. Each family has a folder, and a trait for what its effects may touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Family {
+    /// From the taxels' pressure to the frame's codes.
+    Sensor,
+    /// Between tip and object.
+    Contact,
+    /// From the duty to the tip's way.
+    Drive,
+    /// Clocks, electronics, bus and host.
+    Link,
+}
+
+/// An effect that a scene names.
+#[derive(Clone, Debug)]
+pub struct Named {
+    /// What it is.
+    pub effect: &'static Description,
+    /// Its values.
+    pub values: Values,
+}

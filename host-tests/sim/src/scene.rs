@@ -1,0 +1,47 @@
+//! A scene, read and checked.
+
+use crate::key::Values;
+use crate::registry::Named;
+
+/// All that a run needs.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The file's name without its ending.
+    pub name: String,
+    /// The file, whole.
+    pub text: String,
+    /// What it shows, in a line.
+    pub about: String,
+    /// Where all randomness comes from.
+    pub seed: u64,
+    /// Virtual time from the moment at which the finger is tared and its torque enabled.
+    pub duration_s: f64,
+    /// `[tip]`, `[array]`, `[motor]`, `[object]`, `[controller]`: by their descriptions.
+    pub tables: Vec<(&'static str, Values)>,
+    /// What the host asks for, in order of time.
+    pub script: Vec<Event>,
+    /// The effects that it names, in the order of the registry.
+    pub effects: Vec<Named>,
+    /// What must hold.
+    pub bounds: Vec<Bound>,
+}
+
+/// Something that the host does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Event {
+    /// When, from the start.
+    pub at_s: f64,
+    /// The force asked for from then on.
+    pub goal_n: f64,
+}
+
+/// What a metric must hold. One side may be open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bound {
+    /// The metric's name, with its unit: `peak_force_n`.
+    pub metric: String,
+    /// The least.
+    pub min: Option<f64>,
+    /// The largest.
+    pub max: Option<f64>,
+}

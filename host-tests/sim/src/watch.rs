@@ -1,7 +1,18 @@
 //! What a run shows of itself, a control step at a time.
 
 use fingertip::frame::{COLUMNS, Frame, ROWS, Sense};
+use fingertip::params::Params;
 use fingertip::pipeline::{Command, Status};
+use fingertip::pressure::Calibration;
+
+/// What a finger's controller is set to when a run begins. With every [`Step`] after it, a replay needs nothing else.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    /// Its parameters.
+    pub params: Params,
+    /// Its taxels' gains and mask, where it is given any.
+    pub calibration: Option<Calibration>,
+}
 
 /// One control step of one finger: what went in, what came out, and what was true.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +40,8 @@ pub struct Truth {
     pub force_n: f64,
     /// Indentation of the tip.
     pub indentation_mm: f64,
+    /// Centre of the contact from the array's middle, along columns and rows.
+    pub centre_mm: [f64; 2],
     /// Way of the tip from its start.
     pub travel_mm: f64,
     /// Speed of the tip.
@@ -53,6 +66,9 @@ pub struct Truth {
 
 /// Somebody who watches a run. Nothing that a watcher does can change the run.
 pub trait Watch {
+    /// The run begins with these controllers, one for each finger.
+    fn begin(&mut self, _controllers: &[Controller]) {}
+
     /// Whether this step's true pressures are wanted: they cost.
     fn wants_pressures(&mut self, _finger: usize, _time_s: f64) -> bool {
         false

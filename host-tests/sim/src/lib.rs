@@ -9,6 +9,7 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod effects;
 pub mod key;
 pub mod registry;
 pub mod scene;

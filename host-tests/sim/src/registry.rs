@@ -1,5 +1,6 @@
 //! Every effect by its name. A scene is read, explained and documented by this table, and built from it.
 
+use crate::effects::{Build, Part, link, sensor, stream};
 use crate::key::{Key, Values};
 
 /// An effect as the table knows it. Each stands in the file that holds its equations, as a `pub const EFFECT: Description`.
@@ -19,6 +20,10 @@ pub struct Description {
     pub reference: &'static str,
     /// Its keys.
     pub keys: &'static [Key],
+    /// What its keys must be for it to change nothing; keys not listed may be anything.
+    pub zero: &'static [(&'static str, f64)],
+    /// Builds it for one finger.
+    pub build: fn(&Build) -> Part,
 }
 
 /// Where an effect acts. Each family has a folder, and a trait for what its effects may touch.
@@ -41,4 +46,17 @@ pub struct Named {
     pub effect: &'static Description,
     /// Its values.
     pub values: Values,
+}
+
+/// Every effect, in the order in which they act within a stage.
+pub fn all() -> impl Iterator<Item = &'static Description> {
+    [sensor::EFFECTS, link::EFFECTS].into_iter().flatten().copied()
+}
+
+/// Builds the named effects of a finger, each with its name.
+pub fn build(named: &[Named], seed: u64, finger: usize) -> impl Iterator<Item = (&'static str, Part)> {
+    named.iter().map(move |Named { effect, values }| {
+        let build = Build { values, seed: stream(seed, effect.name, finger) };
+        (effect.name, (effect.build)(&build))
+    })
 }

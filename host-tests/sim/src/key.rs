@@ -39,12 +39,91 @@ pub enum Kind {
         /// Where it is not given.
         default: Option<&'static str>,
     },
+    /// A number within bounds, which may be left out: [`Values::optional`].
+    Optional {
+        /// The least.
+        min: f64,
+        /// The largest.
+        max: f64,
+        /// Whether only whole numbers are allowed.
+        whole: bool,
+    },
+    /// Any text in a line; required.
+    Text,
     /// Pairs of whole numbers, such as `[[3, 4], [9, 9]]` for taxels by row and column; none where it is not given.
     Pairs {
         /// Each number is below this.
         below: i64,
     },
 }
+
+impl Key {
+    /// What it may hold, in words: "number, 0 to 5, default 1".
+    pub fn allowed(&self) -> String {
+        let default = |value: Option<String>| value.map_or("required".into(), |value| format!("default {value}"));
+        match self.kind {
+            Kind::Number { min, max, default: value } => {
+                format!("number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
+            }
+            Kind::Whole { min, max, default: value } => {
+                format!("whole number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
+            }
+            Kind::Word { words, default: value } => {
+                format!(
+                    "{}, {}",
+                    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or "),
+                    default(value.map(|value| format!("\"{value}\"")))
+                )
+            }
+            Kind::Optional { min, max, whole } => {
+                format!("{}number, {min} to {max}, may be left out", if whole { "whole " } else { "" })
+            }
+            Kind::Text => "text, required".into(),
+            Kind::Pairs { below } => format!("pairs [row, column], each 0 to {}, default none", below - 1),
+        }
+    }
+
+    /// What it holds where it is not given; none where it is required or may be left out.
+    pub fn default(&self) -> Option<Value> {
+        match self.kind {
+            Kind::Number { default, .. } => default.map(Value::Number),
+            Kind::Whole { default, .. } => default.map(Value::Whole),
+            Kind::Word { default, .. } => default.map(Value::Word),
+            Kind::Pairs { .. } => Some(Value::Pairs(Vec::new())),
+            Kind::Optional { .. } | Kind::Text => None,
+        }
+    }
+
+    /// The unit that its name ends with; none where it is a plain number, a word or a text.
+    pub fn unit(&self) -> Option<&'static str> {
+        UNITS.iter().find(|(suffix, _)| self.name.ends_with(suffix)).map(|(_, unit)| *unit)
+    }
+}
+
+/// The units by their suffixes, longer ones before the shorter ones that they end with.
+pub const UNITS: &[(&str, &str)] = &[
+    ("_percent_per_decade", "% a decade of time"),
+    ("_percent_per_k", "%/K"),
+    ("_kpa_per_k", "kPa/K"),
+    ("_codes_per_kpa", "codes/kPa"),
+    ("_counts_per_turn", "counts a turn"),
+    ("_per_s", "1/s"),
+    ("_percent", "%"),
+    ("_codes", "codes"),
+    ("_ppm", "ppm"),
+    ("_kpa", "kPa"),
+    ("_mm", "mm"),
+    ("_um", "um"),
+    ("_ms", "ms"),
+    ("_us", "us"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("_g", "g"),
+    ("_v", "V"),
+    ("_mv", "mV"),
+    ("_ohm", "Ohm"),
+    ("_k", "K"),
+];
 
 /// The checked values of a table, with every default filled in.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,12 +132,14 @@ pub struct Values(Vec<(&'static str, Value)>);
 /// A checked value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// Of [`Kind::Number`].
+    /// Of [`Kind::Number`] and [`Kind::Optional`].
     Number(f64),
     /// Of [`Kind::Whole`].
     Whole(i64),
     /// Of [`Kind::Word`].
     Word(&'static str),
+    /// Of [`Kind::Text`].
+    Text(String),
     /// Of [`Kind::Pairs`].
     Pairs(Vec<[i64; 2]>),
 }
@@ -112,6 +193,22 @@ impl Values {
         match self.get(name) {
             Value::Pairs(pairs) => pairs,
             other => panic!("{name} holds no pairs but {other:?}"),
+        }
+    }
+
+    /// A number that may be left out.
+    pub fn optional(&self, name: &str) -> Option<f64> {
+        self.0.iter().any(|(known, _)| *known == name).then(|| self.number(name))
+    }
+
+    /// A text.
+    ///
+    /// # Panics
+    /// As [`Values::number`].
+    pub fn text(&self, name: &str) -> &str {
+        match self.get(name) {
+            Value::Text(text) => text,
+            other => panic!("{name} is no text but {other:?}"),
         }
     }
 

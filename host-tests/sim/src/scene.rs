@@ -1,5 +1,15 @@
 //! A scene, read and checked.
 
+pub mod controller;
+pub mod error;
+pub mod library;
+mod reader;
+pub mod tables;
+pub mod text;
+
+pub use error::{SceneError, SceneErrors};
+pub use reader::read;
+
 use crate::key::Values;
 use crate::registry::Named;
 
@@ -16,7 +26,7 @@ pub struct Scene {
     pub seed: u64,
     /// Virtual time from the moment at which the finger is tared and its torque enabled.
     pub duration_s: f64,
-    /// `[tip]`, `[array]`, `[motor]`, `[object]`, `[controller]`: by their descriptions.
+    /// Those of [`tables::TABLES`], all of them.
     pub tables: Vec<(&'static str, Values)>,
     /// What the host asks for, in order of time.
     pub script: Vec<Event>,
@@ -24,6 +34,17 @@ pub struct Scene {
     pub effects: Vec<Named>,
     /// What must hold.
     pub bounds: Vec<Bound>,
+}
+
+impl Scene {
+    /// The values of a table.
+    ///
+    /// # Panics
+    /// Where no such table is described.
+    pub fn table(&self, name: &str) -> &Values {
+        let found = self.tables.iter().find(|(known, _)| *known == name);
+        &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1
+    }
 }
 
 /// Something that the host does.

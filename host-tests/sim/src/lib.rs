@@ -11,6 +11,9 @@
 
 pub mod effects;
 pub mod key;
+pub mod ledger;
+pub mod metrics;
 pub mod registry;
+pub mod run;
 pub mod scene;
 pub mod watch;

@@ -4,6 +4,7 @@
 //! that is not named has no state and is never called.
 
 pub mod link;
+mod random;
 pub mod sensor;
 
 use crate::key::Values;

@@ -10,6 +10,7 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod effects;
+pub mod host;
 pub mod key;
 pub mod ledger;
 pub mod metrics;

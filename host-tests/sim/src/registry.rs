@@ -48,9 +48,9 @@ pub struct Named {
     pub values: Values,
 }
 
-/// Every effect, in the order in which they act within a stage.
+/// Every effect, in the order in which they act within a stage: interference comes before the converter.
 pub fn all() -> impl Iterator<Item = &'static Description> {
-    [sensor::EFFECTS, link::EFFECTS].into_iter().flatten().copied()
+    [link::EFFECTS, sensor::EFFECTS].into_iter().flatten().copied()
 }
 
 /// Builds the named effects of a finger, each with its name.

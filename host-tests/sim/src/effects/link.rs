@@ -1,11 +1,23 @@
 //! Clocks, electronics, bus and host.
 
+mod burst;
+mod clock_tolerance;
+mod corrupted_packets;
+mod host_jitter;
+mod lost_packets;
+
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::Cost;
 
 /// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[];
+pub const EFFECTS: &[&Description] = &[
+    &clock_tolerance::EFFECT,
+    &burst::EFFECT,
+    &host_jitter::EFFECT,
+    &lost_packets::EFFECT,
+    &corrupted_packets::EFFECT,
+];
 
 /// Acts on the controller's clock.
 pub trait Clock {

@@ -4,6 +4,20 @@
 //! column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal: every taxel alike, a
 //! perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
+mod broken_taxels;
+mod converter;
+mod creep;
+mod gain_spread;
+mod ghosting;
+mod hysteresis;
+mod noise;
+mod offset;
+mod row_sag;
+mod saturation;
+mod settling;
+mod since;
+mod temperature_drift;
+
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::Cost;
@@ -11,7 +25,20 @@ use fingertip::frame::{COLUMNS, ROWS};
 use host_tests::plant::setup::Array;
 
 /// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[];
+pub const EFFECTS: &[&Description] = &[
+    &hysteresis::EFFECT,
+    &creep::EFFECT,
+    &gain_spread::EFFECT,
+    &temperature_drift::EFFECT,
+    &broken_taxels::EFFECT,
+    &ghosting::EFFECT,
+    &row_sag::EFFECT,
+    &settling::EFFECT,
+    &saturation::EFFECT,
+    &noise::EFFECT,
+    &offset::EFFECT,
+    &converter::EFFECT,
+];
 
 /// A row's or a slot's worth of numbers, a column each.
 pub type Row = [f64; COLUMNS];
@@ -139,7 +166,7 @@ impl Readout {
         if let Some(row) = self.siemens.get_mut(slot) {
             let mut kpa = *kpa;
             stages.pressure(slot, time_s, &mut kpa);
-            *row = kpa.map(|kpa| array.preload_siemens + array.siemens_per_kpa * kpa);
+            *row = kpa.map(|kpa| (array.preload_siemens + array.siemens_per_kpa * kpa).max(0.0));
             stages.conductance(slot, time_s, row);
             let mut seen = *row;
             stages.network(slot, &self.siemens, &mut seen);

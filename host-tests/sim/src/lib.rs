@@ -14,6 +14,7 @@ pub mod host;
 pub mod key;
 pub mod ledger;
 pub mod metrics;
+pub mod recording;
 pub mod registry;
 pub mod run;
 pub mod scene;

@@ -3,7 +3,7 @@
 use fingertip::frame::{COLUMNS, Frame, ROWS, Sense};
 use fingertip::params::Params;
 use fingertip::pipeline::{Command, Status};
-use fingertip::pressure::Calibration;
+use serde::{Deserialize, Serialize};
 
 /// What a finger's controller is set to when a run begins. With every [`Step`] after it, a replay needs nothing else.
 #[derive(Clone, Debug)]
@@ -11,7 +11,16 @@ pub struct Controller {
     /// Its parameters.
     pub params: Params,
     /// Its taxels' gains and mask, where it is given any.
-    pub calibration: Option<Calibration>,
+    pub calibration: Option<Gains>,
+}
+
+/// What a calibration is made of; see `fingertip::pressure::Calibration::new`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Gains {
+    /// Gain of each taxel, Q14.
+    pub gains_q14: [[u16; COLUMNS]; ROWS],
+    /// A bit for each column that is left out, for each row.
+    pub masks: [u16; ROWS],
 }
 
 /// One control step of one finger: what went in, what came out, and what was true.

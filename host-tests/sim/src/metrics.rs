@@ -100,7 +100,8 @@ impl Measured {
     pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
         let verdict = |bound: &Bound| {
             let value = self.get(&bound.metric);
-            let within = |value: f64| bound.min.is_none_or(|min| value >= min) && bound.max.is_none_or(|max| value <= max);
+            let within =
+                |value: f64| bound.min.is_none_or(|min| value >= min) && bound.max.is_none_or(|max| value <= max);
             Verdict { bound: bound.clone(), value, held: value.is_some_and(within) }
         };
         bounds.iter().map(verdict).collect()
@@ -120,7 +121,8 @@ pub struct Verdict {
 
 /// The table as Markdown.
 pub fn page() -> String {
-    let mut page = String::from("| metric | what it is, and how it is worked out | of several fingers |\n| --- | --- | --- |\n");
+    let mut page =
+        String::from("| metric | what it is, and how it is worked out | of several fingers |\n| --- | --- | --- |\n");
     for Metric { name, about, of_several, .. } in METRICS {
         let several = match of_several {
             Worst::Largest => "the largest",

@@ -44,7 +44,8 @@ impl Outcome {
 
     /// For scripts. The keys are stable; `null` is a metric that the run does not have, or a side that is not bounded.
     pub fn json(&self, scene: &Scene, board: &str) -> Value {
-        let metrics: Map<String, Value> = self.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+        let metrics: Map<String, Value> =
+            self.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
         let bound = |verdict: &Verdict| {
             let bound = &verdict.bound;
             json!({

@@ -173,9 +173,9 @@ impl Finger {
     fn touch(&mut self, step: &Step) {
         self.touch_s = Some(step.time_s);
         let start = self.approach.iter().rfind(|[time_s, _]| *time_s <= step.time_s - APPROACH_S);
-        self.approach_mm_per_s = start.or(self.approach.first()).map(|[time_s, travel_mm]| {
-            (step.truth.travel_mm - travel_mm) / (step.time_s - time_s)
-        });
+        self.approach_mm_per_s = start
+            .or(self.approach.first())
+            .map(|[time_s, travel_mm]| (step.truth.travel_mm - travel_mm) / (step.time_s - time_s));
         self.approach = Vec::new();
     }
 

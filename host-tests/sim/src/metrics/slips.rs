@@ -34,7 +34,8 @@ impl Slips {
         let moves = slip_mm > self.last_mm;
         let before_mm = core::mem::replace(&mut self.last_mm, slip_mm);
         if moves {
-            let begun = Slip { onset_s: time_s, moved_s: time_s, from_mm: before_mm, goal_n, counted: false, noticed: false };
+            let begun =
+                Slip { onset_s: time_s, moved_s: time_s, from_mm: before_mm, goal_n, counted: false, noticed: false };
             let slip = self.under_way.get_or_insert(begun);
             slip.moved_s = time_s;
             if !slip.counted && slip_mm - slip.from_mm > COUNTS_MM {

@@ -2,6 +2,7 @@
 
 use super::Scene;
 use crate::key::{Value, Values};
+use crate::registry::Description;
 use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
 /// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value as TOML writes it; comments
@@ -91,4 +92,13 @@ fn number(value: f64) -> String {
 
 fn quoted(text: &str) -> String {
     TomlValue::from(text).to_string()
+}
+
+/// An effect's table with the magnitudes at which it changes nothing; its other keys at their defaults.
+pub fn zero(effect: &Description) -> String {
+    let mut text = format!("[effects.{}]\n", effect.name);
+    for (name, value) in effect.zero {
+        text += &format!("{name} = {}\n", number(*value));
+    }
+    text
 }

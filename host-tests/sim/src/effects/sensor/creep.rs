@@ -14,11 +14,11 @@ pub const EFFECT: Description = Description {
     family: Family::Sensor,
     about: "Under a held pressure the reading grows by a share of it in each decade of time.",
     equations: &[
-        "p' = p + c sum of x_k, dx_k/dt = (p - x_k) / tau_k, tau_k = 1 ms, 10 ms, ... 10^4 s; c = rate_percent_per_decade / 100",
+        "p' = p + c sum of x_k, dx_k/dt = (p - x_k) / tau_k, tau_k = 1 ms, 10 ms, ... 10^5 s; c = rate_percent_per_decade / 100",
         "each step exact for a held p: x_k += (p - x_k) (1 - exp(-dt / tau_k))",
-        "after a step of p: c p for each decade, from 1 ms to 3 hours; between whole decades the slope ripples by 11 %",
+        "after a step of p: c p for each decade, within 0.1 % from 1 ms to 1000 s, within 1 % to 3 hours; inside a decade the slope ripples by 11 %",
     ],
-    state: "8 numbers for each taxel",
+    state: "9 numbers for each taxel",
     reference: "Interlink FSR 400 integration guide: drift under 5 % per decade of time; a Prony series with a term for each decade",
     keys: &[Key {
         name: "rate_percent_per_decade",
@@ -32,8 +32,8 @@ pub const EFFECT: Description = Description {
     },
 };
 
-const TERMS: usize = 8;
-const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4];
+const TERMS: usize = 9;
+const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 
 struct Creep {
     share: f64,

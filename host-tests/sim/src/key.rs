@@ -1,5 +1,7 @@
 //! What a key of a scene is, told once: the reader checks by it, errors quote it, and the reference page is made from it.
 
+use std::fmt;
+
 /// A key of a table of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key {
@@ -142,6 +144,21 @@ pub enum Value {
     Text(String),
     /// Of [`Kind::Pairs`].
     Pairs(Vec<[i64; 2]>),
+}
+
+impl fmt::Display for Value {
+    /// As TOML writes it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // The shortest digits that read as the same number.
+            Self::Number(value) if value.fract() == 0.0 && value.abs() < 1e15 => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value:?}"),
+            Self::Whole(value) => write!(f, "{value}"),
+            Self::Word(word) => toml_edit::Value::from(*word).fmt(f),
+            Self::Text(text) => toml_edit::Value::from(text).fmt(f),
+            Self::Pairs(pairs) => write!(f, "{pairs:?}"),
+        }
+    }
 }
 
 impl Values {

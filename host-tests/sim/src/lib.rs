@@ -9,7 +9,9 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod cli;
 pub mod effects;
+pub mod explain;
 pub mod host;
 pub mod key;
 pub mod ledger;

@@ -39,6 +39,28 @@ pub enum Family {
     Link,
 }
 
+impl Family {
+    /// In a word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Contact => "contact",
+            Self::Drive => "drive",
+            Self::Link => "link",
+        }
+    }
+
+    /// As a heading.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Sensor => "Sensor: from pressure to codes",
+            Self::Contact => "Contact: between tip and object",
+            Self::Drive => "Drive: from the duty to the tip's way",
+            Self::Link => "Link: clocks, electronics, bus and host",
+        }
+    }
+}
+
 /// An effect that a scene names.
 #[derive(Clone, Debug)]
 pub struct Named {

@@ -69,7 +69,10 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
     let setup = metadata(bytes, SETUP)?;
     let end = metadata(bytes, END)?;
     let field = |of: &Metadata, name: &str| {
-        of.metadata.get(name).cloned().ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
+        of.metadata
+            .get(name)
+            .cloned()
+            .ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
     };
     let fingers: usize = field(&setup, "fingers")?.parse()?;
     let mut cores = Vec::new();

@@ -69,7 +69,8 @@ impl Recorder {
         if !self.begun {
             return Err("the board did not say how its controllers are set: nothing to replay".into());
         }
-        let steps = self.fingers.iter().enumerate().map(|(n, finger)| (format!("finger{n}.steps"), finger.steps.to_string()));
+        let steps =
+            self.fingers.iter().enumerate().map(|(n, finger)| (format!("finger{n}.steps"), finger.steps.to_string()));
         let metadata = steps.chain([("digest".to_owned(), digest.to_owned())]).collect();
         self.out.write_metadata(&Metadata { name: END.into(), metadata })?;
         self.out.finish()?;
@@ -182,7 +183,8 @@ fn scalars(step: &Step) -> Value {
 fn image(step: &Step, log_time: u64) -> Value {
     let grey = |code: u16| (code / CODES_PER_GREY).min(255) as u8;
     let rows = (0..ROWS).rev();
-    let data: Vec<u8> = rows.flat_map(|row| (0..COLUMNS).map(move |column| grey(step.frame.code(row, column)))).collect();
+    let data: Vec<u8> =
+        rows.flat_map(|row| (0..COLUMNS).map(move |column| grey(step.frame.code(row, column)))).collect();
     json!({
         "timestamp": { "sec": log_time / 1_000_000_000, "nsec": log_time % 1_000_000_000 },
         "frame_id": format!("finger{}", step.finger),

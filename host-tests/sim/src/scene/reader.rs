@@ -1,7 +1,7 @@
 //! From a scene's text to the scene. Strict: whatever is not described is an error, and all errors of a text come together.
 
 use super::error::{SceneError, SceneErrors, alike};
-use super::tables::{EXPECT, ROOT, SCRIPT, TABLES};
+use super::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
 use super::{Bound, Event, Scene, controller};
 use crate::key::{Key, Kind, Value, Values};
 use crate::registry::{self, Named};
@@ -92,7 +92,7 @@ impl Reader<'_> {
     }
 
     /// A table that stands at most once.
-    fn table(&mut self, table: &super::tables::Table, root: &dyn TableLike) -> Values {
+    fn table(&mut self, table: &Table, root: &dyn TableLike) -> Values {
         let Some(item) = root.get(table.name) else {
             return defaults(table.keys);
         };
@@ -108,11 +108,7 @@ impl Reader<'_> {
     }
 
     /// The tables of a `[[name]]`, each with its place.
-    fn many<'i>(
-        &mut self,
-        table: &super::tables::Table,
-        root: &'i dyn TableLike,
-    ) -> Vec<(&'i dyn TableLike, Range<usize>)> {
+    fn many<'i>(&mut self, table: &Table, root: &'i dyn TableLike) -> Vec<(&'i dyn TableLike, Range<usize>)> {
         let Some(item) = root.get(table.name) else { return Vec::new() };
         let at = key_span(root, table.name);
         if let Some(tables) = item.as_array_of_tables() {
@@ -168,7 +164,7 @@ impl Reader<'_> {
                 self.error(at, format!("the effect `{}` is a table", effect.name), allowed);
                 continue;
             };
-            let described = super::tables::Table { name: effect.name, about: effect.about, keys: effect.keys };
+            let described = Table { name: effect.name, about: effect.about, keys: effect.keys };
             named.extend(self.values(&described, table, at, false).map(|values| Named { effect, values }));
         }
         named
@@ -185,7 +181,9 @@ impl Reader<'_> {
             };
             let metric = || item_span(given, "metric");
             if !metrics.contains(&bound.metric.as_str()) {
-                self.unknown(&format!("metric `{}`", bound.metric), &bound.metric, metric(), metrics.iter().copied());
+                // Those of each finger are the same again.
+                let words = metrics.iter().copied().filter(|metric| !metric.contains('.'));
+                self.unknown(&format!("metric `{}`", bound.metric), &bound.metric, metric(), words);
             }
             if bounds.iter().any(|before| before.metric == bound.metric) {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
@@ -210,13 +208,7 @@ impl Reader<'_> {
     }
 
     /// The checked values of a table; none where one is wrong or missing. `open` leaves what is not described to others.
-    fn values(
-        &mut self,
-        table: &super::tables::Table,
-        given: &dyn TableLike,
-        place: Range<usize>,
-        open: bool,
-    ) -> Option<Values> {
+    fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
         let errors = self.errors.len();
         let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
         for (name, _) in given.iter().filter(|(name, _)| strange(name)) {
@@ -231,7 +223,7 @@ impl Reader<'_> {
                     // What was given under a mistaken name is reported already.
                     let mistaken = given.iter().any(|(name, _)| alike(name, [key.name]).is_some() && strange(name));
                     if !mistaken {
-                        let message = format!("{} lacks `{}`", title(table), key.name);
+                        let message = format!("{} lacks `{}`", table.title(), key.name);
                         self.error(place.clone(), message, format!("{}: {}", key.name, key.allowed()));
                     }
                     None
@@ -248,15 +240,15 @@ impl Reader<'_> {
         (complete && self.errors.len() == errors).then_some(values)
     }
 
-    fn unknown_key(&mut self, table: &super::tables::Table, name: &str, at: Range<usize>) {
+    fn unknown_key(&mut self, table: &Table, name: &str, at: Range<usize>) {
         let words = table.keys.iter().map(|key| key.name);
         let suggestion = alike(name, words.clone());
         let meant = suggestion.and_then(|word| table.keys.iter().find(|key| key.name == word));
         let message = match meant {
             Some(Key { name: full, .. }) if full.rsplit_once('_').is_some_and(|(stem, _)| stem == name) => {
-                format!("`{name}` lacks its unit in {}", title(table))
+                format!("`{name}` lacks its unit in {}", table.title())
             }
-            _ => format!("unknown key `{name}` in {}", title(table)),
+            _ => format!("unknown key `{name}` in {}", table.title()),
         };
         let allowed = match meant {
             Some(key) => format!("{}: {}", key.name, key.allowed()),
@@ -326,15 +318,6 @@ fn defaults(keys: &[Key]) -> Values {
     let mut values = Values::default();
     keys.iter().filter_map(|key| Some((key.name, key.default()?))).for_each(|(name, value)| values.insert(name, value));
     values
-}
-
-fn title(table: &super::tables::Table) -> String {
-    match table.name {
-        "" => "the scene".into(),
-        name if [SCRIPT.name, EXPECT.name].contains(&name) => format!("[[{name}]]"),
-        name if TABLES.iter().any(|table| table.name == name) => format!("[{name}]"),
-        name => format!("[effects.{name}]"),
-    }
 }
 
 fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {

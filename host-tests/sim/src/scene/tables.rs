@@ -14,6 +14,18 @@ pub struct Table {
     pub keys: &'static [Key],
 }
 
+impl Table {
+    /// Its head, as it stands in a scene.
+    pub fn title(&self) -> String {
+        match self.name {
+            "" => "the scene".into(),
+            name if [SCRIPT.name, EXPECT.name].contains(&name) => format!("[[{name}]]"),
+            name if TABLES.iter().any(|table| table.name == name) => format!("[{name}]"),
+            name => format!("[effects.{name}]"),
+        }
+    }
+}
+
 const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Key {
     Key { name, about, kind: Kind::Number { min, max, default: Some(default) } }
 }

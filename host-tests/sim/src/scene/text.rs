@@ -48,21 +48,22 @@ fn new_table(implicit: bool) -> Table {
 
 /// The scene as a text that reads as the same scene: every key, without comments.
 pub fn write(scene: &Scene) -> String {
-    let mut text =
-        format!("about = {}\nduration_s = {}\nseed = {}\n", quoted(&scene.about), number(scene.duration_s), scene.seed);
+    let (about, duration_s) = (Value::Text(scene.about.clone()), Value::Number(scene.duration_s));
+    let mut text = format!("about = {about}\nduration_s = {duration_s}\nseed = {}\n", scene.seed);
     for (name, values) in &scene.tables {
         section(&mut text, &format!("[{name}]"), values);
     }
     for event in &scene.script {
-        text += &format!("\n[[script]]\nat_s = {}\ngoal_n = {}\n", number(event.at_s), number(event.goal_n));
+        let [at_s, goal_n] = [event.at_s, event.goal_n].map(Value::Number);
+        text += &format!("\n[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n");
     }
     for named in &scene.effects {
         section(&mut text, &format!("[effects.{}]", named.effect.name), &named.values);
     }
     for bound in &scene.bounds {
-        text += &format!("\n[[expect]]\nmetric = {}\n", quoted(&bound.metric));
+        text += &format!("\n[[expect]]\nmetric = {}\n", Value::Text(bound.metric.clone()));
         for (name, side) in [("min", bound.min), ("max", bound.max)] {
-            text += &side.map_or(String::new(), |side| format!("{name} = {}\n", number(side)));
+            text += &side.map_or(String::new(), |side| format!("{name} = {}\n", Value::Number(side)));
         }
     }
     text
@@ -71,34 +72,15 @@ pub fn write(scene: &Scene) -> String {
 fn section(text: &mut String, head: &str, values: &Values) {
     *text += &format!("\n{head}\n");
     for (name, value) in values.iter() {
-        let value = match value {
-            Value::Number(value) => number(*value),
-            Value::Whole(value) => value.to_string(),
-            Value::Word(word) => quoted(word),
-            Value::Text(words) => quoted(words),
-            Value::Pairs(pairs) => format!("{pairs:?}"),
-        };
         *text += &format!("{name} = {value}\n");
     }
-}
-
-/// The shortest digits that read as the same number.
-fn number(value: f64) -> String {
-    match value.fract() == 0.0 && value.abs() < 1e15 {
-        true => format!("{value}"),
-        false => format!("{value:?}"),
-    }
-}
-
-fn quoted(text: &str) -> String {
-    TomlValue::from(text).to_string()
 }
 
 /// An effect's table with the magnitudes at which it changes nothing; its other keys at their defaults.
 pub fn zero(effect: &Description) -> String {
     let mut text = format!("[effects.{}]\n", effect.name);
     for (name, value) in effect.zero {
-        text += &format!("{name} = {}\n", number(*value));
+        text += &format!("{name} = {}\n", Value::Number(*value));
     }
     text
 }

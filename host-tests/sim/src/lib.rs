@@ -18,6 +18,7 @@ pub mod ledger;
 pub mod metrics;
 pub mod recording;
 pub mod registry;
+pub mod report;
 pub mod run;
 pub mod scene;
 pub mod watch;

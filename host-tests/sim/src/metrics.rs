@@ -8,6 +8,7 @@ mod slips;
 mod table;
 
 pub use finger::Finger;
+pub(crate) use finger::newtons;
 pub use table::METRICS;
 
 use crate::scene::Bound;

@@ -8,6 +8,8 @@ use super::{GOAL_INK, INK, PlotError, picture};
 pub enum Curve {
     /// A solid line through points.
     Solid(Vec<(f64, f64)>),
+    /// A thin, pale line through points.
+    Pale(Vec<(f64, f64)>),
     /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
     /// A circle at each point.
@@ -46,6 +48,7 @@ pub fn curves(panels: &[Curves], panel_px: (u32, u32)) -> Result<String, PlotErr
             frame.draw(&area, |chart| {
                 curves.iter().try_for_each(|curve| match curve {
                     Curve::Solid(points) => chart.solid(points, INK),
+                    Curve::Pale(points) => chart.pale(points),
                     Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
                     Curve::Circles(points) => chart.circles(points),
                 })

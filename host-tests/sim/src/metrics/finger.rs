@@ -239,7 +239,8 @@ fn duty(duty: Duty) -> f64 {
     f64::from(duty.0) / f64::from(Duty::FULL)
 }
 
-pub(super) fn newtons(force: Newtons) -> f64 {
+/// A force as a number.
+pub(crate) fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }
 

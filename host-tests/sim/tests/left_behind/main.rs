@@ -1,0 +1,5 @@
+//! What a run leaves behind: metrics, ledger, recording, report, sweep.
+
+mod measured;
+mod recorded;
+mod stub;

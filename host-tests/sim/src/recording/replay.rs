@@ -7,8 +7,9 @@ use fingertip::config::Config;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::Calibration;
 use fingertip::record::{Digest, Record};
-use mcap::MessageStream;
+use mcap::read::Options;
 use mcap::records::Metadata;
+use mcap::{McapResult, MessageStream};
 use serde::Deserialize;
 use std::fmt;
 use std::fs;
@@ -87,8 +88,10 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         }
         cores.push((topic(number, "core"), pipeline, 0));
     }
+    // The checksum of a chunk is checked at its end: damage is told before its frames are blamed.
+    messages(bytes)?.try_for_each(|message| message.map(drop))?;
     let mut steps = 0;
-    for message in MessageStream::new(bytes)? {
+    for message in messages(bytes)? {
         let message = message?;
         let found = cores.iter_mut().enumerate().find(|(_, (topic, ..))| *topic == message.channel.topic);
         let Some((finger, (_, pipeline, frame))) = found else { continue };
@@ -115,6 +118,10 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         }
     }
     Ok(Replay { steps, difference: None })
+}
+
+fn messages(bytes: &[u8]) -> McapResult<MessageStream<'_>> {
+    MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())
 }
 
 fn metadata(bytes: &[u8], name: &str) -> Result<Metadata, RunError> {

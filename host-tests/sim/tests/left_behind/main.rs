@@ -2,4 +2,5 @@
 
 mod measured;
 mod recorded;
+mod reported;
 mod stub;

@@ -23,29 +23,23 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
     let mut setup = controller::setup(scene);
     let sag = scene.effects.iter().find(|named| named.effect.name == "row_sag");
     setup.array.row_ohm = sag.map_or(0.0, |named| named.values.number("switch_ohm"));
-    let mut native = Native::new(&setup, &Config::new(&params).map_err(|error| error.to_string())?);
+    let config = Config::new(&params).map_err(|error| error.to_string())?;
+    let mut native = Native::new(&setup, &config);
     watch.begin(&[Controller { params, calibration: None }]);
     let mut digest = Digest::new();
     native.command.tare_request = 1;
-    let tare_steps = fingertip::pressure::TARE_FRAMES + 2;
-    let mut steps = 0;
-    let mut start_s = 0.0;
-    loop {
-        if steps == tare_steps {
-            native.command.torque = true;
-            start_s = native.time_s();
-        }
-        let time_s = native.time_s() - start_s;
-        if steps >= tare_steps && time_s > scene.duration_s {
-            break;
-        }
-        if native.command.torque {
+    let tare_steps = fingertip::pressure::TARE_FRAMES as i32 + 2;
+    let frame_s = f64::from(config.timing.frame_ns()) * 1e-9;
+    let steps = (scene.duration_s / frame_s) as i32;
+    for step in -tare_steps..=steps {
+        let time_s = f64::from(step) * frame_s;
+        native.command.torque = step >= 0;
+        if step >= 0 {
             let goal = scene.script.iter().rev().find(|event| event.at_s <= time_s);
             native.command.goal = Newtons(fixed(goal.map_or(0.0, |event| event.goal_n)));
         }
         let status = native.step();
         digest.add(status.duty, &status);
-        let time_s = if steps < tare_steps { time_s - 1.0 } else { time_s };
         let mut truth = truth(&mut native);
         if watch.wants_pressures(0, time_s) {
             truth.pressures_kpa =
@@ -53,7 +47,6 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
         }
         let Native { frame, sense, command, .. } = &native;
         watch.step(&Step { finger: 0, time_s, frame, sense, command, status: &status, truth: &truth });
-        steps += 1;
     }
     let ledger = scene.effects.iter().map(|named| Cost { effect: named.effect.name, evaluations: 7, seconds: 1e-3 });
     Ok(Summary {

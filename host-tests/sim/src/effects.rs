@@ -3,9 +3,12 @@
 //! An effect acts at one stage and knows no other effect. A stage holds the named ones in the order of the registry, so an effect
 //! that is not named has no state and is never called.
 
+pub mod contact;
+pub mod drive;
 pub mod link;
 mod random;
 pub mod sensor;
+pub mod set;
 
 use crate::key::Values;
 use crate::watch::Cost;
@@ -32,6 +35,30 @@ pub enum Part {
     Volts(Box<dyn sensor::Volts>),
     /// See [`sensor::Codes`].
     Codes(Box<dyn sensor::Codes>),
+    /// See [`contact::Shape`].
+    Shape(Box<dyn contact::Shape>),
+    /// See [`contact::Memory`].
+    Memory(Box<dyn contact::Memory>),
+    /// See [`contact::Series`].
+    Series(Box<dyn contact::Series>),
+    /// See [`contact::Strength`].
+    Strength(Box<dyn contact::Strength>),
+    /// See [`contact::Tangent`].
+    Tangent(Box<dyn contact::Tangent>),
+    /// See [`contact::Body`].
+    Body(Box<dyn contact::Body>),
+    /// See [`drive::Inertia`].
+    Inertia(Box<dyn drive::Inertia>),
+    /// See [`drive::Electric`].
+    Electric(Box<dyn drive::Electric>),
+    /// See [`drive::Resist`].
+    Resist(Box<dyn drive::Resist>),
+    /// See [`drive::Potential`].
+    Potential(Box<dyn drive::Potential>),
+    /// See [`drive::Play`].
+    Play(Box<dyn drive::Play>),
+    /// See [`drive::Encoder`].
+    Encoder(Box<dyn drive::Encoder>),
     /// See [`link::Clock`].
     Clock(Box<dyn link::Clock>),
     /// See [`link::Packets`].
@@ -79,6 +106,11 @@ impl<T: ?Sized> Metered<T> {
         self.timed += begun.elapsed();
         self.timed_calls += 1;
         result
+    }
+
+    /// The effect, to look at.
+    pub fn part(&self) -> &T {
+        &self.part
     }
 
     /// What it has cost so far.

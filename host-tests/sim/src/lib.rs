@@ -15,10 +15,15 @@ pub mod explain;
 pub mod host;
 pub mod key;
 pub mod ledger;
+pub mod mechanics;
 pub mod metrics;
+pub mod native;
 pub mod recording;
 pub mod registry;
 pub mod report;
 pub mod run;
 pub mod scene;
 pub mod watch;
+pub mod world;
+
+pub use native::{SimError, simulate};

@@ -1,6 +1,6 @@
 //! Every effect by its name. A scene is read, explained and documented by this table, and built from it.
 
-use crate::effects::{Build, Part, link, sensor, stream};
+use crate::effects::{Build, Part, contact, drive, link, sensor, stream};
 use crate::key::{Key, Values};
 
 /// An effect as the table knows it. Each stands in the file that holds its equations, as a `pub const EFFECT: Description`.
@@ -72,7 +72,7 @@ pub struct Named {
 
 /// Every effect, in the order in which they act within a stage: interference comes before the converter.
 pub fn all() -> impl Iterator<Item = &'static Description> {
-    [link::EFFECTS, sensor::EFFECTS].into_iter().flatten().copied()
+    [link::EFFECTS, sensor::EFFECTS, contact::EFFECTS, drive::EFFECTS].into_iter().flatten().copied()
 }
 
 /// Builds the named effects of a finger, each with its name.

@@ -49,7 +49,7 @@ pub struct Resistance {
 /// What acts on the shaft. It holds through a step.
 pub trait Acting {
     /// Between two angles; at one where they are equal.
-    fn resistance(&self, from_rad: f64, to_rad: f64) -> Resistance;
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance;
 
     /// What feeds the winding, on average over so long.
     fn source(&self, dt_s: f64) -> Source;
@@ -106,7 +106,7 @@ impl Rotor {
     }
 
     /// As [`Rotor::advance`] while the shaft moves; the time taken is less than `dt_s` where it comes to rest.
-    pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, acting: &impl Acting) -> (Shaft, f64) {
+    pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> (Shaft, f64) {
         let Some(direction) = self.direction(&shaft, dt_s, acting) else { return (shaft, 0.0) };
         let (next, _) = self.slide(&shaft, dt_s, direction, acting);
         if next.speed_rad_per_s * direction > 0.0 {
@@ -117,7 +117,7 @@ impl Rotor {
     }
 
     /// Where the shaft moves or starts to move; none while friction holds it.
-    pub fn direction(&self, shaft: &Shaft, dt_s: f64, acting: &impl Acting) -> Option<f64> {
+    pub fn direction(&self, shaft: &Shaft, dt_s: f64, acting: &mut impl Acting) -> Option<f64> {
         if shaft.speed_rad_per_s != 0.0 {
             return Some(shaft.speed_rad_per_s.signum());
         }
@@ -126,7 +126,7 @@ impl Rotor {
         (net.abs() > resistance.holding_nm).then_some(net.signum())
     }
 
-    fn slide(&self, from: &Shaft, dt_s: f64, direction: f64, acting: &impl Acting) -> (Shaft, f64) {
+    fn slide(&self, from: &Shaft, dt_s: f64, direction: f64, acting: &mut impl Acting) -> (Shaft, f64) {
         let half = 0.5 * dt_s / self.inertia_kg_m2;
         let k = self.torque_nm_per_a;
         let source = acting.source(dt_s);
@@ -155,7 +155,7 @@ impl Rotor {
     }
 
     /// The same step with its length such that it ends at rest.
-    fn come_to_rest(&self, from: &Shaft, at_most_s: f64, direction: f64, acting: &impl Acting) -> (Shaft, f64) {
+    fn come_to_rest(&self, from: &Shaft, at_most_s: f64, direction: f64, acting: &mut impl Acting) -> (Shaft, f64) {
         let mean_speed = 0.5 * from.speed_rad_per_s;
         let mut taken_s = 0.0;
         for _ in 0..self.rounds {
@@ -235,7 +235,7 @@ impl Dynamics {
 
     /// As [`Dynamics::advance`] while the shaft moves; the time taken is less than `dt_s` where it comes to rest.
     pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, source: &Source) -> (Shaft, f64) {
-        self.rotor.advance_to_rest(shaft, dt_s, &Against { dynamics: self, source })
+        self.rotor.advance_to_rest(shaft, dt_s, &mut Against { dynamics: self, source })
     }
 }
 
@@ -246,7 +246,7 @@ struct Against<'a> {
 }
 
 impl Acting for Against<'_> {
-    fn resistance(&self, from_rad: f64, to_rad: f64) -> Resistance {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
         let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.dynamics;
         let from_mm = self.dynamics.travel_mm(from_rad) - wall_mm;
         let to_mm = self.dynamics.travel_mm(to_rad) - wall_mm;

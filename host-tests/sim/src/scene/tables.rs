@@ -135,6 +135,11 @@ pub const TABLES: &[Table] = &[
         ],
     },
     Table {
+        name: "world",
+        about: "How the world is simulated.",
+        keys: &[number("step_us", "Longest step of the world; it also ends where a duty changes.", 0.1, 1000.0, 100.0)],
+    },
+    Table {
         name: "host",
         about: "The host on the bus: it sends its command when the script changes it, and repeats it.",
         keys: &[

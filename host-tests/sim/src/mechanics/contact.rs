@@ -1,0 +1,102 @@
+//! One finger's contact: its normal force, what it feels on the taxels, and the friction along the surface.
+
+use super::elastic::Elastic;
+use super::normal::Law;
+use super::pressures::Pressures;
+use crate::effects::contact::{Grip, Stages};
+use fingertip::frame::COLUMNS;
+use host_tests::plant::Setup;
+
+/// A contact and its effects.
+pub struct Contact<C> {
+    /// The effects that act on it.
+    pub effects: C,
+    /// Its state along the surface.
+    pub along: Along,
+    elastic: Elastic,
+    pressures: Pressures,
+    mm_per_n: f64,
+    forgotten_n: f64,
+    left: f64,
+}
+
+/// How the patch is stretched along the surface, and how far it slipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Along {
+    /// The object's displacement against the tip since they stick, mm.
+    pub stretch_mm: f64,
+    /// Way slipped, either way, mm.
+    pub slip_mm: f64,
+    /// Whether it slips, and which way.
+    pub slipping: f64,
+}
+
+impl<C: Stages> Contact<C> {
+    /// Of a finger.
+    pub fn new(setup: &Setup, mut effects: C) -> Self {
+        let elastic = Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() };
+        let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
+        let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
+        let mm_per_n = effects.mm_per_n();
+        Self { effects, along: Along::default(), elastic, pressures, mm_per_n, forgotten_n: 0.0, left: 1.0 }
+    }
+
+    /// What holds through the next step.
+    pub fn law(&self) -> Law<'_> {
+        Law { elastic: &self.elastic, forgotten_n: self.forgotten_n, mm_per_n: self.mm_per_n, left: self.left }
+    }
+
+    /// Lets the tip forget for a while at an overlap.
+    pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
+        let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm)).max(self.forgotten_n);
+        self.effects.relax(dt_s, elastic_n);
+        self.forgotten_n = self.effects.forgotten_n();
+    }
+
+    /// Lets the object bear a force.
+    pub fn bear(&mut self, force_n: f64) {
+        self.left = self.effects.left(force_n / self.left);
+    }
+
+    /// Means of a row's taxels at an overlap.
+    pub fn row_kpa(&mut self, x_mm: f64, row: usize) -> [f64; COLUMNS] {
+        if x_mm <= 0.0 {
+            return [0.0; COLUMNS];
+        }
+        let law = self.law();
+        let d_mm = law.depth_mm(x_mm);
+        let share = law.of_depth_n(d_mm) / self.elastic.force_n(d_mm);
+        let mut kpa = self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
+        if share != 1.0 {
+            kpa.iter_mut().for_each(|kpa| *kpa *= share);
+        }
+        kpa
+    }
+
+    /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it has none.
+    pub fn steepest_n_per_mm(&self, deepest_mm: f64) -> f64 {
+        let tip = self.elastic.n_per_mm(deepest_mm);
+        tip / (1.0 + self.mm_per_n * tip)
+    }
+}
+
+impl Along {
+    /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the state behind it.
+    pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64) -> (f64, Self) {
+        let mut next = *self;
+        let trial = self.stretch_mm + way_mm;
+        // It sticks again once the motion turns against the slip.
+        let slips = self.slipping != 0.0 && way_mm * self.slipping > 0.0;
+        let limit_mm = if slips { grip.slipping } else { grip.still } * normal_n / grip.n_per_mm;
+        if trial.abs() > limit_mm {
+            let held_mm = grip.slipping * normal_n / grip.n_per_mm;
+            next.stretch_mm = trial.clamp(-held_mm, held_mm);
+            next.slip_mm += (trial - next.stretch_mm).abs();
+            next.slipping = trial.signum();
+        } else {
+            next.stretch_mm = trial;
+            next.slipping = 0.0;
+        }
+        (-0.5 * grip.n_per_mm * (self.stretch_mm + next.stretch_mm), next)
+    }
+}

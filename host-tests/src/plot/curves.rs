@@ -18,13 +18,13 @@ pub enum Curve {
 
 /// A panel.
 #[derive(Clone, Debug)]
-pub struct Curves {
+pub struct Curves<'a> {
     /// What it shows.
     pub title: String,
     /// The horizontal axis, with its unit.
-    pub x: &'static str,
+    pub x: &'a str,
     /// The vertical axis, with its unit.
-    pub y: &'static str,
+    pub y: &'a str,
     /// Left and right end.
     pub x_range: [f64; 2],
     /// Lower and upper end.
@@ -37,7 +37,7 @@ pub struct Curves {
 ///
 /// # Errors
 /// There is no panel.
-pub fn curves(panels: &[Curves], panel_px: (u32, u32)) -> Result<String, PlotError> {
+pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, PlotError> {
     if panels.is_empty() {
         return Err(PlotError("there is no panel".into()));
     }

@@ -1,6 +1,7 @@
 //! What a scene computes, what it may name, and the page of it all.
 
-use crate::key::Key;
+use crate::effects::{Build, Part};
+use crate::key::{Key, Values};
 use crate::metrics;
 use crate::registry::{self, Description, Family};
 use crate::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
@@ -79,6 +80,7 @@ pub fn page() -> String {
         "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
         include_str!("explain/scenes.md").trim()
     );
+    stages(&mut page);
     page.push_str("\n## Tables\n");
     for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
         let title =
@@ -99,6 +101,39 @@ pub fn page() -> String {
         metrics::page()
     );
     page
+}
+
+/// From pressure to codes, stage by stage, with the effects as they are built.
+fn stages(page: &mut String) {
+    page.push_str(
+        "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch, a perfect virtual ground, \
+         settled at once, 12 bits rounded down. Each row is sampled at its own instant. The stages and the effects in each, in order:\n\n\
+         | stage | what it holds | effects |\n| --- | --- | --- |\n",
+    );
+    for (stage, about) in [
+        ("pressure", "kPa of each taxel of the row"),
+        ("conductance", "G_0 + alpha p of each taxel, S"),
+        ("network", "what each column sees of the driven row, S"),
+        ("volts", "at the column amplifiers: V_g + R_f G V_drive"),
+        ("codes", "before the converter rounds down: 4096 V / V_ref"),
+    ] {
+        let effects: Vec<_> = registry::all().filter(|effect| stage_of(effect) == Some(stage)).collect();
+        let names: Vec<_> = effects.iter().map(|effect| format!("`{}`", effect.name)).collect();
+        let _ = writeln!(page, "| {stage} | {about} | {} |", names.join(", "));
+    }
+}
+
+/// At which stage of the readout an effect acts.
+fn stage_of(effect: &Description) -> Option<&'static str> {
+    let values = Values::defaults(effect.keys);
+    match (effect.build)(&Build { values: &values, seed: 0 }) {
+        Part::Pressure(_) => Some("pressure"),
+        Part::Conductance(_) => Some("conductance"),
+        Part::Network(_) => Some("network"),
+        Part::Volts(_) => Some("volts"),
+        Part::Codes(_) => Some("codes"),
+        _ => None,
+    }
 }
 
 fn effect_of(page: &mut String, effect: &Description) {

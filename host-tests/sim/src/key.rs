@@ -173,6 +173,11 @@ impl fmt::Display for Value {
 }
 
 impl Values {
+    /// Those of a table that is not given; what is required or may be left out is not among them.
+    pub fn defaults(keys: &[Key]) -> Self {
+        Self(keys.iter().filter_map(|key| Some((key.name, key.default()?))).collect())
+    }
+
     /// Takes a value in; a key comes once.
     pub fn insert(&mut self, name: &'static str, value: Value) {
         self.0.retain(|(known, _)| *known != name);

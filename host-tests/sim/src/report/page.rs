@@ -110,7 +110,8 @@ fn pressures(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
     let time = shown(Some((time_s * 1e4).round() / 1e4));
     let about = format!("Pressure map at {time} s, at most {peak} kPa");
     // The last row on top, as everywhere.
-    let cells = map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
+    let cells =
+        map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
     html! {
         figure {
             svg viewBox="0 0 10 10" role="img" aria-label=(about) shape-rendering="crispEdges" {

@@ -94,15 +94,15 @@ impl Reader<'_> {
     /// A table that stands at most once.
     fn table(&mut self, table: &Table, root: &dyn TableLike) -> Values {
         let Some(item) = root.get(table.name) else {
-            return defaults(table.keys);
+            return Values::defaults(table.keys);
         };
         let at = key_span(root, table.name);
         match item.as_table_like() {
-            Some(given) => self.values(table, given, at, false).unwrap_or_else(|| defaults(table.keys)),
+            Some(given) => self.values(table, given, at, false).unwrap_or_else(|| Values::defaults(table.keys)),
             None => {
                 let message = format!("`{}` is a table", table.name);
                 self.error(at, message, format!("[{}], once", table.name));
-                defaults(table.keys)
+                Values::defaults(table.keys)
             }
         }
     }
@@ -312,12 +312,6 @@ fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
         pairs.push(pair);
     }
     Some(pairs)
-}
-
-fn defaults(keys: &[Key]) -> Values {
-    let mut values = Values::default();
-    keys.iter().filter_map(|key| Some((key.name, key.default()?))).for_each(|(name, value)| values.insert(name, value));
-    values
 }
 
 fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {

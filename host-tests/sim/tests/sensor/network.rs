@@ -34,9 +34,11 @@ fn kirchhoff(driven: usize, read: usize, hold: f64, array: &[Row; ROWS]) -> f64 
             continue;
         }
         equation[line] += hold;
-        for other in 0..10 {
-            let (g, to) =
-                if line < ROWS { (array[line][other], ROWS + other) } else { (array[other][line - ROWS], other) };
+        let others: Vec<(f64, usize)> = match line.checked_sub(ROWS) {
+            None => (0..COLUMNS).map(|column| (array[line][column], ROWS + column)).collect(),
+            Some(column) => (0..ROWS).map(|row| (array[row][column], row)).collect(),
+        };
+        for (g, to) in others {
             equation[line] += g;
             equation[to] -= g;
         }

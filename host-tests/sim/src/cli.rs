@@ -2,7 +2,9 @@
 
 use crate::explain;
 use crate::metrics;
+use crate::run::{Run, RunError};
 use crate::scene::{Scene, library, read, text};
+use crate::session;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -27,6 +29,9 @@ pub struct Args {
     /// Writes the recording and the report here
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Records the scalars of each N-th control step; what the core needs for a replay is always whole
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
+    pub every: u64,
     /// In place of the scene's seed
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
@@ -93,20 +98,29 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
     read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))
 }
 
-/// Does what is asked for. `board` runs a scene.
-pub fn answer(args: &Args) -> ExitCode {
+/// Does what is asked for. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2: it could not be
+/// done.
+pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
-        explain::list().map(|text| print!("{text}"))
+        explain::list().map(|text| print!("{text}")).map(|()| true).map_err(Into::into)
     } else if args.keys {
         print!("{}", explain::keys());
-        Ok(())
+        Ok(true)
     } else if args.explain {
-        args.scene().map(|scene| print!("{}", explain::scene(&scene))).map_err(Into::into)
+        args.scene().map(|scene| print!("{}", explain::scene(&scene))).map(|()| true).map_err(Into::into)
+    } else if let Some(path) = &args.replay {
+        session::replay_file(path)
     } else {
-        Err("running comes with the boards".into())
+        args.scene().map_err(Into::into).and_then(|scene| session::run_scene(args, &scene, board))
     };
+    verdict(done)
+}
+
+/// The exit code of what was done.
+pub fn verdict(done: Result<bool, RunError>) -> ExitCode {
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(error) => {
             eprintln!("{error}");
             ExitCode::from(2)

@@ -23,6 +23,7 @@ pub mod registry;
 pub mod report;
 pub mod run;
 pub mod scene;
+pub mod session;
 pub mod sweep;
 pub mod watch;
 pub mod world;

@@ -1,6 +1,6 @@
 //! A run with everything that watches it, and what it leaves behind.
 
-use crate::ledger;
+use crate::ledger::{self, Without};
 use crate::metrics::{Measured, Meter, Verdict, shown};
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Summary, Watch};
@@ -43,9 +43,13 @@ impl Outcome {
     }
 
     /// For scripts. The keys are stable; `null` is a metric that the run does not have, or a side that is not bounded.
-    pub fn json(&self, scene: &Scene, board: &str) -> Value {
-        let metrics: Map<String, Value> =
-            self.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect();
+    pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
+        let values = |measured: &Measured| -> Map<String, Value> {
+            measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect()
+        };
+        let ablated =
+            ablated.iter().map(|without| json!({ "effect": without.effect, "metrics": values(&without.measured) }));
+
         let bound = |verdict: &Verdict| {
             let bound = &verdict.bound;
             json!({
@@ -62,9 +66,10 @@ impl Outcome {
             "wall_s": self.summary.wall_s,
             "digest": self.summary.digest,
             "passed": self.passed(),
-            "metrics": metrics,
+            "metrics": values(&self.measured),
             "bounds": self.verdicts.iter().map(bound).collect::<Vec<_>>(),
             "ledger": ledger::json(&self.summary),
+            "without": ablated.collect::<Vec<_>>(),
         })
     }
 

@@ -132,4 +132,3 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     };
     combinations.into_iter().map(point).collect()
 }
-

@@ -38,7 +38,7 @@ impl Response {
 
     /// The true force at a time; the first counts as the start.
     pub fn add(&mut self, time_s: f64, force_n: f64) {
-        let start_s = *self.start_s.get_or_insert(time_s);
+        self.start_s.get_or_insert(time_s);
         let way_n = self.goal_n - self.from_n;
         let share = (force_n - self.from_n) / way_n;
         let before = self.before.replace([time_s, share]);
@@ -54,7 +54,7 @@ impl Response {
         } else {
             self.inside_since_s.get_or_insert(time_s);
         }
-        if time_s >= start_s + STEADY_AFTER_S {
+        if self.is_steady(time_s) {
             self.steady_max_n = self.steady_max_n.max(error_n.abs());
             self.steady_squares += error_n * error_n;
             self.steady_samples += 1;
@@ -79,6 +79,11 @@ impl Response {
     /// From the start until the force stays within 2 % of [`Response::unit_n`]; none where it does not.
     pub fn settled_s(&self) -> Option<f64> {
         Some(self.inside_since_s? - self.start_s?)
+    }
+
+    /// Whether 100 ms have passed since the start.
+    pub fn is_steady(&self, time_s: f64) -> bool {
+        self.start_s.is_some_and(|start_s| time_s >= start_s + STEADY_AFTER_S)
     }
 
     /// Largest error from 100 ms after the start on; 0 where there was no such time.

@@ -6,8 +6,8 @@ use fingertip::safety::{Fault, Limits};
 use fingertip::units::{Duty, Millimetres, Newtons};
 use host_tests::metrics::Response;
 
-/// Errors of the centre and confidence count from this force on: below it there is next to nothing to see.
-pub(super) const SEEN_N: f64 = 0.1;
+/// Errors of the centre count from this force on: below it there is next to nothing to see.
+const SEEN_N: f64 = 0.1;
 /// The approach speed is the mean over this last stretch before the touch.
 const APPROACH_S: f64 = 0.01;
 /// A goal that changes by less is no step to judge: a force that is trimmed.
@@ -207,6 +207,8 @@ impl Finger {
             let [x, y] = [off(contact.centre_x, truth.centre_mm[0]), off(contact.centre_y, truth.centre_mm[1])];
             let error_mm = (x * x + y * y).sqrt();
             self.centre_error_mm = Some(self.centre_error_mm.map_or(error_mm, |max| max.max(error_mm)));
+        }
+        if self.response.is_some_and(|response| response.is_steady(step.time_s)) {
             let confidence = contact.confidence;
             self.confidence_min = Some(self.confidence_min.map_or(confidence, |min| min.min(confidence)));
         }

@@ -51,7 +51,7 @@ pub const METRICS: &[Metric] = &[
     metric("force_error_max_mn", Largest, "largest difference of the sensed from the true force", |f| Some(1e3 * f.force_error_n.max)),
     metric("force_error_rms_mn", Largest, "root mean square of that difference, over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
     metric("centre_error_max_mm", Largest, "largest distance of the sensed from the true centre of the contact, above 0.1 N", |f| f.centre_error_mm),
-    metric("confidence_min_percent", Least, "least confidence that the contact is a tip on a plane, above 0.1 N", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
+    metric("confidence_min_percent", Least, "least confidence that the contact is a tip on a plane, from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
     metric("slip_mm", Largest, "way that the contact slipped", |f| Some(f.slip_mm)),
     metric("slips_count", Sum, "slips of more than 1 um; one is over when the contact stuck for 10 ms", |f| Some(f64::from(f.slips.count))),
     metric("slips_unnoticed_count", Sum, "slips that were over before more force was asked for", |f| Some(f64::from(f.slips.unnoticed()))),

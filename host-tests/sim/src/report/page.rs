@@ -63,6 +63,7 @@ fn verdict_line(verdicts: &[Verdict]) -> Markup {
     html! {
         @match (broken, verdicts.len()) {
             (_, 0) => span { "The scene asks for nothing." },
+            (0, 1) => span.held { "The bound is held." },
             (0, all) => span.held { "All " (all) " bounds are held." },
             (broken, all) => span.broken { (broken) " of " (all) " bounds broken." },
         }
@@ -77,7 +78,7 @@ fn bounds(verdicts: &[Verdict]) -> Markup {
                 thead { tr { th scope="col" { "metric" } th scope="col" { "asked" } th.number scope="col" { "measured" } th scope="col" { "" } } }
                 tbody { @for verdict in verdicts { tr {
                     td { code { (verdict.bound.metric) } }
-                    td { (asked(verdict).trim_end_matches(" asked")) }
+                    td.asked { (asked(verdict).trim_end_matches(" asked")) }
                     td.number { (shown(verdict.value)) }
                     td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
                 } } }
@@ -100,14 +101,14 @@ fn finger(number: usize, tracks: &Tracks, several: bool) -> Result<Markup, PlotE
             }
         }
         h3 { "Pressure on the array" }
-        p.note { "True mean pressure on each taxel; full colour is " (shown(Some(full_kpa))) " kPa." }
+        p.note { "True mean pressure on each taxel; full colour is " (format!("{full_kpa:.1}")) " kPa." }
         div.maps { @for (time_s, map) in &tracks.maps { (pressures(*time_s, map, full_kpa)) } }
     })
 }
 
 fn pressures(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
-    let peak = shown(Some(map.iter().flatten().copied().fold(0.0, f64::max)));
-    let time = shown(Some((time_s * 1e4).round() / 1e4));
+    let peak = format!("{:.1}", map.iter().flatten().copied().fold(0.0, f64::max));
+    let time = shown(Some((time_s * 1e3).round() / 1e3));
     let about = format!("Pressure map at {time} s, at most {peak} kPa");
     // The last row on top, as everywhere.
     let cells =
@@ -131,12 +132,12 @@ fn metrics(report: &Report) -> Markup {
         METRICS.iter().find(|metric| metric.name == name).map_or("", |metric| metric.about)
     };
     html! {
-        div.scroll tabindex="0" { table {
+        div.scroll tabindex="0" { table.metrics {
             thead { tr { th scope="col" { "metric" } th.number scope="col" { "value" } th scope="col" { "what it is" } } }
             tbody { @for (name, value) in &outcome.measured.0 { tr {
                 td { code { (name) } }
                 td.number { (shown(*value)) }
-                td { (about(name)) }
+                td.about { (about(name)) }
             } } }
         } }
     }

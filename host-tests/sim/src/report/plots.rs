@@ -26,8 +26,8 @@ pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
     let mut plots = vec![
         plot("Contact force", "N", force_about, force.into())?,
         line("Indentation of the tip", "mm", indentation)?,
-        line("Duty of the bridge", "%", duty)?,
-        line("Current in the winding", "A", current)?,
+        with_mean("Duty of the bridge", "%", duty)?,
+        with_mean("Current in the winding", "A", current)?,
     ];
     // What a scene does not move is not drawn.
     for (title, unit, track) in [
@@ -46,6 +46,12 @@ pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
 
 fn line(title: &str, unit: &'static str, track: &Track) -> Result<Plot, PlotError> {
     plot(title, unit, title, vec![Curve::Solid(track.points())])
+}
+
+/// For what changes from step to step.
+fn with_mean(title: &str, unit: &'static str, track: &Track) -> Result<Plot, PlotError> {
+    let about = format!("{title}: as it was (pale) and its mean over a hundredth of the run");
+    plot(title, unit, &about, vec![Curve::Pale(track.points()), Curve::Solid(track.means())])
 }
 
 fn plot(title: &str, y: &'static str, about: &str, lines: Vec<Curve>) -> Result<Plot, PlotError> {

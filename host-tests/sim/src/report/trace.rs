@@ -7,6 +7,8 @@ use host_tests::heatmap::Pressures;
 
 /// Stretches of time in which the least and the largest value are kept.
 const STRETCHES: f64 = 900.0;
+/// How many of them a mean is taken over.
+const STRETCHES_OF_A_MEAN: u64 = 9;
 /// Pressure maps of a run.
 const MAPS: usize = 10;
 
@@ -14,12 +16,20 @@ const MAPS: usize = 10;
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     points: Vec<(f64, f64)>,
+    /// Sum of the times, sum of the values and number of the points of each longer stretch.
+    sums: Vec<(f64, f64, f64)>,
     stretch: Option<(u64, (f64, f64), (f64, f64))>,
 }
 
 impl Track {
     fn add(&mut self, stretch: u64, time_s: f64, value: f64) {
         let point = (time_s, value);
+        let longer = (stretch / STRETCHES_OF_A_MEAN) as usize;
+        if self.sums.len() <= longer {
+            self.sums.resize(longer + 1, (0.0, 0.0, 0.0));
+        }
+        let (times, values, count) = self.sums[longer];
+        self.sums[longer] = (times + time_s, values + value, count + 1.0);
         match &mut self.stretch {
             Some((number, low, high)) if *number == stretch => {
                 if value < low.1 {
@@ -43,6 +53,12 @@ impl Track {
         if second.0 > first.0 {
             self.points.push(second);
         }
+    }
+
+    /// The mean of each longer stretch.
+    pub fn means(&self) -> Vec<(f64, f64)> {
+        let mean = |(times, values, count): (f64, f64, f64)| (times / count, values / count);
+        self.sums.iter().copied().filter(|(.., count)| *count > 0.0).map(mean).collect()
     }
 
     /// All of them.

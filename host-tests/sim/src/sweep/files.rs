@@ -163,7 +163,9 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let all: usize = sweep.ok_or("there are no runs in these files")?[1].parse()?;
     let missing: Vec<usize> = (1..=all).filter(|number| !rows.contains_key(number)).collect();
     if let Some(first) = missing.first() {
-        return Err(format!("{} of {all} runs are missing, run {first} the first: is a shard missing?", missing.len()).into());
+        return Err(
+            format!("{} of {all} runs are missing, run {first} the first: is a shard missing?", missing.len()).into()
+        );
     }
     let table = Table { head: head.unwrap_or_default(), rows: rows.into_values().collect() };
     fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
@@ -173,7 +175,8 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
 
 impl Table {
     fn write_runs(&self, path: &Path) -> Result<(), RunError> {
-        let mut writer = Writer::from_path(path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        let mut writer =
+            Writer::from_path(path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
         writer.write_record(&self.head)?;
         self.rows.iter().try_for_each(|row| writer.write_record(row))?;
         Ok(writer.flush()?)

@@ -32,7 +32,8 @@ pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
 fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
     let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
     let at = |row: &Vec<String>| number(&row[key]);
-    let mut places: Vec<f64> = points(table).iter().map(|(values, _)| number(&values[key - table.varied().start])).collect();
+    let mut places: Vec<f64> =
+        points(table).iter().map(|(values, _)| number(&values[key - table.varied().start])).collect();
     places.sort_by(f64::total_cmp);
     places.dedup();
     let of = |x: f64| spread(values(table.rows.iter().filter(|row| at(row) == x), column)).map(|spread| (x, spread));
@@ -40,7 +41,8 @@ fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
     let line = |which: usize| spreads.iter().map(|(x, spread)| (*x, spread[which])).collect::<Vec<_>>();
     let [left, right] = around_all(&places);
     let bounds = bounds(table, column).into_iter().map(|bound| Curve::Dashed(vec![(left, bound), (right, bound)]));
-    let mut curves: Vec<Curve> = bounds.chain([Curve::Pale(line(0)), Curve::Pale(line(2)), Curve::Solid(line(1))]).collect();
+    let mut curves: Vec<Curve> =
+        bounds.chain([Curve::Pale(line(0)), Curve::Pale(line(2)), Curve::Solid(line(1))]).collect();
     if table.rows.len() <= DRAWN {
         let runs = table.rows.iter().filter_map(|row| Some((at(row), row[column].parse().ok()?)));
         curves.push(Curve::Circles(runs.collect()));

@@ -42,7 +42,8 @@ pub fn rows(table: &Table) -> Vec<Vec<String>> {
         for column in table.metrics() {
             let values = values(rows.iter().copied(), column);
             let count = values.len();
-            let spread = spread(values).map_or([const { String::new() }; 3], |spread| spread.map(|value| value.to_string()));
+            let spread =
+                spread(values).map_or([const { String::new() }; 3], |spread| spread.map(|value| value.to_string()));
             let counts = [rows.len().to_string(), passed.to_string(), count.to_string()];
             let line = at.iter().chain([&table.head[column]]).cloned().chain(counts).chain(spread);
             lines.push(line.collect());
@@ -59,7 +60,13 @@ pub fn text(table: &Table) -> String {
         for (at, rows) in points(table) {
             let point: Vec<String> = keys.iter().zip(at).map(|(key, value)| format!("{key} = {value}")).collect();
             // Writing to a string does not fail.
-            let _ = writeln!(text, "  {}: {} of {} runs passed", point.join(", "), table.passes(rows.iter().copied()), rows.len());
+            let _ = writeln!(
+                text,
+                "  {}: {} of {} runs passed",
+                point.join(", "),
+                table.passes(rows.iter().copied()),
+                rows.len()
+            );
         }
         text.push('\n');
     }
@@ -70,9 +77,9 @@ pub fn text(table: &Table) -> String {
         let Some(spread) = spread(values(table.rows.iter(), column)) else { continue };
         let [low, median, high] = spread.map(|value| shown(Some(value)));
         let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
-        let expected = table.expected(name).map_or(String::new(), |[min, max]| {
-            format!("   expected {}..{}", side(min), side(max))
-        });
+        let expected = table
+            .expected(name)
+            .map_or(String::new(), |[min, max]| format!("   expected {}..{}", side(min), side(max)));
         let _ = writeln!(text, "  {name:width$} {low:>11} {median:>11} {high:>11}{expected}");
     }
     let (passed, all) = (table.passes(table.rows.iter()), table.rows.len());

@@ -1,6 +1,6 @@
 //! Metrics and bounds.
 
-use crate::stub::{board, wall};
+use crate::{native, wall};
 use sim::ledger;
 use sim::metrics::{self, METRICS};
 use sim::run::run;
@@ -22,7 +22,7 @@ fn every_metric_has_a_name_with_a_unit_and_stands_once() {
 #[test]
 fn the_wall_is_measured() {
     let scene = wall();
-    let outcome = run(&scene, &board, &mut []).unwrap();
+    let outcome = run(&scene, &native, &mut []).unwrap();
     let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!((0.99..1.05).contains(&value("peak_force_n")), "{}", value("peak_force_n"));
     assert!((0.0..5.0).contains(&value("overshoot_percent")));
@@ -32,6 +32,7 @@ fn the_wall_is_measured() {
     assert!((0.01..10.0).contains(&value("steady_error_max_mn")));
     assert!(value("steady_error_rms_mn") <= value("steady_error_max_mn") * (1.0 + 1e-12));
     assert!((0.001..0.2).contains(&value("energy_j")), "{}", value("energy_j"));
+    assert!(value("confidence_min_percent") > 50.0, "{}", value("confidence_min_percent"));
     assert_eq!(value("finger0.peak_force_n"), value("peak_force_n"));
     assert_eq!(value("faults_count"), 0.0);
     assert_eq!(value("missed_frames_count"), 0.0);
@@ -50,13 +51,13 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
         bound("peak_force_n", Some(0.9), Some(1.2)),
         bound("slip_noticed_ms", None, Some(10.0)),
     ];
-    let outcome = run(&scene, &board, &mut []).unwrap();
+    let outcome = run(&scene, &native, &mut []).unwrap();
     let held: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
     assert_eq!(held, [false, false, true, false]);
     assert!(!outcome.passed());
     let text = outcome.text();
     assert!(text.contains("BROKEN peak_force_n") && text.contains("1.2 or more asked"), "{text}");
-    let json = outcome.json(&scene, "native");
+    let json = outcome.json(&scene, "native", &[]);
     assert_eq!(json["passed"], false);
     assert_eq!(json["bounds"][3]["value"], serde_json::Value::Null);
     assert_eq!(json["ledger"][0]["effect"], "row_sag");
@@ -66,8 +67,8 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
 #[test]
 fn an_ablation_shows_what_an_effect_changes() {
     let scene = wall();
-    let whole = run(&scene, &board, &mut []).unwrap();
-    let ablated = ledger::ablate(&scene, &board).unwrap();
+    let whole = run(&scene, &native, &mut []).unwrap();
+    let ablated = ledger::ablate(&scene, &native).unwrap();
     assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
     let rows = ledger::differences(&whole.measured, &ablated);
     assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));

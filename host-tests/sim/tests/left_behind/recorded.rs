@@ -1,6 +1,6 @@
 //! Recordings and their replay.
 
-use crate::stub::{board, wall};
+use crate::{native, wall};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use mcap::{MessageStream, Writer};
 use sim::recording::{Recorder, replay};
@@ -20,7 +20,7 @@ fn record(name: &str) -> PathBuf {
     let mut scene = wall();
     scene.duration_s = 0.05;
     let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
-    let outcome = run(&scene, &board, &mut [&mut recorder]).unwrap();
+    let outcome = run(&scene, &native, &mut [&mut recorder]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();
     path
 }

@@ -60,6 +60,16 @@ pub enum Kind {
 }
 
 impl Key {
+    /// A number within bounds, with a default.
+    pub const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Self {
+        Self { name, about, kind: Kind::Number { min, max, default: Some(default) } }
+    }
+
+    /// A whole number within bounds, with a default.
+    pub const fn whole(name: &'static str, about: &'static str, min: i64, max: i64, default: i64) -> Self {
+        Self { name, about, kind: Kind::Whole { min, max, default: Some(default) } }
+    }
+
     /// What it may hold, in words: "number, 0 to 5, default 1".
     pub fn allowed(&self) -> String {
         let default = |value: Option<String>| value.map_or("required".into(), |value| format!("default {value}"));

@@ -10,6 +10,7 @@ use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
 use crate::effects::set::{Named, Set};
 use crate::host::Host;
+use crate::mechanics::body::Surroundings;
 use crate::scene::Scene;
 use crate::scene::controller;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
@@ -90,7 +91,7 @@ impl<E: Set> Board<E> {
         let params = controller::params(scene);
         let config = Config::new(&params).map_err(SimError::Controller)?;
         let setup = controller::setup(scene);
-        let fingers = 1;
+        let fingers = scene.table("hand").whole("fingers") as usize;
         let (mut units, mut effects) = (Vec::new(), Vec::new());
         for finger in 0..fingers {
             let parts = E::of(scene, finger);
@@ -106,7 +107,7 @@ impl<E: Set> Board<E> {
                 next: Bridge::Coast,
             });
         }
-        let world = World::<E>::new(&setup, effects);
+        let world = World::<E>::new(&setup, &surroundings(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let slot_s = f64::from(config.timing.slot_ticks) / f64::from(fingertip::scan::TIMER_HZ);
@@ -160,8 +161,9 @@ impl<E: Set> Board<E> {
         let mut from = slots.start;
         while from < slots.end {
             let count = if parts > 1.0 { 1 } else { at_once.min(slots.end - from) };
-            for _ in 0..parts as usize {
-                self.world.advance(slot_s * count as f64 / parts, &self.bridges);
+            let (begun_s, part_s) = (self.clock.time_s(), slot_s * count as f64 / parts);
+            for part in 0..parts as usize {
+                self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
             }
             for step in 1..=count {
                 self.clock.go_on(slot_s);
@@ -217,5 +219,18 @@ impl<E: Set> Board<E> {
             sum
         };
         scene.effects.iter().map(|named| of(named.effect.name)).collect()
+    }
+}
+
+/// What a scene does to its object.
+fn surroundings(scene: &Scene) -> Surroundings {
+    let (object, hand) = (scene.table("object"), scene.table("hand"));
+    let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));
+    Surroundings {
+        floor_until_s: object.number("floor_until_s"),
+        shake_g: object.number("shake_g"),
+        shake_s: [shake_s, shake_s + object.number("shake_ms") * 1e-3],
+        lift_mm: hand.number("lift_mm"),
+        lift_s: [lift_s, lift_s + hand.number("lift_s")],
     }
 }

@@ -5,18 +5,48 @@
 //! the motion along the surface (tangent). Without effects the object is a rigid plane without friction: d = x, F = pi Y d^2.
 //! All forces of a step come from one energy, which is asked for its mean slope, so a step creates none.
 
+mod breakable_object;
+mod cylinder;
+mod edge;
+mod object_mass;
+mod object_stiffness;
+mod relaxation;
+mod sphere;
+mod tangential;
+mod tilted_plane;
+
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::{Cost, Truth};
 
 /// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[];
+pub const EFFECTS: &[&Description] = &[
+    &tilted_plane::EFFECT,
+    &sphere::EFFECT,
+    &cylinder::EFFECT,
+    &edge::EFFECT,
+    &relaxation::EFFECT,
+    &object_stiffness::EFFECT,
+    &breakable_object::EFFECT,
+    &tangential::EFFECT,
+    &object_mass::EFFECT,
+];
 
 /// Acts on the object's surface.
 pub trait Shape {
-    /// How far the surface stands out towards the tip beyond the plane through the first point touched, mm; not above 0 at the
-    /// contact's centre. `x` goes along the array's columns, `y` along its rows.
-    fn height_mm(&self, x_mm: f64, y_mm: f64) -> f64;
+    /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where it falls away.
+    /// `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is that.
+    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
+}
+
+/// Where an object ends: farther away than any tip reaches.
+const NOTHING_MM: f64 = -1e3;
+
+/// A round surface's height at the square of a distance from its highest point or line.
+fn round(per_mm: f64, distance2_mm2: f64) -> f64 {
+    let turned = per_mm * per_mm * distance2_mm2;
+    // R - sqrt(R^2 - s^2) without its cancellation for a large R.
+    if turned < 1.0 { -per_mm * distance2_mm2 / (1.0 + (1.0 - turned).sqrt()) } else { NOTHING_MM }
 }
 
 /// A force that the tip has forgotten.
@@ -77,7 +107,7 @@ pub trait Stages {
         false
     }
     /// The sum of [`Shape::height_mm`].
-    fn height_mm(&self, _x_mm: f64, _y_mm: f64) -> f64 {
+    fn height_mm(&self, _x_mm: f64, _y_mm: f64, _radius_mm: f64) -> f64 {
         0.0
     }
     /// Counts the building of the shape's tables as a call of its effects.
@@ -150,8 +180,8 @@ impl Stages for Named {
         !self.shape.is_empty()
     }
 
-    fn height_mm(&self, x_mm: f64, y_mm: f64) -> f64 {
-        self.shape.iter().map(|effect| effect.part().height_mm(x_mm, y_mm)).sum()
+    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
+        self.shape.iter().map(|effect| effect.part().height_mm(x_mm, y_mm, radius_mm)).sum()
     }
 
     fn shape_built(&mut self) {

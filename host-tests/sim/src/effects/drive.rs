@@ -5,12 +5,36 @@
 //! none is lost. After the step the winding's heat, the tip's place behind the gear's play and the encoder's count follow. Without effects
 //! there is a rotor without friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
+mod backlash;
+mod cogging;
+mod dry_friction;
+mod encoder_resolution;
+mod gear_efficiency;
+mod inertia;
+mod stribeck;
+mod supply_sag;
+mod thermal_derating;
+mod viscous_friction;
+mod winding_inductance;
+
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::{Cost, Truth};
 
 /// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[];
+pub const EFFECTS: &[&Description] = &[
+    &inertia::EFFECT,
+    &supply_sag::EFFECT,
+    &thermal_derating::EFFECT,
+    &winding_inductance::EFFECT,
+    &dry_friction::EFFECT,
+    &stribeck::EFFECT,
+    &viscous_friction::EFFECT,
+    &gear_efficiency::EFFECT,
+    &cogging::EFFECT,
+    &backlash::EFFECT,
+    &encoder_resolution::EFFECT,
+];
 
 /// What the winding is connected to, for a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,6 +99,9 @@ pub trait Potential {
 
     /// Its mean torque against the motion between two angles: the difference in energy over the way.
     fn mean_nm(&mut self, from_rad: f64, to_rad: f64) -> f64;
+
+    /// How steep the torque can become.
+    fn steepest_nm_per_rad(&self) -> f64;
 }
 
 /// What lies between shaft and tip.
@@ -107,6 +134,10 @@ pub trait Stages {
     }
     /// See [`Potential::energy_j`].
     fn potential_j(&self, _angle_rad: f64) -> f64 {
+        0.0
+    }
+    /// The sum of [`Potential::steepest_nm_per_rad`].
+    fn steepest_nm_per_rad(&self) -> f64 {
         0.0
     }
     /// See [`Play`].
@@ -181,6 +212,10 @@ impl Stages for Named {
 
     fn potential_j(&self, angle_rad: f64) -> f64 {
         self.potential.iter().map(|effect| effect.part().energy_j(angle_rad)).sum()
+    }
+
+    fn steepest_nm_per_rad(&self) -> f64 {
+        self.potential.iter().map(|effect| effect.part().steepest_nm_per_rad()).sum()
     }
 
     fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {

@@ -3,6 +3,7 @@
 use super::elastic::Elastic;
 use super::normal::Law;
 use super::pressures::Pressures;
+use super::shape;
 use crate::effects::contact::{Grip, Stages};
 use fingertip::frame::COLUMNS;
 use host_tests::plant::Setup;
@@ -14,8 +15,12 @@ pub struct Contact<C> {
     /// Its state along the surface.
     pub along: Along,
     elastic: Elastic,
+    /// Indentation, and where the centre of pressure then is; none on a plane.
+    centres: Vec<[f64; 3]>,
     pressures: Pressures,
     mm_per_n: f64,
+    /// Stiffness along the surface; 0 without friction.
+    pub n_per_mm_along: f64,
     forgotten_n: f64,
     left: f64,
 }
@@ -34,11 +39,27 @@ pub struct Along {
 impl<C: Stages> Contact<C> {
     /// Of a finger.
     pub fn new(setup: &Setup, mut effects: C) -> Self {
-        let elastic = Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() };
+        let (elastic, centres) = if effects.shaped() {
+            effects.shape_built();
+            shape::tables(&effects, &setup.tip)
+        } else {
+            (Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }, Vec::new())
+        };
         let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
         let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
         let mm_per_n = effects.mm_per_n();
-        Self { effects, along: Along::default(), elastic, pressures, mm_per_n, forgotten_n: 0.0, left: 1.0 }
+        let n_per_mm_along = effects.grip().map_or(0.0, |grip| grip.n_per_mm);
+        Self {
+            n_per_mm_along,
+            effects,
+            along: Along::default(),
+            elastic,
+            centres,
+            pressures,
+            mm_per_n,
+            forgotten_n: 0.0,
+            left: 1.0,
+        }
     }
 
     /// What holds through the next step.
@@ -71,6 +92,16 @@ impl<C: Stages> Contact<C> {
             kpa.iter_mut().for_each(|kpa| *kpa *= share);
         }
         kpa
+    }
+
+    /// Where the centre of pressure is at an indentation, from where the tip's axis meets the surface.
+    pub fn centre_mm(&self, d_mm: f64) -> [f64; 2] {
+        let above = self.centres.partition_point(|[knot_mm, ..]| *knot_mm < d_mm);
+        let [x, y] = match self.centres.get(above.min(self.centres.len().saturating_sub(1))) {
+            Some([_, x, y]) => [*x, *y],
+            None => [0.0, 0.0],
+        };
+        [x, y + self.along.stretch_mm]
     }
 
     /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it has none.

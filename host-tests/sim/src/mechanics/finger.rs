@@ -92,6 +92,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
     }
 
+    /// Inertia at the shaft.
+    pub fn inertia_kg_m2(&self) -> f64 {
+        self.rotor.inertia_kg_m2
+    }
+
     /// Asks the effects what holds through the next step.
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
         self.before = self.shaft;

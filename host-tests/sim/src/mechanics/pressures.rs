@@ -4,6 +4,7 @@
 //! runs in the square root of the indentation, in which the rim moves evenly, and holds the means as shares of the peak Y d / a, which
 //! vary slowly. Cubic lines through four knots, with equal slopes where they meet (Catmull and Rom).
 
+use super::shape;
 use crate::effects::contact::Stages;
 use fingertip::frame::{COLUMNS, ROWS};
 use host_tests::plant::cells::Cell;
@@ -99,7 +100,9 @@ fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d
     core::array::from_fn(|row| {
         core::array::from_fn(|column| {
             let cell = Cell::at(pitch_mm, centre_mm, row, column);
-            if stages.shaped() { todo!() } else { cell.mean_kpa(&flattened) / peak_kpa }
+            let mean =
+                if stages.shaped() { shape::mean_kpa(stages, tip, d_mm, &cell) } else { cell.mean_kpa(&flattened) };
+            mean / peak_kpa
         })
     })
 }

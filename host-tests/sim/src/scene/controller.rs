@@ -27,7 +27,7 @@ pub fn setup(scene: &Scene) -> Setup {
     setup.motor.friction_nm = 0.0;
     setup.transmission.ratio = transmission.number("ratio");
     setup.transmission.drum_radius_mm = transmission.number("drum_radius_mm");
-    setup.transmission.efficiency = transmission.number("efficiency");
+    setup.transmission.efficiency = 1.0;
     setup.supply.source_v = supply.number("source_v");
     setup.supply.source_ohm = 0.0;
     setup.supply.bridge_ohm = supply.number("bridge_ohm");

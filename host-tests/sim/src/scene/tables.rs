@@ -114,7 +114,6 @@ pub const TABLES: &[Table] = &[
         keys: &[
             number("ratio", "Motor turns for one turn of the drum.", 1.0, 1000.0, 43.0),
             number("drum_radius_mm", "Radius on which the tendon winds.", 1.0, 50.0, 12.0),
-            number("efficiency", "Share of the torque that arrives when the motor drives the load.", 0.1, 1.0, 0.7),
         ],
     },
     Table {
@@ -132,6 +131,20 @@ pub const TABLES: &[Table] = &[
             number("distance_mm", "Travel at which the tip touches.", 0.0, 100.0, 5.0),
             number("centre_x_mm", "Contact centre from the array's middle, along the columns.", -20.0, 20.0, 0.0),
             number("centre_y_mm", "Contact centre from the array's middle, along the rows.", -20.0, 20.0, 0.0),
+            number("floor_until_s", "Until when a floor carries an object that can move.", 0.0, 1e6, 1e6),
+            number("shake_g", "Acceleration that drives it down for a while, in g.", -1e3, 1e3, 0.0),
+            number("shake_at_s", "From when.", 0.0, 1e6, 0.0),
+            number("shake_ms", "For how long.", 0.0, 1e6, 20.0),
+        ],
+    },
+    Table {
+        name: "hand",
+        about: "The fingers: one, or two that press against each other.",
+        keys: &[
+            Key { name: "fingers", about: "How many.", kind: Kind::Whole { min: 1, max: 2, default: Some(1) } },
+            number("lift_mm", "How far the hand lifts.", 0.0, 1e3, 0.0),
+            number("lift_at_s", "From when.", 0.0, 1e6, 0.0),
+            number("lift_s", "For how long, from rest to rest.", 1e-3, 1e6, 0.5),
         ],
     },
     Table {

@@ -65,6 +65,11 @@ pub enum Board {
 }
 
 impl Args {
+    /// Whether a scene is to be run, and not only shown or replayed.
+    pub fn runs(&self) -> bool {
+        !self.list && !self.keys && !self.explain && self.replay.is_none()
+    }
+
     /// The scene that is asked for, with what is set and checked.
     ///
     /// # Errors

@@ -108,7 +108,7 @@ impl Key {
 
     /// The unit that its name ends with; none where it is a plain number, a word or a text.
     pub fn unit(&self) -> Option<&'static str> {
-        let fits = UNITS.iter().filter(|(suffix, _)| self.name.ends_with(suffix));
+        let fits = UNITS.iter().filter(|(suffix, _)| self.name.ends_with(suffix) || self.name == &suffix[1..]);
         fits.max_by_key(|(suffix, _)| suffix.len()).map(|(_, unit)| *unit)
     }
 }
@@ -145,6 +145,9 @@ pub const UNITS: &[(&str, &str)] = &[
     ("_ohm", "Ohm"),
     ("_uh", "uH"),
     ("_k", "K"),
+    ("_k_per_w", "K/W"),
+    ("_counts", "counts"),
+    ("_unm_s", "uN m s"),
     ("_c", "degrees Celsius"),
 ];
 

@@ -37,6 +37,9 @@ pub trait Shape {
     /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where it falls away.
     /// `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is that.
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
+
+    /// Whether the height is 0 wherever a tip reaches: then the plane's closed forms hold.
+    fn plain(&self) -> bool;
 }
 
 /// Where an object ends: farther away than any tip reaches.
@@ -177,7 +180,7 @@ impl Named {
 
 impl Stages for Named {
     fn shaped(&self) -> bool {
-        !self.shape.is_empty()
+        self.shape.iter().any(|effect| !effect.part().plain())
     }
 
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {

@@ -39,8 +39,8 @@ pub struct Along {
 impl<C: Stages> Contact<C> {
     /// Of a finger.
     pub fn new(setup: &Setup, mut effects: C) -> Self {
+        effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
-            effects.shape_built();
             shape::tables(&effects, &setup.tip)
         } else {
             (Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }, Vec::new())

@@ -35,4 +35,8 @@ impl Shape for Cylinder {
         let across_mm = self.across[0] * x_mm + self.across[1] * y_mm;
         round(self.per_mm, across_mm * across_mm)
     }
+
+    fn plain(&self) -> bool {
+        self.per_mm == 0.0
+    }
 }

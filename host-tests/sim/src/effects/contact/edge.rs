@@ -33,6 +33,9 @@ pub const EFFECT: Description = Description {
     },
 };
 
+/// No tip is larger (`[tip]`, `radius_mm`).
+const LARGEST_TIP_MM: f64 = 16.0;
+
 struct Edge {
     offset_mm: f64,
     towards: [f64; 2],
@@ -42,5 +45,9 @@ impl Shape for Edge {
     fn height_mm(&self, x_mm: f64, y_mm: f64, _radius_mm: f64) -> f64 {
         let far = self.towards[0] * x_mm + self.towards[1] * y_mm > self.offset_mm;
         if far { NOTHING_MM } else { 0.0 }
+    }
+
+    fn plain(&self) -> bool {
+        self.offset_mm >= LARGEST_TIP_MM
     }
 }

@@ -26,4 +26,8 @@ impl Shape for Sphere {
     fn height_mm(&self, x_mm: f64, y_mm: f64, _radius_mm: f64) -> f64 {
         round(self.per_mm, x_mm * x_mm + y_mm * y_mm)
     }
+
+    fn plain(&self) -> bool {
+        self.per_mm == 0.0
+    }
 }

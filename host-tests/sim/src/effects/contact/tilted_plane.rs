@@ -49,4 +49,8 @@ impl Shape for TiltedPlane {
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
         self.x * x_mm + self.y * y_mm - self.over * radius_mm
     }
+
+    fn plain(&self) -> bool {
+        self.x == 0.0 && self.y == 0.0
+    }
 }

@@ -107,7 +107,7 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
 /// done.
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
-        explain::list().map(|text| print!("{text}")).map(|()| true).map_err(Into::into)
+        explain::list().map(|text| print!("{text}")).map(|()| true)
     } else if args.keys {
         print!("{}", explain::keys());
         Ok(true)

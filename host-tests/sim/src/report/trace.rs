@@ -12,13 +12,21 @@ const STRETCHES_OF_A_MEAN: u64 = 9;
 /// Pressure maps of a run.
 const MAPS: usize = 10;
 
+/// A stretch of time under way.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    number: u64,
+    low: (f64, f64),
+    high: (f64, f64),
+}
+
 /// A quantity's points: the least and the largest of each stretch, in order of time.
 #[derive(Clone, Debug, Default)]
 pub struct Track {
     points: Vec<(f64, f64)>,
     /// Sum of the times, sum of the values and number of the points of each longer stretch.
     sums: Vec<(f64, f64, f64)>,
-    stretch: Option<(u64, (f64, f64), (f64, f64))>,
+    stretch: Option<Stretch>,
 }
 
 impl Track {
@@ -31,7 +39,7 @@ impl Track {
         let (times, values, count) = self.sums[longer];
         self.sums[longer] = (times + time_s, values + value, count + 1.0);
         match &mut self.stretch {
-            Some((number, low, high)) if *number == stretch => {
+            Some(Stretch { number, low, high }) if *number == stretch => {
                 if value < low.1 {
                     *low = point;
                 }
@@ -41,13 +49,13 @@ impl Track {
             }
             _ => {
                 self.close();
-                self.stretch = Some((stretch, point, point));
+                self.stretch = Some(Stretch { number: stretch, low: point, high: point });
             }
         }
     }
 
     fn close(&mut self) {
-        let Some((_, low, high)) = self.stretch.take() else { return };
+        let Some(Stretch { low, high, .. }) = self.stretch.take() else { return };
         let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
         self.points.push(first);
         if second.0 > first.0 {

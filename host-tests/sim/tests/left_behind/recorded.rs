@@ -3,7 +3,9 @@
 use crate::{native, wall};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use mcap::{MessageStream, Writer};
+use sim::cli;
 use sim::recording::{Recorder, replay};
+use sim::report::{Report, Trace, page};
 use sim::run::run;
 use std::fs;
 use std::io::Cursor;
@@ -30,6 +32,28 @@ fn a_recording_replays_to_the_bit() {
     let replayed = replay(&record("replayed")).unwrap();
     assert_eq!(replayed.difference, None);
     assert!((560..=580).contains(&replayed.steps), "{}", replayed.steps);
+}
+
+#[test]
+fn two_fingers_are_measured_recorded_and_drawn_each() {
+    let scene = cli::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/grasp.toml"), &[], None).unwrap();
+    let path = folder("grasp").join("grasp.mcap");
+    let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
+    let mut trace = Trace::new(scene.duration_s);
+    let outcome = run(&scene, &native, &mut [&mut recorder, &mut trace]).unwrap();
+    recorder.finish(&outcome.summary.digest).unwrap();
+    let replayed = replay(&path).unwrap();
+    assert_eq!(replayed.difference, None);
+    assert!((6_000..6_400).contains(&replayed.steps), "{}", replayed.steps);
+
+    let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let [one, other] = ["finger0.peak_force_n", "finger1.peak_force_n"].map(value);
+    assert_eq!(value("peak_force_n"), one.max(other));
+    assert!(one > 0.9 && other > 0.9, "{one} {other}");
+    assert_eq!(value("energy_j"), value("finger0.energy_j") + value("finger1.energy_j"));
+
+    let page = page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
+    assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains("finger1.peak_force_n"));
 }
 
 #[test]

@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::scene::controller;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
-use clock::Clock;
+pub use clock::Clock;
 use digest::Digest;
 use fingertip::config::{Config, ConfigError, newtons};
 use fingertip::frame::{COLUMNS, Frame, SLOTS};
@@ -52,11 +52,19 @@ pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimErro
 /// # Errors
 /// As [`simulate`].
 pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+    simulate_from::<E>(scene, 0.0, watch)
+}
+
+/// The same with the board's clock begun so long before; it changes nothing.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from<E: Set>(scene: &Scene, begun_s: f64, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    let mut board = Board::<E>::new(scene)?;
+    let mut board = Board::<E>::new(scene, begun_s)?;
     board.run(scene, watch);
     Ok(Summary {
-        virtual_s: board.clock.time_s(),
+        virtual_s: board.time_s(),
         wall_s: started.elapsed().as_secs_f64(),
         ledger: board.costs(scene),
         digest: board.digest.hex(),
@@ -81,13 +89,15 @@ struct Board<E: Set> {
     bridges: Vec<Bridge>,
     params: fingertip::params::Params,
     clock: Clock,
+    /// The scene's start.
+    start: Clock,
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
 }
 
 impl<E: Set> Board<E> {
-    fn new(scene: &Scene) -> Result<Self, SimError> {
+    fn new(scene: &Scene, begun_s: f64) -> Result<Self, SimError> {
         let params = controller::params(scene);
         let config = Config::new(&params).map_err(SimError::Controller)?;
         let setup = controller::setup(scene);
@@ -107,39 +117,55 @@ impl<E: Set> Board<E> {
                 next: Bridge::Coast,
             });
         }
-        let world = World::<E>::new(&setup, &surroundings(scene), effects);
+        let world = World::<E>::new(&setup, &Surroundings::of(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let slot_s = f64::from(config.timing.slot_ticks) / f64::from(fingertip::scan::TIMER_HZ);
         let bridges = vec![Bridge::Coast; units.len()];
-        Ok(Self { world, units, bridges, params, clock: Clock::default(), slot_s, longest_s, digest: Digest::new() })
+        Ok(Self {
+            world,
+            units,
+            bridges,
+            params,
+            clock: Clock::from_start(begun_s),
+            start: Clock::default(),
+            slot_s,
+            longest_s,
+            digest: Digest::new(),
+        })
     }
 
     fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
         let controller = Controller { params: self.params, calibration: None };
         watch.begin(&vec![controller; self.units.len()]);
         let tare_frames = TARE_FRAMES + 2;
-        let frame_s = self.slot_s * SLOTS as f64;
-        self.clock = Clock::before(f64::from(tare_frames) * frame_s);
+        self.start = self.clock;
+        self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
         for unit in &mut self.units {
             unit.command.tare_request = 1;
         }
         for _ in 0..tare_frames {
             self.frame(watch);
         }
-        self.clock = Clock::default();
+        self.start = self.clock;
         for unit in &mut self.units {
             unit.command.torque = true;
             unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;
         }
-        while self.clock.time_s() < scene.duration_s {
+        while self.time_s() < scene.duration_s {
             self.frame(watch);
         }
     }
 
+    /// From the scene's start; below 0 while the fingers are tared.
+    fn time_s(&self) -> f64 {
+        self.clock.since(self.start)
+    }
+
     /// Scans one frame of each finger and takes its control step.
     fn frame(&mut self, watch: &mut dyn Watch) {
-        let second_s = self.units[0].link.second_s(self.clock.time_s());
+        let time_s = self.time_s();
+        let second_s = self.units[0].link.second_s(time_s);
         let slot_s = self.slot_s * second_s;
         for slot in [0..DUTY_DELAY_SLOTS, DUTY_DELAY_SLOTS..SLOTS] {
             if slot.start == DUTY_DELAY_SLOTS {
@@ -161,7 +187,7 @@ impl<E: Set> Board<E> {
         let mut from = slots.start;
         while from < slots.end {
             let count = if parts > 1.0 { 1 } else { at_once.min(slots.end - from) };
-            let (begun_s, part_s) = (self.clock.time_s(), slot_s * count as f64 / parts);
+            let (begun_s, part_s) = (self.time_s(), slot_s * count as f64 / parts);
             for part in 0..parts as usize {
                 self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
             }
@@ -175,7 +201,7 @@ impl<E: Set> Board<E> {
     }
 
     fn sample(&mut self, slot: usize, since_s: f64) {
-        let time_s = self.clock.time_s();
+        let time_s = self.time_s();
         for (finger, unit) in self.units.iter_mut().enumerate() {
             let kpa = if slot < SLOTS - 1 { self.world.row_kpa(finger, since_s, slot) } else { [0.0; COLUMNS] };
             let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
@@ -186,7 +212,7 @@ impl<E: Set> Board<E> {
     }
 
     fn control(&mut self, finger: usize, watch: &mut dyn Watch) {
-        let time_s = self.clock.time_s();
+        let time_s = self.time_s();
         let unit = &mut self.units[finger];
         unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
         let mut silent_ms = 0;
@@ -219,18 +245,5 @@ impl<E: Set> Board<E> {
             sum
         };
         scene.effects.iter().map(|named| of(named.effect.name)).collect()
-    }
-}
-
-/// What a scene does to its object.
-fn surroundings(scene: &Scene) -> Surroundings {
-    let (object, hand) = (scene.table("object"), scene.table("hand"));
-    let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));
-    Surroundings {
-        floor_until_s: object.number("floor_until_s"),
-        shake_g: object.number("shake_g"),
-        shake_s: [shake_s, shake_s + object.number("shake_ms") * 1e-3],
-        lift_mm: hand.number("lift_mm"),
-        lift_s: [lift_s, lift_s + hand.number("lift_s")],
     }
 }

@@ -132,7 +132,7 @@ impl<E: Set> World<E> {
                 let drawn_s = overlap_s([time_s, time_s + dt_s], [grip.drift_from_s, f64::INFINITY]);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
                 let force_n = finger.contact.law().force_n(finger.flank_mm() - surface_mm);
-                (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm);
+                (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, dt_s);
             }
         }
     }
@@ -159,7 +159,7 @@ impl<E: Set> World<E> {
                 force_n[0] += side(index) * mean_n;
                 if let Some(grip) = &grips[index] {
                     let way_mm = next.place_mm[1] - body.place_mm[1] - lifted_mm;
-                    let (up_n, state) = finger.contact.along.moved(grip, normal_n, way_mm);
+                    let (up_n, state) = finger.contact.along.moved(grip, normal_n, way_mm, dt_s);
                     force_n[1] += up_n;
                     along.push(state);
                 }

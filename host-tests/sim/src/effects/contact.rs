@@ -57,8 +57,8 @@ pub trait Memory {
     /// It is taken from the elastic force.
     fn forgotten_n(&mut self) -> f64;
 
-    /// Time goes on at a held elastic force.
-    fn relax(&mut self, dt_s: f64, elastic_n: f64);
+    /// Time goes on at a held elastic force; at none where the tip, not yet back in shape, touches nothing.
+    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>);
 }
 
 /// The object yields like a spring behind its surface.
@@ -81,6 +81,8 @@ pub trait Strength {
 pub struct Grip {
     /// Stiffness of the patch along the surface.
     pub n_per_mm: f64,
+    /// Damping beside the stiffness.
+    pub n_s_per_mm: f64,
     /// Share of the normal force at which it begins to slip.
     pub still: f64,
     /// Share of the normal force while it slips.
@@ -120,7 +122,7 @@ pub trait Stages {
         0.0
     }
     /// See [`Memory::relax`].
-    fn relax(&mut self, _dt_s: f64, _elastic_n: f64) {}
+    fn relax(&mut self, _dt_s: f64, _elastic_n: Option<f64>) {}
     /// The sum of [`Series::mm_per_n`].
     fn mm_per_n(&mut self) -> f64 {
         0.0
@@ -195,7 +197,7 @@ impl Stages for Named {
         self.memory.iter_mut().map(|effect| effect.call(|part| part.forgotten_n())).sum()
     }
 
-    fn relax(&mut self, dt_s: f64, elastic_n: f64) {
+    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
         self.memory.iter_mut().for_each(|effect| effect.call(|part| part.relax(dt_s, elastic_n)));
     }
 

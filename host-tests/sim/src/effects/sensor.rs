@@ -177,6 +177,7 @@ impl Readout {
         stages.volts(slot, time_s, &mut volts);
         let mut codes = volts.map(|volts| volts / array.reference_v * Array::CODES);
         stages.codes(slot, time_s, &mut codes);
-        codes.map(|code| code.floor().clamp(0.0, Array::CODES - 1.0) as u16)
+        // What becomes an integer is cut: rounded down, as it is not below 0.
+        codes.map(|code| code.clamp(0.0, Array::CODES - 1.0) as u16)
     }
 }

@@ -1,5 +1,7 @@
 //! An object that can move, and what moves it beside the fingers: weight, a floor, a shaking, and the hand that lifts.
 
+use crate::scene::Scene;
+
 /// Standard gravity, mm/s^2.
 const GRAVITY_MM_PER_S2: f64 = 9806.65;
 
@@ -28,6 +30,19 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
+    /// Of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let (object, hand) = (scene.table("object"), scene.table("hand"));
+        let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));
+        Self {
+            floor_until_s: object.number("floor_until_s"),
+            shake_g: object.number("shake_g"),
+            shake_s: [shake_s, shake_s + object.number("shake_ms") * 1e-3],
+            lift_mm: hand.number("lift_mm"),
+            lift_s: [lift_s, lift_s + hand.number("lift_s")],
+        }
+    }
+
     /// How high the hand is: from rest to rest with the least jerk, 10 t^3 - 15 t^4 + 6 t^5.
     pub fn hand_mm(&self, time_s: f64) -> f64 {
         let [from_s, to_s] = self.lift_s;

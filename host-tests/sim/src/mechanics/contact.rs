@@ -69,8 +69,8 @@ impl<C: Stages> Contact<C> {
 
     /// Lets the tip forget for a while at an overlap.
     pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
-        let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm)).max(self.forgotten_n);
-        self.effects.relax(dt_s, elastic_n);
+        let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm));
+        self.effects.relax(dt_s, (elastic_n >= self.forgotten_n).then_some(elastic_n));
         self.forgotten_n = self.effects.forgotten_n();
     }
 
@@ -113,21 +113,24 @@ impl<C: Stages> Contact<C> {
 
 impl Along {
     /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the state behind it.
-    pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64) -> (f64, Self) {
+    pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
         let mut next = *self;
-        let trial = self.stretch_mm + way_mm;
+        let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };
+        let trial_mm = self.stretch_mm + way_mm;
+        let trial_n = grip.n_per_mm * trial_mm + damping * way_mm;
         // It sticks again once the motion turns against the slip.
         let slips = self.slipping != 0.0 && way_mm * self.slipping > 0.0;
-        let limit_mm = if slips { grip.slipping } else { grip.still } * normal_n / grip.n_per_mm;
-        if trial.abs() > limit_mm {
-            let held_mm = grip.slipping * normal_n / grip.n_per_mm;
-            next.stretch_mm = trial.clamp(-held_mm, held_mm);
-            next.slip_mm += (trial - next.stretch_mm).abs();
-            next.slipping = trial.signum();
+        let limit_n = if slips { grip.slipping } else { grip.still } * normal_n;
+        if trial_n.abs() > limit_n {
+            next.slipping = trial_n.signum();
+            let held_n = next.slipping * grip.slipping * normal_n;
+            next.stretch_mm = (held_n + damping * self.stretch_mm) / (grip.n_per_mm + damping);
+            next.slip_mm += (trial_mm - next.stretch_mm).abs();
         } else {
-            next.stretch_mm = trial;
+            next.stretch_mm = trial_mm;
             next.slipping = 0.0;
         }
-        (-0.5 * grip.n_per_mm * (self.stretch_mm + next.stretch_mm), next)
+        let spring_n = 0.5 * grip.n_per_mm * (self.stretch_mm + next.stretch_mm);
+        (-spring_n - damping * (next.stretch_mm - self.stretch_mm), next)
     }
 }

@@ -3,24 +3,29 @@
 /// Femtoseconds in a second.
 const FS: f64 = 1e15;
 
-/// An instant; below 0 while the fingers are tared.
+/// An instant of virtual time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Clock(i128);
 
 impl Clock {
-    /// So long before the start.
-    pub fn before(seconds: f64) -> Self {
-        Self(-whole(seconds))
+    /// So long after the clock began.
+    pub fn from_start(seconds: f64) -> Self {
+        Self(whole(seconds))
     }
 
-    /// Goes on by less than an hour.
+    /// Goes on.
     pub fn go_on(&mut self, seconds: f64) {
         self.0 += whole(seconds);
     }
 
-    /// From the scene's start.
+    /// From another instant to this one: below 0 where it is to come.
+    pub fn since(self, other: Self) -> f64 {
+        (self.0 - other.0) as f64 / FS
+    }
+
+    /// Since the clock began.
     pub fn time_s(self) -> f64 {
-        self.0 as f64 / FS
+        self.since(Self(0))
     }
 }
 

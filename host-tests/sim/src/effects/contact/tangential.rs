@@ -11,7 +11,7 @@ pub const EFFECT: Description = Description {
     family: Family::Contact,
     about: "Friction along the surface: the patch gives a little, sticks, and slips.",
     equations: &[
-        "T = n_per_mm s, s the way of the object against the tip since they stick",
+        "T = n_per_mm s + damping_n_s_per_mm ds/dt, s the way of the object against the tip since they stick",
         "it slips where T > still N; while it slips T = slipping N, and it sticks again once the motion turns",
         "the patch's centre on the array moves by s",
     ],
@@ -19,6 +19,7 @@ pub const EFFECT: Description = Description {
     reference: "Coulomb friction behind a spring (Dahl; Mindlin's full stick): silicone on skin-like surfaces 0.5 to 1",
     keys: &[
         Key::number("n_per_mm", "Stiffness of the patch along the surface.", 0.001, 1000.0, 1.0),
+        Key::number("damping_n_s_per_mm", "Damping of the patch along the surface.", 0.0, 10.0, 0.001),
         Key::number("still", "Share of the normal force at which it begins to slip.", 0.0, 10.0, 0.8),
         Key::number("slipping", "Share of the normal force while it slips; at most `still` counts.", 0.0, 10.0, 0.7),
         Key::number("drift_mm_per_s", "How fast an object that stands fast is drawn along.", -1000.0, 1000.0, 0.0),
@@ -29,6 +30,7 @@ pub const EFFECT: Description = Description {
         let values = build.values;
         Part::Tangent(Box::new(Tangential(Grip {
             n_per_mm: values.number("n_per_mm"),
+            n_s_per_mm: values.number("damping_n_s_per_mm"),
             still: values.number("still"),
             slipping: values.number("slipping").min(values.number("still")),
             drift_mm_per_s: values.number("drift_mm_per_s"),

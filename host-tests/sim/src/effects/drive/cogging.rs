@@ -17,7 +17,7 @@ pub const EFFECT: Description = Description {
     state: "none",
     reference: "ironless motors such as the reference have none; a few percent of the stall torque in slotted ones",
     keys: &[
-        Key::number("torque_mnm", "Amplitude at the motor's shaft.", 0.0, 1000.0, 0.05),
+        Key::number("torque_mnm", "Amplitude at the motor's shaft.", 0.0, 20.0, 0.05),
         Key::whole("teeth", "Periods for one turn of the motor: N.", 1, 1000, 12),
     ],
     zero: &[("torque_mnm", 0.0)],

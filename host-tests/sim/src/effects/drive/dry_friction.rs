@@ -13,7 +13,7 @@ pub const EFFECT: Description = Description {
     equations: &["T = -sign(w) torque_mnm while it turns", "at rest it holds any torque up to torque_mnm"],
     state: "none",
     reference: "FAULHABER data sheet 1331 ... SR: 0.12 mNm",
-    keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 1000.0, 0.12)],
+    keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 20.0, 0.12)],
     zero: &[("torque_mnm", 0.0)],
     build: |build: &Build| Part::Resist(Box::new(DryFriction { torque_nm: build.values.number("torque_mnm") * 1e-3 })),
 };

@@ -18,7 +18,7 @@ pub const EFFECT: Description = Description {
     state: "none",
     reference: "the Lorentzian form after Hess and Soom, J. Tribology 112 (1990); here it comes without an exponential",
     keys: &[
-        Key::number("torque_mnm", "What it adds at rest, at the motor's shaft.", 0.0, 1000.0, 0.06),
+        Key::number("torque_mnm", "What it adds at rest, at the motor's shaft.", 0.0, 20.0, 0.06),
         Key::number("speed_rad_per_s", "Speed at which half of it is left.", 0.01, 10000.0, 5.0),
     ],
     zero: &[("torque_mnm", 0.0)],

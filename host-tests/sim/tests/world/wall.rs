@@ -1,8 +1,6 @@
 //! The wall scene, natively.
 
-mod common;
-
-use common::{Last, scene};
+use crate::bench::{Last, scene};
 use fingertip::safety::Mode;
 use sim::effects::set::Named;
 use sim::native::simulate_with;

@@ -128,6 +128,8 @@ fn the_last_of_simultaneous_events_counts_and_late_packets_keep_their_order() {
         for ms in 0..2000 {
             let goal_n = host.goal_n(f64::from(ms) * 1e-3, &mut stages);
             assert!(goal_n >= last, "an older goal overtook");
+            let silent_ms = host.silent_ms(f64::from(ms) * 1e-3);
+            assert!(goal_n == last || silent_ms <= 1, "a goal came {silent_ms} ms before it arrived");
             last = goal_n;
         }
         assert_eq!(last, 2.0);

@@ -1,6 +1,6 @@
 //! Reports in a real browser, light and dark, on a screen and on a phone. `cargo xtask test` installs the browser and runs this.
 //!
-//! The pictures that it takes lie in `target/tmp/report`.
+//! The pictures that it takes lie in `target/tmp`.
 
 use browser::{Browser, Look, complaints};
 use sim::report::{Report, Trace, page};
@@ -32,10 +32,19 @@ fn address(path: &Path) -> String {
 }
 
 #[test]
-fn a_report_has_nothing_wrong() {
-    let (folder, mut browser) = browser("report");
-    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/../sim/tests/left_behind/wall.toml");
-    let scene = cli::load(scene, &[], None).unwrap();
+fn a_report_of_one_finger_has_nothing_wrong() {
+    nothing_is_wrong("wall");
+}
+
+#[test]
+fn a_report_of_two_fingers_has_nothing_wrong() {
+    nothing_is_wrong("grasp");
+}
+
+fn nothing_is_wrong(name: &str) {
+    let (folder, mut browser) = browser(name);
+    let scene = format!("{}/../sim/tests/left_behind/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let scene = cli::load(&scene, &[], None).unwrap();
     let board: Run = &|scene, watch| Ok(native::simulate(scene, watch)?);
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(&scene, board, &mut [&mut trace]).unwrap();

@@ -126,18 +126,23 @@ fn pressures(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
 }
 
 fn metrics(report: &Report) -> Markup {
-    let outcome = report.outcome;
-    let about = |name: &str| {
-        let name = name.rsplit('.').next().unwrap_or(name);
-        METRICS.iter().find(|metric| metric.name == name).map_or("", |metric| metric.about)
-    };
+    let measured = &report.outcome.measured;
+    let fingers = report.trace.fingers.len();
+    let columns = if fingers > 1 { 0..fingers } else { 0..0 };
     html! {
-        div.scroll tabindex="0" { table.metrics {
-            thead { tr { th scope="col" { "metric" } th.number scope="col" { "value" } th scope="col" { "what it is" } } }
-            tbody { @for (name, value) in &outcome.measured.0 { tr {
-                td { code { (name) } }
-                td.number { (shown(*value)) }
-                td.about { (about(name)) }
+        div.scroll tabindex="0" { table.metrics[columns.is_empty()] {
+            thead { tr {
+                th scope="col" { "metric" } th.number scope="col" { "value" }
+                @for finger in columns.clone() { th.number scope="col" { "finger " (finger) } }
+                th scope="col" { "what it is" }
+            } }
+            tbody { @for metric in METRICS { tr {
+                td { code { (metric.name) } }
+                td.number { (shown(measured.get(metric.name))) }
+                @for finger in columns.clone() {
+                    td.number { (shown(measured.get(&format!("finger{finger}.{}", metric.name)))) }
+                }
+                td.about { (metric.about) }
             } } }
         } }
     }

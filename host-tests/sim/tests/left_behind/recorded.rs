@@ -52,8 +52,9 @@ fn two_fingers_are_measured_recorded_and_drawn_each() {
     assert!(one > 0.9 && other > 0.9, "{one} {other}");
     assert_eq!(value("energy_j"), value("finger0.energy_j") + value("finger1.energy_j"));
 
-    let page = page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
-    assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains("finger1.peak_force_n"));
+    let page =
+        page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
+    assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains(">finger 1</th>"));
 }
 
 #[test]

@@ -62,6 +62,8 @@ pub enum Board {
     Native,
     /// The flash image on the emulated microcontroller.
     Virtual,
+    /// Both, one after the other, and compared: results are the emulated one's.
+    Both,
 }
 
 impl Args {

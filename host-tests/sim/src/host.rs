@@ -40,6 +40,12 @@ impl Host {
 
     /// The goal that has arrived at the controller by a time; times never fall.
     pub fn goal_n(&mut self, time_s: f64, stages: &mut impl Stages) -> f64 {
+        while self.arrival(time_s, stages).is_some() {}
+        self.arrived_n
+    }
+
+    /// The next packet that arrives by a time: when, and its goal. Times never fall.
+    pub fn arrival(&mut self, time_s: f64, stages: &mut impl Stages) -> Option<(f64, f64)> {
         loop {
             let event = self.script.get(self.next).filter(|event| event.at_s <= self.send_s);
             let at_s = event.map_or(self.send_s, |event| event.at_s);
@@ -52,10 +58,9 @@ impl Host {
             }
             self.send(at_s, stages);
         }
-        while let Some((at_s, goal_n)) = self.flying.pop_front_if(|(at_s, _)| *at_s <= time_s) {
-            (self.arrived_s, self.arrived_n) = (at_s, goal_n);
-        }
-        self.arrived_n
+        let packet = self.flying.pop_front_if(|(at_s, _)| *at_s <= time_s)?;
+        (self.arrived_s, self.arrived_n) = packet;
+        Some(packet)
     }
 
     /// Since the last packet that arrived, as the controller tells it.

@@ -3,7 +3,7 @@
 use crate::metrics::{Measured, shown};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
-use crate::watch::Summary;
+use crate::watch::{Cost, Summary};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -16,6 +16,19 @@ pub fn text(summary: &Summary) -> String {
         let _ = writeln!(text, "  {effect:24} {evaluations:>12} {seconds:>10.4} {percent:>6.1} %");
     }
     text
+}
+
+/// By effect in the scene's order, all fingers and stages together.
+pub fn by_effect(scene: &Scene, all: &[Cost]) -> Vec<Cost> {
+    let of = |effect| {
+        let mut sum = Cost { effect, evaluations: 0, seconds: 0.0 };
+        for cost in all.iter().filter(|cost| cost.effect == effect) {
+            sum.evaluations += cost.evaluations;
+            sum.seconds += cost.seconds;
+        }
+        sum
+    };
+    scene.effects.iter().map(|named| of(named.effect.name)).collect()
 }
 
 /// An effect, how often it was called, its time and its share of the run in percent; last what is no effect.

@@ -9,6 +9,7 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod agreement;
 pub mod cli;
 pub mod effects;
 pub mod explain;

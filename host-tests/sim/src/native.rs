@@ -10,6 +10,7 @@ use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
 use crate::effects::set::{Named, Set};
 use crate::host::Host;
+use crate::ledger;
 use crate::mechanics::body::Surroundings;
 use crate::scene::Scene;
 use crate::scene::controller;
@@ -236,14 +237,6 @@ impl<E: Set> Board<E> {
         for (unit, finger) in self.units.iter().zip(self.world.fingers()) {
             all.extend(E::costs(&unit.sensor, &finger.contact.effects, &finger.drive, &unit.link));
         }
-        let of = |name| {
-            let mut sum = Cost { effect: name, evaluations: 0, seconds: 0.0 };
-            for cost in all.iter().filter(|cost| cost.effect == name) {
-                sum.evaluations += cost.evaluations;
-                sum.seconds += cost.seconds;
-            }
-            sum
-        };
-        scene.effects.iter().map(|named| of(named.effect.name)).collect()
+        ledger::by_effect(scene, &all)
     }
 }

@@ -7,7 +7,8 @@
 //! | `/finger0/image` | `foxglove.RawImage` | 100 times a second | the same as a grey picture |
 //! | `/finger0/core` | `fingertip.Core` | each step | all that the core was given, byte for byte, and a digest of all that it answered |
 //!
-//! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file.
+//! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file. A
+//! recording of the emulated board holds what is seen of it from outside, a step each millisecond: it cannot be replayed, and says so.
 
 mod replay;
 mod schemas;
@@ -24,6 +25,9 @@ use serde_json::{Map, Value, json};
 const SETUP: &str = "fingertip.setup";
 /// The metadata record that closes a whole recording.
 const END: &str = "fingertip.end";
+
+/// Its entry that says whether a replay is possible.
+const WHOLE: &str = "whole";
 
 fn topic(finger: usize, what: &str) -> String {
     format!("/finger{finger}/{what}")

@@ -33,7 +33,7 @@ pub const EFFECTS: &[&Description] = &[
 ];
 
 /// Acts on the object's surface.
-pub trait Shape {
+pub trait Shape: Send {
     /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where it falls away.
     /// `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is that.
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
@@ -53,7 +53,7 @@ fn round(per_mm: f64, distance2_mm2: f64) -> f64 {
 }
 
 /// A force that the tip has forgotten.
-pub trait Memory {
+pub trait Memory: Send {
     /// It is taken from the elastic force.
     fn forgotten_n(&mut self) -> f64;
 
@@ -62,13 +62,13 @@ pub trait Memory {
 }
 
 /// The object yields like a spring behind its surface.
-pub trait Series {
+pub trait Series: Send {
     /// How far for each force. Asked for once.
     fn mm_per_n(&mut self) -> f64;
 }
 
 /// What an object bears.
-pub trait Strength {
+pub trait Strength: Send {
     /// The share of the force that is left after it bore this one.
     fn left(&mut self, force_n: f64) -> f64;
 
@@ -94,13 +94,13 @@ pub struct Grip {
 }
 
 /// Acts along the surface.
-pub trait Tangent {
+pub trait Tangent: Send {
     /// Asked for once a step.
     fn grip(&mut self) -> Grip;
 }
 
 /// The object can move.
-pub trait Body {
+pub trait Body: Send {
     /// Its mass. Asked for once.
     fn mass_kg(&mut self) -> f64;
 }

@@ -69,13 +69,13 @@ pub struct Friction {
 }
 
 /// Adds inertia.
-pub trait Inertia {
+pub trait Inertia: Send {
     /// At the shaft, where the tip moves so far for each angle. Asked for once.
     fn kg_m2(&mut self, m_per_rad: f64) -> f64;
 }
 
 /// Acts on what feeds the winding.
-pub trait Electric {
+pub trait Electric: Send {
     /// Changes the circuit of the step to come.
     fn apply(&mut self, circuit: &mut Circuit);
 
@@ -87,13 +87,13 @@ pub trait Electric {
 }
 
 /// Acts on what takes energy from the shaft.
-pub trait Resist {
+pub trait Resist: Send {
     /// Adds to the friction of a step whose mean speed is about this.
     fn apply(&mut self, speed_rad_per_s: f64, friction: &mut Friction);
 }
 
 /// A torque on the shaft that gives back what it takes.
-pub trait Potential {
+pub trait Potential: Send {
     /// Its energy at an angle.
     fn energy_j(&self, angle_rad: f64) -> f64;
 
@@ -105,13 +105,13 @@ pub trait Potential {
 }
 
 /// What lies between shaft and tip.
-pub trait Play {
+pub trait Play: Send {
     /// Where the tip is: the pressing flank stands at `flank_mm`, the object's surface at `surface_mm`.
     fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64;
 }
 
 /// Acts on the encoder's count.
-pub trait Encoder {
+pub trait Encoder: Send {
     /// What is read for a count.
     fn read(&mut self, count: i32) -> i32;
 }

@@ -20,13 +20,13 @@ pub const EFFECTS: &[&Description] = &[
 ];
 
 /// Acts on the controller's clock.
-pub trait Clock {
+pub trait Clock: Send {
     /// How long a second of the controller lasts in the world, from this time on.
     fn second_s(&mut self, time_s: f64) -> f64;
 }
 
 /// Acts on the packets from the host to the controller.
-pub trait Packets {
+pub trait Packets: Send {
     /// When a packet sent at a time arrives; none where it does not.
     fn pass(&mut self, sent_s: f64) -> Option<f64>;
 }

@@ -44,31 +44,31 @@ pub const EFFECTS: &[&Description] = &[
 pub type Row = [f64; COLUMNS];
 
 /// Acts on what a row's taxels feel, kPa.
-pub trait Pressure {
+pub trait Pressure: Send {
     /// The row is sampled at this time; times never fall.
     fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row);
 }
 
 /// Acts on the conductance of a row's taxels, S.
-pub trait Conductance {
+pub trait Conductance: Send {
     /// See [`Pressure::apply`].
     fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row);
 }
 
 /// Acts on the conductance that each column sees of the driven row, S.
-pub trait Network {
+pub trait Network: Send {
     /// `array` holds every taxel's conductance as of its row's last sample, `seen` what the columns see.
     fn apply(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row);
 }
 
 /// Acts on the amplifiers' voltages.
-pub trait Volts {
+pub trait Volts: Send {
     /// `slot` is a row, or [`ROWS`] where none is driven.
     fn apply(&mut self, slot: usize, time_s: f64, volts: &mut Row);
 }
 
 /// Acts on the converter's codes, not yet rounded.
-pub trait Codes {
+pub trait Codes: Send {
     /// See [`Volts::apply`].
     fn apply(&mut self, slot: usize, time_s: f64, codes: &mut Row);
 }

@@ -1,6 +1,6 @@
 //! Feeds a recording through the core again; the answers must be the same to the bit.
 
-use super::{END, SETUP, controller_of, topic};
+use super::{END, SETUP, WHOLE, controller_of, topic};
 use crate::run::RunError;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::config::Config;
@@ -68,6 +68,11 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
     let setup = metadata(bytes, SETUP)?;
+    if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
+        return Err("a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
+                    through the core again"
+            .into());
+    }
     let end = metadata(bytes, END)?;
     let field = |of: &Metadata, name: &str| {
         of.metadata

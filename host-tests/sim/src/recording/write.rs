@@ -1,6 +1,6 @@
 //! Writes a recording while the run goes on.
 
-use super::{END, SETUP, controller_json, schemas, topic};
+use super::{END, SETUP, WHOLE, controller_json, schemas, topic};
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Watch};
@@ -26,6 +26,7 @@ pub struct Recorder {
     out: Writer<BufWriter<File>>,
     scene: Scene,
     every: u64,
+    whole: bool,
     fingers: Vec<Finger>,
     begun: bool,
     start_s: Option<f64>,
@@ -53,11 +54,18 @@ impl Recorder {
             out: options.create(BufWriter::new(file))?,
             scene: scene.clone(),
             every: every.max(1),
+            whole: true,
             fingers: Vec::new(),
             begun: false,
             start_s: None,
             failed: Ok(()),
         })
+    }
+
+    /// Says in the file that the steps do not hold all that the core was given: no replay. Before the run begins.
+    pub fn seen_from_outside(mut self) -> Self {
+        self.whole = false;
+        self
     }
 
     /// Closes the file after the run.
@@ -90,6 +98,7 @@ impl Recorder {
             ("scene".to_owned(), self.scene.name.clone()),
             ("seed".to_owned(), self.scene.seed.to_string()),
             ("simulated".to_owned(), "true".to_owned()),
+            (WHOLE.to_owned(), self.whole.to_string()),
             ("fingers".to_owned(), controllers.len().to_string()),
         ]);
         for (number, controller) in controllers.iter().enumerate() {

@@ -21,6 +21,7 @@ pub struct Plot {
 /// One cannot be drawn.
 pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
     let Tracks { goal, force, sensed, indentation, duty, current, supply, winding, slip, height, .. } = tracks;
+    let Tracks { force_difference, travel_difference, .. } = tracks;
     let force = [Curve::Pale(sensed.points()), Curve::Dashed(steps(&goal.points())), Curve::Solid(force.points())];
     let force_about = "True force (solid), sensed force (pale), goal (dashed)";
     let mut plots = vec![
@@ -35,6 +36,8 @@ pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
         ("Temperature of the winding", "C", winding),
         ("Slip of the contact", "mm", slip),
         ("Height of the object", "mm", height),
+        ("True force less the native board's", "N", force_difference),
+        ("Travel less the native board's", "mm", travel_difference),
     ] {
         let points = track.points();
         if points.iter().any(|(_, value)| *value != points[0].1) {

@@ -1,5 +1,6 @@
 //! What a report draws, gathered while the run goes on: a bounded number of points, whatever the run's length.
 
+use crate::agreement::Path;
 use crate::metrics::newtons;
 use crate::watch::{Step, Watch};
 use fingertip::units::Duty;
@@ -100,6 +101,10 @@ pub struct Tracks {
     pub slip: Track,
     /// Height of the object, mm.
     pub height: Track,
+    /// The true force beside the other board's, N, where there is one.
+    pub force_difference: Track,
+    /// The travel beside the other board's, mm.
+    pub travel_difference: Track,
     /// True pressures at instants.
     pub maps: Vec<(f64, Pressures)>,
 }
@@ -108,6 +113,7 @@ pub struct Tracks {
 #[derive(Clone, Debug)]
 pub struct Trace {
     duration_s: f64,
+    other: Option<Path>,
     /// Finger by finger.
     pub fingers: Vec<Tracks>,
 }
@@ -115,7 +121,12 @@ pub struct Trace {
 impl Trace {
     /// Of a run of this length.
     pub fn new(duration_s: f64) -> Self {
-        Self { duration_s, fingers: Vec::new() }
+        Self { duration_s, other: None, fingers: Vec::new() }
+    }
+
+    /// Draws the difference from this one too.
+    pub fn compare_with(&mut self, other: Path) {
+        self.other = Some(other);
     }
 
     fn map_is_due(&self, finger: usize, time_s: f64) -> bool {
@@ -154,6 +165,10 @@ impl Watch for Trace {
             (&mut tracks.height, truth.object_mm[1]),
         ] {
             track.add(stretch, time_s, value);
+        }
+        if let Some([force_n, travel_mm]) = self.other.as_ref().and_then(|other| other.difference(step)) {
+            tracks.force_difference.add(stretch, time_s, force_n);
+            tracks.travel_difference.add(stretch, time_s, travel_mm);
         }
         if due {
             tracks.maps.push((time_s, truth.pressures_kpa));

@@ -150,7 +150,8 @@ impl<E: Set> World<E> {
         let mut next = body.moved(mass_kg, [0.0; 2], &self.around, time_s, dt_s);
         for _ in 0..ROUNDS {
             let (mut force_n, mut changed_mm) = ([0.0; 2], 0.0_f64);
-            (ends.clear(), along.clear());
+            ends.clear();
+            along.clear();
             for (index, finger) in self.fingers.iter_mut().enumerate() {
                 let [from, to] = [&body, &next].map(|body| surface_mm(finger.setup(), index, body));
                 let law = finger.contact.law();

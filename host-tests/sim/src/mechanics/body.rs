@@ -69,8 +69,8 @@ impl Body {
         let mut next = *self;
         let down = around.down_mm_per_s2(time_s, dt_s);
         let mm_per_s2 = [force_n[0] / mass_kg * 1e3, force_n[1] / mass_kg * 1e3 - down];
-        for axis in 0..2 {
-            let change = dt_s * mm_per_s2[axis];
+        for (axis, mm_per_s2) in mm_per_s2.into_iter().enumerate() {
+            let change = dt_s * mm_per_s2;
             next.place_mm[axis] += dt_s * (self.speed_mm_per_s[axis] + 0.5 * change);
             next.speed_mm_per_s[axis] += change;
         }

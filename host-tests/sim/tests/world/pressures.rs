@@ -1,6 +1,6 @@
 //! Taxel means from the table against the fine integral.
 
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::frame::ROWS;
 use host_tests::plant::cells::Cell;
 use host_tests::plant::setup::Tip;
 use sim::mechanics::pressures::Pressures;
@@ -38,8 +38,8 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
             sum += means.iter().sum::<f64>();
             // Every taxel of some rows: the fine integral is slow.
             if (row + case) % 3 == 0 {
-                for column in 0..COLUMNS {
-                    worst = worst.max((means[column] - fine(d_mm, centre_mm, row, column)).abs() / peak_kpa);
+                for (column, mean) in means.into_iter().enumerate() {
+                    worst = worst.max((mean - fine(d_mm, centre_mm, row, column)).abs() / peak_kpa);
                 }
             }
         }

@@ -121,6 +121,7 @@ pub const UNITS: &[(&str, &str)] = &[
     ("_codes_per_kpa", "codes/kPa"),
     ("_counts_per_turn", "counts a turn"),
     ("_mnm_per_a", "mN m/A"),
+    ("_n_s_per_mm", "N s/mm"),
     ("_n_per_mm", "N/mm"),
     ("_mm_per_s", "mm/s"),
     ("_rad_per_s", "rad/s"),

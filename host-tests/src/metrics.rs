@@ -2,6 +2,10 @@
 //!
 //! Every figure is of the true contact force, which only the simulated world knows; the sensed one is kept beside it.
 
+mod response;
+
+pub use response::Response;
+
 use crate::optimal::{Unreachable, minimum_time_s};
 use crate::plant::Setup;
 use fingertip::safety::Mode;
@@ -137,6 +141,7 @@ pub fn touch(stretch: &[Sample]) -> Result<Touch, MetricsError> {
     let start = before.iter().rfind(|sample| sample.time_s <= touched.time_s - APPROACH_S).unwrap_or(&first);
     let way_s = touched.time_s - start.time_s;
     let peak_n = after.iter().map(|sample| sample.true_force_n).fold(0.0, f64::max);
+    let response = response(0.0, last.goal_n, after);
     Ok(Touch {
         goal_n: last.goal_n,
         touched_after_ms: (touched.time_s - first.time_s) * 1e3,
@@ -144,8 +149,8 @@ pub fn touch(stretch: &[Sample]) -> Result<Touch, MetricsError> {
         distance_mm: touched.travel_mm - first.travel_mm,
         peak_n,
         peak_above_goal_percent: (peak_n / last.goal_n - 1.0) * 100.0,
-        settled_after_touch_ms: settled_s(after, SETTLED_SHARE * last.goal_n).map(|s| s * 1e3),
-        steady_error_mn: steady_error_n(after) * 1e3,
+        settled_after_touch_ms: response.settled_s().map(|s| s * 1e3),
+        steady_error_mn: response.steady_max_n() * 1e3,
     })
 }
 
@@ -156,24 +161,18 @@ pub fn touch(stretch: &[Sample]) -> Result<Touch, MetricsError> {
 pub fn step(stretch: &[Sample], setup: &Setup, limits: DriveLimits) -> Result<Step, MetricsError> {
     let (first, last) = ends(stretch)?;
     let (from_n, to_n) = (first.true_force_n, last.goal_n);
-    let reaches_s = |part| {
-        crossing_s(stretch, |sample| (sample.true_force_n - from_n) / (to_n - from_n) - part)
-            .ok_or(MetricsError::NoRise { from_n, to_n })
-    };
-    let unit_n = (to_n - from_n).abs().min(to_n);
-    let beyond_n =
-        stretch.iter().map(|sample| (sample.true_force_n - to_n) * (to_n - from_n).signum()).fold(0.0, f64::max);
+    let response = response(from_n, to_n, stretch);
     let [d_from_mm, d_to_mm] = [from_n, to_n].map(|force_n| setup.tip.indentation_mm(force_n));
     let optimal_s = minimum_time_s(setup, d_from_mm, d_to_mm, limits.volts, limits.amperes);
     let optimal_s = optimal_s.map_err(MetricsError::Unreachable)?;
-    let settling_s = settled_s(stretch, SETTLED_SHARE * unit_n);
+    let settling_s = response.settled_s();
     Ok(Step {
         from_n,
         to_n,
-        rise_ms: (reaches_s(0.9)? - reaches_s(0.1)?) * 1e3,
-        overshoot_percent: beyond_n / unit_n * 100.0,
+        rise_ms: response.rise_s().ok_or(MetricsError::NoRise { from_n, to_n })? * 1e3,
+        overshoot_percent: response.beyond_n() / response.unit_n() * 100.0,
         settling_ms: settling_s.map(|s| s * 1e3),
-        steady_error_mn: steady_error_n(stretch) * 1e3,
+        steady_error_mn: response.steady_max_n() * 1e3,
         time_optimal_ms: optimal_s * 1e3,
         settling_to_optimal_ratio: settling_s.map(|s| s / optimal_s),
     })
@@ -194,25 +193,8 @@ fn ends(stretch: &[Sample]) -> Result<(Sample, Sample), MetricsError> {
     }
 }
 
-/// When a value first is 0 or more, on the straight line between the samples around it.
-fn crossing_s(stretch: &[Sample], value: impl Fn(&Sample) -> f64) -> Option<f64> {
-    let at = stretch.iter().position(|sample| value(sample) >= 0.0)?;
-    let after = stretch[at];
-    let Some(before) = at.checked_sub(1).map(|before| stretch[before]) else { return Some(after.time_s) };
-    let (low, high) = (value(&before), value(&after));
-    Some(before.time_s + (after.time_s - before.time_s) * low / (low - high))
-}
-
-/// From the first sample to the first after which all are within the band; none where the last is outside.
-fn settled_s(stretch: &[Sample], band_n: f64) -> Option<f64> {
-    let outside = |sample: &Sample| (sample.true_force_n - sample.goal_n).abs() > band_n;
-    let inside = stretch.iter().rposition(outside).map_or(0, |last| last + 1);
-    Some(stretch.get(inside)?.time_s - stretch.first()?.time_s)
-}
-
-/// The largest error once the steady part began.
-fn steady_error_n(stretch: &[Sample]) -> f64 {
-    let from_s = stretch.first().map_or(0.0, |sample| sample.time_s + STEADY_AFTER_S);
-    let steady = stretch.iter().filter(|sample| sample.time_s >= from_s);
-    steady.map(|sample| (sample.true_force_n - sample.goal_n).abs()).fold(0.0, f64::max)
+fn response(from_n: f64, goal_n: f64, samples: &[Sample]) -> Response {
+    let mut response = Response::new(from_n, goal_n);
+    samples.iter().for_each(|sample| response.add(sample.time_s, sample.true_force_n));
+    response
 }

@@ -137,6 +137,7 @@ impl Shooting {
             volts: duty * supply.source_v * (d_to_mm - d_from_mm).signum(),
             ohms: supply.circuit_ohm(&setup.motor, duty),
             limit_a: current_limit,
+            kept_a: 0.0,
         };
         let angle_rad = |d_mm: f64| dynamics.angle_rad(setup.wall.distance_mm + d_mm);
         Self { dynamics, drive, from_rad: angle_rad(d_from_mm), to_rad: angle_rad(d_to_mm) }

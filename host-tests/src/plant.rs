@@ -244,7 +244,7 @@ impl World {
             Bridge::Driven { .. } => {
                 let duty = self.duty();
                 let ohms = self.setup.supply.circuit_ohm(&self.setup.motor, duty);
-                Source { volts: duty * self.source_v(), ohms, limit_a: f64::INFINITY }
+                Source { volts: duty * self.source_v(), ohms, ..Source::OPEN }
             }
         }
     }

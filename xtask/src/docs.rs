@@ -8,16 +8,19 @@ use crate::{
 use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
-/// Files that programs write: path, and the example of the package host-tests that prints their text.
-const GENERATED: [(&str, &str); 2] =
-    [("docs/control-table.md", "control-table"), ("examples/python/registers.py", "registers-python")];
+/// Files that programs write: path, and the package and its example that print their text.
+const GENERATED: [(&str, (&str, &str)); 3] = [
+    ("docs/control-table.md", ("host-tests", "control-table")),
+    ("docs/scenes.md", ("sim", "scenes-page")),
+    ("examples/python/registers.py", ("host-tests", "registers-python")),
+];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Its pictures, and those of the paper.
 pub const PICTURES: &str = "docs/pictures";
 /// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
-const README: (&str, &str) = ("README.md", "readme");
+const README: (&str, (&str, &str)) = ("README.md", ("host-tests", "readme"));
 
 /// Flags of `cargo xtask docs`.
 #[derive(clap::Args)]
@@ -65,9 +68,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// The text that a program prints.
-fn print(example: &str, argument: Option<&Path>) -> Result<String> {
+fn print((package, example): (&str, &str), argument: Option<&Path>) -> Result<String> {
     let mut command = console::cargo("run");
-    command.args(["--quiet", "--package", "host-tests", "--example", example, "--"]).args(argument);
+    command.args(["--quiet", "--package", package, "--example", example, "--"]).args(argument);
     console::output(&mut command)
 }
 

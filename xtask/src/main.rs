@@ -1,6 +1,7 @@
 //! The project's commands. `cargo xtask --help` lists them; each does its own set-up.
 
 mod apt;
+mod browser;
 mod console;
 mod demo;
 mod docs;
@@ -14,6 +15,7 @@ mod paths;
 mod proof;
 mod python;
 mod qemu;
+mod sim;
 mod size;
 mod study;
 mod test;
@@ -43,7 +45,19 @@ struct Cli {
 enum Command {
     /// Watch the flash image touch an object, hold the force and let go, on the virtual board
     Demo(demo::Args),
-    /// Run every test: core, host, panic-free proof, QEMU, virtual board
+    /// Run a scene: a text file that names what is simulated around the fingertip
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask sim wall --out target/wall\n  cargo xtask sim --list\n  cargo xtask sim --help    (all that it takes)"
+    )]
+    Sim(sim::Args),
+    /// Run a scene many times: over values of its keys, over seeds, on all cores and machines
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask sweep wall --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
+    )]
+    Sweep(sim::Args),
+    /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
     Build,
@@ -91,6 +105,8 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     let toolchain = cli.toolchain;
     match &cli.command {
         Command::Demo(args) => demo::run(args, toolchain, console),
+        Command::Sim(args) => sim::sim(args, toolchain, console),
+        Command::Sweep(args) => sim::sweep(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
@@ -115,8 +131,9 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     timing::ensure(console)?;
     qemu::ensure(console)?;
     python::ensure(console)?;
+    browser::ensure(console)?;
     lint::ensure_deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
-    console.say("All set up: demo, test, build, qemu, timing, size, lint and docs work offline now.");
+    console.say("All set up: demo, sim, sweep, test, build, qemu, timing, size, lint and docs work offline now.");
     Ok(())
 }

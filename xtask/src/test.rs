@@ -1,6 +1,7 @@
 //! Every test, a stage each.
 
 use crate::{
+    browser,
     console::{self, Stages},
     demo, image, proof, python, qemu,
     size::Sizes,
@@ -39,6 +40,12 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
         let python = python::ensure(console)?;
         let mut command = demo::virtual_board("test");
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
+        console.run(&mut command)
+    });
+    stages.stage("reports in a browser", |console| {
+        let program = browser::ensure(console)?;
+        let mut command = console::cargo("test");
+        command.args(["--profile", "host", "--package", "browser"]).env("FINGERTIP_CHROMIUM", &program);
         console.run(&mut command)
     });
     stages.finish("test")

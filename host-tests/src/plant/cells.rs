@@ -36,10 +36,14 @@ pub struct Cell {
 impl Cell {
     /// The square of a taxel.
     pub fn of(setup: &Setup, row: usize, column: usize) -> Self {
-        let pitch = setup.array.pitch_mm;
-        let left = (column as f64 - 0.5 * COLUMNS as f64) * pitch - setup.wall.centre_x_mm;
-        let low = (row as f64 - 0.5 * ROWS as f64) * pitch - setup.wall.centre_y_mm;
-        Self { x_mm: [left, left + pitch], y_mm: [low, low + pitch] }
+        Self::at(setup.array.pitch_mm, [setup.wall.centre_x_mm, setup.wall.centre_y_mm], row, column)
+    }
+
+    /// The same, of squares so far apart under a contact centred there.
+    pub fn at(pitch_mm: f64, centre_mm: [f64; 2], row: usize, column: usize) -> Self {
+        let left = (column as f64 - 0.5 * COLUMNS as f64) * pitch_mm - centre_mm[0];
+        let low = (row as f64 - 0.5 * ROWS as f64) * pitch_mm - centre_mm[1];
+        Self { x_mm: [left, left + pitch_mm], y_mm: [low, low + pitch_mm] }
     }
 
     /// Mean pressure on it.

@@ -52,7 +52,7 @@ pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
         frame("Duty of the bridge: as it was (pale) and its mean of 10 ms", "%", -100.0, 100.0).draw(
             &panels[2],
             |chart| {
-                chart.line(&duty, PALE_INK.stroke_width(1))?;
+                chart.pale(&duty)?;
                 chart.solid(&mean, INK)
             },
         )
@@ -152,6 +152,10 @@ impl Frame<'_> {
 impl Chart<'_, '_> {
     pub fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
         self.line(points, ink.stroke_width(2))
+    }
+
+    pub fn pale(&mut self, points: &Points) -> Result<(), PlotError> {
+        self.line(points, PALE_INK.stroke_width(1))
     }
 
     fn line(&mut self, points: &Points, style: ShapeStyle) -> Result<(), PlotError> {

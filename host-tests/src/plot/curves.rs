@@ -8,6 +8,8 @@ use super::{GOAL_INK, INK, PlotError, picture};
 pub enum Curve {
     /// A solid line through points.
     Solid(Vec<(f64, f64)>),
+    /// A thin, pale line through points.
+    Pale(Vec<(f64, f64)>),
     /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
     /// A circle at each point.
@@ -16,13 +18,13 @@ pub enum Curve {
 
 /// A panel.
 #[derive(Clone, Debug)]
-pub struct Curves {
+pub struct Curves<'a> {
     /// What it shows.
     pub title: String,
     /// The horizontal axis, with its unit.
-    pub x: &'static str,
+    pub x: &'a str,
     /// The vertical axis, with its unit.
-    pub y: &'static str,
+    pub y: &'a str,
     /// Left and right end.
     pub x_range: [f64; 2],
     /// Lower and upper end.
@@ -35,7 +37,7 @@ pub struct Curves {
 ///
 /// # Errors
 /// There is no panel.
-pub fn curves(panels: &[Curves], panel_px: (u32, u32)) -> Result<String, PlotError> {
+pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, PlotError> {
     if panels.is_empty() {
         return Err(PlotError("there is no panel".into()));
     }
@@ -46,6 +48,7 @@ pub fn curves(panels: &[Curves], panel_px: (u32, u32)) -> Result<String, PlotErr
             frame.draw(&area, |chart| {
                 curves.iter().try_for_each(|curve| match curve {
                     Curve::Solid(points) => chart.solid(points, INK),
+                    Curve::Pale(points) => chart.pale(points),
                     Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
                     Curve::Circles(points) => chart.circles(points),
                 })

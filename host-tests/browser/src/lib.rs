@@ -1,0 +1,8 @@
+//! A headless Chromium, driven over the DevTools protocol: opens a page as a screen or a phone shows it, light or dark, and tells
+//! what is wrong with it.
+
+mod complaints;
+mod devtools;
+
+pub use complaints::{Look, complaints};
+pub use devtools::{Browser, BrowserError};

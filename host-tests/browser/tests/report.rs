@@ -1,0 +1,88 @@
+//! Reports in a real browser, light and dark, on a screen and on a phone. `cargo xtask test` installs the browser and runs this.
+//!
+//! The pictures that it takes lie in `target/tmp`.
+
+use browser::{Browser, Look, complaints};
+use sim::report::{Report, Trace, page};
+use sim::run::{Run, run};
+use sim::{cli, ledger, native};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const LOOKS: [Look; 4] = [
+    Look { dark: false, phone: false },
+    Look { dark: true, phone: false },
+    Look { dark: false, phone: true },
+    Look { dark: true, phone: true },
+];
+
+/// A folder, and a browser with a new profile in it.
+fn browser(name: &str) -> (PathBuf, Browser) {
+    let program = std::env::var_os("FINGERTIP_CHROMIUM");
+    let program = program.expect("FINGERTIP_CHROMIUM must name a Chromium: `cargo xtask test` sets it");
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    let browser = Browser::start(Path::new(&program), &folder.join("profile")).unwrap();
+    (folder, browser)
+}
+
+fn address(path: &Path) -> String {
+    format!("file://{}", path.display())
+}
+
+#[test]
+fn a_report_of_one_finger_has_nothing_wrong() {
+    nothing_is_wrong("wall");
+}
+
+#[test]
+fn a_report_of_two_fingers_has_nothing_wrong() {
+    nothing_is_wrong("grasp");
+}
+
+fn nothing_is_wrong(name: &str) {
+    let (folder, mut browser) = browser(name);
+    let scene = format!("{}/../sim/tests/left_behind/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let scene = cli::load(&scene, &[], None).unwrap();
+    let board: Run = &|scene, watch| Ok(native::simulate(scene, watch)?);
+    let mut trace = Trace::new(scene.duration_s);
+    let outcome = run(&scene, board, &mut [&mut trace]).unwrap();
+    let ablated = ledger::ablate(&scene, board).unwrap();
+    let report = Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated };
+    let path = folder.join("report.html");
+    fs::write(&path, page(&report).unwrap()).unwrap();
+    for look in LOOKS {
+        let [scheme, device] =
+            [["light", "dark"][usize::from(look.dark)], ["screen", "phone"][usize::from(look.phone)]];
+        let picture = folder.join(format!("{device}-{scheme}.png"));
+        let found = complaints(&mut browser, &address(&path), look, &picture).unwrap();
+        assert!(found.is_empty(), "{look:?}:\n{}", found.join("\n"));
+        assert!(fs::metadata(&picture).unwrap().len() > 20_000, "{} shows next to nothing", picture.display());
+    }
+}
+
+#[test]
+fn whatever_is_wrong_is_found() {
+    let (folder, mut browser) = browser("wrong");
+    let mut found = |look, page: &str| {
+        let path = folder.join("wrong.html");
+        fs::write(&path, page).unwrap();
+        complaints(&mut browser, &address(&path), look, &folder.join("wrong.png")).unwrap().join("\n")
+    };
+    let [light, dark] = [LOOKS[0], LOOKS[1]];
+    let empty = found(light, "<!doctype html><title></title>");
+    for complaint in ["no title", "all but empty", "does not say", "`plots` is missing", "0 plots", "0 pressure maps"] {
+        assert!(empty.contains(complaint), "{complaint} is not in\n{empty}");
+    }
+    let wide = found(light, "<!doctype html><title>t</title><div style='width:3000px'>x</div>");
+    assert!(wide.contains("px too wide"), "{wide}");
+    let script = found(light, "<!doctype html><script>console.error('one'); missing()</script>");
+    assert!(script.contains("console: ") && script.contains("exception: "), "{script}");
+    let fetch = found(light, "<!doctype html><img src='nowhere.png'>");
+    assert!(fetch.contains("fetches file://"), "{fetch}");
+    let bright = found(dark, "<!doctype html><style>body { background: #fff; color: #000 }</style>x");
+    assert!(bright.contains("rgb(255, 255, 255)"), "{bright}");
+    let nameless = found(light, "<!doctype html><div role='img'></div>");
+    assert!(nameless.contains("1 pictures have no words"), "{nameless}");
+}

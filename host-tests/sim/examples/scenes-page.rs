@@ -1,0 +1,5 @@
+//! Prints `docs/scenes.md`: `cargo run -p sim --example scenes-page`.
+
+fn main() {
+    print!("{}", sim::explain::page());
+}

@@ -1,0 +1,143 @@
+//! Whether two boards do the same in a scene: the second one's trajectory beside the first one's.
+//!
+//! Both begin with the script. They cannot be alike to the bit: the emulated board's frames run on through the script's times, so a
+//! goal is taken up to two frames sooner or later; its duty acts some microseconds beside the native board's; its PWM counts in
+//! steps; its rows are sampled in a world that moves in steps of 10 us. All but the PWM's steps is a shift in time. So the bound is
+//! a tube: at each time the second board lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond
+//! them by a little: [`BEYOND_N`] and [`BEYOND_MM`].
+
+use crate::scene::Scene;
+use crate::watch::{Step, Watch};
+use std::fmt;
+
+/// How far the two may be shifted in time.
+pub const SHIFT_S: f64 = 0.5e-3;
+/// How far beyond the tube the force may be.
+pub const BEYOND_N: f64 = 0.01;
+/// How far beyond the tube the travel may be.
+pub const BEYOND_MM: f64 = 0.01;
+/// What draws its numbers by the sample draws others on the other board.
+const NOISE: [&str; 2] = ["noise", "burst"];
+
+/// Force and travel at a time.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    time_s: f64,
+    values: [f64; 2],
+}
+
+/// A run's trajectory, finger by finger.
+#[derive(Clone, Debug, Default)]
+pub struct Path(Vec<Vec<Point>>);
+
+impl Watch for Path {
+    fn step(&mut self, step: &Step) {
+        if self.0.len() <= step.finger {
+            self.0.resize_with(step.finger + 1, Vec::new);
+        }
+        self.0[step.finger].push(point(step));
+    }
+}
+
+impl Path {
+    /// What another board's step differs by: force in N, travel in mm; none where the path is not known.
+    pub fn difference(&self, step: &Step) -> Option<[f64; 2]> {
+        let points = self.0.get(step.finger)?;
+        let after = points.partition_point(|point| point.time_s < step.time_s);
+        let (to, from) = (points.get(after)?, points.get(after.checked_sub(1)?)?);
+        let share = (step.time_s - from.time_s) / (to.time_s - from.time_s);
+        let here = point(step).values;
+        Some(core::array::from_fn(|n| here[n] - from.values[n] - share * (to.values[n] - from.values[n])))
+    }
+
+    /// How far a step lies beyond what the path was within the shift.
+    fn beyond(&self, step: &Step) -> Option<[f64; 2]> {
+        let points = self.0.get(step.finger)?;
+        let first = points.partition_point(|point| point.time_s < step.time_s - SHIFT_S).saturating_sub(1);
+        let near = points[first..].iter().take_while(|point| point.time_s <= step.time_s + 2.0 * SHIFT_S);
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for point in near {
+            for n in 0..2 {
+                (low[n], high[n]) = (low[n].min(point.values[n]), high[n].max(point.values[n]));
+            }
+        }
+        let here = point(step).values;
+        Some(core::array::from_fn(|n| (low[n] - here[n]).max(here[n] - high[n]).max(0.0)))
+    }
+}
+
+fn point(step: &Step) -> Point {
+    Point { time_s: step.time_s, values: [step.truth.force_n, step.truth.travel_mm] }
+}
+
+/// The largest of something and when it was.
+type Largest = (f64, f64);
+
+/// Watches the second board.
+#[derive(Clone, Debug)]
+pub struct Agreement {
+    first: Path,
+    noisy: bool,
+    steps: u64,
+    /// Force and travel.
+    difference: [Largest; 2],
+    beyond: [Largest; 2],
+}
+
+impl Agreement {
+    /// With the first board's path.
+    pub fn new(scene: &Scene, first: Path) -> Self {
+        let noisy = scene.effects.iter().any(|named| NOISE.contains(&named.effect.name));
+        Self { first, noisy, steps: 0, difference: [(0.0, 0.0); 2], beyond: [(0.0, 0.0); 2] }
+    }
+
+    /// Whether the second board stayed in the tube; a scene with noise is not judged.
+    pub fn held(&self) -> bool {
+        let [(force_n, _), (travel_mm, _)] = self.beyond;
+        self.noisy || self.steps > 0 && force_n <= BEYOND_N && travel_mm <= BEYOND_MM
+    }
+
+    /// Largest difference of the force, N, and of the travel, mm.
+    pub fn differences(&self) -> [f64; 2] {
+        self.difference.map(|(largest, _)| largest)
+    }
+
+    /// How far beyond the tube the second board was: N and mm.
+    pub fn beyond(&self) -> [f64; 2] {
+        self.beyond.map(|(largest, _)| largest)
+    }
+}
+
+impl Watch for Agreement {
+    fn step(&mut self, step: &Step) {
+        if step.time_s < 0.0 {
+            return;
+        }
+        let (Some(difference), Some(beyond)) = (self.first.difference(step), self.first.beyond(step)) else { return };
+        self.steps += 1;
+        for (largest, value) in [(&mut self.difference, difference), (&mut self.beyond, beyond)] {
+            for (largest, value) in largest.iter_mut().zip(value) {
+                if value.abs() > largest.0 {
+                    *largest = (value.abs(), step.time_s);
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Agreement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [(force_n, force_s), (travel_mm, travel_s)] = self.difference;
+        let [(beyond_n, _), (beyond_mm, _)] = self.beyond;
+        writeln!(f, "Both boards, {} steps: they differ by {force_n:.4} N at most (at {force_s:.4} s)", self.steps)?;
+        writeln!(f, "  and by {travel_mm:.4} mm (at {travel_s:.4} s);")?;
+        let shift_ms = SHIFT_S * 1e3;
+        writeln!(f, "  beyond a shift of {shift_ms} ms by {beyond_n:.4} N ({BEYOND_N} allowed) and {beyond_mm:.4} mm")?;
+        let verdict = match (self.noisy, self.held()) {
+            (true, _) => "a scene with noise is not judged",
+            (false, true) => "held",
+            (false, false) => "BROKEN",
+        };
+        write!(f, "  ({BEYOND_MM} allowed): {verdict}")
+    }
+}

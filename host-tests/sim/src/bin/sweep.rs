@@ -1,0 +1,87 @@
+//! `sweep`: many runs of a scene on the native board, over keys, seeds, cores and machines.
+
+use clap::{Parser, Subcommand};
+use sim::cli::verdict;
+use sim::native;
+use sim::sweep::{Plan, Vary, merge, sweep};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::time::Instant;
+
+/// Runs a scene many times: over values of its keys and over seeds, on all cores. Writes runs.csv, summary.csv and plots.
+#[derive(Parser)]
+#[command(
+    name = "sweep",
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  \
+        sweep wall --seeds 1000\n  \
+        sweep wall --vary tip.modulus_kpa=200..300:5 --vary tip.radius_mm=8..12:3 --seeds 20\n  \
+        sweep wall --seeds 1000 --shard 2/4 --out DIR    (on the second of four machines)\n  \
+        sweep merge DIR/runs-*-of-4.csv --out DIR    (the same, byte for byte, as without --shard)"
+)]
+struct Args {
+    #[command(subcommand)]
+    merge: Option<Merge>,
+    /// The scene: a file, or a name out of the library
+    #[arg(required = true)]
+    scene: Option<String>,
+    /// Varies a key over N values (5 where N is not given); may be given many times: all combinations are run
+    #[arg(long, value_name = "TABLE.KEY=LO..HI[:N]", value_parser = Vary::from_str)]
+    vary: Vec<Vary>,
+    /// In place of what the scene says, in every run
+    #[arg(long, value_name = "TABLE.KEY=VALUE")]
+    set: Vec<String>,
+    /// Seeds at each point, counted on from the scene's
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    seeds: u64,
+    /// Runs only the I-th of N shares, for merging
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<[usize; 2]>,
+    /// Where the results go
+    #[arg(long, value_name = "DIR", default_value = "target/sweep")]
+    out: PathBuf,
+}
+
+#[derive(Subcommand)]
+enum Merge {
+    /// Puts the shards of a sweep together
+    Merge {
+        /// The shards' files
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+        /// Where the results go
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+    },
+}
+
+fn shard(text: &str) -> Result<[usize; 2], String> {
+    let wrong = || format!("`{text}`: I/N is asked for, I from 1 to N");
+    let (shard, shards) = text.split_once('/').ok_or_else(wrong)?;
+    let [shard, shards]: [usize; 2] = [shard.parse().map_err(|_| wrong())?, shards.parse().map_err(|_| wrong())?];
+    if (1..=shards).contains(&shard) { Ok([shard, shards]) } else { Err(wrong()) }
+}
+
+fn main() -> ExitCode {
+    let Args { merge: merged, scene, vary, set, seeds, shard, out } = Args::parse();
+    let started = Instant::now();
+    let (table, out, whole) = match merged {
+        Some(Merge::Merge { files, out }) => (merge(&files, &out), out, true),
+        None => {
+            let plan = Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or([1, 1]), out };
+            let board =
+                |scene: &_, watch: &mut dyn sim::watch::Watch| native::simulate(scene, watch).map_err(Into::into);
+            (sweep(&plan, &board), plan.out.clone(), plan.shard[1] == 1)
+        }
+    };
+    verdict(table.map(|table| {
+        if whole {
+            print!("{}", table.text());
+        }
+        println!("{} runs in {:.1} s, written to {}", table.rows.len(), started.elapsed().as_secs_f64(), out.display());
+        table.passed()
+    }))
+}

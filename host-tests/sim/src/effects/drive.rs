@@ -1,0 +1,233 @@
+//! From the bridge's duty to the tip's way.
+//!
+//! A step of the drive asks each stage once: what feeds the winding (circuit), what takes energy from the shaft (friction). Torques
+//! that store energy (potential) are asked for at every round of the step's solution, and give the mean over the step's way, so that
+//! none is lost. After the step the winding's heat, the tip's place behind the gear's play and the encoder's count follow. Without effects
+//! there is a rotor without friction, a winding that is a resistance, an ideal source, and a rigid transmission.
+
+mod backlash;
+mod cogging;
+mod dry_friction;
+mod encoder_resolution;
+mod gear_efficiency;
+mod inertia;
+mod stribeck;
+mod supply_sag;
+mod thermal_derating;
+mod viscous_friction;
+mod winding_inductance;
+
+use super::{Metered, Part};
+use crate::registry::Description;
+use crate::watch::{Cost, Truth};
+
+/// The effects of this family, in the order in which they act within a stage.
+pub const EFFECTS: &[&Description] = &[
+    &inertia::EFFECT,
+    &supply_sag::EFFECT,
+    &thermal_derating::EFFECT,
+    &winding_inductance::EFFECT,
+    &dry_friction::EFFECT,
+    &stribeck::EFFECT,
+    &viscous_friction::EFFECT,
+    &gear_efficiency::EFFECT,
+    &cogging::EFFECT,
+    &backlash::EFFECT,
+    &encoder_resolution::EFFECT,
+];
+
+/// What the winding is connected to, for a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Circuit {
+    /// The source's voltage.
+    pub source_v: f64,
+    /// Its resistance; the motor sees duty^2 of it.
+    pub source_ohm: f64,
+    /// The bridge's share of the supply, -1 to 1.
+    pub duty: f64,
+    /// The winding.
+    pub winding_ohm: f64,
+    /// The bridge's two switches.
+    pub bridge_ohm: f64,
+    /// The winding's inductance; without one the current follows at once.
+    pub henry: f64,
+    /// Torque constant, and back-EMF constant in V s/rad.
+    pub torque_nm_per_a: f64,
+}
+
+/// What takes energy from the shaft, for a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Friction {
+    /// While it slides, whatever its load.
+    pub sliding_nm: f64,
+    /// To be exceeded from rest, whatever its load.
+    pub holding_nm: f64,
+    /// Share of the tip's load, sliding and from rest.
+    pub load_share: f64,
+    /// For each speed.
+    pub viscous_nm_s: f64,
+}
+
+/// Adds inertia.
+pub trait Inertia: Send {
+    /// At the shaft, where the tip moves so far for each angle. Asked for once.
+    fn kg_m2(&mut self, m_per_rad: f64) -> f64;
+}
+
+/// Acts on what feeds the winding.
+pub trait Electric: Send {
+    /// Changes the circuit of the step to come.
+    fn apply(&mut self, circuit: &mut Circuit);
+
+    /// The step is done: its length, and the integral of the current's square over it.
+    fn after(&mut self, _dt_s: f64, _circuit: &Circuit, _square_a2_s: f64) {}
+
+    /// Says what it knows.
+    fn tell(&self, _truth: &mut Truth) {}
+}
+
+/// Acts on what takes energy from the shaft.
+pub trait Resist: Send {
+    /// Adds to the friction of a step whose mean speed is about this.
+    fn apply(&mut self, speed_rad_per_s: f64, friction: &mut Friction);
+}
+
+/// A torque on the shaft that gives back what it takes.
+pub trait Potential: Send {
+    /// Its energy at an angle.
+    fn energy_j(&self, angle_rad: f64) -> f64;
+
+    /// Its mean torque against the motion between two angles: the difference in energy over the way.
+    fn mean_nm(&mut self, from_rad: f64, to_rad: f64) -> f64;
+
+    /// How steep the torque can become.
+    fn steepest_nm_per_rad(&self) -> f64;
+}
+
+/// What lies between shaft and tip.
+pub trait Play: Send {
+    /// Where the tip is: the pressing flank stands at `flank_mm`, the object's surface at `surface_mm`.
+    fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64;
+}
+
+/// Acts on the encoder's count.
+pub trait Encoder: Send {
+    /// What is read for a count.
+    fn read(&mut self, count: i32) -> i32;
+}
+
+/// The stages as the finger calls them: of the named effects, or `()`, in which none is compiled.
+pub trait Stages {
+    /// All inertia added.
+    fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
+        0.0
+    }
+    /// See [`Electric::apply`].
+    fn circuit(&mut self, _circuit: &mut Circuit) {}
+    /// See [`Electric::after`].
+    fn heated(&mut self, _dt_s: f64, _circuit: &Circuit, _square_a2_s: f64) {}
+    /// See [`Resist`].
+    fn friction(&mut self, _speed_rad_per_s: f64, _friction: &mut Friction) {}
+    /// See [`Potential::mean_nm`].
+    fn potential_nm(&mut self, _from_rad: f64, _to_rad: f64) -> f64 {
+        0.0
+    }
+    /// See [`Potential::energy_j`].
+    fn potential_j(&self, _angle_rad: f64) -> f64 {
+        0.0
+    }
+    /// The sum of [`Potential::steepest_nm_per_rad`].
+    fn steepest_nm_per_rad(&self) -> f64 {
+        0.0
+    }
+    /// See [`Play`].
+    fn tip_mm(&mut self, flank_mm: f64, _surface_mm: f64) -> f64 {
+        flank_mm
+    }
+    /// See [`Encoder`].
+    fn count(&mut self, count: i32) -> i32 {
+        count
+    }
+    /// Says what the effects know.
+    fn tell(&self, _truth: &mut Truth) {}
+}
+
+impl Stages for () {}
+
+/// The named effects.
+#[derive(Default)]
+pub struct Named {
+    inertia: Vec<Metered<dyn Inertia>>,
+    electric: Vec<Metered<dyn Electric>>,
+    resist: Vec<Metered<dyn Resist>>,
+    potential: Vec<Metered<dyn Potential>>,
+    play: Vec<Metered<dyn Play>>,
+    encoder: Vec<Metered<dyn Encoder>>,
+}
+
+impl Named {
+    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
+    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
+        match part {
+            Part::Inertia(part) => self.inertia.push(Metered::new(name, part)),
+            Part::Electric(part) => self.electric.push(Metered::new(name, part)),
+            Part::Resist(part) => self.resist.push(Metered::new(name, part)),
+            Part::Potential(part) => self.potential.push(Metered::new(name, part)),
+            Part::Play(part) => self.play.push(Metered::new(name, part)),
+            Part::Encoder(part) => self.encoder.push(Metered::new(name, part)),
+            other => return Some(other),
+        }
+        None
+    }
+
+    /// What each has cost so far.
+    pub fn costs(&self) -> impl Iterator<Item = Cost> {
+        let (inertia, electric) = (self.inertia.iter().map(Metered::cost), self.electric.iter().map(Metered::cost));
+        let (resist, potential) = (self.resist.iter().map(Metered::cost), self.potential.iter().map(Metered::cost));
+        let (play, encoder) = (self.play.iter().map(Metered::cost), self.encoder.iter().map(Metered::cost));
+        inertia.chain(electric).chain(resist).chain(potential).chain(play).chain(encoder)
+    }
+}
+
+impl Stages for Named {
+    fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
+        self.inertia.iter_mut().map(|effect| effect.call(|part| part.kg_m2(m_per_rad))).sum()
+    }
+
+    fn circuit(&mut self, circuit: &mut Circuit) {
+        self.electric.iter_mut().for_each(|effect| effect.call(|part| part.apply(circuit)));
+    }
+
+    fn heated(&mut self, dt_s: f64, circuit: &Circuit, square_a2_s: f64) {
+        self.electric.iter_mut().for_each(|effect| effect.call(|part| part.after(dt_s, circuit, square_a2_s)));
+    }
+
+    fn friction(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
+        self.resist.iter_mut().for_each(|effect| effect.call(|part| part.apply(speed_rad_per_s, friction)));
+    }
+
+    fn potential_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
+        self.potential.iter_mut().map(|effect| effect.call(|part| part.mean_nm(from_rad, to_rad))).sum()
+    }
+
+    fn potential_j(&self, angle_rad: f64) -> f64 {
+        self.potential.iter().map(|effect| effect.part().energy_j(angle_rad)).sum()
+    }
+
+    fn steepest_nm_per_rad(&self) -> f64 {
+        self.potential.iter().map(|effect| effect.part().steepest_nm_per_rad()).sum()
+    }
+
+    fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
+        let plays = self.play.iter_mut();
+        plays.fold(flank_mm, |tip_mm, effect| effect.call(|part| part.tip_mm(tip_mm, surface_mm)))
+    }
+
+    fn count(&mut self, count: i32) -> i32 {
+        self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part.read(count)))
+    }
+
+    fn tell(&self, truth: &mut Truth) {
+        self.electric.iter().for_each(|effect| effect.part().tell(truth));
+    }
+}

@@ -1,0 +1,42 @@
+//! Friction that is higher at low speed: what starts moving jumps.
+
+use super::{Friction, Resist};
+use crate::effects::{Build, Part};
+use crate::key::Key;
+use crate::registry::{Description, Family};
+
+/// What a scene names.
+pub const EFFECT: Description = Description {
+    name: "stribeck",
+    family: Family::Drive,
+    about: "Friction that is higher at low speed: what starts moving jumps.",
+    equations: &[
+        "T = -sign(w) torque_mnm / (1 + (w / speed)^2), added to other friction",
+        "at rest it holds up to torque_mnm more",
+        "the speed is taken at the middle of the step, foreseen from the step before",
+    ],
+    state: "none",
+    reference: "the Lorentzian form after Hess and Soom, J. Tribology 112 (1990); here it comes without an exponential",
+    keys: &[
+        Key::number("torque_mnm", "What it adds at rest, at the motor's shaft.", 0.0, 20.0, 0.06),
+        Key::number("speed_rad_per_s", "Speed at which half of it is left.", 0.01, 10000.0, 5.0),
+    ],
+    zero: &[("torque_mnm", 0.0)],
+    build: |build: &Build| {
+        let (torque_nm, speed) = (build.values.number("torque_mnm") * 1e-3, build.values.number("speed_rad_per_s"));
+        Part::Resist(Box::new(Stribeck { torque_nm, speed_rad_per_s: speed }))
+    },
+};
+
+struct Stribeck {
+    torque_nm: f64,
+    speed_rad_per_s: f64,
+}
+
+impl Resist for Stribeck {
+    fn apply(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
+        let share = speed_rad_per_s / self.speed_rad_per_s;
+        friction.sliding_nm += self.torque_nm / (1.0 + share * share);
+        friction.holding_nm += self.torque_nm;
+    }
+}

@@ -1,0 +1,183 @@
+//! From the taxels' pressure to the frame's codes.
+//!
+//! The stages in order: pressure (kPa a row), conductance (S a row), network (what a column sees of the driven row), volts (at the
+//! column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal: every taxel alike, a
+//! perfect row switch, a perfect virtual ground, settled at once, 12 bits.
+
+mod broken_taxels;
+mod converter;
+mod creep;
+mod gain_spread;
+mod ghosting;
+mod hysteresis;
+mod noise;
+mod offset;
+mod row_sag;
+mod saturation;
+mod settling;
+mod since;
+mod temperature_drift;
+
+use super::{Metered, Part};
+use crate::registry::Description;
+use crate::watch::Cost;
+use fingertip::frame::{COLUMNS, ROWS};
+use host_tests::plant::setup::Array;
+
+/// The effects of this family, in the order in which they act within a stage.
+pub const EFFECTS: &[&Description] = &[
+    &hysteresis::EFFECT,
+    &creep::EFFECT,
+    &gain_spread::EFFECT,
+    &temperature_drift::EFFECT,
+    &broken_taxels::EFFECT,
+    &ghosting::EFFECT,
+    &row_sag::EFFECT,
+    &settling::EFFECT,
+    &saturation::EFFECT,
+    &noise::EFFECT,
+    &offset::EFFECT,
+    &converter::EFFECT,
+];
+
+/// A row's or a slot's worth of numbers, a column each.
+pub type Row = [f64; COLUMNS];
+
+/// Acts on what a row's taxels feel, kPa.
+pub trait Pressure: Send {
+    /// The row is sampled at this time; times never fall.
+    fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row);
+}
+
+/// Acts on the conductance of a row's taxels, S.
+pub trait Conductance: Send {
+    /// See [`Pressure::apply`].
+    fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row);
+}
+
+/// Acts on the conductance that each column sees of the driven row, S.
+pub trait Network: Send {
+    /// `array` holds every taxel's conductance as of its row's last sample, `seen` what the columns see.
+    fn apply(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row);
+}
+
+/// Acts on the amplifiers' voltages.
+pub trait Volts: Send {
+    /// `slot` is a row, or [`ROWS`] where none is driven.
+    fn apply(&mut self, slot: usize, time_s: f64, volts: &mut Row);
+}
+
+/// Acts on the converter's codes, not yet rounded.
+pub trait Codes: Send {
+    /// See [`Volts::apply`].
+    fn apply(&mut self, slot: usize, time_s: f64, codes: &mut Row);
+}
+
+/// The stages as the readout calls them: of the named effects, or `()`, in which none is compiled.
+pub trait Stages {
+    /// All effects of the stage, in order.
+    fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
+    /// As [`Stages::pressure`].
+    fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
+    /// As [`Stages::pressure`].
+    fn network(&mut self, _row: usize, _array: &[Row; ROWS], _seen: &mut Row) {}
+    /// As [`Stages::pressure`].
+    fn volts(&mut self, _slot: usize, _time_s: f64, _volts: &mut Row) {}
+    /// As [`Stages::pressure`].
+    fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
+}
+
+impl Stages for () {}
+
+/// The named effects.
+#[derive(Default)]
+pub struct Named {
+    pressure: Vec<Metered<dyn Pressure>>,
+    conductance: Vec<Metered<dyn Conductance>>,
+    network: Vec<Metered<dyn Network>>,
+    volts: Vec<Metered<dyn Volts>>,
+    codes: Vec<Metered<dyn Codes>>,
+}
+
+impl Named {
+    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
+    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
+        match part {
+            Part::Pressure(part) => self.pressure.push(Metered::new(name, part)),
+            Part::Conductance(part) => self.conductance.push(Metered::new(name, part)),
+            Part::Network(part) => self.network.push(Metered::new(name, part)),
+            Part::Volts(part) => self.volts.push(Metered::new(name, part)),
+            Part::Codes(part) => self.codes.push(Metered::new(name, part)),
+            other => return Some(other),
+        }
+        None
+    }
+
+    /// What each has cost so far.
+    pub fn costs(&self) -> impl Iterator<Item = Cost> {
+        let pressure = self.pressure.iter().map(Metered::cost);
+        let conductance = self.conductance.iter().map(Metered::cost);
+        let network = self.network.iter().map(Metered::cost);
+        let volts = self.volts.iter().map(Metered::cost);
+        let codes = self.codes.iter().map(Metered::cost);
+        pressure.chain(conductance).chain(network).chain(volts).chain(codes)
+    }
+}
+
+impl Stages for Named {
+    fn pressure(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
+        self.pressure.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, time_s, kpa)));
+    }
+
+    fn conductance(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
+        self.conductance.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, time_s, siemens)));
+    }
+
+    fn network(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row) {
+        self.network.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, array, seen)));
+    }
+
+    fn volts(&mut self, slot: usize, time_s: f64, volts: &mut Row) {
+        self.volts.iter_mut().for_each(|effect| effect.call(|part| part.apply(slot, time_s, volts)));
+    }
+
+    fn codes(&mut self, slot: usize, time_s: f64, codes: &mut Row) {
+        self.codes.iter_mut().for_each(|effect| effect.call(|part| part.apply(slot, time_s, codes)));
+    }
+}
+
+/// The readout of one finger's array.
+pub struct Readout {
+    array: Array,
+    siemens: [Row; ROWS],
+}
+
+impl Readout {
+    /// Of an array whose row switches are perfect; what its `row_ohm` and `settle_tau_s` say is the effects' to say.
+    pub fn new(array: &Array) -> Self {
+        let array = Array { row_ohm: 0.0, settle_tau_s: 0.0, ..*array };
+        Self { array, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
+    }
+
+    /// The codes of a slot sampled at a time, its row under these pressures (not looked at where no row is driven).
+    pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
+        let array = &self.array;
+        let mut volts = [array.ground_v; COLUMNS];
+        if let Some(row) = self.siemens.get_mut(slot) {
+            let mut kpa = *kpa;
+            stages.pressure(slot, time_s, &mut kpa);
+            *row = kpa.map(|kpa| (array.preload_siemens + array.siemens_per_kpa * kpa).max(0.0));
+            stages.conductance(slot, time_s, row);
+            let mut seen = *row;
+            stages.network(slot, &self.siemens, &mut seen);
+            for (volts, more) in volts.iter_mut().zip(array.row_volts(&seen)) {
+                *volts += more;
+            }
+        }
+        stages.volts(slot, time_s, &mut volts);
+        let mut codes = volts.map(|volts| volts / array.reference_v * Array::CODES);
+        stages.codes(slot, time_s, &mut codes);
+        // What becomes an integer is cut: rounded down, as it is not below 0.
+        codes.map(|code| code.clamp(0.0, Array::CODES - 1.0) as u16)
+    }
+}

@@ -1,0 +1,66 @@
+//! Taxels that are dead, stuck or shorted.
+
+use super::{Conductance, Row};
+use crate::effects::{Build, Part};
+use crate::key::{Key, Kind};
+use crate::registry::{Description, Family};
+use fingertip::frame::{COLUMNS, ROWS};
+use host_tests::plant::setup::Array;
+
+const TAXELS: Kind = Kind::Pairs { below: ROWS as i64 };
+
+/// What a scene names.
+pub const EFFECT: Description = Description {
+    name: "broken_taxels",
+    family: Family::Sensor,
+    about: "Taxels that are dead, stuck or shorted, from a time on.",
+    equations: &["dead: G = 0", "shorted: G = 0.1 S (10 Ohm)", "stuck: G = what it was at the first sample after at_s"],
+    state: "the conductance at which each stuck taxel is stuck",
+    reference: "docs/plant.md, defects of the array",
+    keys: &[
+        Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
+        Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },
+        Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: TAXELS },
+        Key {
+            name: "at_s",
+            about: "When they break; -10 is before the tare.",
+            kind: Kind::Number { min: -10.0, max: 1e6, default: Some(-10.0) },
+        },
+    ],
+    zero: &[],
+    build: |build: &Build| {
+        let mut taxels = [[Taxel::Sound; COLUMNS]; ROWS];
+        let shorted = Taxel::Fixed(Array::default().short_siemens);
+        for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
+            build.values.pairs(name).iter().for_each(|[row, column]| taxels[*row as usize][*column as usize] = taxel);
+        }
+        Part::Conductance(Box::new(BrokenTaxels { taxels, at_s: build.values.number("at_s") }))
+    },
+};
+
+#[derive(Clone, Copy)]
+enum Taxel {
+    Sound,
+    Stuck,
+    Fixed(f64),
+}
+
+struct BrokenTaxels {
+    taxels: [[Taxel; COLUMNS]; ROWS],
+    at_s: f64,
+}
+
+impl Conductance for BrokenTaxels {
+    fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
+        if time_s < self.at_s {
+            return;
+        }
+        for (taxel, siemens) in self.taxels[row].iter_mut().zip(siemens) {
+            match *taxel {
+                Taxel::Sound => {}
+                Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
+                Taxel::Fixed(fixed) => *siemens = fixed,
+            }
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! The columns are sampled before they have settled.
+
+use super::{Row, Volts};
+use crate::effects::{Build, Part};
+use crate::key::{Key, Kind};
+use crate::registry::{Description, Family};
+use host_tests::plant::readout::decay;
+
+/// What a scene names.
+pub const EFFECT: Description = Description {
+    name: "settling",
+    family: Family::Sensor,
+    about: "Each column still carries a part of the slot before when it is sampled.",
+    equations: &[
+        "dv/dt = (V - v) / tau_us, V what the slot settles to",
+        "sampled at after_us behind the slot's edge: v = V + (v_edge - V) exp(-after_us / tau_us), exact",
+    ],
+    state: "voltage of each column at the last edge, and what it settles to (20 numbers)",
+    reference: "docs/plant.md, readout: 0.2 us; half a bit of 12 takes 9.0 tau",
+    keys: &[
+        Key {
+            name: "tau_us",
+            about: "Time constant.",
+            kind: Kind::Number { min: 0.0, max: 100.0, default: Some(0.2) },
+        },
+        Key {
+            name: "after_us",
+            about: "From the edge to the sample.",
+            kind: Kind::Number { min: 0.1, max: 1000.0, default: Some(2.4) },
+        },
+    ],
+    zero: &[("tau_us", 0.0)],
+    build: |build: &Build| {
+        let tau_s = build.values.number("tau_us") * 1e-6;
+        let left = decay(build.values.number("after_us") * 1e-6 / tau_s);
+        Part::Volts(Box::new(Settling { tau_s, left, before: None }))
+    },
+};
+
+struct Settling {
+    tau_s: f64,
+    /// What is left of a difference at the sample.
+    left: f64,
+    before: Option<Before>,
+}
+
+struct Before {
+    time_s: f64,
+    edge_v: Row,
+    end_v: Row,
+}
+
+impl Volts for Settling {
+    fn apply(&mut self, _slot: usize, time_s: f64, volts: &mut Row) {
+        let end_v = *volts;
+        let edge_v = match &self.before {
+            None => end_v,
+            Some(Before { time_s: before_s, edge_v, end_v }) => {
+                let left = decay((time_s - before_s) / self.tau_s);
+                core::array::from_fn(|column| end_v[column] + left * (edge_v[column] - end_v[column]))
+            }
+        };
+        for (volts, edge) in volts.iter_mut().zip(edge_v) {
+            *volts += self.left * (edge - *volts);
+        }
+        self.before = Some(Before { time_s, edge_v, end_v });
+    }
+}

@@ -1,0 +1,67 @@
+//! The array warms up and reads differently.
+
+use super::{Pressure, Row};
+use crate::effects::{Build, Part};
+use crate::key::{Key, Kind};
+use crate::registry::{Description, Family};
+use host_tests::plant::readout::decay;
+
+/// What a scene names.
+pub const EFFECT: Description = Description {
+    name: "temperature_drift",
+    family: Family::Sensor,
+    about: "The array warms up from the scene's start; its gain and its zero drift along.",
+    equations: &[
+        "T = warming_k (1 - exp(-t / time_constant_s)), t from the start, 0 before it",
+        "p' = p (1 + a T) + b T, a = gain_percent_per_k / 100, b = zero_kpa_per_k",
+    ],
+    state: "none: T is a function of time",
+    reference: "Tekscan FlexiForce A201 data sheet: 0.36 %/K; the zero's drift is an assumption",
+    keys: &[
+        Key {
+            name: "warming_k",
+            about: "How much warmer it is in the end.",
+            kind: Kind::Number { min: -60.0, max: 100.0, default: Some(20.0) },
+        },
+        Key {
+            name: "time_constant_s",
+            about: "Time in which it has come to 63 % of that.",
+            kind: Kind::Number { min: 0.001, max: 1e6, default: Some(600.0) },
+        },
+        Key {
+            name: "gain_percent_per_k",
+            about: "Change of the gain.",
+            kind: Kind::Number { min: -1.0, max: 1.0, default: Some(0.36) },
+        },
+        Key {
+            name: "zero_kpa_per_k",
+            about: "Change of the reading without pressure.",
+            kind: Kind::Number { min: -1.0, max: 1.0, default: Some(0.01) },
+        },
+    ],
+    zero: &[("warming_k", 0.0)],
+    build: |build: &Build| {
+        let number = |name| build.values.number(name);
+        Part::Pressure(Box::new(TemperatureDrift {
+            warming_k: number("warming_k"),
+            time_constant_s: number("time_constant_s"),
+            gain_per_k: number("gain_percent_per_k") / 100.0,
+            zero_kpa_per_k: number("zero_kpa_per_k"),
+        }))
+    },
+};
+
+struct TemperatureDrift {
+    warming_k: f64,
+    time_constant_s: f64,
+    gain_per_k: f64,
+    zero_kpa_per_k: f64,
+}
+
+impl Pressure for TemperatureDrift {
+    fn apply(&mut self, _row: usize, time_s: f64, kpa: &mut Row) {
+        let warmer_k = self.warming_k * (1.0 - decay(time_s.max(0.0) / self.time_constant_s));
+        let (gain, zero_kpa) = (1.0 + self.gain_per_k * warmer_k, self.zero_kpa_per_k * warmer_k);
+        kpa.iter_mut().for_each(|kpa| *kpa = *kpa * gain + zero_kpa);
+    }
+}

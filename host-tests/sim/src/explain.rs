@@ -1,0 +1,154 @@
+//! What a scene computes, what it may name, and the page of it all.
+
+use crate::effects::{Build, Part};
+use crate::key::{Key, Values};
+use crate::metrics;
+use crate::registry::{self, Description, Family};
+use crate::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
+use crate::scene::{Scene, library, read};
+use std::fmt::Write as _;
+
+/// The effects that a scene names, with the equations and the state that each adds.
+pub fn scene(scene: &Scene) -> String {
+    let mut text = format!("{}: {}\n", scene.name, scene.about);
+    let _ = writeln!(
+        text,
+        "{} s, {} events, {} bounds, seed {}",
+        scene.duration_s,
+        scene.script.len(),
+        scene.bounds.len(),
+        scene.seed
+    );
+    if scene.effects.is_empty() {
+        text += "\nIt names no effect: a motor without friction presses an ideal tip on a rigid plane, read without error.\n";
+    }
+    for named in &scene.effects {
+        let Description { name, family, about, equations, state, reference, .. } = named.effect;
+        let _ = writeln!(text, "\n{name} ({})\n  {about}", family.name());
+        equations.iter().for_each(|line| text += &format!("    {line}\n"));
+        let _ = writeln!(text, "  state: {state}\n  source: {reference}");
+        for (name, value) in named.values.iter() {
+            let _ = writeln!(text, "  {name} = {value}");
+        }
+    }
+    text
+}
+
+/// The library's scenes, each with what it shows.
+///
+/// # Errors
+/// The library cannot be read, or a scene of it is broken.
+pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
+    let names = library::names()?;
+    let width = names.iter().map(String::len).max().unwrap_or(0);
+    let mut text = String::new();
+    for name in names {
+        let (path, scene) = library::text(&name)?;
+        let about = read(&path.to_string_lossy(), &scene, &metrics::names())?.about;
+        let _ = writeln!(text, "{name:width$}  {about}");
+    }
+    Ok(text)
+}
+
+/// Every key, for a terminal.
+pub fn keys() -> String {
+    let mut text = String::new();
+    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
+        keys_of(&mut text, &table.title(), table.about, table.keys);
+    }
+    for effect in registry::all() {
+        keys_of(&mut text, &format!("[effects.{}]", effect.name), effect.about, effect.keys);
+    }
+    text
+}
+
+fn keys_of(text: &mut String, title: &str, about: &str, keys: &[Key]) {
+    let _ = writeln!(text, "{}  # {about}", title);
+    for key in keys {
+        let _ = writeln!(text, "  {}: {}", key.name, key.allowed());
+        let _ = writeln!(text, "      {}", key.about.trim());
+    }
+    text.push('\n');
+}
+
+/// How the page is made anew.
+pub const COMMAND: &str = "cargo xtask docs";
+
+/// The reference page, `docs/scenes.md`.
+pub fn page() -> String {
+    let mut page = format!(
+        "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
+        include_str!("explain/scenes.md").trim()
+    );
+    stages(&mut page);
+    page.push_str("\n## Tables\n");
+    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
+        let title =
+            if table.name.is_empty() { "Before the first table".into() } else { format!("`{}`", table.title()) };
+        let _ = write!(page, "\n### {title}\n\n{}\n\n", table.about);
+        table_of(&mut page, table);
+    }
+    page.push_str("\n## Effects\n\nThey act in this order within a stage, whatever the order in the scene.\n");
+    for family in [Family::Contact, Family::Drive, Family::Sensor, Family::Link] {
+        let _ = write!(page, "\n### {}\n", family.title());
+        for effect in registry::all().filter(|effect| effect.family == family) {
+            effect_of(&mut page, effect);
+        }
+    }
+    let _ = write!(
+        page,
+        "\n## Metrics\n\nWhat `[[expect]]` may bound. With two fingers, `finger0.` and `finger1.` before a name ask for one of them.\n\n{}",
+        metrics::page()
+    );
+    page
+}
+
+/// From pressure to codes, stage by stage, with the effects as they are built.
+fn stages(page: &mut String) {
+    page.push_str(
+        "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch, a perfect virtual ground, \
+         settled at once, 12 bits rounded down. Each row is sampled at its own instant. The stages and the effects in each, in order:\n\n\
+         | stage | what it holds | effects |\n| --- | --- | --- |\n",
+    );
+    for (stage, about) in [
+        ("pressure", "kPa of each taxel of the row"),
+        ("conductance", "G_0 + alpha p of each taxel, S"),
+        ("network", "what each column sees of the driven row, S"),
+        ("volts", "at the column amplifiers: V_g + R_f G V_drive"),
+        ("codes", "before the converter rounds down: 4096 V / V_ref"),
+    ] {
+        let effects: Vec<_> = registry::all().filter(|effect| stage_of(effect) == Some(stage)).collect();
+        let names: Vec<_> = effects.iter().map(|effect| format!("`{}`", effect.name)).collect();
+        let _ = writeln!(page, "| {stage} | {about} | {} |", names.join(", "));
+    }
+}
+
+/// At which stage of the readout an effect acts.
+fn stage_of(effect: &Description) -> Option<&'static str> {
+    let values = Values::defaults(effect.keys);
+    match (effect.build)(&Build { values: &values, seed: 0 }) {
+        Part::Pressure(_) => Some("pressure"),
+        Part::Conductance(_) => Some("conductance"),
+        Part::Network(_) => Some("network"),
+        Part::Volts(_) => Some("volts"),
+        Part::Codes(_) => Some("codes"),
+        _ => None,
+    }
+}
+
+fn effect_of(page: &mut String, effect: &Description) {
+    let Description { name, about, equations, state, reference, keys, .. } = effect;
+    let _ = write!(page, "\n#### `[effects.{name}]`\n\n{about}\n\n");
+    table_of(page, &Table { name, about, keys });
+    page.push_str("\n```text\n");
+    equations.iter().for_each(|line| *page += &format!("{line}\n"));
+    let _ = writeln!(page, "```\n\nState: {state}. Source: {reference}.");
+}
+
+fn table_of(page: &mut String, table: &Table) {
+    page.push_str("| key | unit | allowed | what it is |\n| --- | --- | --- | --- |\n");
+    for key in table.keys {
+        let unit = key.unit().unwrap_or("");
+        let _ = writeln!(page, "| `{}` | {unit} | {} | {} |", key.name, key.allowed(), key.about.trim());
+    }
+}

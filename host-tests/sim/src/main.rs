@@ -1,0 +1,15 @@
+//! `sim`: runs a scene on the native board.
+
+use clap::Parser;
+use sim::cli::{self, Args, Board};
+use sim::native;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    if args.board != Board::Native && args.runs() {
+        eprintln!("this program is the native board: `cargo xtask sim --board ...` runs the flash image");
+        return ExitCode::from(2);
+    }
+    cli::answer(&args, &|scene, watch| native::simulate(scene, watch).map_err(Into::into))
+}

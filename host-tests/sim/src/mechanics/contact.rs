@@ -1,0 +1,136 @@
+//! One finger's contact: its normal force, what it feels on the taxels, and the friction along the surface.
+
+use super::elastic::Elastic;
+use super::normal::Law;
+use super::pressures::Pressures;
+use super::shape;
+use crate::effects::contact::{Grip, Stages};
+use fingertip::frame::COLUMNS;
+use host_tests::plant::Setup;
+
+/// A contact and its effects.
+pub struct Contact<C> {
+    /// The effects that act on it.
+    pub effects: C,
+    /// Its state along the surface.
+    pub along: Along,
+    elastic: Elastic,
+    /// Indentation, and where the centre of pressure then is; none on a plane.
+    centres: Vec<[f64; 3]>,
+    pressures: Pressures,
+    mm_per_n: f64,
+    /// Stiffness along the surface; 0 without friction.
+    pub n_per_mm_along: f64,
+    forgotten_n: f64,
+    left: f64,
+}
+
+/// How the patch is stretched along the surface, and how far it slipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Along {
+    /// The object's displacement against the tip since they stick, mm.
+    pub stretch_mm: f64,
+    /// Way slipped, either way, mm.
+    pub slip_mm: f64,
+    /// Whether it slips, and which way.
+    pub slipping: f64,
+}
+
+impl<C: Stages> Contact<C> {
+    /// Of a finger.
+    pub fn new(setup: &Setup, mut effects: C) -> Self {
+        effects.shape_built();
+        let (elastic, centres) = if effects.shaped() {
+            shape::tables(&effects, &setup.tip)
+        } else {
+            (Elastic::Plane { n_per_mm2: setup.tip.force_per_mm2() }, Vec::new())
+        };
+        let centre_mm = [setup.wall.centre_x_mm, setup.wall.centre_y_mm];
+        let pressures = Pressures::new(setup.tip, setup.array.pitch_mm, centre_mm);
+        let mm_per_n = effects.mm_per_n();
+        let n_per_mm_along = effects.grip().map_or(0.0, |grip| grip.n_per_mm);
+        Self {
+            n_per_mm_along,
+            effects,
+            along: Along::default(),
+            elastic,
+            centres,
+            pressures,
+            mm_per_n,
+            forgotten_n: 0.0,
+            left: 1.0,
+        }
+    }
+
+    /// What holds through the next step.
+    pub fn law(&self) -> Law<'_> {
+        Law { elastic: &self.elastic, forgotten_n: self.forgotten_n, mm_per_n: self.mm_per_n, left: self.left }
+    }
+
+    /// Lets the tip forget for a while at an overlap.
+    pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
+        let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm));
+        self.effects.relax(dt_s, (elastic_n >= self.forgotten_n).then_some(elastic_n));
+        self.forgotten_n = self.effects.forgotten_n();
+    }
+
+    /// Lets the object bear a force.
+    pub fn bear(&mut self, force_n: f64) {
+        self.left = self.effects.left(force_n / self.left);
+    }
+
+    /// Means of a row's taxels at an overlap.
+    pub fn row_kpa(&mut self, x_mm: f64, row: usize) -> [f64; COLUMNS] {
+        if x_mm <= 0.0 {
+            return [0.0; COLUMNS];
+        }
+        let law = self.law();
+        let d_mm = law.depth_mm(x_mm);
+        let share = law.of_depth_n(d_mm) / self.elastic.force_n(d_mm);
+        let mut kpa = self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
+        if share != 1.0 {
+            kpa.iter_mut().for_each(|kpa| *kpa *= share);
+        }
+        kpa
+    }
+
+    /// Where the centre of pressure is at an indentation, from where the tip's axis meets the surface.
+    pub fn centre_mm(&self, d_mm: f64) -> [f64; 2] {
+        let above = self.centres.partition_point(|[knot_mm, ..]| *knot_mm < d_mm);
+        let [x, y] = match self.centres.get(above.min(self.centres.len().saturating_sub(1))) {
+            Some([_, x, y]) => [*x, *y],
+            None => [0.0, 0.0],
+        };
+        [x, y + self.along.stretch_mm]
+    }
+
+    /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it has none.
+    pub fn steepest_n_per_mm(&self, deepest_mm: f64) -> f64 {
+        let tip = self.elastic.n_per_mm(deepest_mm);
+        tip / (1.0 + self.mm_per_n * tip)
+    }
+}
+
+impl Along {
+    /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the state behind it.
+    pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
+        let mut next = *self;
+        let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };
+        let trial_mm = self.stretch_mm + way_mm;
+        let trial_n = grip.n_per_mm * trial_mm + damping * way_mm;
+        // It sticks again once the motion turns against the slip.
+        let slips = self.slipping != 0.0 && way_mm * self.slipping > 0.0;
+        let limit_n = if slips { grip.slipping } else { grip.still } * normal_n;
+        if trial_n.abs() > limit_n {
+            next.slipping = trial_n.signum();
+            let held_n = next.slipping * grip.slipping * normal_n;
+            next.stretch_mm = (held_n + damping * self.stretch_mm) / (grip.n_per_mm + damping);
+            next.slip_mm += (trial_mm - next.stretch_mm).abs();
+        } else {
+            next.stretch_mm = trial_mm;
+            next.slipping = 0.0;
+        }
+        let spring_n = 0.5 * grip.n_per_mm * (self.stretch_mm + next.stretch_mm);
+        (-spring_n - damping * (next.stretch_mm - self.stretch_mm), next)
+    }
+}

@@ -1,0 +1,307 @@
+//! One finger: shaft, winding, gear, tip and its contact.
+
+use super::contact::Contact;
+use crate::effects::drive::{Circuit, Friction, Stages};
+use crate::effects::{contact, drive};
+use core::f64::consts::TAU;
+use host_tests::plant::drive::{Acting, Resistance, Rotor, Shaft, Source};
+use host_tests::plant::readout::decay;
+use host_tests::plant::{Bridge, Setup};
+
+/// Rounds of a step's solution at most, and the share of the speed at which they end.
+const ROUNDS: usize = 40;
+const TOLERANCE: f64 = 1e-15;
+
+/// A finger and the effects on its drive.
+pub struct Finger<D, C> {
+    /// What it touches.
+    pub contact: Contact<C>,
+    /// The effects that act on its drive.
+    pub drive: D,
+    setup: Setup,
+    rotor: Rotor,
+    mm_per_rad: f64,
+    shaft: Shaft,
+    before: Shaft,
+    rad_per_s2: f64,
+    winding_a: f64,
+    tip_mm: f64,
+    count: i32,
+    bridge: Bridge,
+    circuit: Circuit,
+    friction: Friction,
+    dt_s: f64,
+}
+
+/// Where a step ends.
+#[derive(Clone, Copy, Debug)]
+pub struct End {
+    /// Angle and speed.
+    pub shaft: Shaft,
+    winding_a: f64,
+    square_a2_s: f64,
+}
+
+impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
+    /// At rest at travel 0, the bridge open.
+    pub fn new(setup: &Setup, mut drive: D, contact: C) -> Self {
+        let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
+        let rotor = Rotor {
+            inertia_kg_m2: setup.motor.inertia_kg_m2 + drive.inertia_kg_m2(mm_per_rad * 1e-3),
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+            rounds: ROUNDS,
+            tolerance: TOLERANCE,
+        };
+        let contact = Contact::new(setup, contact);
+        let (shaft, bridge) = (Shaft::default(), Bridge::Coast);
+        let circuit = Circuit {
+            source_v: setup.supply.source_v,
+            source_ohm: 0.0,
+            duty: 0.0,
+            winding_ohm: setup.motor.resistance_ohm,
+            bridge_ohm: setup.supply.bridge_ohm,
+            henry: 0.0,
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+        };
+        Self {
+            contact,
+            drive,
+            setup: setup.clone(),
+            rotor,
+            mm_per_rad,
+            shaft,
+            before: shaft,
+            rad_per_s2: 0.0,
+            winding_a: 0.0,
+            tip_mm: 0.0,
+            count: 0,
+            bridge,
+            circuit,
+            friction: Friction::default(),
+            dt_s: 0.0,
+        }
+    }
+
+    /// What it is made of.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Inertia at the shaft over the square of the tip's way for each angle: the mass that the tip feels like.
+    pub fn mass_kg(&self) -> f64 {
+        self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
+    }
+
+    /// Inertia at the shaft.
+    pub fn inertia_kg_m2(&self) -> f64 {
+        self.rotor.inertia_kg_m2
+    }
+
+    /// Asks the effects what holds through the next step.
+    pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
+        self.before = self.shaft;
+        self.dt_s = dt_s;
+        self.bridge = bridge;
+        let base = Circuit {
+            source_v: self.setup.supply.source_v,
+            source_ohm: 0.0,
+            duty: match bridge {
+                Bridge::Coast => 0.0,
+                Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
+            },
+            winding_ohm: self.setup.motor.resistance_ohm,
+            bridge_ohm: self.setup.supply.bridge_ohm,
+            henry: 0.0,
+            torque_nm_per_a: self.setup.motor.torque_nm_per_a,
+        };
+        self.circuit = base;
+        self.drive.circuit(&mut self.circuit);
+        self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
+        self.friction = Friction::default();
+        let middle = self.shaft.speed_rad_per_s + 0.5 * dt_s * self.rad_per_s2;
+        self.drive.friction(middle, &mut self.friction);
+    }
+
+    /// Where the step prepared ends against a load: its mean force between two places of the pressing flank. Changes nothing.
+    pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
+        let mut acting = Acts {
+            drive: &mut self.drive,
+            circuit: &self.circuit,
+            open: self.bridge == Bridge::Coast,
+            friction: &self.friction,
+            mm_per_rad: self.mm_per_rad,
+            load_n: |from_mm, to_mm| load_n(&self.contact, from_mm, to_mm),
+            torque_nm_per_a: self.rotor.torque_nm_per_a,
+            winding_a: self.winding_a,
+            square_a2_s: 0.0,
+        };
+        let shaft = self.rotor.advance(self.shaft, self.dt_s, &mut acting);
+        End { shaft, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
+    }
+
+    /// Goes to the step's end; the object's surface then stands at this travel.
+    pub fn finish(&mut self, end: &End, surface_mm: f64) {
+        self.shaft = end.shaft;
+        self.winding_a = end.winding_a;
+        if self.dt_s > 0.0 {
+            self.rad_per_s2 = (self.shaft.speed_rad_per_s - self.before.speed_rad_per_s) / self.dt_s;
+        }
+        self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
+        self.tip_mm = self.drive.tip_mm(self.flank_mm(), surface_mm);
+        let turns = self.shaft.angle_rad / TAU;
+        self.count = self.drive.count((turns * self.setup.motor.encoder_counts_per_turn).floor() as i32);
+    }
+
+    /// Puts it at rest at a travel, as if carried there.
+    pub fn place(&mut self, travel_mm: f64) {
+        self.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        (self.before, self.rad_per_s2, self.winding_a, self.tip_mm) = (self.shaft, 0.0, 0.0, travel_mm);
+    }
+
+    /// Sets its speed.
+    pub fn launch(&mut self, mm_per_s: f64) {
+        self.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
+    }
+
+    /// Travel of the gear's pressing flank, which is the tip's where it presses.
+    pub fn flank_mm(&self) -> f64 {
+        self.shaft.angle_rad * self.mm_per_rad
+    }
+
+    /// The same for the angle of an end.
+    pub fn flank_at_mm(&self, end: &End) -> f64 {
+        end.shaft.angle_rad * self.mm_per_rad
+    }
+
+    /// The same at a time within the last step.
+    pub fn flank_within_mm(&self, since_s: f64) -> f64 {
+        if since_s >= self.dt_s {
+            return self.flank_mm();
+        }
+        let (v0, v1) = (self.before.speed_rad_per_s, self.shaft.speed_rad_per_s);
+        let angle = self.before.angle_rad + since_s * (v0 + 0.5 * (v1 - v0) * since_s / self.dt_s);
+        angle * self.mm_per_rad
+    }
+
+    /// Travel of the tip.
+    pub fn tip_mm(&self) -> f64 {
+        self.tip_mm
+    }
+
+    /// Angle and speed of the motor.
+    pub fn shaft(&self) -> Shaft {
+        self.shaft
+    }
+
+    /// Speed of the tip where the gear drives it.
+    pub fn speed_mm_per_s(&self) -> f64 {
+        self.shaft.speed_rad_per_s * self.mm_per_rad
+    }
+
+    /// What the encoder reads.
+    pub fn count(&self) -> i32 {
+        self.count
+    }
+
+    /// Current in the winding.
+    pub fn current_a(&self) -> f64 {
+        if self.circuit.henry > 0.0 {
+            return self.winding_a;
+        }
+        let source = resistive(&self.circuit, self.bridge == Bridge::Coast);
+        self.rotor.current_a(&source, self.shaft.speed_rad_per_s)
+    }
+
+    /// The supply at the bridge.
+    pub fn supply_v(&self) -> f64 {
+        self.circuit.source_v - self.circuit.source_ohm * self.circuit.duty * self.current_a()
+    }
+
+    /// Kinetic energy and that of the effects on the drive, mJ.
+    pub fn energy_mj(&self) -> f64 {
+        let speed = self.shaft.speed_rad_per_s;
+        let winding_j = 0.5 * self.circuit.henry * self.winding_a * self.winding_a;
+        let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
+        1e3 * (turning_j + winding_j + self.drive.potential_j(self.shaft.angle_rad))
+    }
+}
+
+/// The source without what an inductance adds.
+fn resistive(circuit: &Circuit, open: bool) -> Source {
+    if open {
+        return Source::OPEN;
+    }
+    let ohms = circuit.winding_ohm + circuit.bridge_ohm + circuit.duty * circuit.duty * circuit.source_ohm;
+    Source { volts: circuit.duty * circuit.source_v, ohms, ..Source::OPEN }
+}
+
+/// What acts on a finger's shaft.
+struct Acts<'a, D, L> {
+    drive: &'a mut D,
+    circuit: &'a Circuit,
+    open: bool,
+    friction: &'a Friction,
+    mm_per_rad: f64,
+    load_n: L,
+    torque_nm_per_a: f64,
+    winding_a: f64,
+    square_a2_s: f64,
+}
+
+impl<D, L> Acts<'_, D, L> {
+    /// exp(-x) and its mean from 0 to x, x the time in units of L / R.
+    fn kept(&self, dt_s: f64, ohms: f64) -> [f64; 2] {
+        let x = dt_s * ohms / self.circuit.henry;
+        let end = decay(x);
+        let mean = if x < 0.01 {
+            1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
+        } else {
+            (1.0 - end) / x
+        };
+        [end, mean]
+    }
+}
+
+impl<D: Stages, L: Fn(f64, f64) -> f64> Acting for Acts<'_, D, L> {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
+        let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
+        let load_nm = self.mm_per_rad * 1e-3 * load_n;
+        let shared = self.friction.load_share * load_nm;
+        Resistance {
+            load_nm: load_nm + self.drive.potential_nm(from_rad, to_rad),
+            sliding_nm: self.friction.sliding_nm + shared,
+            holding_nm: self.friction.holding_nm + shared,
+        }
+    }
+
+    fn source(&self, dt_s: f64) -> Source {
+        let source = resistive(self.circuit, self.open);
+        if self.circuit.henry == 0.0 || self.open {
+            return source;
+        }
+        // Exact for a speed that holds: i = i_end + (i_0 - i_end) exp(-t R / L).
+        let [_, mean] = self.kept(dt_s, source.ohms);
+        let given = 1.0 - mean;
+        Source { ohms: source.ohms / given, kept_a: mean * self.winding_a, ..source }
+    }
+
+    fn viscous_nm_s(&self) -> f64 {
+        self.friction.viscous_nm_s
+    }
+
+    fn took(&mut self, dt_s: f64, mean_rad_per_s: f64) {
+        let source = resistive(self.circuit, self.open);
+        let end_a = (source.volts - self.torque_nm_per_a * mean_rad_per_s) / source.ohms;
+        if self.circuit.henry == 0.0 || self.open {
+            self.winding_a = end_a;
+            self.square_a2_s += end_a * end_a * dt_s;
+            return;
+        }
+        let [end, mean] = self.kept(dt_s, source.ohms);
+        let over_a = self.winding_a - end_a;
+        self.winding_a = end_a + over_a * end;
+        // Mean of the square: the transient's own mean square is mean (1 + end) / 2.
+        let square = end_a * (end_a + 2.0 * over_a * mean) + over_a * over_a * mean * 0.5 * (1.0 + end);
+        self.square_a2_s += square * dt_s;
+    }
+}

@@ -1,0 +1,92 @@
+//! The tip on a surface that is no plane: force, centre and the taxels' means from the surface's height.
+//!
+//! The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`, `L = sqrt(a^2 - r^2)`, so with polar
+//! coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the angle: sample by sample, a ramp that
+//! begins at the sample's clearance `a - L - h`.
+
+use super::elastic::{Elastic, Table};
+use crate::effects::contact::Stages;
+use core::f64::consts::TAU;
+use host_tests::plant::cells::Cell;
+use host_tests::plant::setup::Tip;
+
+/// Samples around, and from the apex to the tip's rim.
+const AROUND: usize = 64;
+const OUTWARDS: usize = 256;
+/// Knots of the force, even in the square root of the indentation.
+const KNOTS: usize = 2048;
+/// Samples along a taxel's side.
+const ALONG: usize = 16;
+
+/// Force and centre of pressure against indentation.
+pub fn tables(stages: &impl Stages, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
+    let mut samples = samples(stages, tip);
+    samples.sort_by(|a, b| a.clearance_mm.total_cmp(&b.clearance_mm));
+    let deepest_mm = Tip::DEEPEST * tip.radius_mm;
+    let (mut d_mm, mut force_n, mut centres) = (Vec::new(), Vec::new(), Vec::new());
+    // Sums over the samples that touch: of weight, weight times clearance, and both times the place.
+    let mut sums = [[0.0; 2]; 3];
+    let mut reached = samples.iter().peekable();
+    for knot in 0..=KNOTS {
+        let share = knot as f64 / KNOTS as f64;
+        let depth_mm = share * share * deepest_mm;
+        while let Some(sample) = reached.next_if(|sample| sample.clearance_mm < depth_mm) {
+            for (sum, by) in sums.iter_mut().zip([1.0, sample.x_mm, sample.y_mm]) {
+                sum[0] += sample.weight * by;
+                sum[1] += sample.weight * by * sample.clearance_mm;
+            }
+        }
+        let [force, x, y] = sums.map(|[weight, clearance]| (weight * depth_mm - clearance) * tip.modulus_kpa * 1e-3);
+        let before = force_n.last().copied().unwrap_or(0.0);
+        let force = if knot == 0 { 0.0 } else { f64::max(force, before) };
+        d_mm.push(depth_mm);
+        force_n.push(force);
+        centres.push([depth_mm, if force > 0.0 { x / force } else { 0.0 }, if force > 0.0 { y / force } else { 0.0 }]);
+    }
+    (Elastic::Table(Table::new(d_mm, force_n)), centres)
+}
+
+/// A place on the tip: the indentation at which it touches, and its share of the integral.
+struct Sample {
+    clearance_mm: f64,
+    weight: f64,
+    x_mm: f64,
+    y_mm: f64,
+}
+
+fn samples(stages: &impl Stages, tip: &Tip) -> Vec<Sample> {
+    let radius_mm = tip.radius_mm;
+    let mut samples = Vec::with_capacity(AROUND * OUTWARDS);
+    for outwards in 0..OUTWARDS {
+        // L = a (1 - t^2): closest at the apex, where shallow contacts are.
+        let t = (outwards as f64 + 0.5) / OUTWARDS as f64;
+        let length_mm = radius_mm * (1.0 - t * t);
+        let weight = 2.0 * radius_mm * t / OUTWARDS as f64 * TAU / AROUND as f64;
+        let r_mm = (radius_mm * radius_mm - length_mm * length_mm).sqrt();
+        for around in 0..AROUND {
+            let angle = TAU * (around as f64 + 0.5) / AROUND as f64;
+            let (x_mm, y_mm) = (r_mm * libm::cos(angle), r_mm * libm::sin(angle));
+            let clearance_mm = radius_mm - length_mm - stages.height_mm(x_mm, y_mm, radius_mm);
+            samples.push(Sample { clearance_mm, weight, x_mm, y_mm });
+        }
+    }
+    samples
+}
+
+/// Mean pressure on a taxel, by its midpoints.
+pub fn mean_kpa(stages: &impl Stages, tip: &Tip, d_mm: f64, cell: &Cell) -> f64 {
+    let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / ALONG as f64;
+    let mut sum = 0.0;
+    for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
+        let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
+        let length2_mm2 = tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm;
+        // At the tip's own rim there is nothing left to compress.
+        if length2_mm2 <= 0.0 {
+            continue;
+        }
+        let length_mm = length2_mm2.sqrt();
+        let compressed_mm = length_mm - (tip.radius_mm - d_mm) + stages.height_mm(x_mm, y_mm, tip.radius_mm);
+        sum += tip.modulus_kpa * compressed_mm.clamp(0.0, Tip::DEEPEST * length_mm) / length_mm;
+    }
+    sum / (ALONG * ALONG) as f64
+}

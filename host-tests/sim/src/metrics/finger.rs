@@ -1,0 +1,260 @@
+//! What is gathered of one finger, step by step; no trace is kept, so an hour costs what a second does.
+
+use super::slips::Slips;
+use crate::watch::Step;
+use fingertip::safety::{Fault, Limits};
+use fingertip::units::{Duty, Millimetres, Newtons};
+use host_tests::metrics::Response;
+
+/// Errors of the centre count from this force on: below it there is next to nothing to see.
+const SEEN_N: f64 = 0.1;
+/// The approach speed is the mean over this last stretch before the touch.
+const APPROACH_S: f64 = 0.01;
+/// A goal that changes by less is no step to judge: a force that is trimmed.
+const STEP_N: f64 = 0.02;
+/// An object that fell this far below its highest place was dropped.
+pub(super) const DROPPED_MM: f64 = 5.0;
+
+/// A sum of squares over time.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Squares {
+    sum: f64,
+    time_s: f64,
+    /// The largest magnitude.
+    pub max: f64,
+}
+
+impl Squares {
+    fn add(&mut self, value: f64, dt_s: f64) {
+        self.sum += value * value * dt_s;
+        self.time_s += dt_s;
+        self.max = self.max.max(value.abs());
+    }
+
+    /// None where nothing was added.
+    pub fn rms(&self) -> Option<f64> {
+        (self.time_s > 0.0).then(|| (self.sum / self.time_s).sqrt())
+    }
+}
+
+/// The answers to all goals that are over: the worst of each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Answers {
+    count: u32,
+    rise_s: f64,
+    settling_s: f64,
+    overshoot: f64,
+    steady_max_n: f64,
+    steady_squares: (f64, u64),
+    never_rose: bool,
+    never_settled: bool,
+}
+
+impl Answers {
+    fn add(&mut self, response: &Response) {
+        self.count += 1;
+        self.never_rose |= response.rise_s().is_none();
+        self.never_settled |= response.settled_s().is_none();
+        self.rise_s = self.rise_s.max(response.rise_s().unwrap_or(0.0));
+        self.settling_s = self.settling_s.max(response.settled_s().unwrap_or(0.0));
+        self.overshoot = self.overshoot.max(response.beyond_n() / response.unit_n());
+        self.steady_max_n = self.steady_max_n.max(response.steady_max_n());
+        let (squares, samples) = response.steady_squares();
+        self.steady_squares = (self.steady_squares.0 + squares, self.steady_squares.1 + samples);
+    }
+
+    pub fn rise_s(&self) -> Option<f64> {
+        (self.count > 0 && !self.never_rose).then_some(self.rise_s)
+    }
+
+    pub fn settling_s(&self) -> Option<f64> {
+        (self.count > 0 && !self.never_settled).then_some(self.settling_s)
+    }
+
+    pub fn overshoot(&self) -> Option<f64> {
+        (self.count > 0).then_some(self.overshoot)
+    }
+
+    pub fn steady_max_n(&self) -> Option<f64> {
+        (self.steady_squares.1 > 0).then_some(self.steady_max_n)
+    }
+
+    pub fn steady_rms_n(&self) -> Option<f64> {
+        let (squares, samples) = self.steady_squares;
+        (samples > 0).then(|| (squares / samples as f64).sqrt())
+    }
+}
+
+/// One finger's run so far.
+#[derive(Clone, Debug, Default)]
+pub struct Finger {
+    last_s: Option<f64>,
+    goal_n: f64,
+    answers: Answers,
+    response: Option<Response>,
+    /// Where the tip was, over the last stretch before the touch.
+    approach: Vec<[f64; 2]>,
+    missed_before: u32,
+    fault: Option<Fault>,
+    object_start_mm: f64,
+    object_highest_mm: f64,
+    pub(super) peak_n: f64,
+    pub(super) touch_s: Option<f64>,
+    pub(super) approach_mm_per_s: Option<f64>,
+    pub(super) travel_max_mm: f64,
+    pub(super) indentation_max_mm: f64,
+    pub(super) faults: u32,
+    pub(super) first_fault: Option<(Fault, f64)>,
+    pub(super) limits_s: [f64; 9],
+    pub(super) time_s: f64,
+    pub(super) missed: u32,
+    pub(super) duty: Squares,
+    pub(super) force_error_n: Squares,
+    pub(super) centre_error_mm: Option<f64>,
+    pub(super) confidence_min: Option<u8>,
+    pub(super) slip_mm: f64,
+    pub(super) slips: Slips,
+    pub(super) broken: bool,
+    pub(super) object_lift_mm: f64,
+    pub(super) object_fall_mm: f64,
+    pub(super) energy_j: f64,
+    pub(super) current_a: Squares,
+    pub(super) winding_max_c: Option<f64>,
+}
+
+impl Finger {
+    pub(super) fn step(&mut self, step: &Step) {
+        if step.time_s < 0.0 {
+            self.missed_before = step.status.missed_frames;
+            return;
+        }
+        let dt_s = self.last_s.map_or(0.0, |last_s| step.time_s - last_s);
+        let begins = self.last_s.replace(step.time_s).is_none();
+        self.time_s += dt_s;
+        self.force(step);
+        self.controller(step, dt_s);
+        self.sensing(step, dt_s);
+        self.drive(step, dt_s);
+        self.object(step, begins);
+    }
+
+    /// All goals' answers, the one under way included.
+    pub(super) fn answers(&self) -> Answers {
+        let mut answers = self.answers;
+        self.response.iter().for_each(|response| answers.add(response));
+        answers
+    }
+
+    fn force(&mut self, step: &Step) {
+        let (force_n, goal_n) = (step.truth.force_n, newtons(step.command.goal));
+        self.peak_n = self.peak_n.max(force_n);
+        self.travel_max_mm = self.travel_max_mm.max(step.truth.travel_mm);
+        self.indentation_max_mm = self.indentation_max_mm.max(step.truth.indentation_mm);
+        if force_n > 0.0 && self.touch_s.is_none() {
+            self.touch(step);
+        }
+        if goal_n != self.goal_n {
+            let trimmed = self.response.is_some() && goal_n > 0.0 && (goal_n - self.goal_n).abs() < STEP_N;
+            self.goal_n = goal_n;
+            if let Some(over) = if trimmed { None } else { self.response.take() } {
+                self.answers.add(&over);
+            }
+            if goal_n > 0.0 && force_n > 0.0 && !trimmed {
+                self.response = Some(Response::new(force_n, goal_n));
+            }
+        } else if self.response.is_none() && goal_n > 0.0 && force_n > 0.0 {
+            self.response = Some(Response::new(0.0, goal_n));
+        }
+        if let Some(response) = &mut self.response {
+            response.add(step.time_s, force_n);
+        }
+    }
+
+    fn touch(&mut self, step: &Step) {
+        self.touch_s = Some(step.time_s);
+        let start = self.approach.iter().rfind(|[time_s, _]| *time_s <= step.time_s - APPROACH_S);
+        self.approach_mm_per_s = start
+            .or(self.approach.first())
+            .map(|[time_s, travel_mm]| (step.truth.travel_mm - travel_mm) / (step.time_s - time_s));
+        self.approach = Vec::new();
+    }
+
+    fn controller(&mut self, step: &Step, dt_s: f64) {
+        let status = step.status;
+        if self.touch_s.is_none() {
+            self.approach.retain(|[time_s, _]| *time_s > step.time_s - 2.0 * APPROACH_S);
+            self.approach.push([step.time_s, step.truth.travel_mm]);
+        }
+        if let Some(fault) = status.fault.filter(|fault| self.fault != Some(*fault)) {
+            self.faults += 1;
+            self.first_fault.get_or_insert((fault, step.time_s));
+        }
+        self.fault = status.fault;
+        for (bit, seen_s) in self.limits_s.iter_mut().enumerate() {
+            if status.limits.has(1 << bit) {
+                *seen_s += dt_s;
+            }
+        }
+        self.missed = status.missed_frames.wrapping_sub(self.missed_before);
+        self.duty.add(duty(status.duty), dt_s);
+    }
+
+    fn sensing(&mut self, step: &Step, dt_s: f64) {
+        let (contact, truth) = (&step.status.contact, step.truth);
+        self.force_error_n.add(newtons(contact.force) - truth.force_n, dt_s);
+        if truth.force_n > SEEN_N {
+            let off = |sensed: Millimetres, true_mm: f64| sensed.0.to_num::<f64>() - true_mm;
+            let [x, y] = [off(contact.centre_x, truth.centre_mm[0]), off(contact.centre_y, truth.centre_mm[1])];
+            let error_mm = (x * x + y * y).sqrt();
+            self.centre_error_mm = Some(self.centre_error_mm.map_or(error_mm, |max| max.max(error_mm)));
+        }
+        if self.response.is_some_and(|response| response.is_steady(step.time_s)) {
+            let confidence = contact.confidence;
+            self.confidence_min = Some(self.confidence_min.map_or(confidence, |min| min.min(confidence)));
+        }
+    }
+
+    fn drive(&mut self, step: &Step, dt_s: f64) {
+        let truth = step.truth;
+        self.current_a.add(truth.current_a, dt_s);
+        self.energy_j += duty(step.status.duty) * truth.supply_v * truth.current_a * dt_s;
+        self.winding_max_c = Some(self.winding_max_c.map_or(truth.winding_c, |max| max.max(truth.winding_c)));
+    }
+
+    fn object(&mut self, step: &Step, begins: bool) {
+        let truth = step.truth;
+        let height_mm = truth.object_mm[1];
+        if begins {
+            (self.object_start_mm, self.object_highest_mm) = (height_mm, height_mm);
+        }
+        self.object_highest_mm = self.object_highest_mm.max(height_mm);
+        self.object_lift_mm = height_mm - self.object_start_mm;
+        self.object_fall_mm = self.object_fall_mm.max(self.object_highest_mm - height_mm);
+        self.broken |= truth.broken;
+        self.slip_mm = self.slip_mm.max(truth.slip_mm);
+        self.slips.step(step.time_s, truth.slip_mm, newtons(step.command.goal));
+    }
+}
+
+/// As a share of the supply.
+fn duty(duty: Duty) -> f64 {
+    f64::from(duty.0) / f64::from(Duty::FULL)
+}
+
+/// A force as a number.
+pub(crate) fn newtons(force: Newtons) -> f64 {
+    force.0.to_num()
+}
+
+/// The limits' names, by bit.
+pub(super) const LIMITS: [(&str, u16); 9] = [
+    ("voltage", Limits::VOLTAGE),
+    ("current", Limits::CURRENT),
+    ("speed", Limits::SPEED),
+    ("goal", Limits::GOAL),
+    ("travel", Limits::TRAVEL),
+    ("taxels", Limits::TAXELS),
+    ("not tared", Limits::NOT_TARED),
+    ("frame missed", Limits::FRAME_MISSED),
+    ("slew", Limits::SLEW),
+];

@@ -1,0 +1,242 @@
+//! The native board: the same core on the host, closed over the world.
+//!
+//! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came of a frame acts
+//! [`DUTY_DELAY_SLOTS`] after its end. Time is counted in whole femtoseconds, so a run is the same at any hour of the day.
+
+mod clock;
+mod digest;
+
+use crate::effects::link::Stages as _;
+use crate::effects::sensor::Readout;
+use crate::effects::set::{Named, Set};
+use crate::host::Host;
+use crate::ledger;
+use crate::mechanics::body::Surroundings;
+use crate::scene::Scene;
+use crate::scene::controller;
+use crate::watch::{Controller, Cost, Step, Summary, Watch};
+use crate::world::{World, WorldError};
+pub use clock::Clock;
+use digest::Digest;
+use fingertip::config::{Config, ConfigError, newtons};
+use fingertip::frame::{COLUMNS, Frame, SLOTS};
+use fingertip::pipeline::{Command, Pipeline};
+use fingertip::pressure::TARE_FRAMES;
+use host_tests::native::bridge;
+use host_tests::plant::Bridge;
+use std::time::Instant;
+
+/// Slots between the end of a frame and the duty that came of it.
+const DUTY_DELAY_SLOTS: usize = 3;
+
+/// Why a scene does not run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// The controller refuses its parameters.
+    #[error("[controller] {0}")]
+    Controller(ConfigError),
+    /// The world cannot be simulated.
+    #[error(transparent)]
+    World(#[from] WorldError),
+}
+
+/// Runs a scene with the effects that it names.
+///
+/// # Errors
+/// What the scene asks for cannot be simulated.
+pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+    simulate_with::<Named>(scene, watch)
+}
+
+/// The same with a set of effects: `()` has none compiled in, whatever the scene names.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+    simulate_from::<E>(scene, 0.0, watch)
+}
+
+/// The same with the board's clock begun so long before; it changes nothing.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from<E: Set>(scene: &Scene, begun_s: f64, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+    let started = Instant::now();
+    let mut board = Board::<E>::new(scene, begun_s)?;
+    board.run(scene, watch);
+    Ok(Summary {
+        virtual_s: board.time_s(),
+        wall_s: started.elapsed().as_secs_f64(),
+        ledger: board.costs(scene),
+        digest: board.digest.hex(),
+    })
+}
+
+/// A finger's controller and what lies between it and the world.
+struct Unit<E: Set> {
+    pipeline: Pipeline,
+    readout: Readout,
+    sensor: E::Sensor,
+    link: E::Link,
+    host: Host,
+    frame: Frame,
+    command: Command,
+    next: Bridge,
+}
+
+struct Board<E: Set> {
+    world: World<E>,
+    units: Vec<Unit<E>>,
+    bridges: Vec<Bridge>,
+    params: fingertip::params::Params,
+    clock: Clock,
+    /// The scene's start.
+    start: Clock,
+    slot_s: f64,
+    longest_s: f64,
+    digest: Digest,
+}
+
+impl<E: Set> Board<E> {
+    fn new(scene: &Scene, begun_s: f64) -> Result<Self, SimError> {
+        let params = controller::params(scene);
+        let config = Config::new(&params).map_err(SimError::Controller)?;
+        let setup = controller::setup(scene);
+        let fingers = scene.table("hand").whole("fingers") as usize;
+        let (mut units, mut effects) = (Vec::new(), Vec::new());
+        for finger in 0..fingers {
+            let parts = E::of(scene, finger);
+            effects.push((parts.drive, parts.contact));
+            units.push(Unit {
+                pipeline: Pipeline::new(&config),
+                readout: Readout::new(&setup.array),
+                sensor: parts.sensor,
+                link: parts.link,
+                host: Host::new(scene),
+                frame: Frame::EMPTY,
+                command: Command::default(),
+                next: Bridge::Coast,
+            });
+        }
+        let world = World::<E>::new(&setup, &Surroundings::of(scene), effects);
+        let longest_s = scene.table("world").number("step_us") * 1e-6;
+        world.check_step(longest_s)?;
+        let slot_s = f64::from(config.timing.slot_ticks) / f64::from(fingertip::scan::TIMER_HZ);
+        let bridges = vec![Bridge::Coast; units.len()];
+        Ok(Self {
+            world,
+            units,
+            bridges,
+            params,
+            clock: Clock::from_start(begun_s),
+            start: Clock::default(),
+            slot_s,
+            longest_s,
+            digest: Digest::new(),
+        })
+    }
+
+    fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
+        let controller = Controller { params: self.params, calibration: None };
+        watch.begin(&vec![controller; self.units.len()]);
+        let tare_frames = TARE_FRAMES + 2;
+        self.start = self.clock;
+        self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
+        for unit in &mut self.units {
+            unit.command.tare_request = 1;
+        }
+        for _ in 0..tare_frames {
+            self.frame(watch);
+        }
+        self.start = self.clock;
+        for unit in &mut self.units {
+            unit.command.torque = true;
+            unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;
+        }
+        while self.time_s() < scene.duration_s {
+            self.frame(watch);
+        }
+    }
+
+    /// From the scene's start; below 0 while the fingers are tared.
+    fn time_s(&self) -> f64 {
+        self.clock.since(self.start)
+    }
+
+    /// Scans one frame of each finger and takes its control step.
+    fn frame(&mut self, watch: &mut dyn Watch) {
+        let time_s = self.time_s();
+        let second_s = self.units[0].link.second_s(time_s);
+        let slot_s = self.slot_s * second_s;
+        for slot in [0..DUTY_DELAY_SLOTS, DUTY_DELAY_SLOTS..SLOTS] {
+            if slot.start == DUTY_DELAY_SLOTS {
+                for (bridge, unit) in self.bridges.iter_mut().zip(&self.units) {
+                    *bridge = unit.next;
+                }
+            }
+            self.slots(slot, slot_s);
+        }
+        for finger in 0..self.units.len() {
+            self.control(finger, watch);
+        }
+    }
+
+    /// Moves the world through slots under the same duty, and samples each at its end.
+    fn slots(&mut self, slots: core::ops::Range<usize>, slot_s: f64) {
+        let at_once = (self.longest_s / slot_s).max(1.0) as usize;
+        let parts = (slot_s / self.longest_s).ceil().max(1.0);
+        let mut from = slots.start;
+        while from < slots.end {
+            let count = if parts > 1.0 { 1 } else { at_once.min(slots.end - from) };
+            let (begun_s, part_s) = (self.time_s(), slot_s * count as f64 / parts);
+            for part in 0..parts as usize {
+                self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
+            }
+            for step in 1..=count {
+                self.clock.go_on(slot_s);
+                let since_s = if step == count { f64::INFINITY } else { slot_s * step as f64 };
+                self.sample(from + step - 1, since_s);
+            }
+            from += count;
+        }
+    }
+
+    fn sample(&mut self, slot: usize, since_s: f64) {
+        let time_s = self.time_s();
+        for (finger, unit) in self.units.iter_mut().enumerate() {
+            let kpa = if slot < SLOTS - 1 { self.world.row_kpa(finger, since_s, slot) } else { [0.0; COLUMNS] };
+            let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
+            for (column, code) in codes.into_iter().enumerate() {
+                unit.frame.set_code(slot, column, code);
+            }
+        }
+    }
+
+    fn control(&mut self, finger: usize, watch: &mut dyn Watch) {
+        let time_s = self.time_s();
+        let unit = &mut self.units[finger];
+        unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
+        let mut silent_ms = 0;
+        if unit.command.torque {
+            let goal_n = unit.host.goal_n(time_s, &mut unit.link);
+            unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
+            silent_ms = unit.host.silent_ms(time_s);
+        }
+        let sense = self.world.sense(finger, silent_ms);
+        let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
+        unit.next = bridge(duty, status);
+        self.digest.add(&unit.frame, &sense, &unit.command, duty, &status);
+        let truth = self.world.truth(finger, watch.wants_pressures(finger, time_s));
+        let (frame, sense, command, status) = (&unit.frame, &sense, &unit.command, &status);
+        watch.step(&Step { finger, time_s, frame, sense, command, status, truth: &truth });
+    }
+
+    /// By effect in the scene's order, all fingers and stages together.
+    fn costs(&self, scene: &Scene) -> Vec<Cost> {
+        let mut all = Vec::new();
+        for (unit, finger) in self.units.iter().zip(self.world.fingers()) {
+            all.extend(E::costs(&unit.sensor, &finger.contact.effects, &finger.drive, &unit.link));
+        }
+        ledger::by_effect(scene, &all)
+    }
+}

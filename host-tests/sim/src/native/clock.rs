@@ -1,0 +1,34 @@
+//! Virtual time, exact: whole femtoseconds from the scene's start.
+
+/// Femtoseconds in a second.
+const FS: f64 = 1e15;
+
+/// An instant of virtual time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clock(i128);
+
+impl Clock {
+    /// So long after the clock began.
+    pub fn from_start(seconds: f64) -> Self {
+        Self(whole(seconds))
+    }
+
+    /// Goes on.
+    pub fn go_on(&mut self, seconds: f64) {
+        self.0 += whole(seconds);
+    }
+
+    /// From another instant to this one: below 0 where it is to come.
+    pub fn since(self, other: Self) -> f64 {
+        (self.0 - other.0) as f64 / FS
+    }
+
+    /// Since the clock began.
+    pub fn time_s(self) -> f64 {
+        self.since(Self(0))
+    }
+}
+
+fn whole(seconds: f64) -> i128 {
+    (seconds * FS + 0.5) as i128
+}

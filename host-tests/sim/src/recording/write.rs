@@ -1,0 +1,217 @@
+//! Writes a recording while the run goes on.
+
+use super::{END, SETUP, WHOLE, controller_json, schemas, topic};
+use crate::run::RunError;
+use crate::scene::Scene;
+use crate::watch::{Controller, Step, Watch};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use fingertip::record::{Digest, Record};
+use fingertip::units::Duty;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, McapResult, WriteOptions, Writer};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+/// Between two frames as arrays and pictures.
+const FRAME_S: f64 = 0.01;
+/// A code's share of a grey level: 2040 codes are white.
+const CODES_PER_GREY: u16 = 8;
+
+/// Records a run.
+pub struct Recorder {
+    out: Writer<BufWriter<File>>,
+    scene: Scene,
+    every: u64,
+    whole: bool,
+    fingers: Vec<Finger>,
+    begun: bool,
+    start_s: Option<f64>,
+    /// The first failure; nothing is written after it.
+    failed: McapResult<()>,
+}
+
+#[derive(Default)]
+struct Finger {
+    /// Scalars, frame, image, core.
+    channels: [u16; 4],
+    steps: u64,
+    next_frame_s: f64,
+}
+
+impl Recorder {
+    /// Into a new file; the scalars of each `every`-th step.
+    ///
+    /// # Errors
+    /// The file cannot be made.
+    pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
+        let file = File::create(path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        let options = WriteOptions::new().profile("").library(concat!("fingertip-sim/", env!("CARGO_PKG_VERSION")));
+        Ok(Self {
+            out: options.create(BufWriter::new(file))?,
+            scene: scene.clone(),
+            every: every.max(1),
+            whole: true,
+            fingers: Vec::new(),
+            begun: false,
+            start_s: None,
+            failed: Ok(()),
+        })
+    }
+
+    /// Says in the file that the steps do not hold all that the core was given: no replay. Before the run begins.
+    pub fn seen_from_outside(mut self) -> Self {
+        self.whole = false;
+        self
+    }
+
+    /// Closes the file after the run.
+    ///
+    /// # Errors
+    /// Something could not be written.
+    pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
+        self.failed?;
+        if !self.begun {
+            return Err("the board did not say how its controllers are set: nothing to replay".into());
+        }
+        let steps =
+            self.fingers.iter().enumerate().map(|(n, finger)| (format!("finger{n}.steps"), finger.steps.to_string()));
+        let metadata = steps.chain([("digest".to_owned(), digest.to_owned())]).collect();
+        self.out.write_metadata(&Metadata { name: END.into(), metadata })?;
+        self.out.finish()?;
+        Ok(())
+    }
+
+    fn write_head(&mut self, controllers: &[Controller]) -> McapResult<()> {
+        let out = &mut self.out;
+        out.attach(&Attachment {
+            log_time: 0,
+            create_time: 0,
+            name: format!("{}.toml", self.scene.name),
+            media_type: "application/toml".into(),
+            data: self.scene.text.as_bytes().into(),
+        })?;
+        let mut metadata = BTreeMap::from([
+            ("scene".to_owned(), self.scene.name.clone()),
+            ("seed".to_owned(), self.scene.seed.to_string()),
+            ("simulated".to_owned(), "true".to_owned()),
+            (WHOLE.to_owned(), self.whole.to_string()),
+            ("fingers".to_owned(), controllers.len().to_string()),
+        ]);
+        for (number, controller) in controllers.iter().enumerate() {
+            metadata.insert(format!("finger{number}"), controller_json(controller).to_string());
+        }
+        out.write_metadata(&Metadata { name: SETUP.into(), metadata })?;
+        let schemas = schemas::all();
+        let mut ids = [0; 4];
+        for ((_, name, schema), id) in schemas.iter().zip(&mut ids) {
+            *id = out.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
+        }
+        for number in 0..controllers.len() {
+            let mut finger = Finger { next_frame_s: f64::NEG_INFINITY, ..Finger::default() };
+            for (((what, ..), id), channel) in schemas.iter().zip(ids).zip(&mut finger.channels) {
+                *channel = out.add_channel(id, &topic(number, what), "json", &BTreeMap::new())?;
+            }
+            self.fingers.push(finger);
+        }
+        Ok(())
+    }
+
+    fn write_step(&mut self, step: &Step) -> McapResult<()> {
+        let since_s = step.time_s - *self.start_s.get_or_insert(step.time_s);
+        let log_time = (since_s * 1e9 + 0.5) as u64;
+        let Some(finger) = self.fingers.get_mut(step.finger) else { return Ok(()) };
+        let [scalars_channel, frame_channel, image_channel, core_channel] = finger.channels;
+        let sequence = finger.steps as u32;
+        let out = &mut self.out;
+        let mut put = |channel_id, message: &Value| {
+            let header = MessageHeader { channel_id, sequence, log_time, publish_time: log_time };
+            out.write_to_known_channel(&header, message.to_string().as_bytes())
+        };
+        if finger.steps.is_multiple_of(self.every) {
+            put(scalars_channel, &scalars(step))?;
+        }
+        if step.time_s >= finger.next_frame_s {
+            finger.next_frame_s = step.time_s + FRAME_S;
+            let codes: Vec<Vec<u16>> =
+                (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| step.frame.code(slot, column)).collect()).collect();
+            put(frame_channel, &json!({ "sequence": step.frame.sequence, "codes": codes }))?;
+            put(image_channel, &image(step, log_time))?;
+        }
+        finger.steps += 1;
+        put(core_channel, &core(step))
+    }
+}
+
+impl Watch for Recorder {
+    fn begin(&mut self, controllers: &[Controller]) {
+        self.begun = true;
+        self.failed = self.write_head(controllers);
+    }
+
+    fn step(&mut self, step: &Step) {
+        if self.failed.is_ok() {
+            self.failed = self.write_step(step);
+        }
+    }
+}
+
+fn scalars(step: &Step) -> Value {
+    let Step { status, truth, .. } = step;
+    let contact = &status.contact;
+    let values = [
+        step.time_s,
+        step.command.goal.0.to_num(),
+        contact.force.0.to_num(),
+        truth.force_n,
+        truth.indentation_mm,
+        truth.travel_mm,
+        truth.speed_mm_per_s,
+        100.0 * f64::from(status.duty.0) / f64::from(Duty::FULL),
+        truth.current_a,
+        truth.supply_v,
+        truth.winding_c,
+        contact.centre_x.0.to_num(),
+        contact.centre_y.0.to_num(),
+        f64::from(contact.confidence) / 2.55,
+        f64::from(status.mode as u8),
+        f64::from(status.fault.map_or(0, |fault| fault as u8)),
+        f64::from(status.limits.0),
+        truth.tangential_n,
+        truth.slip_mm,
+        truth.object_mm[1],
+    ];
+    let names = schemas::SCALARS.iter().map(|(name, _)| (*name).to_owned());
+    Value::Object(names.zip(values.map(Value::from)).collect::<Map<_, _>>())
+}
+
+/// The taxels' codes in grey, the last row on top.
+fn image(step: &Step, log_time: u64) -> Value {
+    let grey = |code: u16| (code / CODES_PER_GREY).min(255) as u8;
+    let rows = (0..ROWS).rev();
+    let data: Vec<u8> =
+        rows.flat_map(|row| (0..COLUMNS).map(move |column| grey(step.frame.code(row, column)))).collect();
+    json!({
+        "timestamp": { "sec": log_time / 1_000_000_000, "nsec": log_time % 1_000_000_000 },
+        "frame_id": format!("finger{}", step.finger),
+        "width": COLUMNS,
+        "height": ROWS,
+        "encoding": "mono8",
+        "step": COLUMNS,
+        "data": BASE64_STANDARD.encode(data),
+    })
+}
+
+fn core(step: &Step) -> Value {
+    let record = Record { frame: *step.frame, sense: *step.sense, command: *step.command };
+    let mut digest = Digest::new();
+    digest.add(step.status.duty, step.status);
+    json!({
+        "record": BASE64_STANDARD.encode(record.to_bytes()),
+        "duty": step.status.duty.0,
+        "digest": format!("{:016x}", digest.value()),
+    })
+}

@@ -1,0 +1,323 @@
+//! From a scene's text to the scene. Strict: whatever is not described is an error, and all errors of a text come together.
+
+use super::error::{SceneError, SceneErrors, alike};
+use super::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
+use super::{Bound, Event, Scene, controller};
+use crate::key::{Key, Kind, Value, Values};
+use crate::registry::{self, Named};
+use fingertip::config::Config;
+use std::ops::Range;
+use std::path::Path;
+use toml_edit::{Document, Item, TableLike};
+
+/// Reads a scene. `file` names it in errors; `metrics` are those that `[[expect]]` may name.
+///
+/// # Errors
+/// Everything in the text that is not a scene.
+pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
+    let mut reader = Reader { file, text, errors: Vec::new() };
+    let scene = match Document::parse(text) {
+        Ok(document) => reader.scene(document.as_table(), metrics),
+        Err(error) => {
+            let message = format!("this is not TOML: {}", error.message().trim().replace('\n', "; "));
+            reader.error(error.span().unwrap_or(0..0), message, String::new());
+            None
+        }
+    };
+    match scene {
+        Some(scene) if reader.errors.is_empty() => Ok(scene),
+        _ => {
+            reader.errors.sort_by_key(|error| (error.line, error.column));
+            Err(SceneErrors(reader.errors))
+        }
+    }
+}
+
+struct Reader<'a> {
+    file: &'a str,
+    text: &'a str,
+    errors: Vec<SceneError>,
+}
+
+impl Reader<'_> {
+    fn error(&mut self, at: Range<usize>, message: String, allowed: String) -> &mut SceneError {
+        self.errors.push(SceneError::new(self.file, self.text, at, message, allowed));
+        self.errors.last_mut().expect("one was pushed")
+    }
+
+    /// Something that is not described, with the described ones.
+    fn unknown<'w>(&mut self, what: &str, given: &str, at: Range<usize>, words: impl Iterator<Item = &'w str> + Clone) {
+        let allowed = words.clone().collect::<Vec<_>>().join(", ");
+        let suggestion = alike(given, words).map(str::to_owned);
+        self.error(at, format!("unknown {what}"), allowed).suggestion = suggestion;
+    }
+
+    /// None where a part is missing without which there is no scene; the error is among the others.
+    fn scene(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Option<Scene> {
+        let many = [SCRIPT.name, EXPECT.name];
+        let tables = || TABLES.iter().map(|table| table.name).chain(many).chain(["effects"]);
+        let known = |name: &str| ROOT.keys.iter().any(|key| key.name == name) || tables().any(|table| table == name);
+        for (name, item) in root.iter().filter(|(name, _)| !known(name)) {
+            let at = key_span(root, name);
+            match item.is_table_like() || item.is_array_of_tables() {
+                true => self.unknown(&format!("table [{name}]"), name, at, tables()),
+                false => self.unknown_key(&ROOT, name, at),
+            }
+        }
+        let head = self.values(&ROOT, root, 0..0, true);
+        let tables = TABLES.iter().map(|table| (table.name, self.table(table, root))).collect();
+        let script = self.script(root, head.as_ref().map_or(f64::INFINITY, |head| head.number("duration_s")));
+        let effects = self.effects(root);
+        let bounds = self.bounds(root, metrics);
+        let head = head?;
+        let stem = Path::new(self.file).file_stem().map_or("".into(), |stem| stem.to_string_lossy());
+        let scene = Scene {
+            name: stem.into_owned(),
+            text: self.text.to_owned(),
+            about: head.text("about").to_owned(),
+            seed: head.whole("seed") as u64,
+            duration_s: head.number("duration_s"),
+            tables,
+            script,
+            effects,
+            bounds,
+        };
+        if self.errors.is_empty()
+            && let Err(error) = Config::new(&controller::params(&scene))
+        {
+            let at = root.get("controller").map_or(0..0, |_| key_span(root, "controller"));
+            self.error(at, format!("the controller refuses its parameters: {error}"), String::new());
+        }
+        Some(scene)
+    }
+
+    /// A table that stands at most once.
+    fn table(&mut self, table: &Table, root: &dyn TableLike) -> Values {
+        let Some(item) = root.get(table.name) else {
+            return Values::defaults(table.keys);
+        };
+        let at = key_span(root, table.name);
+        match item.as_table_like() {
+            Some(given) => self.values(table, given, at, false).unwrap_or_else(|| Values::defaults(table.keys)),
+            None => {
+                let message = format!("`{}` is a table", table.name);
+                self.error(at, message, format!("[{}], once", table.name));
+                Values::defaults(table.keys)
+            }
+        }
+    }
+
+    /// The tables of a `[[name]]`, each with its place.
+    fn many<'i>(&mut self, table: &Table, root: &'i dyn TableLike) -> Vec<(&'i dyn TableLike, Range<usize>)> {
+        let Some(item) = root.get(table.name) else { return Vec::new() };
+        let at = key_span(root, table.name);
+        if let Some(tables) = item.as_array_of_tables() {
+            return tables.iter().map(|given| (given as &dyn TableLike, given.span().unwrap_or(at.clone()))).collect();
+        }
+        let array = item.as_array().map(|array| array.iter().map(|value| (value.as_inline_table(), value.span())));
+        let inline = array.and_then(|tables| {
+            tables.map(|(given, span)| Some((given? as &dyn TableLike, span.unwrap_or(at.clone())))).collect()
+        });
+        inline.unwrap_or_else(|| {
+            let message = format!("`{}` is a list of tables", table.name);
+            self.error(at, message, format!("[[{}]], any number of times", table.name));
+            Vec::new()
+        })
+    }
+
+    fn script(&mut self, root: &dyn TableLike, duration_s: f64) -> Vec<Event> {
+        let mut script: Vec<Event> = Vec::new();
+        for (given, at) in self.many(&SCRIPT, root) {
+            let Some(values) = self.values(&SCRIPT, given, at, false) else { continue };
+            let event = Event { at_s: values.number("at_s"), goal_n: values.number("goal_n") };
+            let at = || item_span(given, "at_s");
+            if let Some(before) = script.last().filter(|before| before.at_s > event.at_s) {
+                let message = format!("the script is not in order of time: {} s after {} s", event.at_s, before.at_s);
+                self.error(at(), message, format!("at_s of {} or later", before.at_s));
+            }
+            if event.at_s > duration_s {
+                let message = format!("this never happens: the scene ends at {duration_s} s");
+                self.error(at(), message, format!("at_s of 0 to {duration_s}"));
+            }
+            script.push(event);
+        }
+        script
+    }
+
+    fn effects(&mut self, root: &dyn TableLike) -> Vec<Named> {
+        let Some(item) = root.get("effects") else { return Vec::new() };
+        let Some(given) = item.as_table_like() else {
+            let allowed = "[effects.NAME] for each effect";
+            self.error(key_span(root, "effects"), "`effects` is a table of tables".into(), allowed.into());
+            return Vec::new();
+        };
+        for (name, _) in given.iter().filter(|(name, _)| registry::all().all(|effect| effect.name != *name)) {
+            let names: Vec<_> = registry::all().map(|effect| effect.name).collect();
+            self.unknown(&format!("effect `{name}`"), name, key_span(given, name), names.iter().copied());
+        }
+        let mut named = Vec::new();
+        for effect in registry::all() {
+            let Some(item) = given.get(effect.name) else { continue };
+            let at = key_span(given, effect.name);
+            let Some(table) = item.as_table_like() else {
+                let allowed = format!("[effects.{}]", effect.name);
+                self.error(at, format!("the effect `{}` is a table", effect.name), allowed);
+                continue;
+            };
+            let described = Table { name: effect.name, about: effect.about, keys: effect.keys };
+            named.extend(self.values(&described, table, at, false).map(|values| Named { effect, values }));
+        }
+        named
+    }
+
+    fn bounds(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Vec<Bound> {
+        let mut bounds: Vec<Bound> = Vec::new();
+        for (given, place) in self.many(&EXPECT, root) {
+            let Some(values) = self.values(&EXPECT, given, place.clone(), false) else { continue };
+            let bound = Bound {
+                metric: values.text("metric").to_owned(),
+                min: values.optional("min"),
+                max: values.optional("max"),
+            };
+            let metric = || item_span(given, "metric");
+            if !metrics.contains(&bound.metric.as_str()) {
+                // Those of each finger are the same again.
+                let words = metrics.iter().copied().filter(|metric| !metric.contains('.'));
+                self.unknown(&format!("metric `{}`", bound.metric), &bound.metric, metric(), words);
+            }
+            if bounds.iter().any(|before| before.metric == bound.metric) {
+                let message = format!("bounds of `{}` for the second time", bound.metric);
+                self.error(metric(), message, "one [[expect]] a metric, with min, max or both".into());
+            }
+            match (bound.min, bound.max) {
+                (None, None) => {
+                    self.error(place, format!("`{}` without a bound", bound.metric), "min, max or both".into());
+                }
+                (Some(min), Some(max)) if min > max => {
+                    self.error(
+                        item_span(given, "min"),
+                        format!("min of {min} is above max of {max}"),
+                        "min <= max".into(),
+                    );
+                }
+                _ => {}
+            }
+            bounds.push(bound);
+        }
+        bounds
+    }
+
+    /// The checked values of a table; none where one is wrong or missing. `open` leaves what is not described to others.
+    fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
+        let errors = self.errors.len();
+        let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
+        for (name, _) in given.iter().filter(|(name, _)| strange(name)) {
+            self.unknown_key(table, name, key_span(given, name));
+        }
+        let mut values = Values::default();
+        for key in table.keys {
+            let value = match given.get(key.name) {
+                Some(item) => self.value(key, item, item_span(given, key.name)),
+                None if matches!(key.kind, Kind::Optional { .. }) => continue,
+                None => key.default().or_else(|| {
+                    // What was given under a mistaken name is reported already.
+                    let mistaken = given.iter().any(|(name, _)| alike(name, [key.name]).is_some() && strange(name));
+                    if !mistaken {
+                        let message = format!("{} lacks `{}`", table.title(), key.name);
+                        self.error(place.clone(), message, format!("{}: {}", key.name, key.allowed()));
+                    }
+                    None
+                }),
+            };
+            if let Some(value) = value {
+                values.insert(key.name, value);
+            }
+        }
+        let complete = table
+            .keys
+            .iter()
+            .all(|key| matches!(key.kind, Kind::Optional { .. }) || values.iter().any(|(name, _)| name == key.name));
+        (complete && self.errors.len() == errors).then_some(values)
+    }
+
+    fn unknown_key(&mut self, table: &Table, name: &str, at: Range<usize>) {
+        let words = table.keys.iter().map(|key| key.name);
+        let suggestion = alike(name, words.clone());
+        let meant = suggestion.and_then(|word| table.keys.iter().find(|key| key.name == word));
+        let message = match meant {
+            Some(Key { name: full, .. }) if full.rsplit_once('_').is_some_and(|(stem, _)| stem == name) => {
+                format!("`{name}` lacks its unit in {}", table.title())
+            }
+            _ => format!("unknown key `{name}` in {}", table.title()),
+        };
+        let allowed = match meant {
+            Some(key) => format!("{}: {}", key.name, key.allowed()),
+            None => words.collect::<Vec<_>>().join(", "),
+        };
+        self.error(at, message, allowed).suggestion = suggestion.map(str::to_owned);
+    }
+
+    fn value(&mut self, key: &Key, item: &Item, at: Range<usize>) -> Option<Value> {
+        let name = key.name;
+        let number = item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64));
+        // -0 is 0 for everybody; adding 0 makes it so.
+        let within = |min: f64, max: f64| number.filter(|n| (min..=max).contains(n)).map(|n| n + 0.0);
+        let value = match key.kind {
+            Kind::Number { min, max, .. } => within(min, max).map(Value::Number),
+            Kind::Optional { whole: true, .. } if item.as_integer().is_none() => None,
+            Kind::Optional { min, max, .. } => within(min, max).map(Value::Number),
+            Kind::Whole { min, max, .. } => {
+                item.as_integer().filter(|whole| (min..=max).contains(whole)).map(Value::Whole)
+            }
+            Kind::Text => item.as_str().filter(|text| !text.contains('\n')).map(|text| Value::Text(text.to_owned())),
+            Kind::Word { words, .. } => match item.as_str() {
+                Some(given) if !words.contains(&given) => {
+                    let suggestion = alike(given, words.iter().copied()).map(str::to_owned);
+                    let message = format!("`{name}` does not know \"{given}\"");
+                    self.error(at, message, key.allowed()).suggestion = suggestion;
+                    return None;
+                }
+                given => words.iter().find(|word| Some(**word) == given).map(|word| Value::Word(word)),
+            },
+            Kind::Pairs { below } => pairs(item, below).map(Value::Pairs),
+        };
+        if value.is_none() {
+            let given = self.text.get(at.clone()).unwrap_or("that").to_owned();
+            let given = given.lines().next().unwrap_or("that");
+            let right_type = match key.kind {
+                Kind::Number { .. } | Kind::Optional { whole: false, .. } => number.is_some(),
+                Kind::Whole { .. } | Kind::Optional { .. } => item.as_integer().is_some(),
+                _ => false,
+            };
+            let message = match right_type {
+                true => format!("`{name}` of {given} is out of its range"),
+                false => format!("`{name}` cannot be {given}"),
+            };
+            self.error(at, message, key.allowed());
+        }
+        value
+    }
+}
+
+/// Pairs of numbers from 0, each pair once.
+fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
+    let mut pairs = Vec::new();
+    for pair in item.as_array()? {
+        let pair = pair.as_array()?;
+        let at = |place| pair.get(place)?.as_integer().filter(|number| (0..below).contains(number));
+        let pair = [at(0)?, at(1).filter(|_| pair.len() == 2)?];
+        if pairs.contains(&pair) {
+            return None;
+        }
+        pairs.push(pair);
+    }
+    Some(pairs)
+}
+
+fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+    table.get_key_value(name).and_then(|(key, _)| key.span()).unwrap_or(0..0)
+}
+
+fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+    table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
+}

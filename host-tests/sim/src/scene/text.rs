@@ -1,0 +1,86 @@
+//! A scene's text, changed in a place or written anew.
+
+use super::Scene;
+use crate::key::{Value, Values};
+use crate::registry::Description;
+use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
+
+/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value as TOML writes it; comments
+/// stay. What is set is checked when the text is read.
+///
+/// # Errors
+/// The text or the value is not TOML, or there is no such place.
+pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
+    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.message().to_owned())?;
+    let mut value: TomlValue = value.parse().map_err(|_| format!("{path}={value}: `{value}` is not a TOML value"))?;
+    let mut names: Vec<&str> = path.split('.').collect();
+    let key = names.pop().filter(|key| !key.is_empty()).ok_or_else(|| format!("`{path}` names no key"))?;
+    let mut table: &mut dyn toml_edit::TableLike = document.as_table_mut();
+    for (place, name) in names.iter().enumerate().filter(|(_, name)| name.parse::<usize>().is_err()) {
+        let item = table.entry(name).or_insert_with(|| Item::Table(new_table(*name == "effects")));
+        let index = names.get(place + 1).and_then(|next| next.parse::<usize>().ok());
+        table = match (item, index) {
+            (Item::ArrayOfTables(tables), Some(index)) => {
+                let count = tables.len();
+                tables.get_mut(index).ok_or_else(|| format!("`{path}`: [[{name}]] stands {count} times, from 0"))?
+            }
+            (item, None) => item.as_table_like_mut().ok_or_else(|| format!("`{path}`: `{name}` is no table"))?,
+            _ => return Err(format!("`{path}`: `{name}` is no list of tables")),
+        };
+    }
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(present) => {
+            *value.decor_mut() = present.decor().clone();
+            *present = value;
+        }
+        None => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+    Ok(document.to_string())
+}
+
+fn new_table(implicit: bool) -> Table {
+    let mut table = Table::new();
+    table.set_implicit(implicit);
+    table
+}
+
+/// The scene as a text that reads as the same scene: every key, without comments.
+pub fn write(scene: &Scene) -> String {
+    let (about, duration_s) = (Value::Text(scene.about.clone()), Value::Number(scene.duration_s));
+    let mut text = format!("about = {about}\nduration_s = {duration_s}\nseed = {}\n", scene.seed);
+    for (name, values) in &scene.tables {
+        section(&mut text, &format!("[{name}]"), values);
+    }
+    for event in &scene.script {
+        let [at_s, goal_n] = [event.at_s, event.goal_n].map(Value::Number);
+        text += &format!("\n[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n");
+    }
+    for named in &scene.effects {
+        section(&mut text, &format!("[effects.{}]", named.effect.name), &named.values);
+    }
+    for bound in &scene.bounds {
+        text += &format!("\n[[expect]]\nmetric = {}\n", Value::Text(bound.metric.clone()));
+        for (name, side) in [("min", bound.min), ("max", bound.max)] {
+            text += &side.map_or(String::new(), |side| format!("{name} = {}\n", Value::Number(side)));
+        }
+    }
+    text
+}
+
+fn section(text: &mut String, head: &str, values: &Values) {
+    *text += &format!("\n{head}\n");
+    for (name, value) in values.iter() {
+        *text += &format!("{name} = {value}\n");
+    }
+}
+
+/// An effect's table with the magnitudes at which it changes nothing; its other keys at their defaults.
+pub fn zero(effect: &Description) -> String {
+    let mut text = format!("[effects.{}]\n", effect.name);
+    for (name, value) in effect.zero {
+        text += &format!("{name} = {}\n", Value::Number(*value));
+    }
+    text
+}

@@ -1,0 +1,23 @@
+//! What a run leaves behind: metrics, ledger, recording, report, sweep.
+
+mod measured;
+mod recorded;
+mod reported;
+mod swept;
+
+use sim::cli;
+use sim::run::RunError;
+use sim::scene::Scene;
+use sim::watch::{Summary, Watch};
+
+/// A wall with one effect.
+const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/wall.toml");
+
+fn wall() -> Scene {
+    cli::load(SCENE, &[], None).unwrap()
+}
+
+/// The native board.
+fn native(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
+    Ok(sim::native::simulate(scene, watch)?)
+}

@@ -1,0 +1,89 @@
+//! Metrics and bounds.
+
+use crate::{native, wall};
+use sim::ledger;
+use sim::metrics::{self, METRICS};
+use sim::run::run;
+use sim::scene::Bound;
+use std::collections::BTreeSet;
+
+#[test]
+fn every_metric_has_a_name_with_a_unit_and_stands_once() {
+    let units = ["n", "mn", "ms", "mm", "mm_per_s", "percent", "count", "number", "j", "a", "c", "dropped", "broken"];
+    let names = metrics::names();
+    assert_eq!(names.len(), 3 * METRICS.len());
+    assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
+    for name in names {
+        assert!(units.iter().any(|unit| name.ends_with(&format!("_{unit}")) || name.ends_with(unit)), "{name}");
+    }
+    assert_eq!(metrics::page().lines().count(), 2 + METRICS.len());
+}
+
+#[test]
+fn the_wall_is_measured() {
+    let scene = wall();
+    let outcome = run(&scene, &native, &mut []).unwrap();
+    let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
+    assert!((0.99..1.05).contains(&value("peak_force_n")), "{}", value("peak_force_n"));
+    assert!((0.0..5.0).contains(&value("overshoot_percent")));
+    assert!((29.0..31.0).contains(&value("approach_mm_per_s")), "{}", value("approach_mm_per_s"));
+    assert!((160.0..220.0).contains(&value("touch_ms")), "{}", value("touch_ms"));
+    assert!((1.0..30.0).contains(&value("settling_ms")), "{}", value("settling_ms"));
+    assert!((0.01..10.0).contains(&value("steady_error_max_mn")));
+    assert!(value("steady_error_rms_mn") <= value("steady_error_max_mn") * (1.0 + 1e-12));
+    assert!((0.001..0.2).contains(&value("energy_j")), "{}", value("energy_j"));
+    assert!(value("confidence_min_percent") > 50.0, "{}", value("confidence_min_percent"));
+    assert_eq!(value("finger0.peak_force_n"), value("peak_force_n"));
+    assert_eq!(value("faults_count"), 0.0);
+    assert_eq!(value("missed_frames_count"), 0.0);
+    assert_eq!(value("winding_max_c"), 25.0);
+    assert!(outcome.measured.get("fault_ms").is_none() && outcome.measured.get("slip_noticed_ms").is_none());
+    assert!(outcome.passed(), "{}", outcome.text());
+}
+
+#[test]
+fn a_bound_breaks_on_either_side_and_without_a_value() {
+    let mut scene = wall();
+    let bound = |metric: &str, min, max| Bound { metric: metric.into(), min, max };
+    scene.bounds = vec![
+        bound("peak_force_n", Some(1.2), None),
+        bound("peak_force_n", None, Some(0.9)),
+        bound("peak_force_n", Some(0.9), Some(1.2)),
+        bound("slip_noticed_ms", None, Some(10.0)),
+    ];
+    let outcome = run(&scene, &native, &mut []).unwrap();
+    let held: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
+    assert_eq!(held, [false, false, true, false]);
+    assert!(!outcome.passed());
+    let text = outcome.text();
+    assert!(text.contains("BROKEN peak_force_n") && text.contains("1.2 or more asked"), "{text}");
+    let json = outcome.json(&scene, "native", &[]);
+    assert_eq!(json["passed"], false);
+    assert_eq!(json["bounds"][3]["value"], serde_json::Value::Null);
+    assert_eq!(json["ledger"][0]["effect"], "row_sag");
+    assert_eq!(json["seed"], 1);
+}
+
+#[test]
+fn an_ablation_shows_what_an_effect_changes() {
+    let scene = wall();
+    let whole = run(&scene, &native, &mut []).unwrap();
+    let ablated = ledger::ablate(&scene, &native).unwrap();
+    assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
+    let rows = ledger::differences(&whole.measured, &ablated);
+    assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));
+    assert!(rows.iter().all(|(name, ..)| *name != "winding_max_c"));
+    let text = ledger::ablation_text(&whole.measured, &ablated);
+    assert!(text.contains("row_sag") && text.contains("force_error_rms_mn"), "{text}");
+}
+
+#[test]
+fn values_are_shown_with_the_digits_that_count() {
+    let shown = |value| metrics::shown(Some(value));
+    assert_eq!(shown(0.0), "0");
+    assert_eq!(shown(1.0), "1");
+    assert_eq!(shown(1.234_567_8), "1.2346");
+    assert_eq!(shown(-123_456.7), "-123457");
+    assert_eq!(shown(1.234_567e-4), "0.00012346");
+    assert_eq!(metrics::shown(None), "none");
+}

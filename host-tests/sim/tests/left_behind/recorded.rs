@@ -1,0 +1,152 @@
+//! Recordings and their replay.
+
+use crate::{native, wall};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+use mcap::{MessageStream, Writer};
+use sim::cli;
+use sim::recording::{Recorder, replay};
+use sim::report::{Report, Trace, page};
+use sim::run::run;
+use std::fs;
+use std::io::Cursor;
+use std::path::PathBuf;
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn record(name: &str) -> PathBuf {
+    let path = folder(name).join("wall.mcap");
+    let mut scene = wall();
+    scene.duration_s = 0.05;
+    let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
+    let outcome = run(&scene, &native, &mut [&mut recorder]).unwrap();
+    recorder.finish(&outcome.summary.digest).unwrap();
+    path
+}
+
+#[test]
+fn a_recording_replays_to_the_bit() {
+    let replayed = replay(&record("replayed")).unwrap();
+    assert_eq!(replayed.difference, None);
+    assert!((560..=580).contains(&replayed.steps), "{}", replayed.steps);
+}
+
+#[test]
+fn two_fingers_are_measured_recorded_and_drawn_each() {
+    let scene = cli::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/grasp.toml"), &[], None).unwrap();
+    let path = folder("grasp").join("grasp.mcap");
+    let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
+    let mut trace = Trace::new(scene.duration_s);
+    let outcome = run(&scene, &native, &mut [&mut recorder, &mut trace]).unwrap();
+    recorder.finish(&outcome.summary.digest).unwrap();
+    let replayed = replay(&path).unwrap();
+    assert_eq!(replayed.difference, None);
+    assert!((6_000..6_400).contains(&replayed.steps), "{}", replayed.steps);
+
+    let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
+    let [one, other] = ["finger0.peak_force_n", "finger1.peak_force_n"].map(value);
+    assert_eq!(value("peak_force_n"), one.max(other));
+    assert!(one > 0.9 && other > 0.9, "{one} {other}");
+    assert_eq!(value("energy_j"), value("finger0.energy_j") + value("finger1.energy_j"));
+
+    let page =
+        page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
+    assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains(">finger 1</th>"));
+}
+
+#[test]
+fn a_recording_holds_what_viewers_look_for() {
+    let bytes = fs::read(record("viewed")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let mut topics: Vec<_> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+    topics.sort_unstable();
+    assert_eq!(topics, ["/finger0/core", "/finger0/frame", "/finger0/image", "/finger0/scalars"]);
+    for channel in summary.channels.values() {
+        let schema = channel.schema.as_ref().unwrap();
+        assert_eq!((schema.encoding.as_str(), channel.message_encoding.as_str()), ("jsonschema", "json"));
+        let shape: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
+        let properties = shape["properties"].as_object().unwrap();
+        // Each message has exactly the fields that its schema tells of.
+        let messages = MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+        let mut count = 0;
+        for message in messages.filter(|message| message.channel.topic == channel.topic) {
+            let message: serde_json::Value = serde_json::from_slice(&message.data).unwrap();
+            assert!(message.as_object().unwrap().keys().eq(properties.keys()), "{message}");
+            count += 1;
+        }
+        assert!(count >= 5, "{count} messages of {}", channel.topic);
+        if channel.topic == "/finger0/image" {
+            assert_eq!(schema.name, "foxglove.RawImage");
+        }
+    }
+    let attachment = mcap::read::attachment(&bytes, &summary.attachment_indexes[0]).unwrap();
+    assert_eq!((attachment.name.as_str(), &attachment.data[..]), ("wall.toml", wall().text.as_bytes()));
+}
+
+/// The recording with a message of the core changed, whole and with valid checksums otherwise.
+fn rewritten(bytes: &[u8], change: impl Fn(u32, &mut serde_json::Value)) -> Vec<u8> {
+    let summary = mcap::Summary::read(bytes).unwrap().unwrap();
+    let mut out = Writer::new(Cursor::new(Vec::new())).unwrap();
+    for index in &summary.metadata_indexes {
+        out.write_metadata(&mcap::read::metadata(bytes, index).unwrap()).unwrap();
+    }
+    for message in MessageStream::new(bytes).unwrap() {
+        let mut message = message.unwrap();
+        if message.channel.topic == "/finger0/core" {
+            let mut core = serde_json::from_slice(&message.data).unwrap();
+            change(message.sequence, &mut core);
+            message.data = core.to_string().into_bytes().into();
+        }
+        out.write(&message).unwrap();
+    }
+    out.finish().unwrap();
+    out.into_inner().into_inner()
+}
+
+#[test]
+fn one_flipped_bit_is_found_at_its_frame() {
+    let path = record("flipped");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, rewritten(&bytes, |_, _| ())).unwrap();
+    assert_eq!(replay(&path).unwrap().difference, None);
+
+    // The lowest bit of the encoder's count in frame 300.
+    let changed = rewritten(&bytes, |frame, core| {
+        if frame == 300 {
+            let mut record = BASE64_STANDARD.decode(core["record"].as_str().unwrap()).unwrap();
+            record[2 * 110 + 4] ^= 1;
+            core["record"] = BASE64_STANDARD.encode(record).into();
+        }
+    });
+    fs::write(&path, changed).unwrap();
+    let difference = replay(&path).unwrap().difference.expect("a changed encoder changes the core's answer");
+    assert_eq!((difference.finger, difference.frame), (0, 300));
+    assert!(difference.to_string().contains("differs first at frame 300"), "{difference}");
+
+    // A duty that was not answered.
+    let changed = rewritten(&bytes, |frame, core| {
+        if frame == 200 {
+            core["duty"] = (core["duty"].as_i64().unwrap() ^ 1).into();
+        }
+    });
+    fs::write(&path, changed).unwrap();
+    assert_eq!(replay(&path).unwrap().difference.unwrap().frame, 200);
+}
+
+#[test]
+fn damaged_files_are_told() {
+    let path = record("damaged");
+    let bytes = fs::read(&path).unwrap();
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() / 2] ^= 1;
+    fs::write(&path, damaged).unwrap();
+    assert!(replay(&path).unwrap_err().to_string().contains("CRC"));
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    assert!(replay(&path).is_err());
+    fs::write(&path, "no recording").unwrap();
+    assert!(replay(&path).is_err());
+    assert!(replay(&path.with_extension("nowhere")).unwrap_err().to_string().contains("cannot read"));
+}

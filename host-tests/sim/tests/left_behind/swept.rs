@@ -1,0 +1,95 @@
+//! Sweeps, shards and merging.
+
+use crate::{SCENE, native};
+use sim::sweep::{Plan, Table, merge, sweep};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn folder(name: &str) -> PathBuf {
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("swept").join(name);
+    let _ = fs::remove_dir_all(&folder);
+    folder
+}
+
+/// Two keys and two seeds, short.
+fn plan(out: &Path, shard: [usize; 2]) -> Plan {
+    Plan {
+        scene: SCENE.into(),
+        set: vec!["duration_s=0.04".into(), "object.distance_mm=0.5".into()],
+        vary: vec!["tip.modulus_kpa=240..260:3".parse().unwrap(), "tip.radius_mm=9.5..10.5:2".parse().unwrap()],
+        seeds: 2,
+        shard,
+        out: out.into(),
+    }
+}
+
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let file = |path: PathBuf| (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read(path).unwrap());
+    fs::read_dir(folder).unwrap().map(|entry| file(entry.unwrap().path())).collect()
+}
+
+fn whole(name: &str) -> (PathBuf, Table) {
+    let out = folder(name);
+    let table = sweep(&plan(&out, [1, 1]), &native).unwrap();
+    (out, table)
+}
+
+#[test]
+fn shards_merged_are_the_whole_byte_for_byte() {
+    let (whole, table) = whole("whole");
+    let expected = files(&whole);
+    assert_eq!(expected.keys().collect::<Vec<_>>(), ["peak_force_n.svg", "runs.csv", "summary.csv"]);
+    assert_eq!(table.rows.len(), 12);
+    assert!(
+        table.text().contains("tip.modulus_kpa = 240.0, tip.radius_mm = 9.5")
+            || table.text().contains("tip.modulus_kpa = 240, ")
+    );
+
+    let shards = folder("shards");
+    // The last first: the order of the files does not count.
+    for shard in (1..=4).rev() {
+        sweep(&plan(&shards, [shard, 4]), &native).unwrap();
+    }
+    let parts: Vec<PathBuf> = (1..=4).rev().map(|shard| shards.join(format!("runs-{shard}-of-4.csv"))).collect();
+    let merged = folder("merged");
+    assert_eq!(merge(&parts, &merged).unwrap(), table);
+    assert_eq!(files(&merged), expected);
+
+    // What cannot be merged is refused.
+    let refused = |files: &[PathBuf]| merge(files, &folder("refused")).unwrap_err().to_string();
+    assert!(refused(&parts[1..]).contains("3 of 12 runs are missing, run 4 the first"), "{}", refused(&parts[1..]));
+    assert!(refused(&[parts.clone(), vec![parts[0].clone()]].concat()).contains("there twice"));
+    let other = folder("other");
+    sweep(&Plan { seeds: 1, ..plan(&other, [1, 2]) }, &native).unwrap();
+    assert!(refused(&[parts[0].clone(), other.join("runs-1-of-2.csv")]).contains("is of the sweep"));
+    assert!(refused(&[whole.join("summary.csv")]).contains("is no shard"));
+}
+
+#[test]
+fn a_stopped_sweep_goes_on_where_it_stood() {
+    let (out, table) = whole("stopped");
+    let expected = files(&out);
+    // Six rows are left, and a cut one.
+    let runs = String::from_utf8(expected["runs.csv"].clone()).unwrap();
+    let kept: String = runs.split_inclusive('\n').take(7).collect();
+    let cut = runs.lines().nth(7).unwrap();
+    fs::write(out.join("runs.csv.part"), kept + &cut[..cut.len() / 2]).unwrap();
+    let ran = std::sync::atomic::AtomicUsize::new(0);
+    let again = sweep(&plan(&out, [1, 1]), &|scene, watch| {
+        ran.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        native(scene, watch)
+    });
+    assert_eq!(again.unwrap(), table);
+    assert_eq!(ran.into_inner(), 6);
+    assert_eq!(files(&out), expected);
+}
+
+#[test]
+fn what_cannot_be_run_is_told() {
+    let out = folder("wrong");
+    let plan = Plan { vary: vec!["tip.radius_mm=10..1000:2".parse().unwrap()], ..plan(&out, [1, 1]) };
+    assert!(sweep(&plan, &native).unwrap_err().to_string().contains("radius_mm"));
+    let failing = sweep(&self::plan(&out, [1, 1]), &|_, _| Err("the board burns".into()));
+    assert!(failing.unwrap_err().to_string().contains("the board burns"));
+}

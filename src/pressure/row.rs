@@ -127,10 +127,11 @@ impl Total {
         self.running = self.running.wrapping_add(self.sum >> 2);
     }
 
-    /// Takes in a row that was passed over, when all others are in.
-    pub fn add_late(&mut self, row: usize, sum_sixteenths: i32, moment_sixteenths: i32) {
-        let sum = sum_sixteenths.wrapping_shl(GAIN_BITS - COARSER - CODE_BITS);
-        let moment = moment_sixteenths.wrapping_shl(MOMENT_BITS - COARSER - CODE_BITS);
+    /// Takes in a row that was passed over, when all others are in: its sums without the bad taxels, and as much tare, in sixteenths, as
+    /// the bad ones do not have.
+    pub fn add_late(&mut self, row: usize, sums: [i32; 2], boost: i32, tares: [i32; 2]) {
+        let sum = lanes::add_high(tares[0] << (GAIN_BITS - COARSER - CODE_BITS), sums[0], boost);
+        let moment = lanes::add_high(tares[1] << (MOMENT_BITS - COARSER - CODE_BITS), sums[1], boost);
         self.sum = self.sum.wrapping_add(sum);
         self.moment_x = self.moment_x.wrapping_add(moment);
         self.running = self.running.wrapping_add((sum >> 2).wrapping_mul((ROWS - row) as i32));

@@ -162,30 +162,25 @@ impl Array {
             if line.boost != 0 {
                 continue;
             }
-            let suspect = Suspect::new([codes, undriven], &line.gains, config.dead_codes);
+            let suspect = Suspect::new([codes, undriven], config.dead_codes);
             line.boost = row::boost(suspect.codes, config.sag_q32);
             // Masked taxels have neither gain nor tare.
             let bad = suspect.bad & !self.mask[row];
             self.picture.bad[row] |= bad;
-            let mut tares = [0; 2];
-            for (column, tare) in self.tare[row].iter().enumerate() {
-                if bad >> column & 1 != 0 {
-                    self.picture.bad_count += 1;
-                    let tare = tare >> (TARE_BITS - CODE_BITS);
-                    tares[0] += tare;
-                    tares[1] += tare * row::weight(column);
-                }
+            self.picture.bad_count += bad.count_ones() as u8;
+            // A frame that is broken anyhow must not take long.
+            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                total.add_late(row, suspect.sums(&line.gains), line.boost, tare::sums(&self.tare[row], bad));
             }
-            total.add_late(row, [suspect.sum, suspect.moment], line.boost, tares);
         }
     }
 
     /// Works out the single taxels of some rows (a bit each) for the picture, from the frame last read.
     pub fn develop(&mut self, frame: &Frame, rows: u16) {
-        for row in 0..ROWS {
-            if rows >> row & 1 != 0 {
-                self.develop_row(row, frame);
-            }
+        let mut rows = rows & ALL_ROWS;
+        while rows != 0 {
+            self.develop_row(rows.trailing_zeros() as usize, frame);
+            rows &= rows - 1;
         }
         let [a, b, c, d, e, f, g, h, i, j] = self.peaks;
         self.picture.peak = a.max(b).max(c).max(d).max(e).max(f).max(g).max(h).max(i).max(j);
@@ -215,9 +210,9 @@ impl Array {
         let [rows @ .., undriven] = &frame.pairs;
         let sound = Sound::new(undriven, config.dead_codes);
         let mut count = 0;
-        for ((codes, mask), line) in rows.iter().zip(&self.mask).zip(&self.lines) {
+        for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.beyond(sound.largest(codes)) != 0 {
-                count += (Suspect::new([codes, undriven], &line.gains, config.dead_codes).bad & !mask).count_ones();
+                count += (Suspect::new([codes, undriven], config.dead_codes).bad & !mask).count_ones();
             }
         }
         count

@@ -71,10 +71,23 @@ impl Array {
         }
         let line = &mut self.lines[row];
         let more = sum - line.tare_sum;
-        let changes = [more, moment - line.tare_moment, more * row::weight(row)];
-        for (tare, change) in self.tare_sums.iter_mut().zip(changes) {
-            *tare = tare.wrapping_add(change);
-        }
+        let [all, all_x, all_y] = &mut self.tare_sums;
+        *all = all.wrapping_add(more);
+        *all_x = all_x.wrapping_add(moment - line.tare_moment);
+        *all_y = all_y.wrapping_add(more * row::weight(row));
         (line.tare_sum, line.tare_moment) = (sum, moment);
     }
+}
+
+/// Sum and moment of the tares of some columns (a bit each) of a row, in sixteenths.
+pub(super) fn sums(tares: &[i32; COLUMNS], columns: u16) -> [i32; 2] {
+    let [mut sum, mut moment] = [0; 2];
+    for (column, tare) in tares.iter().enumerate() {
+        if columns >> column & 1 != 0 {
+            let tare = tare >> (TARE_BITS - CODE_BITS);
+            sum += tare;
+            moment += tare * row::weight(column);
+        }
+    }
+    [sum, moment]
 }

@@ -73,7 +73,9 @@ proptest! {
     fn the_sums_are_those_of_the_taxels(
         blank in codes(0, 0), codes in codes(3, 4095), calibration in calibration(), sag in 0..20_001, dead in 1..13,
     ) {
-        let config = config(sag, dead);
+        let mut config = config(sag, dead);
+        // A wild level spoils a column: the sums of an array that is not broken.
+        config.params.bad_taxels_max = 100;
         let mut array = tared(&calibration, &blank.frame(), &config);
         let picture = *array.read_all(&codes.frame(), &config);
         let (mut sums, mut sizes, mut peak) = ([0_i64; 3], 0, 0);

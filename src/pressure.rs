@@ -168,10 +168,13 @@ impl Array {
             let bad = suspect.bad & !self.mask[row];
             self.picture.bad[row] |= bad;
             self.picture.bad_count += bad.count_ones() as u8;
-            // A frame that is broken anyhow must not take long.
-            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                total.add_late(row, suspect.sums(&line.gains), line.boost, tare::sums(&self.tare[row], bad));
-            }
+            // A frame that is broken anyhow must not take long: the row is left out whole.
+            let (sums, tares) = if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                (suspect.sums(&line.gains), tare::sums(&self.tare[row], bad))
+            } else {
+                ([0; 2], [line.tare_sum, line.tare_moment])
+            };
+            total.add_late(row, sums, line.boost, tares);
         }
     }
 

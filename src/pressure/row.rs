@@ -32,19 +32,20 @@ impl Sound {
     /// From the slot with nothing driven.
     #[inline(always)]
     pub fn new(undriven: &Pairs, dead_codes: u16) -> Self {
+        let levels = each(|place| held(undriven[place]));
         let mut highest = 0;
         each(|place| {
-            highest = lanes::larger(highest, undriven[place]);
+            highest = lanes::larger(highest, levels[place]);
             0
         });
         let undriven_max = (highest as u16).max((highest >> 16) as u16);
-        let highest = undriven_max.min(CODE_MAX).saturating_add(dead_codes);
+        let highest = undriven_max.saturating_add(dead_codes);
         // Where not every column has a sound code, a floor out of each code's reach makes every row suspect.
         let (dead, room) = if highest < SATURATED { (dead_codes, SATURATED - 1 - highest) } else { (1 << 15, 0) };
         let both = |lane: u16| lanes::pair(lane as i16, lane as i16);
         let (dead, room) = (both(dead), both(room));
         let held_back = COLUMNS as u32 * u32::from(dead_codes);
-        Self { floors: each(|place| held(undriven[place]).wrapping_add(dead)), room, held_back, undriven_max }
+        Self { floors: each(|place| levels[place].wrapping_add(dead)), room, held_back, undriven_max }
     }
 
     /// Not 0 where a row with this largest pair has a taxel that may be dead or saturated: a code below its floor is huge as an

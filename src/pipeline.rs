@@ -208,7 +208,7 @@ impl Pipeline {
     /// Rows of which somebody looks at single taxels in this frame, a bit each.
     fn rows_wanted(&self) -> u16 {
         match self.status.mode {
-            Mode::Tare => ALL_ROWS,
+            Mode::Tare => self.array.tare_rows(),
             Mode::Identify => 0,
             _ if self.array.picture().force(&self.config) >= self.config.contact_off => self.fit.wants().bits(),
             // The baseline may follow.

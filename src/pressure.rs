@@ -11,25 +11,25 @@
 mod calibration;
 mod picture;
 mod row;
+mod suspect;
+mod tare;
 mod taxels;
 
 pub use calibration::{Calibration, CalibrationError};
 pub use picture::Picture;
+pub use tare::TARE_FRAMES;
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
 use calibration::Gains;
 use lanes::Pairs;
 use row::{Sound, Sums, Total};
+use suspect::Suspect;
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = 4;
 /// Fractional bits of the tare: the baseline's filter needs steps far below one code.
 const TARE_BITS: u32 = 16;
-/// Frames averaged by a tare.
-pub const TARE_FRAMES: u32 = 64;
-/// Weight of a frame in the baseline, Q16; each row is visited every tenth frame, so the time constant is 10,240 frames.
-const BASELINE_WEIGHT: i32 = 64;
 /// Fractional bits of what takes a row's sag out.
 const BOOST_BITS: u32 = 28;
 /// Fractional bits of a gain.
@@ -47,18 +47,16 @@ struct Line {
     gains: Gains,
     /// Sum and moment of the codes that the floors hold back, see [`Sound`].
     held_back: [i32; 2],
-    /// 1 / (1 - rho N), Q28.
+    /// 1 / (1 - rho N), Q28; 0 while the row is suspect.
     boost: i32,
     /// Sum of the tares and their moment, in sixteenths of a corrected code.
     tare_sum: i32,
     tare_moment: i32,
-    /// The highest taxel when the row was last developed.
-    peak: i32,
 }
 
 impl Line {
     const fn new(gains: Gains) -> Self {
-        Self { gains, held_back: [0; 2], boost: 1 << BOOST_BITS, tare_sum: 0, tare_moment: 0, peak: 0 }
+        Self { gains, held_back: [0; 2], boost: 1 << BOOST_BITS, tare_sum: 0, tare_moment: 0 }
     }
 }
 
@@ -67,6 +65,8 @@ impl Line {
 pub struct Array {
     picture: Picture,
     lines: [Line; ROWS],
+    /// The highest taxel of each row when that was last developed.
+    peaks: [i32; ROWS],
     /// What the lines' `held_back` was made for.
     dead_codes: u16,
     /// A bit for each column that is left out.
@@ -91,6 +91,7 @@ impl Array {
         Self {
             picture: Picture::EMPTY,
             lines: [Line::new(Calibration::NONE.rows[0]); ROWS],
+            peaks: [0; ROWS],
             dead_codes: 0,
             mask: [0; ROWS],
             tare: [[0; COLUMNS]; ROWS],
@@ -126,13 +127,13 @@ impl Array {
         let mut left_out = 0;
         for (codes, line) in rows.iter().zip(&mut self.lines) {
             let sums = Sums::new(codes, &sound, line);
-            line.boost = row::boost(sums.codes, config.sag_q32);
             let beyond = sound.beyond(sums.largest);
             left_out |= beyond;
-            total.add(&sums, if beyond == 0 { line.boost } else { 0 });
+            line.boost = if beyond == 0 { row::boost(sums.codes, config.sag_q32) } else { 0 };
+            total.add(&sums, line.boost);
         }
         if left_out != 0 {
-            self.read_suspects(frame, config, &sound, &mut total);
+            self.read_suspects(frame, config, &mut total);
         }
         let [sum, moment_x, moment_y] = self.tare_sums;
         let [total_sum, total_x, total_y] = total.sixteenths();
@@ -141,6 +142,7 @@ impl Array {
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
         &self.picture
     }
+
     /// Works out what floors of so many codes above the undriven levels hold back.
     #[cold]
     #[inline(never)]
@@ -154,32 +156,37 @@ impl Array {
     /// Reads the rows in which a taxel may be dead or saturated: such a one is left out.
     #[cold]
     #[inline(never)]
-    fn read_suspects(&mut self, frame: &Frame, config: &Config, sound: &Sound, total: &mut Total) {
+    fn read_suspects(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
         let [rows @ .., undriven] = &frame.pairs;
-        for (row, codes) in rows.iter().enumerate() {
-            if sound.beyond(sound.largest(codes)) == 0 {
+        for (row, (codes, line)) in rows.iter().zip(&mut self.lines).enumerate() {
+            if line.boost != 0 {
                 continue;
             }
-            self.lines[row].boost = row::boost(taxels::net_sum(codes, undriven), config.sag_q32);
-            let mask = self.mask[row];
-            let found = taxels::bad(codes, undriven, config.dead_codes) & !mask;
-            self.picture.bad[row] |= found;
-            self.picture.bad_count += found.count_ones() as u8;
-            self.develop_row(row, frame);
-            let [sum, moment] = row_sums(&self.picture.taxels[row]);
-            let Line { tare_sum, tare_moment, .. } = self.lines[row];
-            total.add_late(row, sum.wrapping_add(tare_sum), moment.wrapping_add(tare_moment));
+            let suspect = Suspect::new([codes, undriven], config.dead_codes);
+            line.boost = row::boost(suspect.codes, config.sag_q32);
+            // Masked taxels have neither gain nor tare.
+            let bad = suspect.bad & !self.mask[row];
+            self.picture.bad[row] |= bad;
+            self.picture.bad_count += bad.count_ones() as u8;
+            // A frame that is broken anyhow must not take long: the row is left out whole.
+            let (sums, tares) = if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                (suspect.sums(&line.gains), tare::sums(&self.tare[row], bad))
+            } else {
+                ([0; 2], [line.tare_sum, line.tare_moment])
+            };
+            total.add_late(row, sums, line.boost, tares);
         }
     }
 
     /// Works out the single taxels of some rows (a bit each) for the picture, from the frame last read.
     pub fn develop(&mut self, frame: &Frame, rows: u16) {
-        for row in 0..ROWS {
-            if rows >> row & 1 != 0 {
-                self.develop_row(row, frame);
-            }
+        let mut rows = rows & ALL_ROWS;
+        while rows != 0 {
+            self.develop_row(rows.trailing_zeros() as usize, frame);
+            rows &= rows - 1;
         }
-        self.picture.peak = self.lines.iter().fold(0, |peak, line| peak.max(line.peak));
+        let [a, b, c, d, e, f, g, h, i, j] = self.peaks;
+        self.picture.peak = a.max(b).max(c).max(d).max(e).max(f).max(g).max(h).max(i).max(j);
     }
 
     /// Reads a frame with all of its taxels.
@@ -193,11 +200,11 @@ impl Array {
     fn develop_row(&mut self, row: usize, frame: &Frame) {
         let row = row.min(ROWS - 1);
         let [rows @ .., undriven] = &frame.pairs;
-        let (line, out) = (&mut self.lines[row], &mut self.picture.taxels[row]);
-        line.peak = taxels::develop([&rows[row], undriven], &line.gains, line.boost, &self.tare[row], out);
+        let (line, out) = (&self.lines[row], &mut self.picture.taxels[row]);
+        self.peaks[row] = taxels::develop([&rows[row], undriven], &line.gains, line.boost, &self.tare[row], out);
         let bad = self.picture.bad[row] & !self.mask[row];
         if bad != 0 {
-            line.peak = taxels::leave_out(bad, out);
+            self.peaks[row] = taxels::leave_out(bad, out);
         }
     }
 
@@ -208,7 +215,7 @@ impl Array {
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.beyond(sound.largest(codes)) != 0 {
-                count += (taxels::bad(codes, undriven, config.dead_codes) & !mask).count_ones();
+                count += (Suspect::new([codes, undriven], config.dead_codes).bad & !mask).count_ones();
             }
         }
         count
@@ -225,72 +232,6 @@ impl Array {
         (self.picture.bad, self.picture.bad_count) = (*mask, 0);
         self.start_tare();
     }
-
-    /// Forgets the tare and starts to measure it anew.
-    pub fn start_tare(&mut self) {
-        self.tare = [[0; COLUMNS]; ROWS];
-        for line in &mut self.lines {
-            (line.tare_sum, line.tare_moment) = (0, 0);
-        }
-        self.tare_sums = [0; 3];
-        self.tare_frames = 0;
-    }
-
-    /// Takes the picture last read into the tare's running mean; true when the tare is complete. All rows must be developed.
-    pub fn continue_tare(&mut self) -> bool {
-        self.tare_frames += 1;
-        let weight = (1 << 16) / self.tare_frames.clamp(1, TARE_FRAMES) as i32;
-        // The sums are not rounded taxel by taxel, so they have a mean of their own.
-        let Picture { sum, moment_x, moment_y, .. } = self.picture;
-        let mut tare_sums = self.tare_sums;
-        for (tare, value) in tare_sums.iter_mut().zip([sum, moment_x, moment_y]) {
-            *tare = tare.wrapping_add(((i64::from(value) * i64::from(weight) + (1 << 15)) >> 16) as i32);
-        }
-        for row in 0..ROWS {
-            self.learn(row, weight);
-        }
-        self.tare_sums = tare_sums;
-        self.tare_frames >= TARE_FRAMES
-    }
-
-    /// The row, as a bit, that [`Array::follow_drift`] looks at next.
-    pub fn drift_row(&self) -> u16 {
-        1 << self.baseline_row.min(ROWS - 1)
-    }
-
-    /// Lets the baseline follow the picture, one row a frame, which must be developed; call it only where there is no contact.
-    pub fn follow_drift(&mut self) {
-        self.learn(self.baseline_row, BASELINE_WEIGHT);
-        self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
-    }
-
-    /// Moves each tare of a row by `weight` (Q16) of what the taxel now reads above it. It wraps only for codes that no
-    /// converter of 12 bits gives.
-    fn learn(&mut self, row: usize, weight: i32) {
-        let row = row.min(ROWS - 1);
-        for (tare, value) in self.tare[row].iter_mut().zip(&self.picture.taxels[row]) {
-            *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
-        }
-        let tares = self.tare[row].map(|tare| tare >> (TARE_BITS - CODE_BITS));
-        let [sum, moment] = row_sums(&tares);
-        let line = &mut self.lines[row];
-        let more = sum - line.tare_sum;
-        let changes = [more, moment - line.tare_moment, more * row::weight(row)];
-        for (tare, change) in self.tare_sums.iter_mut().zip(changes) {
-            *tare = tare.wrapping_add(change);
-        }
-        (line.tare_sum, line.tare_moment) = (sum, moment);
-    }
-}
-
-/// Sum and moment of a row's taxels.
-fn row_sums(taxels: &[i32; COLUMNS]) -> [i32; 2] {
-    let (mut sum, mut moment) = (0, 0);
-    for (column, taxel) in taxels.iter().enumerate() {
-        sum += taxel;
-        moment += taxel * row::weight(column);
-    }
-    [sum, moment]
 }
 
 /// Every place in turn, written out: the compiler would keep the loop where it builds for size.

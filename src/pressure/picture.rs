@@ -11,7 +11,8 @@ pub struct Picture {
     /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated. Each row is that of the frame in which it was
     /// last developed.
     pub taxels: [[i32; COLUMNS]; ROWS],
-    /// Sum over all taxels.
+    /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows, the array is broken,
+    /// and rows with bad ones may be missing whole.
     pub sum: i32,
     /// Sum weighted by twice the column's distance from the middle, in pitches: -9, -7 .. 9.
     pub moment_x: i32,
@@ -23,7 +24,7 @@ pub struct Picture {
     pub bad: [u16; ROWS],
     /// Taxels that are dead or saturated, and not masked.
     pub bad_count: u8,
-    /// The highest undriven column level, codes.
+    /// The highest undriven column level, the lower 12 bits of its code.
     pub undriven_max: u16,
 }
 

@@ -32,19 +32,20 @@ impl Sound {
     /// From the slot with nothing driven.
     #[inline(always)]
     pub fn new(undriven: &Pairs, dead_codes: u16) -> Self {
+        let levels = each(|place| held(undriven[place]));
         let mut highest = 0;
         each(|place| {
-            highest = lanes::larger(highest, undriven[place]);
+            highest = lanes::larger(highest, levels[place]);
             0
         });
         let undriven_max = (highest as u16).max((highest >> 16) as u16);
-        let highest = undriven_max.min(CODE_MAX).saturating_add(dead_codes);
+        let highest = undriven_max.saturating_add(dead_codes);
         // Where not every column has a sound code, a floor out of each code's reach makes every row suspect.
         let (dead, room) = if highest < SATURATED { (dead_codes, SATURATED - 1 - highest) } else { (1 << 15, 0) };
         let both = |lane: u16| lanes::pair(lane as i16, lane as i16);
         let (dead, room) = (both(dead), both(room));
         let held_back = COLUMNS as u32 * u32::from(dead_codes);
-        Self { floors: each(|place| held(undriven[place]).wrapping_add(dead)), room, held_back, undriven_max }
+        Self { floors: each(|place| levels[place].wrapping_add(dead)), room, held_back, undriven_max }
     }
 
     /// Not 0 where a row with this largest pair has a taxel that may be dead or saturated: a code below its floor is huge as an
@@ -127,10 +128,11 @@ impl Total {
         self.running = self.running.wrapping_add(self.sum >> 2);
     }
 
-    /// Takes in a row that was passed over, when all others are in.
-    pub fn add_late(&mut self, row: usize, sum_sixteenths: i32, moment_sixteenths: i32) {
-        let sum = sum_sixteenths.wrapping_shl(GAIN_BITS - COARSER - CODE_BITS);
-        let moment = moment_sixteenths.wrapping_shl(MOMENT_BITS - COARSER - CODE_BITS);
+    /// Takes in a row that was passed over, when all others are in: its sums without the bad taxels, and as much tare, in sixteenths, as
+    /// the bad ones do not have.
+    pub fn add_late(&mut self, row: usize, sums: [i32; 2], boost: i32, tares: [i32; 2]) {
+        let sum = lanes::add_high(tares[0] << (GAIN_BITS - COARSER - CODE_BITS), sums[0], boost);
+        let moment = lanes::add_high(tares[1] << (MOMENT_BITS - COARSER - CODE_BITS), sums[1], boost);
         self.sum = self.sum.wrapping_add(sum);
         self.moment_x = self.moment_x.wrapping_add(moment);
         self.running = self.running.wrapping_add((sum >> 2).wrapping_mul((ROWS - row) as i32));

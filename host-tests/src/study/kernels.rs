@@ -136,7 +136,7 @@ pub const KERNELS: &[Kernel] = &[
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Frames,
-        why: "`Array::read_all` works out every taxel as well: for a tare, and for the bus when it asks. The loop takes `Array::read` in each \
+        why: "`Array::read_all` works out every taxel as well: for the bus when it asks. The loop takes `Array::read` in each \
             frame, and single taxels of two rows at most.",
     },
     Kernel {

@@ -1,0 +1,93 @@
+//! The reading without contact: measured at once by a tare, followed slowly by the baseline.
+
+use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
+use crate::frame::{COLUMNS, ROWS};
+
+/// Frames of a tare, 16 ms at 10 kHz.
+///
+/// Each looks at two rows, so that it takes no longer than a frame in contact, and each row is looked at 32 times: that leaves 0.18 of
+/// a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08.
+pub const TARE_FRAMES: u32 = 32 * TARE_STRIDE;
+/// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
+const TARE_STRIDE: u32 = ROWS as u32 / 2;
+/// Weight of a frame in the baseline, Q16; each row is visited every tenth frame, so the time constant is 10,240 frames.
+const BASELINE_WEIGHT: i32 = 64;
+
+impl Array {
+    /// Forgets the tare and starts to measure it anew.
+    pub fn start_tare(&mut self) {
+        self.tare = [[0; COLUMNS]; ROWS];
+        for line in &mut self.lines {
+            (line.tare_sum, line.tare_moment) = (0, 0);
+        }
+        self.tare_sums = [0; 3];
+        self.tare_frames = 0;
+    }
+
+    /// The two rows, a bit each, that [`Array::continue_tare`] looks at next.
+    pub fn tare_rows(&self) -> u16 {
+        (1 | 1 << TARE_STRIDE) << (self.tare_frames % TARE_STRIDE)
+    }
+
+    /// Takes the picture last read into the tare's running means, of which two rows must be developed; true when the tare is complete.
+    pub fn continue_tare(&mut self) -> bool {
+        let (visits, first) = (self.tare_frames / TARE_STRIDE, self.tare_frames % TARE_STRIDE);
+        self.tare_frames = (self.tare_frames + 1).min(TARE_FRAMES);
+        // The sums are not rounded taxel by taxel, so they have a mean of their own.
+        let weight = i64::from((1 << 16) / self.tare_frames.max(1));
+        let Picture { sum, moment_x, moment_y, .. } = self.picture;
+        let mut tare_sums = self.tare_sums;
+        for (tare, value) in tare_sums.iter_mut().zip([sum, moment_x, moment_y]) {
+            *tare = tare.wrapping_add(((i64::from(value) * weight + (1 << 15)) >> 16) as i32);
+        }
+        for row in [first, first + TARE_STRIDE] {
+            self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
+        }
+        self.tare_sums = tare_sums;
+        self.tare_frames >= TARE_FRAMES
+    }
+
+    /// The row, as a bit, that [`Array::follow_drift`] looks at next.
+    pub fn drift_row(&self) -> u16 {
+        1 << self.baseline_row.min(ROWS - 1)
+    }
+
+    /// Lets the baseline follow the picture, one row a frame, which must be developed; call it only where there is no contact.
+    pub fn follow_drift(&mut self) {
+        self.learn(self.baseline_row, BASELINE_WEIGHT);
+        self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
+    }
+
+    /// Moves each tare of a row by `weight` (Q16) of what the taxel now reads above it. It wraps only for codes that no
+    /// converter of 12 bits gives.
+    fn learn(&mut self, row: usize, weight: i32) {
+        let row = row.min(ROWS - 1);
+        let (mut sum, mut moment) = (0, 0);
+        for (column, (tare, value)) in self.tare[row].iter_mut().zip(&self.picture.taxels[row]).enumerate() {
+            *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
+            let tare = *tare >> (TARE_BITS - CODE_BITS);
+            sum += tare;
+            moment += tare * row::weight(column);
+        }
+        let line = &mut self.lines[row];
+        let more = sum - line.tare_sum;
+        let [all, all_x, all_y] = &mut self.tare_sums;
+        *all = all.wrapping_add(more);
+        *all_x = all_x.wrapping_add(moment - line.tare_moment);
+        *all_y = all_y.wrapping_add(more * row::weight(row));
+        (line.tare_sum, line.tare_moment) = (sum, moment);
+    }
+}
+
+/// Sum and moment of the tares of some columns (a bit each) of a row, in sixteenths.
+pub(super) fn sums(tares: &[i32; COLUMNS], columns: u16) -> [i32; 2] {
+    let [mut sum, mut moment, mut left] = [0, 0, i32::from(columns)];
+    while left != 0 {
+        let column = left.trailing_zeros() as usize;
+        left &= left - 1;
+        let tare = tares.get(column).map_or(0, |tare| tare >> (TARE_BITS - CODE_BITS));
+        sum += tare;
+        moment += tare * row::weight(column);
+    }
+    [sum, moment]
+}

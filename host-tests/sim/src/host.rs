@@ -1,7 +1,11 @@
-//! The host at the other end of the bus: it sends its command when the script changes it, and repeats it.
+//! The host at the other end of the bus: it sends its command when the script changes it, and repeats it. Where the scene says so it
+//! reads the controller too, and grips harder when it must.
+
+pub mod grip;
 
 use crate::effects::link::Stages;
 use crate::scene::{Event, Scene};
+use grip::{Grip, Reading};
 use std::collections::VecDeque;
 
 /// The host of one finger.
@@ -15,15 +19,32 @@ pub struct Host {
     flying: VecDeque<(f64, f64)>,
     arrived_n: f64,
     arrived_s: f64,
+    reader: Option<Reader>,
     /// Packets sent.
     pub sent: u64,
     /// Packets among them that do not arrive.
     pub lost: u64,
 }
 
+/// What reads the controller for the grip.
+#[derive(Clone, Debug)]
+struct Reader {
+    grip: Grip,
+    period_s: f64,
+    read_s: f64,
+    answers: VecDeque<(f64, Reading)>,
+}
+
 impl Host {
     /// Begins at the scene's start, with no force asked for.
     pub fn new(scene: &Scene) -> Self {
+        let read_ms = scene.table("host").number("read_ms");
+        let reader = (read_ms > 0.0).then(|| Reader {
+            grip: Grip::new(scene.table("host")),
+            period_s: read_ms * 1e-3,
+            read_s: 0.0,
+            answers: VecDeque::new(),
+        });
         Self {
             script: scene.script.clone(),
             next: 0,
@@ -33,6 +54,7 @@ impl Host {
             flying: VecDeque::new(),
             arrived_n: 0.0,
             arrived_s: 0.0,
+            reader,
             sent: 0,
             lost: 0,
         }
@@ -44,8 +66,18 @@ impl Host {
         self.arrived_n
     }
 
+    /// Lets the host read the controller where it is time to: the reading arrives later, or not at all. Times never fall.
+    pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
+        let Some(reader) = self.reader.as_mut().filter(|reader| reader.read_s <= time_s) else { return };
+        reader.read_s = time_s + reader.period_s;
+        if let Some(asked_s) = stages.pass(time_s) {
+            reader.answers.push_back((Grip::answered_s(asked_s), reading()));
+        }
+    }
+
     /// The next packet that arrives by a time: when, and its goal. Times never fall.
     pub fn arrival(&mut self, time_s: f64, stages: &mut impl Stages) -> Option<(f64, f64)> {
+        self.judge(time_s, stages);
         loop {
             let event = self.script.get(self.next).filter(|event| event.at_s <= self.send_s);
             let at_s = event.map_or(self.send_s, |event| event.at_s);
@@ -68,13 +100,24 @@ impl Host {
         ((time_s - self.arrived_s).max(0.0) * 1e3) as u16
     }
 
+    fn judge(&mut self, time_s: f64, stages: &mut impl Stages) {
+        while let Some(reader) = &mut self.reader
+            && let Some((at_s, reading)) = reader.answers.pop_front_if(|(at_s, _)| *at_s <= time_s)
+        {
+            if reader.grip.judge(self.goal_n, &reading) {
+                self.send(at_s, stages);
+            }
+        }
+    }
+
     fn send(&mut self, at_s: f64, stages: &mut impl Stages) {
         self.sent += 1;
         self.send_s = at_s + self.period_s;
+        let goal_n = self.reader.as_ref().map_or(self.goal_n, |reader| reader.grip.goal_n(self.goal_n));
         match stages.pass(at_s) {
             Some(arrives_s) => {
                 let last_s = self.flying.back().map_or(arrives_s, |(at_s, _)| *at_s);
-                self.flying.push_back((arrives_s.max(last_s), self.goal_n));
+                self.flying.push_back((arrives_s.max(last_s), goal_n));
             }
             None => self.lost += 1,
         }

@@ -10,6 +10,7 @@ use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
 use crate::effects::set::{Named, Set};
 use crate::host::Host;
+use crate::host::grip::Reading;
 use crate::ledger;
 use crate::mechanics::body::Surroundings;
 use crate::scene::Scene;
@@ -225,6 +226,9 @@ impl<E: Set> Board<E> {
         let sense = self.world.sense(finger, silent_ms);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = bridge(duty, status);
+        if unit.command.torque {
+            unit.host.read(time_s, || Reading::of(&status.contact), &mut unit.link);
+        }
         self.digest.add(&unit.frame, &sense, &unit.command, duty, &status);
         let truth = self.world.truth(finger, watch.wants_pressures(finger, time_s));
         let (frame, sense, command, status) = (&unit.frame, &sense, &unit.command, &status);

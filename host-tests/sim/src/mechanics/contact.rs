@@ -86,7 +86,9 @@ impl<C: Stages> Contact<C> {
         }
         let law = self.law();
         let d_mm = law.depth_mm(x_mm);
-        let share = law.of_depth_n(d_mm) / self.elastic.force_n(d_mm);
+        // At the first touch of a shaped surface both forces may round to 0.
+        let elastic_n = self.elastic.force_n(d_mm);
+        let share = if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left };
         let mut kpa = self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
         if share != 1.0 {
             kpa.iter_mut().for_each(|kpa| *kpa *= share);

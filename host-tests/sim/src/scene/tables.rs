@@ -154,7 +154,8 @@ pub const TABLES: &[Table] = &[
     },
     Table {
         name: "host",
-        about: "The host on the bus: it sends its command when the script changes it, and repeats it.",
+        about: "The host on the bus: it sends its command when the script changes it, and repeats it. With `read_ms` it also reads \
+                force and centre of pressure, and asks for more before the contact slips, or when it did.",
         keys: &[
             number("period_ms", "Time from a command to its repetition.", 0.1, 10_000.0, 10.0),
             Key {
@@ -162,6 +163,11 @@ pub const TABLES: &[Table] = &[
                 about: "Bus watchdog that it sets in the controller; 0 is off.",
                 kind: Kind::Whole { min: 0, max: 65_535, default: Some(0) },
             },
+            number("read_ms", "Time from a reading to the next; 0 reads nothing, and does not grip.", 0.0, 1000.0, 0.0),
+            number("grip_friction", "Share of the force that the host trusts along the surface.", 0.01, 10.0, 0.5),
+            number("grip_n_per_mm", "What it takes for the patch's stiffness along the surface.", 0.001, 1000.0, 1.0),
+            number("grip_drop_mm", "A centre that springs back this far has slipped.", 0.001, 20.0, 0.05),
+            number("grip_most_n", "The largest force that it asks for by itself.", 0.0, 150.0, 4.0),
         ],
     },
     Table {

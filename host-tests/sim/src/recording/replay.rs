@@ -69,9 +69,11 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
-        return Err("a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
+        return Err(
+            "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
                     through the core again"
-            .into());
+                .into(),
+        );
     }
     let end = metadata(bytes, END)?;
     let field = |of: &Metadata, name: &str| {

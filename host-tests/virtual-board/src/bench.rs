@@ -112,7 +112,7 @@ impl Bench {
 
     fn advance_world(&mut self, to_ns: u64) {
         if to_ns > self.world_ns {
-            self.front_end.lock().world.advance((to_ns - self.world_ns) as f64 * 1e-9, self.bridge);
+            self.front_end.lock().world.advance(self.world_ns, to_ns, self.bridge);
             self.world_ns = to_ns;
         }
     }

@@ -49,6 +49,23 @@ pub enum Error {
     /// The client's pseudo-terminal failed.
     #[error("the bus client's pseudo-terminal: {0}")]
     Client(#[from] std::io::Error),
+    /// The plant was asked for where the board stands in a scene.
+    #[error("the board stands in a scene, not in the plant")]
+    InAScene,
+    /// A scene was asked for where there is none.
+    #[error("there is no scene around the board")]
+    NoScene,
+    /// A scene cannot be simulated.
+    #[error(transparent)]
+    Scene(#[from] sim::SimError),
+    /// The board did not do what a scene's host asked of it.
+    #[error("{at_ms:.3} ms after power-on: {why}")]
+    Host {
+        /// When.
+        at_ms: f64,
+        /// What it did.
+        why: String,
+    },
     /// The run touched what the emulator lacks and the allow-list does not name.
     #[error("emulator gaps that are not on the allow-list:\n{0}")]
     Gaps(String),

@@ -1,5 +1,7 @@
 //! The converters' inputs: rows in, column voltages out.
 
+use crate::surroundings::Surroundings;
+use fingertip::frame::COLUMNS;
 use host_tests::plant::{World, readout::decay};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -23,6 +25,9 @@ struct Drive {
     since_ns: u64,
 }
 
+/// What the columns settle to under the drive of that place and under the one before it.
+type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
+
 /// What the converters have done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanCounts {
@@ -40,7 +45,7 @@ pub struct ScanCounts {
 #[derive(Debug, Serialize, Deserialize)]
 pub struct FrontEnd {
     /// What the fingertip touches and what moves it.
-    pub world: World,
+    pub world: Surroundings,
     /// The trigger line between timer and converters is cut.
     pub trigger_cut: bool,
     /// The interrupt of the scan's stream does not reach the core.
@@ -59,7 +64,7 @@ pub struct Shared(Arc<Mutex<FrontEnd>>);
 
 impl Shared {
     /// A front end with no row driven.
-    pub fn new(world: World) -> Self {
+    pub fn new(world: Surroundings) -> Self {
         Self(Arc::new(Mutex::new(FrontEnd {
             world,
             trigger_cut: false,
@@ -100,26 +105,26 @@ impl FrontEnd {
         if converter < COLUMN_INPUTS.len() {
             self.counts.conversions += samples.len() as u64;
         }
-        let reference_v = self.world.setup().array.reference_v;
-        let mut settled: Option<(usize, [f64; 10], [f64; 10])> = None;
+        let reference_v = self.world.reference_v();
+        let word = |volts: f64| (volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16;
+        let mut settled = None;
+        let mut begun_ns = None;
         for (input, at_ns) in samples {
-            let volts = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
+            let begun_ns = *begun_ns.get_or_insert(at_ns);
+            let word = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
                 Some(Some(place)) => {
-                    let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
-                    let (drive, before) = (self.drives[newest], self.drives[(newest + 1).min(2)]);
-                    let (_, end, start) = *match settled {
-                        Some(ref known) if known.0 == newest => known,
-                        _ => settled.insert((newest, self.settled(drive.rows), self.settled(before.rows))),
-                    };
                     let column = converter * COLUMN_INPUTS[0].len() + place;
-                    let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
-                    let left = decay(since_s / self.world.setup().array.settle_tau_s);
-                    end[column] + left * (start[column] - end[column])
+                    let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
+                    match &mut self.world {
+                        Surroundings::Plant(world) => {
+                            word(column_volts(world, &self.drives, newest, column, at_ns, &mut settled))
+                        }
+                        Surroundings::Scene(finger) => finger.code(column, self.drives[newest].rows, begun_ns),
+                    }
                 }
-                None if input == SUPPLY_INPUT => self.world.supply_v() / SUPPLY_RATIO,
-                _ => 0.0,
+                None if input == SUPPLY_INPUT => word(self.world.supply_v() / SUPPLY_RATIO),
+                _ => 0,
             };
-            let word = (volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16;
             self.waiting[converter].push_back(word);
         }
     }
@@ -129,11 +134,29 @@ impl FrontEnd {
         if self.drives[0].rows == 0 && self.drives[1].rows != 0 {
             self.counts.frames += 1;
             self.counts.frame_end_ns = at_ns;
+            if let Surroundings::Scene(finger) = &mut self.world {
+                finger.frame_done(self.counts.frames, at_ns);
+            }
         }
     }
+}
 
-    fn settled(&mut self, rows: u16) -> [f64; 10] {
-        let driven: [bool; ROWS] = std::array::from_fn(|row| rows >> row & 1 == 1);
-        self.world.settled_volts(&driven)
-    }
+/// A column's voltage under the drive of a place.
+fn column_volts(
+    world: &mut World,
+    drives: &[Drive; 3],
+    newest: usize,
+    column: usize,
+    at_ns: u64,
+    settled: &mut Settled,
+) -> f64 {
+    let (drive, before) = (drives[newest], drives[(newest + 1).min(2)]);
+    let mut settles = |drive: Drive| world.settled_volts(&std::array::from_fn(|row| drive.rows >> row & 1 == 1));
+    let (_, end, start) = *match settled {
+        Some(known) if known.0 == newest => known,
+        _ => settled.insert((newest, settles(drive), settles(before))),
+    };
+    let since_s = (at_ns - drive.since_ns.min(at_ns)) as f64 * 1e-9;
+    let left = decay(since_s / world.setup().array.settle_tau_s);
+    end[column] + left * (start[column] - end[column])
 }

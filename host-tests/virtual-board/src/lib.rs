@@ -27,10 +27,12 @@ pub mod recorder;
 pub mod report;
 pub mod rig;
 pub mod scan_timer;
+pub mod scene;
 pub mod serve;
 pub mod stack;
 pub mod stand;
 pub mod streams;
+pub mod surroundings;
 pub mod trace;
 pub mod wire;
 

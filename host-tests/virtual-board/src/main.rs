@@ -21,6 +21,8 @@ enum Command {
     Demo(commands::demo::Arguments),
     /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
     Serve(commands::serve::Arguments),
+    /// Runs a scene with the image.
+    Sim(commands::sim::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -28,6 +30,7 @@ fn main() -> ExitCode {
         Command::Run(arguments) => commands::run::run(&arguments).map_err(Into::into),
         Command::Demo(arguments) => commands::demo::run(&arguments).map_err(Into::into),
         Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),
+        Command::Sim(arguments) => return commands::sim::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

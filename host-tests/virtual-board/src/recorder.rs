@@ -1,9 +1,10 @@
 //! What the world did, sampled while it runs: the truth that the image never sees.
 
+use crate::surroundings::Surroundings;
 use host_tests::metrics::Sample;
-use host_tests::plant::{Bridge, World};
+use host_tests::plant::Bridge;
 
-/// Samples the world at an even pace.
+/// Samples the plant at an even pace; a scene's world is not sampled here.
 #[derive(Clone, Debug)]
 pub struct Recorder {
     every_ns: u64,
@@ -18,7 +19,8 @@ impl Recorder {
     }
 
     /// Takes a sample where one is due.
-    pub fn look(&mut self, now_ns: u64, world: &World, bridge: Bridge) {
+    pub fn look(&mut self, now_ns: u64, world: &Surroundings, bridge: Bridge) {
+        let Surroundings::Plant(world) = world else { return };
         if !now_ns.is_multiple_of(self.every_ns) {
             return;
         }

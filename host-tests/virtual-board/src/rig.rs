@@ -8,7 +8,9 @@ use crate::board::FingerBoard;
 use crate::error::Error;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
+use crate::scene::finger::Finger;
 use crate::stand::{Hall, Stand};
+use crate::surroundings::Surroundings;
 use host_tests::plant::World;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
@@ -61,8 +63,8 @@ impl Rig {
     ///
     /// # Errors
     /// The image cannot be read or placed.
-    pub fn new(image: &Path, world: World, options: &Options) -> Result<Self, Error> {
-        Self::start(image, world, options, None)
+    pub fn new(image: &Path, world: impl Into<Surroundings>, options: &Options) -> Result<Self, Error> {
+        Self::start(image, world.into(), options, None)
     }
 
     /// The board as a snapshot kept it: the same image and options, at the instant at which it was taken.
@@ -71,10 +73,10 @@ impl Rig {
     /// As [`Rig::new`], or the snapshot is of something else.
     pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
         let world = World::new(&host_tests::plant::Setup::default());
-        Self::start(image, world, options, Some(Snapshot::read(snapshot)?))
+        Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
     }
 
-    fn start(path: &Path, world: World, options: &Options, kept: Option<Snapshot>) -> Result<Self, Error> {
+    fn start(path: &Path, world: Surroundings, options: &Options, kept: Option<Snapshot>) -> Result<Self, Error> {
         let image = Firmware::read(path)?;
         let images = images(&image, options)?;
         let front_end = Shared::new(world);
@@ -113,8 +115,17 @@ impl Rig {
         if until_ns <= self.now_ns {
             return Ok(());
         }
-        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))?;
+        self.set_out(until_ns)?;
         self.await_reached()
+    }
+
+    /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. Nothing may be asked
+    /// before [`Rig::await_reached`].
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn set_out(&mut self, until_ns: u64) -> Result<(), Error> {
+        self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
     }
 
     /// Runs on for some ms.
@@ -142,16 +153,34 @@ impl Rig {
         answered.recv().map_err(|_| self.broken())
     }
 
-    /// The world, to look at or to change.
+    /// The plant, to look at or to change.
     ///
     /// # Errors
-    /// The emulator stopped.
+    /// The emulator stopped, or the board stands in a scene.
     pub fn world<T, F>(&mut self, job: F) -> Result<T, Error>
     where
         T: Send + 'static,
         F: FnOnce(&mut World) -> T + Send + 'static,
     {
-        self.with(|stand| job(&mut stand.bench.front_end.lock().world))
+        self.with(|stand| match &mut stand.bench.front_end.lock().world {
+            Surroundings::Plant(world) => Ok(job(world)),
+            Surroundings::Scene(_) => Err(Error::InAScene),
+        })?
+    }
+
+    /// The finger in its scene.
+    ///
+    /// # Errors
+    /// The emulator stopped, or there is no scene around the board.
+    pub fn finger<T, F>(&mut self, job: F) -> Result<T, Error>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut Finger) -> T + Send + 'static,
+    {
+        self.with(|stand| match &mut stand.bench.front_end.lock().world {
+            Surroundings::Scene(finger) => Ok(job(finger)),
+            Surroundings::Plant(_) => Err(Error::NoScene),
+        })?
     }
 
     /// What the converters have done.
@@ -184,7 +213,11 @@ impl Rig {
         if sent { Ok(()) } else { Err(self.broken()) }
     }
 
-    fn await_reached(&mut self) -> Result<(), Error> {
+    /// Waits until the run is where it set out for.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn await_reached(&mut self) -> Result<(), Error> {
         self.now_ns = self.reached.recv().map_err(|_| self.broken())?;
         Ok(())
     }

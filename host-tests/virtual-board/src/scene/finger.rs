@@ -1,0 +1,187 @@
+//! The board's end of a scene: the world behind the pins, and what only it knows, frame by frame.
+
+use super::joint::Joint;
+use crate::bench::STEP_NS;
+use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use host_tests::plant::Bridge;
+use host_tests::plant::setup::Array;
+use sim::SimError;
+use sim::effects::link;
+use sim::effects::sensor::{self, Readout};
+use sim::effects::set::{Named, Parts, Set};
+use sim::mechanics::body::Surroundings;
+use sim::scene::{Scene, controller};
+use sim::watch::{Cost, Truth};
+use sim::world::World;
+
+/// A frame as the converters made it, and the world at its end.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// How many frames the converters had made by then, this one included.
+    pub number: u64,
+    /// When its last conversion ended, on the board.
+    pub end_ns: u64,
+    /// The instant of the world, in the scene's time.
+    pub time_s: f64,
+    /// The codes.
+    pub frame: Frame,
+    /// Encoder and supply.
+    pub sense: Sense,
+    /// What is true.
+    pub truth: Truth,
+}
+
+/// The scene's time by the board's: a second of the board's lasts `second_s` from an instant on.
+#[derive(Clone, Copy, Debug)]
+pub struct Clock {
+    from_ns: u64,
+    from_s: f64,
+    second_s: f64,
+}
+
+impl Clock {
+    /// The scene begins so long after power-on.
+    pub fn new(start_ns: u64) -> Self {
+        Self { from_ns: start_ns, from_s: 0.0, second_s: 1.0 }
+    }
+
+    /// The scene's time at an instant of the board.
+    pub fn time_s(&self, at_ns: u64) -> f64 {
+        self.from_s + (at_ns as f64 - self.from_ns as f64) * 1e-9 * self.second_s
+    }
+
+    /// The instant of the board at a time of the scene.
+    pub fn at_ns(&self, time_s: f64) -> u64 {
+        (self.from_ns as f64 + (time_s - self.from_s) / self.second_s * 1e9).max(0.0) as u64
+    }
+
+    /// From an instant on a second of the board lasts so long.
+    pub fn run_at(&mut self, at_ns: u64, second_s: f64) {
+        if second_s != self.second_s {
+            *self = Self { from_ns: at_ns, from_s: self.time_s(at_ns), second_s };
+        }
+    }
+}
+
+/// A scene's finger.
+pub struct Finger {
+    /// The scene's time.
+    pub clock: Clock,
+    /// Whether frames to come bring their true pressures.
+    pub wants_pressures: bool,
+    joint: Joint,
+    sensor: sensor::Named,
+    readout: Readout,
+    reference_v: f64,
+    sampled: Option<(u64, [u16; COLUMNS])>,
+    frame: Frame,
+    seen: Vec<Seen>,
+}
+
+impl std::fmt::Debug for Finger {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Finger").field("clock", &self.clock).finish_non_exhaustive()
+    }
+}
+
+impl Finger {
+    /// All fingers of a scene, in a world that stands still until a time of the scene's.
+    ///
+    /// # Errors
+    /// The world cannot be simulated.
+    pub fn all(scene: &Scene, clock: Clock, moves_from_s: f64) -> Result<Vec<Self>, SimError> {
+        let setup = controller::setup(scene);
+        let fingers = scene.table("hand").whole("fingers") as usize;
+        let (mut sensors, mut effects) = (Vec::new(), Vec::new());
+        for finger in 0..fingers {
+            let Parts { sensor, contact, drive, .. } = Named::of(scene, finger);
+            sensors.push(sensor);
+            effects.push((drive, contact));
+        }
+        let world = World::new(&setup, &Surroundings::of(scene), effects);
+        let joints = Joint::all(scene, world, moves_from_s)?;
+        let finger = |(joint, sensor)| Self {
+            clock,
+            wants_pressures: false,
+            joint,
+            sensor,
+            readout: Readout::new(&setup.array),
+            reference_v: setup.array.reference_v,
+            sampled: None,
+            frame: Frame::EMPTY,
+            seen: Vec::new(),
+        };
+        Ok(joints.into_iter().zip(sensors).map(finger).collect())
+    }
+
+    /// Goes to an instant of the board with the bridge held. Where fingers share the world it moves by whole steps of the grid, and
+    /// a duty acts from the beginning of the step in which it is written.
+    pub fn advance(&mut self, to_ns: u64, bridge: Bridge) {
+        let to_s = self.clock.time_s(to_ns);
+        if to_s > self.joint.now_s() && (to_ns.is_multiple_of(STEP_NS) || !self.joint.shared()) {
+            self.joint.advance(to_ns, to_s, bridge);
+        }
+    }
+
+    /// The supply at the bridge.
+    pub fn supply_v(&self) -> f64 {
+        self.joint.supply_v()
+    }
+
+    /// What the encoder has counted.
+    pub fn encoder_counts(&self) -> i32 {
+        self.joint.encoder_counts()
+    }
+
+    /// The converters' reference.
+    pub fn reference_v(&self) -> f64 {
+        self.reference_v
+    }
+
+    /// A column's code in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both converters
+    /// see one and the same readout of the slot.
+    pub fn code(&mut self, column: usize, rows: u16, begun_ns: u64) -> u16 {
+        let codes = match self.sampled {
+            Some((of_ns, codes)) if of_ns == begun_ns => codes,
+            _ => {
+                let codes = self.slot_codes(rows, begun_ns);
+                self.sampled.insert((begun_ns, codes)).1
+            }
+        };
+        codes[column]
+    }
+
+    fn slot_codes(&mut self, rows: u16, begun_ns: u64) -> [u16; COLUMNS] {
+        let slot = match rows.count_ones() {
+            0 => ROWS,
+            1 => rows.trailing_zeros() as usize,
+            // No scan drives two rows at once; a firmware that does sees its amplifiers at the rail.
+            _ => return [Array::CODES as u16 - 1; COLUMNS],
+        };
+        let kpa = if slot < ROWS { self.joint.row_kpa(slot) } else { [0.0; COLUMNS] };
+        let time_s = self.clock.time_s(begun_ns).max(self.joint.now_s());
+        let codes = self.readout.codes(&mut self.sensor, slot, time_s, &kpa);
+        for (column, code) in codes.into_iter().enumerate() {
+            self.frame.set_code(slot.min(SLOTS - 1), column, code);
+        }
+        codes
+    }
+
+    /// The last slot of a frame was converted.
+    pub fn frame_done(&mut self, number: u64, end_ns: u64) {
+        let time_s = self.joint.now_s();
+        let (sense, truth) = self.joint.look(self.wants_pressures);
+        self.frame.sequence = number as u32;
+        self.seen.push(Seen { number, end_ns, time_s, frame: self.frame, sense, truth });
+    }
+
+    /// Takes the frames made since the last time.
+    pub fn take_seen(&mut self) -> Vec<Seen> {
+        std::mem::take(&mut self.seen)
+    }
+
+    /// What the effects on sensor, contact and drive have cost.
+    pub fn costs(&self) -> Vec<Cost> {
+        self.joint.costs(|contact, drive| Named::costs(&self.sensor, contact, drive, &link::Named::default()))
+    }
+}

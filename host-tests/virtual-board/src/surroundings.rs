@@ -1,0 +1,62 @@
+//! What lies around the board: the plant of `host-tests`, or one finger in the world of a scene.
+
+use crate::scene::finger::Finger;
+use host_tests::plant::{Bridge, World};
+use serde::{Deserialize, Serialize};
+
+/// The world behind the board's pins.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Surroundings {
+    /// The plant. A snapshot keeps it.
+    Plant(World),
+    /// A scene's. It has no snapshot: asking for one is an error.
+    #[serde(skip)]
+    Scene(Box<Finger>),
+}
+
+impl From<World> for Surroundings {
+    fn from(world: World) -> Self {
+        Self::Plant(world)
+    }
+}
+
+impl From<Finger> for Surroundings {
+    fn from(finger: Finger) -> Self {
+        Self::Scene(Box::new(finger))
+    }
+}
+
+impl Surroundings {
+    /// Goes from one instant of the board to another with the bridge held.
+    pub fn advance(&mut self, from_ns: u64, to_ns: u64, bridge: Bridge) {
+        let dt_s = (to_ns - from_ns) as f64 * 1e-9;
+        match self {
+            Self::Plant(world) => world.advance(dt_s, bridge),
+            Self::Scene(finger) => finger.advance(to_ns, bridge),
+        }
+    }
+
+    /// The supply at the bridge.
+    pub fn supply_v(&self) -> f64 {
+        match self {
+            Self::Plant(world) => world.supply_v(),
+            Self::Scene(finger) => finger.supply_v(),
+        }
+    }
+
+    /// What the timer in encoder mode has counted, unwrapped.
+    pub fn encoder_counts(&self) -> i32 {
+        match self {
+            Self::Plant(world) => world.encoder_counts(),
+            Self::Scene(finger) => finger.encoder_counts(),
+        }
+    }
+
+    /// The converters' reference.
+    pub fn reference_v(&self) -> f64 {
+        match self {
+            Self::Plant(world) => world.setup().array.reference_v,
+            Self::Scene(finger) => finger.reference_v(),
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Scenes with the flash image: it does what the native board does, and what is made of a run holds.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::image;
+use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
+use sim::metrics;
+use sim::scene::{Scene, read};
+use sim::watch::{Step, Summary, Watch};
+use virtual_board::scene::simulate;
+use virtual_board::{Error, Options, Rig};
+
+/// Touches a wall 1 mm away.
+const WALL: &str = "about = \"wall\"\nduration_s = 0.3\n[object]\ndistance_mm = 1.0\n[effects.dry_friction]\n\
+                    [[script]]\nat_s = 0.0\ngoal_n = 1.0\n";
+/// Touches, presses harder, gives way.
+const STEPS: &str = "about = \"steps\"\nduration_s = 0.5\n[object]\ndistance_mm = 0.5\n[effects.dry_friction]\n[effects.row_sag]\n\
+                     [[script]]\nat_s = 0.0\ngoal_n = 1.0\n[[script]]\nat_s = 0.2\ngoal_n = 2.0\n\
+                     [[script]]\nat_s = 0.35\ngoal_n = 0.5\n";
+
+fn scene(text: &str) -> Scene {
+    read("test.toml", text, &metrics::names()).unwrap_or_else(|errors| panic!("{errors}"))
+}
+
+/// Keeps what a test asks for.
+#[derive(Debug, Default)]
+struct Kept {
+    steps: u64,
+    times_s: Vec<f64>,
+    goal_n: f64,
+    force_n: f64,
+    sensed_n: f64,
+    travel_max_mm: f64,
+    error_n: f64,
+}
+
+impl Watch for Kept {
+    fn step(&mut self, step: &Step) {
+        self.steps += 1;
+        self.times_s.push(step.time_s);
+        self.goal_n = step.command.goal.0.to_num();
+        self.force_n = step.truth.force_n;
+        self.sensed_n = step.status.contact.force.0.to_num();
+        self.travel_max_mm = self.travel_max_mm.max(step.truth.travel_mm);
+        self.error_n = self.error_n.max((self.sensed_n - self.force_n).abs());
+    }
+}
+
+fn run(scene: &Scene, watch: &mut dyn Watch) -> Summary {
+    simulate(&image(), scene, watch).expect("the scene runs")
+}
+
+fn compared(first: &Scene, second: &Scene) -> Agreement {
+    let mut path = Path::default();
+    sim::simulate(first, &mut path).expect("the scene runs natively");
+    let mut agreement = Agreement::new(second, path);
+    let summary = run(second, &mut agreement);
+    println!("{agreement}\n{:.3} times real time", summary.virtual_s / summary.wall_s);
+    agreement
+}
+
+#[test]
+fn both_boards_do_the_same() {
+    for text in [WALL, STEPS] {
+        let agreement = compared(&scene(text), &scene(text));
+        assert!(agreement.held(), "{agreement}");
+        // Two boards that do not differ at all would be one board compared with itself.
+        let [force_n, travel_mm] = agreement.differences();
+        assert!(force_n > 1e-4 && travel_mm > 1e-5, "{agreement}");
+    }
+}
+
+#[test]
+fn a_board_that_does_otherwise_is_noticed() {
+    // A tip that is 5 % stiffer than the native board's.
+    let agreement = compared(&scene(WALL), &scene(&format!("{WALL}[tip]\nmodulus_kpa = 262.5\n")));
+    let [force_n, travel_mm] = agreement.beyond();
+    assert!(!agreement.held() && (force_n > BEYOND_N || travel_mm > BEYOND_MM), "{agreement}");
+}
+
+#[test]
+fn a_run_repeats_and_shows_a_step_each_millisecond() {
+    let scene = scene(&WALL.replace("0.3", "0.1"));
+    let (mut first, mut second) = (Kept::default(), Kept::default());
+    let digest = run(&scene, &mut first).digest;
+    assert_eq!(run(&scene, &mut second).digest, digest);
+    assert_eq!(first.times_s, second.times_s);
+    assert!((100..=102).contains(&first.steps), "{} steps", first.steps);
+    assert!(
+        first.times_s.windows(2).all(|pair| (0.8e-3..1.2e-3).contains(&(pair[1] - pair[0]))),
+        "{:?}",
+        first.times_s
+    );
+    assert!(first.times_s[0] < 0.0);
+    assert_eq!(first.goal_n, 1.0);
+    // The status is of the very frame whose truth stands beside it: on the way at 60 N/s, a frame is 6 mN.
+    assert!(first.error_n < 0.03, "{} N", first.error_n);
+}
+
+#[test]
+fn a_goal_that_is_lost_moves_nothing() {
+    let mut kept = Kept::default();
+    run(&scene(&format!("{}[effects.lost_packets]\nlost_percent = 100.0\n", WALL.replace("0.3", "0.05"))), &mut kept);
+    assert_eq!(kept.goal_n, 0.0);
+    assert!(kept.travel_max_mm < 1e-3, "{} mm", kept.travel_max_mm);
+}
+
+#[test]
+fn two_boards_hold_one_object() {
+    let text = "about = \"grasp\"\nduration_s = 0.15\n[hand]\nfingers = 2\n[object]\ndistance_mm = 0.5\n[effects.object_mass]\n\
+                [[script]]\nat_s = 0.0\ngoal_n = 1.0\n";
+    let mut kept = Kept::default();
+    let digest = run(&scene(text), &mut kept).digest;
+    assert!((0.9..1.1).contains(&kept.force_n), "{} N", kept.force_n);
+    assert_eq!(run(&scene(text), &mut Kept::default()).digest, digest, "boards side by side repeat");
+}
+
+#[test]
+fn a_scene_has_no_snapshot_and_no_plant() {
+    let scene = scene(WALL);
+    let clock = virtual_board::scene::finger::Clock::new(0);
+    let finger = virtual_board::scene::finger::Finger::all(&scene, clock, 0.0).expect("the scene is sound").remove(0);
+    let mut rig = Rig::new(&image(), finger, &Options::default()).expect("the image starts");
+    rig.run_ms(1).expect("it runs");
+    assert!(rig.snapshot(&std::env::temp_dir().join("never-written.snapshot")).is_err());
+    assert!(matches!(rig.world(|world| world.force_n()), Err(Error::InAScene)));
+}

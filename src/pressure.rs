@@ -158,11 +158,12 @@ impl Array {
     #[inline(never)]
     fn read_suspects(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
         let [rows @ .., undriven] = &frame.pairs;
+        let mut suspect = Suspect::default();
         for (row, (codes, line)) in rows.iter().zip(&mut self.lines).enumerate() {
             if line.boost != 0 {
                 continue;
             }
-            let suspect = Suspect::new([codes, undriven], config.dead_codes);
+            suspect.look([codes, undriven], config.dead_codes);
             line.boost = row::boost(suspect.codes, config.sag_q32);
             // Masked taxels have neither gain nor tare.
             let bad = suspect.bad & !self.mask[row];
@@ -212,10 +213,11 @@ impl Array {
     pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
         let [rows @ .., undriven] = &frame.pairs;
         let sound = Sound::new(undriven, config.dead_codes);
-        let mut count = 0;
+        let (mut suspect, mut count) = (Suspect::default(), 0);
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.beyond(sound.largest(codes)) != 0 {
-                count += (Suspect::new([codes, undriven], config.dead_codes).bad & !mask).count_ones();
+                suspect.look([codes, undriven], config.dead_codes);
+                count += (suspect.bad & !mask).count_ones();
             }
         }
         count

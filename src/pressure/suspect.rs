@@ -6,6 +6,7 @@ use crate::frame::{BANK_COLUMNS, COLUMNS, SATURATED};
 use lanes::{Pairs, SIGNS};
 
 /// What such a row shows.
+#[derive(Default)]
 pub(super) struct Suspect {
     /// A bit for each column that is dead or saturated.
     pub bad: u16,
@@ -16,13 +17,13 @@ pub(super) struct Suspect {
 }
 
 impl Suspect {
-    /// Of any codes and levels.
+    /// Looks at a row of any codes and levels.
     #[cold]
     #[inline(never)]
-    pub fn new([codes, undriven]: [&Pairs; 2], dead_codes: u16) -> Self {
+    pub fn look(&mut self, [codes, undriven]: [&Pairs; 2], dead_codes: u16) {
         let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
         let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
-        let (mut bad, mut sum, mut good) = (0, 0, [0; BANK_COLUMNS]);
+        let (mut bad, mut sum) = (0, 0);
         for place in 0..BANK_COLUMNS {
             let net = lanes::sub(codes[place], held(undriven[place]));
             sum = lanes::dot(net, lanes::pair(1, 1), sum);
@@ -30,15 +31,12 @@ impl Suspect {
             let signs = (lanes::sub(net, dead) | lanes::sub(sound, codes[place])) & SIGNS;
             bad = bad >> 1 | signs;
             let bad_lanes = (signs << 1).wrapping_sub(signs >> 15);
-            good[place] = net & !bad_lanes;
+            self.good[place] = net & !bad_lanes;
         }
         let first = bad >> (16 - BANK_COLUMNS) & ((1 << BANK_COLUMNS) - 1);
         let second = bad >> (32 - BANK_COLUMNS);
-        Self {
-            bad: (first | second << BANK_COLUMNS) as u16,
-            codes: sum.unsigned_abs().min(COLUMNS as u32 * u32::from(CODE_MAX)),
-            good,
-        }
+        self.bad = (first | second << BANK_COLUMNS) as u16;
+        self.codes = sum.unsigned_abs().min(COLUMNS as u32 * u32::from(CODE_MAX));
     }
 
     /// The good taxels' net codes times the gain, Q14, and times the weighted gain, Q10.

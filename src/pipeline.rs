@@ -135,14 +135,16 @@ impl Pipeline {
         if let Some(fault) = monitor::broken(picture, sense, &self.config).filter(|_| watched) {
             return (Duty::ZERO, self.stop(fault));
         }
-        self.array.develop(frame, self.rows_wanted());
+        // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything to fit to
+        // in a broken array.
+        let sound = monitor::array_broken(picture, &self.config).is_none();
+        let fits = sound && self.status.mode != Mode::Identify;
+        if sound {
+            self.array.develop(frame, self.rows_wanted());
+        }
         let picture = self.array.picture();
-        // A press that measures the modulus must not lean on the configured one, as the fit does.
-        let contact = match self.status.mode {
-            Mode::Identify => contact::from_sums(picture, &self.config),
-            _ => self.fit.read(picture, &self.config),
-        };
-        let fits = self.status.mode != Mode::Identify;
+        let contact =
+            if fits { self.fit.read(picture, &self.config) } else { contact::from_sums(picture, &self.config) };
         self.budget.note(fits && self.fit.at_work());
         let modelled = fits && self.fit.found();
         if picture.bad_count > 0 {
@@ -186,13 +188,13 @@ impl Pipeline {
             limits.set(Limits::NOT_TARED);
         }
 
+        self.status.identification = self.press.outcome();
         self.status.limits = limits;
         self.status.effort = effort;
         self.status.contact = contact;
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
-        self.status.identification = self.press.outcome();
         (duty, &self.status)
     }
 
@@ -298,7 +300,9 @@ impl Pipeline {
 
     /// Lets the baseline follow drift where nothing is touched.
     fn follow_drift(&mut self, contact: &Contact) {
-        if self.tared && self.config.params.baseline_follows != 0 && contact.force < self.config.contact_off {
+        let sound = monitor::array_broken(self.array.picture(), &self.config).is_none();
+        let untouched = sound && contact.force < self.config.contact_off;
+        if self.tared && self.config.params.baseline_follows != 0 && untouched {
             self.array.follow_drift();
         }
     }

@@ -117,10 +117,13 @@ impl Monitor {
 
 /// A broken bridge or array: what a frame shows before its contact is read.
 pub fn broken(picture: &Picture, sense: &Sense, config: &Config) -> Option<Fault> {
+    if sense.bridge_fault { Some(Fault::Bridge) } else { array_broken(picture, config) }
+}
+
+/// A broken array: nothing is to be read off it.
+pub fn array_broken(picture: &Picture, config: &Config) -> Option<Fault> {
     let p = &config.params;
-    if sense.bridge_fault {
-        Some(Fault::Bridge)
-    } else if i32::from(picture.undriven_max) > p.undriven_max_codes {
+    if i32::from(picture.undriven_max) > p.undriven_max_codes {
         Some(Fault::RowStuck)
     } else if i32::from(picture.bad_count) > p.bad_taxels_max {
         Some(Fault::ArrayBroken)

@@ -225,7 +225,7 @@ impl<E: Set> Board<E> {
         }
         let sense = self.world.sense(finger, silent_ms);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        unit.next = bridge(duty, status);
+        unit.next = bridge(duty, status.mode);
         if unit.command.torque {
             unit.host.read(time_s, || Reading::of(&status.contact), &mut unit.link);
         }

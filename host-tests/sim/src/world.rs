@@ -220,7 +220,7 @@ impl<E: Set> World<E> {
     pub fn sense(&self, finger: usize, bus_silent_ms: u16) -> Sense {
         let finger = &self.fingers[finger];
         let supply_mv = (finger.supply_v() * 1e3 + 0.5).clamp(0.0, f64::from(u16::MAX)) as u16;
-        Sense { encoder: finger.count(), supply_mv, bus_silent_ms, bridge_fault: false }
+        Sense { encoder: finger.count(), supply_mv, bus_silent_ms, bridge_fault: false, answer_ticks: 0 }
     }
 
     /// What is true of a finger, with the pressures if they are wanted.

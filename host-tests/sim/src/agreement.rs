@@ -13,9 +13,9 @@ use std::fmt;
 /// How far the two may be shifted in time.
 pub const SHIFT_S: f64 = 0.5e-3;
 /// How far beyond the tube the force may be.
-pub const BEYOND_N: f64 = 0.01;
+pub const BEYOND_N: f64 = 0.005;
 /// How far beyond the tube the travel may be.
-pub const BEYOND_MM: f64 = 0.01;
+pub const BEYOND_MM: f64 = 0.005;
 /// What draws its numbers by the sample draws others on the other board.
 const NOISE: [&str; 2] = ["noise", "burst"];
 

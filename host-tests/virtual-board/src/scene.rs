@@ -1,7 +1,7 @@
 //! A scene on the emulated board: the flash image, unmodified, in the world that the scene names.
 //!
 //! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's goals over
-//! the bus at the times at which the scene's link lets them through; once a millisecond it reads the status registers. A step of
+//! the bus at the times at which the scene's link lets them through; once a millisecond it reads the status registers, where no goal is in the way. A step of
 //! the run is what such a read says, together with the frame that it was made from and what was true at that frame's end. What the
 //! core has inside and no register shows is not in it, so a recording of such a run cannot be fed through the core again.
 //!

@@ -81,15 +81,16 @@ fn a_board_that_does_otherwise_is_noticed() {
 }
 
 #[test]
-fn a_run_repeats_and_shows_a_step_each_millisecond() {
+fn a_run_repeats_and_shows_a_step_nearly_each_millisecond() {
     let scene = scene(&WALL.replace("0.3", "0.1"));
     let (mut first, mut second) = (Kept::default(), Kept::default());
     let digest = run(&scene, &mut first).digest;
     assert_eq!(run(&scene, &mut second).digest, digest);
     assert_eq!(first.times_s, second.times_s);
-    assert!((100..=102).contains(&first.steps), "{} steps", first.steps);
+    // One in ten is lost to the goal that the host repeats.
+    assert!((88..=95).contains(&first.steps), "{} steps", first.steps);
     assert!(
-        first.times_s.windows(2).all(|pair| (0.8e-3..1.2e-3).contains(&(pair[1] - pair[0]))),
+        first.times_s.windows(2).all(|pair| (0.6e-3..2.4e-3).contains(&(pair[1] - pair[0]))),
         "{:?}",
         first.times_s
     );

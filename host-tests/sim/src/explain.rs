@@ -80,6 +80,7 @@ pub fn page() -> String {
         "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
         include_str!("explain/scenes.md").trim()
     );
+    library_of(&mut page);
     stages(&mut page);
     page.push_str("\n## Tables\n");
     for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
@@ -101,6 +102,19 @@ pub fn page() -> String {
         metrics::page()
     );
     page
+}
+
+/// The library's scenes; none where this runs far from its sources.
+fn library_of(page: &mut String) {
+    page.push_str(
+        "\n## The library\n\nEach scene of `host-tests/sim/scenes` explains itself; a test runs them all and holds their bounds.\n\n",
+    );
+    page.push_str("| scene | what it shows |\n| --- | --- |\n");
+    for line in list().unwrap_or_default().lines() {
+        if let Some((name, about)) = line.split_once(' ') {
+            let _ = writeln!(page, "| `{name}` | {} |", about.trim());
+        }
+    }
 }
 
 /// From pressure to codes, stage by stage, with the effects as they are built.

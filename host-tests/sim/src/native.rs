@@ -227,9 +227,9 @@ impl<E: Set> Board<E> {
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = bridge(duty, status.mode);
         if unit.command.torque {
-            unit.host.read(time_s, || Reading::of(&status.contact), &mut unit.link);
+            unit.host.read(time_s, || Reading::of(status), &mut unit.link);
         }
-        self.digest.add(&unit.frame, &sense, &unit.command, duty, &status);
+        self.digest.add(&unit.frame, &sense, &unit.command, duty, status);
         let truth = self.world.truth(finger, watch.wants_pressures(finger, time_s));
         let (frame, sense, command, status) = (&unit.frame, &sense, &unit.command, &status);
         watch.step(&Step { finger, time_s, frame, sense, command, status, truth: &truth });

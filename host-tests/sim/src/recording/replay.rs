@@ -109,7 +109,7 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         let Record { frame: codes, sense, command } = Record::from_bytes(&record);
         let (duty, status) = pipeline.step(&codes, &sense, &command);
         let mut digest = Digest::new();
-        digest.add(duty, &status);
+        digest.add(duty, status);
         let (recorded, replayed) = ((core.duty, core.digest), (duty.0, format!("{:016x}", digest.value())));
         if recorded != replayed {
             let difference = Difference { finger, frame: *frame, time_ns: message.log_time, recorded, replayed };

@@ -168,6 +168,14 @@ pub const TABLES: &[Table] = &[
             number("grip_n_per_mm", "What it takes for the patch's stiffness along the surface.", 0.001, 1000.0, 1.0),
             number("grip_drop_mm", "A centre that springs back this far has slipped.", 0.001, 20.0, 0.05),
             number("grip_most_n", "The largest force that it asks for by itself.", 0.0, 150.0, 4.0),
+            number(
+                "centre_n_per_mm",
+                "How much less it asks of a finger that went on from where its force first stood: two fingers keep a free thing in \
+                 its place.",
+                0.0,
+                10.0,
+                0.0,
+            ),
         ],
     },
     Table {

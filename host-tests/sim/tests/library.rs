@@ -1,0 +1,104 @@
+//! The library of scenes: each is read, runs on the native board, and holds what it promises. The forces and pressures of the paper's
+//! compression test come out of its scene.
+
+use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use sim::native::simulate;
+use sim::registry;
+use sim::run::run;
+use sim::scene::{Scene, library};
+use sim::watch::{Step, Watch};
+use std::thread;
+
+fn scene(name: &str) -> Scene {
+    sim::cli::load(name, &[], None).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Runs a scene, and says which bounds it breaks.
+fn broken(name: &str) -> Vec<String> {
+    let scene = scene(name);
+    let two_sided = scene.bounds.iter().any(|bound| bound.min.is_some() && bound.max.is_some());
+    let outcome = run(&scene, &|scene, watch| Ok(simulate(scene, watch)?), &mut []).expect("it runs");
+    let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
+    let unbounded = (!two_sided).then(|| format!("{name}: nothing is bounded on both sides"));
+    let broken = verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value));
+    broken.chain(unbounded).collect()
+}
+
+#[test]
+fn every_scene_of_the_library_holds_its_bounds() {
+    let names = library::names().expect("the library is there");
+    assert!(names.len() >= 14, "{names:?}");
+    let broken: Vec<String> = thread::scope(|scope| {
+        let runs: Vec<_> = names.iter().map(|name| scope.spawn(|| broken(name))).collect();
+        runs.into_iter().flat_map(|run| run.join().expect("no panic")).collect()
+    });
+    assert!(broken.is_empty(), "{broken:#?}");
+}
+
+#[test]
+fn the_library_shows_every_effect() {
+    let everything = scene("everything");
+    let named: Vec<&str> = everything.effects.iter().map(|named| named.effect.name).collect();
+    let missing: Vec<&str> =
+        registry::all().map(|effect| effect.name).filter(|effect| !named.contains(effect)).collect();
+    assert!(missing.is_empty(), "everything.toml does not name {missing:?}");
+}
+
+/// What the array shows at the end of each hold of the compression test.
+#[derive(Default)]
+struct Gauge {
+    until_s: Vec<f64>,
+    shown: Vec<Shown>,
+}
+
+struct Shown {
+    depth_mm: f64,
+    sensed_n: f64,
+    kpa: [[f64; COLUMNS]; ROWS],
+}
+
+impl Watch for Gauge {
+    fn step(&mut self, step: &Step) {
+        if self.until_s.first().is_some_and(|until_s| step.time_s >= *until_s) {
+            self.until_s.remove(0);
+            let net = |row, column| {
+                let codes = |slot| f64::from(step.frame.code(slot, column));
+                // By the scene's array: 40 codes of preload, 24 codes for each kPa.
+                (codes(row) - codes(SLOTS - 1) - 40.0) / 24.0
+            };
+            self.shown.push(Shown {
+                depth_mm: step.truth.indentation_mm,
+                sensed_n: step.status.contact.force.0.to_num(),
+                kpa: core::array::from_fn(|row| core::array::from_fn(|column| net(row, column))),
+            });
+        }
+    }
+}
+
+#[test]
+fn figures_10_and_11_of_the_paper_come_out_of_the_compression_test() {
+    const PARTS: usize = 40;
+    let (a, modulus_kpa) = (10.0_f64, 250.0);
+    let mut gauge = Gauge { until_s: vec![0.399, 0.649, 0.899], shown: Vec::new() };
+    simulate(&scene("compression"), &mut gauge).expect("it runs");
+    assert_eq!(gauge.shown.len(), 3);
+    for (shown, asked_mm) in gauge.shown.iter().zip([1.0, 2.0, 3.0]) {
+        let d = shown.depth_mm;
+        assert!((d - asked_mm).abs() < 0.005, "{d} mm instead of {asked_mm}");
+        // Figure 11: F = pi Y d^2, here read off the array.
+        let force_n = core::f64::consts::PI * modulus_kpa * 1e-3 * d * d;
+        let off = shown.sensed_n / force_n - 1.0;
+        assert!(off.abs() < 0.01, "{} N instead of {force_n} at {d} mm", shown.sensed_n);
+        // Figure 10: each taxel's mean of p = Y (1 - (a - d) / sqrt(a^2 - r^2)), 0 beyond the rim.
+        let pressure =
+            |x: f64, y: f64| modulus_kpa * (1.0 - (a - d) / (a * a - x * x - y * y).max(1.0).sqrt()).max(0.0);
+        for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+            let place = |taxel: usize, part: usize| 1.5 * (taxel as f64 - 5.0 + (part as f64 + 0.5) / PARTS as f64);
+            let points =
+                (0..PARTS * PARTS).map(|point| pressure(place(column, point % PARTS), place(row, point / PARTS)));
+            let mean = points.sum::<f64>() / (PARTS * PARTS) as f64;
+            let kpa = shown.kpa[row][column];
+            assert!((kpa - mean).abs() < 0.1, "{kpa} kPa instead of {mean} at row {row}, column {column}, {d} mm deep");
+        }
+    }
+}

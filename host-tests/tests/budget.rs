@@ -136,11 +136,11 @@ fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
     let mut running = Loop::new();
     let mut rises = [0; 2];
     let mut last = Effort::Sum;
-    for half in 0..2 {
+    for rises in &mut rises {
         for _ in 0..20 * WAIT_MAX * WINDOW {
             let (effort, taken) = running.frame(Effort::AllRows, DEADLINE, &dear);
             assert!(taken <= DEADLINE, "{taken} with {effort:?}");
-            rises[half] += u32::from(effort > last);
+            *rises += u32::from(effort > last);
             last = effort;
         }
     }

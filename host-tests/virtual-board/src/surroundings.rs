@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Surroundings {
     /// The plant. A snapshot keeps it.
-    Plant(World),
+    Plant(Box<World>),
     /// A scene's. It has no snapshot: asking for one is an error.
     #[serde(skip)]
     Scene(Box<Finger>),
@@ -16,7 +16,7 @@ pub enum Surroundings {
 
 impl From<World> for Surroundings {
     fn from(world: World) -> Self {
-        Self::Plant(world)
+        Self::Plant(Box::new(world))
     }
 }
 

@@ -7,8 +7,21 @@ use sim::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES};
 use sim::scene::text;
 
 /// Plain numbers that have no unit.
-const PLAIN: &[&str] =
-    &["seed", "ratio", "efficiency", "bits", "min", "max", "fingers", "share", "left", "still", "slipping", "teeth"];
+const PLAIN: &[&str] = &[
+    "seed",
+    "ratio",
+    "efficiency",
+    "bits",
+    "min",
+    "max",
+    "fingers",
+    "share",
+    "left",
+    "still",
+    "slipping",
+    "teeth",
+    "grip_friction",
+];
 
 fn described() -> Vec<(&'static str, &'static Key)> {
     let tables = TABLES.iter().chain([&ROOT, &SCRIPT, &EXPECT]).map(|table| (table.name, table.keys));

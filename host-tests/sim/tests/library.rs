@@ -35,6 +35,13 @@ fn every_scene_of_the_library_holds_its_bounds() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
+#[test]
+fn the_readme_shows_the_wall_as_it_is() {
+    let readme = include_str!("../../../README.md");
+    let wall = include_str!("../scenes/wall.toml");
+    assert!(readme.contains(wall) && wall.lines().count() <= 25);
+}
+
 /// The first of the many seeds for which these scenes are made; `cargo xtask sweep` runs them all.
 #[test]
 fn what_depends_on_chance_holds_for_more_than_one_seed() {

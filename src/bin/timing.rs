@@ -16,7 +16,7 @@ use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::{Contact, Pipeline, Status};
+use fingertip::pipeline::{Contact, Pipeline};
 use fingertip::pressure::{ALL_ROWS, Array, Picture};
 use fingertip::record::{MAGIC, Record};
 use fingertip::safety::{Limits, Mode};

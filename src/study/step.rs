@@ -7,7 +7,7 @@ use fingertip::contact::{self, Effort};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
-use fingertip::pipeline::{Command, Contact, Pipeline, Status};
+use fingertip::pipeline::{Command, Contact, Pipeline};
 use fingertip::pressure::{Array, Picture};
 use fingertip::record::Record;
 use fingertip::safety::{Limits, Mode};

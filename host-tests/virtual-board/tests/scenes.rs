@@ -87,13 +87,9 @@ fn a_run_repeats_and_shows_a_step_nearly_each_millisecond() {
     let digest = run(&scene, &mut first).digest;
     assert_eq!(run(&scene, &mut second).digest, digest);
     assert_eq!(first.times_s, second.times_s);
-    // One in ten is lost to the goal that the host repeats.
-    assert!((88..=95).contains(&first.steps), "{} steps", first.steps);
-    assert!(
-        first.times_s.windows(2).all(|pair| (0.6e-3..2.4e-3).contains(&(pair[1] - pair[0]))),
-        "{:?}",
-        first.times_s
-    );
+    // What is not answered within its millisecond is left out: where the host repeats its goal, and for some ms at the touch.
+    assert!((80..=95).contains(&first.steps), "{} steps", first.steps);
+    assert!(first.times_s.windows(2).all(|pair| (0.6e-3..9e-3).contains(&(pair[1] - pair[0]))), "{:?}", first.times_s);
     assert!(first.times_s[0] < 0.0);
     assert_eq!(first.goal_n, 1.0);
     // The status is of the very frame whose truth stands beside it: on the way at 60 N/s, a frame is 6 mN.

@@ -188,10 +188,12 @@ impl Host {
         if now_ns > self.start_ns && self.status.sequence == 0 {
             return Err(Error::Host { at_ms: now_ns as f64 * 1e-6, why: "the board does not answer a read".into() });
         }
-        // The frame that the status speaks of; without an answer, the newest.
+        // The frame that the status speaks of. A millisecond without an answer shows nothing, but where reads are rare: then the newest.
         let number = self.status.sequence.wrapping_sub(self.offset as u32);
         let of_status = |seen: &&Seen| read && seen.number as u32 == number;
-        let frame = self.before.iter().chain(&seen).find(of_status).or(seen.last());
+        let frame = self.before.iter().chain(&seen).find(of_status);
+        let newest = seen.last().filter(|_| !read && self.watchdog_ns > 0);
+        let frame = frame.or(newest);
         if let Some(frame) = frame.filter(|frame| frame.number > self.shown) {
             self.shown = frame.number;
             let at_ns = self.clock.at_ns(frame.time_s);

@@ -63,7 +63,7 @@ pub struct Config {
     pub tip: Tip,
 
     /// See [`Params::row_sag_ppb_per_code`], as a share in Q32.
-    pub sag_q32: u32,
+    pub sag_q32: u16,
     /// See [`Params::dead_codes`].
     pub dead_codes: u16,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
@@ -178,7 +178,7 @@ impl Config {
             params: *p,
             timing,
             tip,
-            sag_q32: (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u32,
+            sag_q32: (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16,
             dead_codes: p.dead_codes as u16,
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
@@ -235,6 +235,8 @@ const fn exp2(n: u32) -> f32 {
 }
 
 /// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
+// Kept apart, as the next: a dozen copies would fill a sixtieth of the flash.
+#[inline(never)]
 fn wide(value: f32) -> i64 {
     value.clamp(-4e18, 4e18) as i64
 }
@@ -252,6 +254,7 @@ fn brake(motor: i32) -> [i32; 3] {
 }
 
 /// `value / 1000` in units of 2^-bits, rounded.
+#[inline(never)]
 const fn thousandths(value: i32, bits: u32) -> i32 {
     ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
 }

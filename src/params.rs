@@ -83,7 +83,7 @@ params! {
     codes_per_kpa_milli = 24_000 in 1_000..=200_000;
     /// Share of the row's voltage lost to the row driver's resistance for each code in the row's sum, parts per billion:
     /// R_on / (R_f V_drive 4096 / V_ref).
-    row_sag_ppb_per_code = 1_667 in 0..=20_000;
+    row_sag_ppb_per_code = 1_667 in 0..=7_600;
     /// A taxel that reads fewer codes than this above its column's undriven level is dead: the sensor's preload is gone.
     dead_codes = 12 in 1..=1_000;
     /// A column that reads more codes than this with no row driven shows a row that is stuck on.

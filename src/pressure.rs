@@ -21,17 +21,14 @@ pub use tare::TARE_FRAMES;
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
-use calibration::Gains;
-use lanes::Pairs;
-use row::{Sound, Sums, Total};
+use lanes::{BOOST_BITS, Pairs, Row, Total};
+use row::Sound;
 use suspect::Suspect;
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = 4;
 /// Fractional bits of the tare: the baseline's filter needs steps far below one code.
 const TARE_BITS: u32 = 16;
-/// Fractional bits of what takes a row's sag out.
-const BOOST_BITS: u32 = 28;
 /// Fractional bits of a gain.
 const GAIN_BITS: u32 = 14;
 /// Per-taxel gain of one, Q14. Gains reach from 0 to just below 2.
@@ -41,38 +38,22 @@ pub const GAIN_MAX: u16 = (1 << 15) - 1;
 /// A bit for each row.
 pub const ALL_ROWS: u16 = (1 << ROWS) - 1;
 
-/// A row's calibration, tare, and what the last frame showed of it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Line {
-    gains: Gains,
-    /// Sum and moment of the codes that the floors hold back, see [`Sound`].
-    held_back: [i32; 2],
-    /// 1 / (1 - rho N), Q28; 0 while the row is suspect.
-    boost: i32,
-    /// Sum of the tares and their moment, in sixteenths of a corrected code.
-    tare_sum: i32,
-    tare_moment: i32,
-}
-
-impl Line {
-    const fn new(gains: Gains) -> Self {
-        Self { gains, held_back: [0; 2], boost: 1 << BOOST_BITS, tare_sum: 0, tare_moment: 0 }
-    }
-}
-
 /// Per-taxel calibration and the last picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
     picture: Picture,
-    lines: [Line; ROWS],
+    /// Gains, what the floors hold back of the rows' sums (see [`Sound`]), and the sag of the last frame.
+    rows: [Row; ROWS],
     /// The highest taxel of each row when that was last developed.
     peaks: [i32; ROWS],
-    /// What the lines' `held_back` was made for.
+    /// What is held back was worked out for so many.
     dead_codes: u16,
     /// A bit for each column that is left out.
     mask: [u16; ROWS],
     /// Reading without contact, codes in Q16.
     tare: [[i32; COLUMNS]; ROWS],
+    /// Sum of each row's tares and their moment, in sixteenths of a corrected code.
+    tare_lines: [[i32; 2]; ROWS],
     /// Sum and moments of the tare, in sixteenths of a corrected code.
     tare_sums: [i32; 3],
     tare_frames: u32,
@@ -90,11 +71,12 @@ impl Array {
     pub const fn new() -> Self {
         Self {
             picture: Picture::EMPTY,
-            lines: [Line::new(Calibration::NONE.rows[0]); ROWS],
+            rows: [Row { weights: Calibration::NONE.weights[0], start: [0; 2], boost: 1 << BOOST_BITS }; ROWS],
             peaks: [0; ROWS],
             dead_codes: 0,
             mask: [0; ROWS],
             tare: [[0; COLUMNS]; ROWS],
+            tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
             tare_frames: 0,
             baseline_row: 0,
@@ -115,28 +97,22 @@ impl Array {
     /// taxels and its peak stay as they are, see [`Array::develop`].
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
         let [rows @ .., undriven] = &frame.pairs;
-        let sound = Sound::new(undriven, config.dead_codes);
         if config.dead_codes != self.dead_codes {
             self.hold_back(config.dead_codes);
         }
         if self.picture.bad_count != 0 {
             (self.picture.bad, self.picture.bad_count) = (self.mask, 0);
         }
+        let sound = Sound::new(undriven, config.dead_codes, config.sag_q32);
+        let mut total = lanes::pass(rows, &mut self.rows, &sound.common);
+        let largest = row::larger_lane(total.largest);
         self.picture.undriven_max = sound.undriven_max;
-        let mut total = Total::default();
-        let mut left_out = 0;
-        for (codes, line) in rows.iter().zip(&mut self.lines) {
-            let sums = Sums::new(codes, &sound, line);
-            let beyond = sound.beyond(sums.largest);
-            left_out |= beyond;
-            line.boost = if beyond == 0 { row::boost(sums.codes, config.sag_q32) } else { 0 };
-            total.add(&sums, line.boost);
-        }
-        if left_out != 0 {
-            self.read_suspects(frame, config, &mut total);
+        self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
+        if sound.suspects(largest) {
+            self.leave_out(frame, config, &sound, &mut total);
         }
         let [sum, moment_x, moment_y] = self.tare_sums;
-        let [total_sum, total_x, total_y] = total.sixteenths();
+        let [total_sum, total_x, total_y] = row::sixteenths(&total);
         self.picture.sum = total_sum.wrapping_sub(sum);
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
@@ -148,35 +124,37 @@ impl Array {
     #[inline(never)]
     fn hold_back(&mut self, dead_codes: u16) {
         self.dead_codes = dead_codes;
-        for line in &mut self.lines {
-            line.held_back = line.gains.sums.map(|sum| sum.wrapping_mul(dead_codes.into()));
+        let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
+        for row in &mut self.rows {
+            row.start = row.weights.map(|weights| weights.into_iter().fold(0, |sum, pair| lanes::dot(pair, dead, sum)));
         }
     }
 
-    /// Reads the rows in which a taxel may be dead or saturated: such a one is left out.
+    /// Takes dead and saturated taxels out of a pass, and tells which they are.
     #[cold]
     #[inline(never)]
-    fn read_suspects(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
+    fn leave_out(&mut self, frame: &Frame, config: &Config, sound: &Sound, total: &mut Total) {
         let [rows @ .., undriven] = &frame.pairs;
         let mut suspect = Suspect::default();
-        for (row, (codes, line)) in rows.iter().zip(&mut self.lines).enumerate() {
-            if line.boost != 0 {
+        let mut peak = 0;
+        for (row, codes) in rows.iter().enumerate() {
+            let largest = sound.largest(codes);
+            if !sound.suspects(largest) {
+                peak = peak.max(largest);
                 continue;
             }
             suspect.look([codes, undriven], config.dead_codes);
-            line.boost = row::boost(suspect.codes, config.sag_q32);
             // Masked taxels have neither gain nor tare.
             let bad = suspect.bad & !self.mask[row];
             self.picture.bad[row] |= bad;
             self.picture.bad_count += bad.count_ones() as u8;
-            // A frame that is broken anyhow must not take long: the row is left out whole.
-            let (sums, tares) = if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                (suspect.sums(&line.gains), tare::sums(&self.tare[row], bad))
-            } else {
-                ([0; 2], [line.tare_sum, line.tare_moment])
-            };
-            total.add_late(row, sums, line.boost, tares);
+            // An array that is broken anyhow must not take long.
+            if bad != 0 && i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                let Row { weights, boost, .. } = &self.rows[row];
+                row::leave_out(total, row, suspect.sums(weights), *boost, tare::sums(&self.tare[row], bad));
+            }
         }
+        self.picture.peak_codes = peak + config.dead_codes;
     }
 
     /// Works out the single taxels of some rows (a bit each) for the picture, from the frame last read.
@@ -201,8 +179,8 @@ impl Array {
     fn develop_row(&mut self, row: usize, frame: &Frame) {
         let row = row.min(ROWS - 1);
         let [rows @ .., undriven] = &frame.pairs;
-        let (line, out) = (&self.lines[row], &mut self.picture.taxels[row]);
-        self.peaks[row] = taxels::develop([&rows[row], undriven], &line.gains, line.boost, &self.tare[row], out);
+        let out = &mut self.picture.taxels[row];
+        self.peaks[row] = taxels::develop([&rows[row], undriven], &self.rows[row], &self.tare[row], out);
         let bad = self.picture.bad[row] & !self.mask[row];
         if bad != 0 {
             self.peaks[row] = taxels::leave_out(bad, out);
@@ -212,10 +190,10 @@ impl Array {
     /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
     pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
         let [rows @ .., undriven] = &frame.pairs;
-        let sound = Sound::new(undriven, config.dead_codes);
+        let sound = Sound::new(undriven, config.dead_codes, config.sag_q32);
         let (mut suspect, mut count) = (Suspect::default(), 0);
         for (codes, mask) in rows.iter().zip(&self.mask) {
-            if sound.beyond(sound.largest(codes)) != 0 {
+            if sound.suspects(sound.largest(codes)) {
                 suspect.look([codes, undriven], config.dead_codes);
                 count += (suspect.bad & !mask).count_ones();
             }
@@ -225,9 +203,9 @@ impl Array {
 
     /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
     pub fn calibrate(&mut self, calibration: &Calibration) {
-        let Calibration { rows, mask } = calibration;
-        for (line, gains) in self.lines.iter_mut().zip(rows) {
-            line.gains = *gains;
+        let Calibration { weights, mask } = calibration;
+        for (row, weights) in self.rows.iter_mut().zip(weights) {
+            row.weights = *weights;
         }
         self.hold_back(self.dead_codes);
         self.mask = *mask;

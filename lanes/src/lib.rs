@@ -9,6 +9,10 @@
 #[cfg(not(target_os = "none"))]
 extern crate std;
 
+mod rows;
+
+pub use rows::{BOOST_BITS, Common, Row, Total, pass, portable_pass};
+
 /// The sign bits of both lanes.
 pub const SIGNS: u32 = 0x8000_8000;
 
@@ -44,36 +48,9 @@ pub fn larger(a: u32, b: u32) -> u32 {
 /// Five pairs.
 pub type Pairs = [u32; 5];
 
-/// What five pairs, each less its floor, add up to.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Weighed {
-    /// Each lane's sum, where no lane carries.
-    pub plain: u32,
-    /// Both lanes times the first weights.
-    pub first: i32,
-    /// Both lanes times the second weights.
-    pub second: i32,
-    /// The largest of each lane, unsigned.
-    pub largest: u32,
-}
-
 /// The same functions without the instructions.
 pub mod portable {
-    use super::{Pairs, Weighed, high, larger, low, pair};
-
-    /// See [`super::weigh`].
-    #[inline(always)]
-    pub fn weigh(pairs: &Pairs, floors: &Pairs, weights: &[Pairs; 2], mut sums: Weighed) -> Weighed {
-        let [first, second] = weights;
-        for (((pair, floor), first), second) in pairs.iter().zip(floors).zip(first).zip(second) {
-            let above = sub(*pair, *floor);
-            sums.plain = sums.plain.wrapping_add(above);
-            sums.first = dot(above, *first, sums.first);
-            sums.second = dot(above, *second, sums.second);
-            sums.largest = larger(sums.largest, above);
-        }
-        sums
-    }
+    use super::{high, low, pair};
 
     /// See [`super::sub`].
     #[inline(always)]
@@ -118,47 +95,13 @@ pub mod portable {
 }
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
-pub use instructions::{add_high, dot, excess, near_root, root_and_product, sub, weigh};
+pub use instructions::{add_high, dot, excess, near_root, root_and_product, sub};
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
-pub use portable::{add_high, dot, excess, near_root, root_and_product, sub, weigh};
+pub use portable::{add_high, dot, excess, near_root, root_and_product, sub};
 
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 mod instructions {
-    use super::{Pairs, Weighed};
     use core::arch::asm;
-
-    /// Adds five pairs, each less its floor, to the sums: plain, by the first and by the second weights, and the largest
-    /// (SSUB16, SMLAD, UQSUB16).
-    ///
-    /// Written out, because the compiler has too few registers for any other order of the same instructions, and keeps loading
-    /// and storing.
-    #[inline(always)]
-    pub fn weigh(pairs: &Pairs, floors: &Pairs, weights: &[Pairs; 2], sums: Weighed) -> Weighed {
-        let Weighed { mut plain, mut first, mut second, mut largest } = sums;
-        // SAFETY: reads registers and the arrays, whose lengths the types hold; writes registers only. The flag that it can set (Q) is
-        // sticky and read nowhere.
-        unsafe {
-            asm!(
-                ".irp place, 0, 4, 8, 12, 16",
-                "ldr {above}, [{pairs}, #\\place]",
-                "ldr {a}, [{floors}, #\\place]",
-                "ldr {b}, [{weights}, #\\place]",
-                "ldr {c}, [{weights}, #\\place + 20]",
-                "ssub16 {above}, {above}, {a}",
-                "smlad {first}, {above}, {b}, {first}",
-                "smlad {second}, {above}, {c}, {second}",
-                "uqsub16 {a}, {above}, {largest}",
-                "add {plain}, {plain}, {above}",
-                "add {largest}, {largest}, {a}",
-                ".endr",
-                pairs = in(reg) pairs, floors = in(reg) floors, weights = in(reg) weights,
-                plain = inout(reg) plain, first = inout(reg) first, second = inout(reg) second, largest = inout(reg) largest,
-                above = out(reg) _, a = out(reg) _, b = out(reg) _, c = out(reg) _,
-                options(pure, readonly, nostack),
-            );
-        }
-        Weighed { plain, first, second, largest }
-    }
 
     /// a - b in each lane, wrapping (SSUB16).
     #[inline(always)]

@@ -45,42 +45,33 @@ impl core::error::Error for CalibrationError {}
 /// Gains of all taxels, and a mask of those that are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Calibration {
-    pub(super) rows: [Gains; ROWS],
+    pub(super) weights: [Weights; ROWS],
     /// A bit for each column that is left out.
     pub(super) mask: [u16; ROWS],
 }
 
-/// The gains of a row, in pairs like the codes of a frame; zero where the taxel is left out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Gains {
-    /// The gains in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9, in Q10: at most 18 in 16 bits.
-    pub weights: [Pairs; 2],
-    /// Sums of both.
-    pub sums: [i32; 2],
-}
+/// The gains of a row in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9, in Q10: at most 18 in 16 bits.
+/// In pairs like the codes of a frame; zero where the taxel is left out.
+type Weights = [Pairs; 2];
 
-impl Gains {
-    const fn new(gains: &[u16; COLUMNS]) -> Self {
-        let mut row = Self { weights: [[0; BANK_COLUMNS]; 2], sums: [0; 2] };
-        let mut place = 0;
-        while place < BANK_COLUMNS {
-            let (left, right) = (gains[place] as i32, gains[place + BANK_COLUMNS] as i32);
-            // Rounded from Q14.
-            let weighted_left = (left * weight(place) + 8) >> 4;
-            let weighted_right = (right * weight(place + BANK_COLUMNS) + 8) >> 4;
-            row.weights[0][place] = lanes::pair(left as i16, right as i16);
-            row.weights[1][place] = lanes::pair(weighted_left as i16, weighted_right as i16);
-            row.sums[0] += left + right;
-            row.sums[1] += weighted_left + weighted_right;
-            place += 1;
-        }
-        row
+const fn weights(gains: &[u16; COLUMNS]) -> Weights {
+    let mut weights = [[0; BANK_COLUMNS]; 2];
+    let mut place = 0;
+    while place < BANK_COLUMNS {
+        let (left, right) = (gains[place] as i32, gains[place + BANK_COLUMNS] as i32);
+        // Rounded from Q14.
+        let weighted_left = (left * weight(place) + 8) >> 4;
+        let weighted_right = (right * weight(place + BANK_COLUMNS) + 8) >> 4;
+        weights[0][place] = lanes::pair(left as i16, right as i16);
+        weights[1][place] = lanes::pair(weighted_left as i16, weighted_right as i16);
+        place += 1;
     }
+    weights
 }
 
 impl Calibration {
     /// Gains of one, and every taxel counts.
-    pub const NONE: Self = Self { rows: [Gains::new(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
+    pub const NONE: Self = Self { weights: [weights(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
 
     /// Takes gains in Q14 (`gains[row][column]`, [`GAIN_ONE`] is 1) and a mask with a bit for each column to leave out.
     ///
@@ -98,7 +89,7 @@ impl Calibration {
                 }
             }
             let kept = core::array::from_fn(|column| if mask >> column & 1 == 0 { gains[column] } else { 0 });
-            calibration.rows[row] = Gains::new(&kept);
+            calibration.weights[row] = weights(&kept);
         }
         Ok(calibration)
     }

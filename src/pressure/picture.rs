@@ -12,7 +12,7 @@ pub struct Picture {
     /// last developed.
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows, the array is broken,
-    /// and rows with bad ones may be missing whole.
+    /// and bad ones may be in it.
     pub sum: i32,
     /// Sum weighted by twice the column's distance from the middle, in pitches: -9, -7 .. 9.
     pub moment_x: i32,
@@ -20,11 +20,13 @@ pub struct Picture {
     pub moment_y: i32,
     /// Largest of the taxels as they were last developed, at least 0.
     pub peak: i32,
+    /// The highest code above its column's undriven level, in any taxel of a row without a bad one: how near the array is to saturation.
+    pub peak_codes: u16,
     /// A bit for each column that is masked, dead or saturated, for each row.
     pub bad: [u16; ROWS],
     /// Taxels that are dead or saturated, and not masked.
     pub bad_count: u8,
-    /// The highest undriven column level, the lower 12 bits of its code.
+    /// The highest undriven column level.
     pub undriven_max: u16,
 }
 
@@ -36,6 +38,7 @@ impl Picture {
         moment_x: 0,
         moment_y: 0,
         peak: 0,
+        peak_codes: 0,
         bad: [0; ROWS],
         bad_count: 0,
         undriven_max: 0,

@@ -1,8 +1,6 @@
 //! A row in which a taxel may be dead or saturated.
 
-use super::calibration::Gains;
-use super::row::{CODE_MAX, held};
-use crate::frame::{BANK_COLUMNS, COLUMNS, SATURATED};
+use crate::frame::{BANK_COLUMNS, SATURATED};
 use lanes::{Pairs, SIGNS};
 
 /// What such a row shows.
@@ -10,10 +8,8 @@ use lanes::{Pairs, SIGNS};
 pub(super) struct Suspect {
     /// A bit for each column that is dead or saturated.
     pub bad: u16,
-    /// Net codes of all taxels, whatever they are, within what a sound row can have.
-    pub codes: u32,
-    /// Net codes, zero where a taxel is bad.
-    good: Pairs,
+    /// The bad taxels' net codes, zero where a taxel is sound.
+    nets: Pairs,
 }
 
 impl Suspect {
@@ -23,28 +19,26 @@ impl Suspect {
     pub fn look(&mut self, [codes, undriven]: [&Pairs; 2], dead_codes: u16) {
         let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
         let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
-        let (mut bad, mut sum) = (0, 0);
+        let mut bad = 0;
         for place in 0..BANK_COLUMNS {
-            let net = lanes::sub(codes[place], held(undriven[place]));
-            sum = lanes::dot(net, lanes::pair(1, 1), sum);
+            let net = lanes::sub(codes[place], undriven[place]);
             // The sign of each lane tells whether its taxel is bad; those of the first place are shifted most.
             let signs = (lanes::sub(net, dead) | lanes::sub(sound, codes[place])) & SIGNS;
             bad = bad >> 1 | signs;
             let bad_lanes = (signs << 1).wrapping_sub(signs >> 15);
-            self.good[place] = net & !bad_lanes;
+            self.nets[place] = net & bad_lanes;
         }
         let first = bad >> (16 - BANK_COLUMNS) & ((1 << BANK_COLUMNS) - 1);
         let second = bad >> (32 - BANK_COLUMNS);
         self.bad = (first | second << BANK_COLUMNS) as u16;
-        self.codes = sum.unsigned_abs().min(COLUMNS as u32 * u32::from(CODE_MAX));
     }
 
-    /// The good taxels' net codes times the gain, Q14, and times the weighted gain, Q10.
-    pub fn sums(&self, gains: &Gains) -> [i32; 2] {
+    /// The bad taxels' net codes times both weights.
+    pub fn sums(&self, weights: &[Pairs; 2]) -> [i32; 2] {
         let [mut sum, mut moment] = [0; 2];
-        for (place, net) in self.good.iter().enumerate() {
-            sum = lanes::dot(*net, gains.weights[0][place], sum);
-            moment = lanes::dot(*net, gains.weights[1][place], moment);
+        for (place, net) in self.nets.iter().enumerate() {
+            sum = lanes::dot(*net, weights[0][place], sum);
+            moment = lanes::dot(*net, weights[1][place], moment);
         }
         [sum, moment]
     }

@@ -17,9 +17,7 @@ impl Array {
     /// Forgets the tare and starts to measure it anew.
     pub fn start_tare(&mut self) {
         self.tare = [[0; COLUMNS]; ROWS];
-        for line in &mut self.lines {
-            (line.tare_sum, line.tare_moment) = (0, 0);
-        }
+        self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
     }
@@ -69,13 +67,13 @@ impl Array {
             sum += tare;
             moment += tare * row::weight(column);
         }
-        let line = &mut self.lines[row];
-        let more = sum - line.tare_sum;
+        let [line, line_x] = &mut self.tare_lines[row];
+        let more = sum - *line;
         let [all, all_x, all_y] = &mut self.tare_sums;
         *all = all.wrapping_add(more);
-        *all_x = all_x.wrapping_add(moment - line.tare_moment);
+        *all_x = all_x.wrapping_add(moment - *line_x);
         *all_y = all_y.wrapping_add(more * row::weight(row));
-        (line.tare_sum, line.tare_moment) = (sum, moment);
+        (*line, *line_x) = (sum, moment);
     }
 }
 

@@ -1,26 +1,23 @@
 //! Single taxels of a row, where somebody needs them.
 
-use super::calibration::Gains;
-use super::row::held;
-use super::{BOOST_BITS, CODE_BITS, GAIN_BITS, TARE_BITS};
+use super::{CODE_BITS, GAIN_BITS, TARE_BITS};
 use crate::frame::{BANK_COLUMNS, COLUMNS};
-use lanes::Pairs;
+use lanes::{BOOST_BITS, Pairs, Row};
 
 /// Writes a row's taxels in sixteenths of a corrected code; tells the highest, at least 0.
 #[inline(always)]
 pub(super) fn develop(
     [codes, undriven]: [&Pairs; 2],
-    gains: &Gains,
-    boost: i32,
+    row: &Row,
     tare: &[i32; COLUMNS],
     out: &mut [i32; COLUMNS],
 ) -> i32 {
     let mut peak = 0;
     // The boost in Q22, so that a taxel is the upper half of a product.
-    let boost = boost >> (GAIN_BITS + BOOST_BITS - CODE_BITS - 32);
+    let boost = row.boost >> (GAIN_BITS + BOOST_BITS - CODE_BITS - 32);
     for place in 0..BANK_COLUMNS {
-        let net = lanes::sub(codes[place], held(undriven[place]));
-        let gain = gains.weights[0][place];
+        let net = lanes::sub(codes[place], undriven[place]);
+        let gain = row.weights[0][place];
         let left = taxel(lanes::low(net), lanes::low(gain), boost, tare[place]);
         let right = taxel(lanes::high(net), lanes::high(gain), boost, tare[place + BANK_COLUMNS]);
         out[place] = left;

@@ -19,7 +19,7 @@ use crate::pipeline::budget::Budget;
 use crate::pressure::{Array, Picture};
 use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
-use lanes::Weighed;
+use lanes::{Common, Row, Total};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
@@ -114,14 +114,15 @@ pub const STEPS: [Step; 26] = [
     ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
     ("lanes::excess", |_, s, mix| mix.add(lanes::excess(s.share_q32, s.words[0].cast_unsigned()))),
     ("lanes::add_high", |_, s, mix| mix.add(lanes::add_high(s.words[2], s.share_q32.cast_signed(), s.words[0]))),
-    ("lanes::weigh", |_, s, mix| {
+    ("lanes::pass", |_, s, mix| {
         let [first, second, third, fourth] = s.words.map(i32::cast_unsigned);
         let pairs = [first, second, third, fourth, s.share_q32];
         let weights = [[s.share_q32, third, first, fourth, second], [fourth, first, s.share_q32, second, third]];
-        let sums = Weighed { plain: second, first: s.words[0], second: s.words[3], largest: third & 0x0fff_0fff };
-        let Weighed { plain, first, second, largest } = lanes::weigh(&pairs, &weights[0], &weights, sums);
-        [plain, largest].into_iter().for_each(|number| mix.add(number));
-        [first, second].into_iter().for_each(|number| mix.add(number));
+        let mut rows = [Row { weights, start: [s.words[0], s.words[3]], boost: 0 }; 2];
+        let common = Common { floors: weights[0], start: s.words[2], sag: second & 0x7fff_7fff };
+        let Total { first, second, running, largest } = lanes::pass(&[pairs, weights[1]], &mut rows, &common);
+        [first, second, running, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+        mix.add(largest);
     }),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
     ("lanes::root_and_product", |_, s, mix| {
@@ -242,9 +243,9 @@ fn add_reference(mix: &mut Mix, reference: Reference) {
 }
 
 fn add_picture(mix: &mut Mix, picture: &Picture) {
-    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, undriven_max } = picture;
+    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, undriven_max, peak_codes } = picture;
     taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
-    bad.iter().chain([undriven_max]).for_each(|number| mix.add(*number));
+    bad.iter().chain([undriven_max, peak_codes]).for_each(|number| mix.add(*number));
     mix.add(*bad_count);
 }
 

@@ -117,7 +117,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
         mix.add(*ticks);
     }
-    mix.add(*sag_q32);
+    mix.add(u32::from(*sag_q32));
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
         mix.add(force.to_bits());
     }

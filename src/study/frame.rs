@@ -230,7 +230,7 @@ extern "C" fn integers(bench: &mut Bench) {
             total += *net;
         }
         // 1 / (1 - rho N) in Q22.
-        let remaining = (u32::MAX - (total as u32).saturating_mul(bench.config.sag_q32)) >> 16;
+        let remaining = (u32::MAX - (total as u32).saturating_mul(bench.config.sag_q32.into())) >> 16;
         let boost = ((u32::MAX / remaining.max(1 << 15)) << 6) as i32;
         for (column, net) in nets.into_iter().enumerate() {
             let pair = bench.gain[row][column % BANK_COLUMNS];

@@ -92,7 +92,7 @@ fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
     let mut weight = 1 - ROWS as i32;
     for ((codes, gain), weighted) in rows.iter().zip(&bench.gain).zip(&bench.weighted) {
         let row = frame.row::<true>(codes, undriven, gain, weighted);
-        let (sum, moment) = read(&row, bench.config.sag_q32);
+        let (sum, moment) = read(&row, bench.config.sag_q32.into());
         out.sum += sum;
         out.moment_x += moment;
         out.moment_y += sum * weight;

@@ -44,7 +44,7 @@ fn sums(frame: &Frame, frames: &Frames, config: &Config) -> [Real; 3] {
     for row in 0..ROWS {
         let net = |column| i32::from(frame.code(row, column)) - i32::from(frame.code(ROWS, column));
         let total: i32 = (0..COLUMNS).map(net).sum();
-        let remaining = real(1, 0) - real(config.sag_q32 as i32, 32) * real(total, 0);
+        let remaining = real(1, 0) - real(config.sag_q32.into(), 32) * real(total, 0);
         for column in 0..COLUMNS {
             let gained = real(net(column) * i32::from(frames.gains[row][column]), 14);
             let value = gained / &remaining;

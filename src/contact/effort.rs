@@ -4,7 +4,8 @@ use crate::frame::ROWS;
 
 /// How much work the loop puts into the contact of each frame. The numbers are stable: hosts store them.
 ///
-/// A refinement of the model takes each row of the array once, so many rows in a frame.
+/// A refinement of the model takes each row of the array once, so many rows in a frame. Where it is spread over frames, it begins in
+/// one of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Effort {

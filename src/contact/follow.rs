@@ -1,7 +1,7 @@
 //! A contact followed from frame to frame, with little work in each.
 //!
-//! A refinement is spread over frames: each row of the array is taken once, so many in a frame as the effort says, and the
-//! solution comes in a frame of its own. What it tells is how many times larger the contact's force is than the sum of the
+//! A refinement is spread over frames: it begins in a frame of its own, each row of the array is then taken once, so many in a
+//! frame as the effort says, and the solution comes with the last of them. What it tells is how many times larger the contact's force is than the sum of the
 //! taxels over those frames: 1 where the array sees all of it. That ratio changes slowly, while the sum follows every
 //! frame. So the force is the sum times the last ratio, as quick as the sum itself.
 
@@ -63,19 +63,21 @@ const FOLLOWS_MAX: i32 = ONE / 16;
 pub struct Fit {
     effort: Effort,
     at_work: bool,
-    /// Frames taken in since the last refinement.
+    /// Whether a refinement has begun.
+    begun: bool,
+    /// Frames taken in since then.
     frames: u8,
-    /// Whether the array sees the whole contact, as at the first of them.
+    /// Whether the array sees the whole contact, as at the beginning.
     covered: bool,
     /// The contact supposed.
     guess: Guess,
     /// The same, worked out for the taxels.
     pressed: Pressed,
-    /// By the peak of the first frame.
+    /// By the peak at the beginning.
     scale: Scale,
-    /// The sum's force at the first of them.
+    /// The sum's force at the beginning.
     force: Newtons,
-    /// Over all of them, in its smallest units.
+    /// Over all frames taken in, in its smallest units.
     forces: i64,
     /// How far the indentation follows the sum's force: d over twice that force.
     follows: i32,
@@ -109,6 +111,7 @@ impl Fit {
         Self {
             effort,
             at_work: false,
+            begun: false,
             frames: 0,
             covered: true,
             guess: Guess { rest: 0, x: 0, y: 0 },
@@ -129,16 +132,18 @@ impl Fit {
     pub fn set_effort(&mut self, effort: Effort) {
         if effort != self.effort {
             self.effort = effort;
-            self.frames = 0;
+            self.begun = false;
         }
     }
 
     /// The rows whose taxels the next [`Fit::read`] looks at. Of the others it takes only what they add up to.
     pub fn wants(&self) -> Rows {
-        let (rows, frame) = (self.effort.rows(), usize::from(self.frames));
-        if rows == 0 || frame * rows >= ROWS {
-            return Rows { first: ROWS, stride: ROWS };
-        }
+        let rows = self.effort.rows();
+        let frame = match (self.begun, rows) {
+            (true, 1..) => usize::from(self.frames),
+            (false, ROWS) => 0,
+            _ => return Rows { first: ROWS, stride: ROWS },
+        };
         let stride = ROWS / rows;
         Rows { first: if rows == 1 { frame * ROW_STEP % ROWS } else { frame }, stride }
     }
@@ -167,21 +172,21 @@ impl Fit {
                 _ => from_sums(picture, config),
             };
         }
-        // At the start, and while the sums are all there is.
-        let sums = (self.frames == 0 || self.fitted.is_none()).then(|| from_sums(picture, config));
-        if let (0, Some(sums)) = (self.frames, &sums)
+        let rows = self.wants();
+        // At the beginning, and while the sums are all there is.
+        let sums = (!self.begun || self.fitted.is_none()).then(|| from_sums(picture, config));
+        if let (false, Some(sums)) = (self.begun, &sums)
             && !self.start(sums, picture, config)
         {
             self.lose();
             return *sums;
         }
         self.at_work = true;
-        let rows = self.wants();
         if rows.first < ROWS {
             self.take(rows, force, picture, config);
-        }
-        if rows.first >= ROWS || rows.stride == 1 {
-            self.refine(force, config);
+            if usize::from(self.frames) * self.effort.rows() >= ROWS {
+                self.refine(force, config);
+            }
         }
         let contact = match (self.fitted, sums) {
             (Some(Fitted { ratio, centre }), _) => {
@@ -210,6 +215,7 @@ impl Fit {
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
         self.pressed = Pressed::new(&self.guess, &scale, &config.geometry);
         self.scale = scale;
+        (self.begun, self.frames) = (true, 0);
         (self.force, self.forces) = (sums.force, 0);
         self.follows = Divisor::new(2 * u64::from(sums.force.to_bits().unsigned_abs()))
             .divide((ONE - self.guess.rest).into(), FOLLOWS_BITS);
@@ -244,7 +250,7 @@ impl Fit {
 
     /// Ends a refinement.
     fn refine(&mut self, force: Newtons, config: &Config) {
-        let frames = core::mem::take(&mut self.frames);
+        self.begun = false;
         self.confidence = confidence(&self.equations.misfit, &self.scale);
         if self.covered {
             return;
@@ -257,7 +263,7 @@ impl Fit {
         self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
         if self.confidence > 0 && self.equations.misfit.taxels >= TAXELS_LEAST {
             // At the mean of the frames, where noise counts least.
-            let mean = Divisor::new(frames.into()).divide(self.forces, 0);
+            let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
             let rest = self.followed(&guess, Newtons::from_bits(mean));
             let mean_guess = Guess::new(rest, guess.x, guess.y, &config.geometry);
             let fitted = i64::from(config.tip.force(mean_guess.indentation(&config.tip)).to_bits());
@@ -269,7 +275,7 @@ impl Fit {
     /// No contact, or none that the model can say anything of.
     fn lose(&mut self) {
         self.forget();
-        (self.frames, self.confidence) = (0, 255);
+        (self.begun, self.confidence) = (false, 255);
     }
 
     /// Back to the sums.

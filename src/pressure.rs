@@ -23,7 +23,7 @@ use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
 use lanes::{BOOST_BITS, Pairs, Row, Total};
 use row::Sound;
-use suspect::Suspect;
+use suspect::Share;
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = 4;
@@ -109,7 +109,7 @@ impl Array {
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
         if sound.suspects(largest) {
-            self.leave_out(frame, config, &sound, &mut total);
+            self.leave_out(frame, config, &mut total);
         }
         let [sum, moment_x, moment_y] = self.tare_sums;
         let [total_sum, total_x, total_y] = row::sixteenths(&total);
@@ -133,28 +133,24 @@ impl Array {
     /// Takes dead and saturated taxels out of a pass, and tells which they are.
     #[cold]
     #[inline(never)]
-    fn leave_out(&mut self, frame: &Frame, config: &Config, sound: &Sound, total: &mut Total) {
+    fn leave_out(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
         let [rows @ .., undriven] = &frame.pairs;
-        let mut suspect = Suspect::default();
-        let mut peak = 0;
         for (row, codes) in rows.iter().enumerate() {
-            let largest = sound.largest(codes);
-            if !sound.suspects(largest) {
-                peak = peak.max(largest);
+            let bad = suspect::bad([codes, undriven], config.dead_codes);
+            if bad == 0 {
                 continue;
             }
-            suspect.look([codes, undriven], config.dead_codes);
+            self.picture.peak_codes = 0;
             // Masked taxels have neither gain nor tare.
-            let bad = suspect.bad & !self.mask[row];
+            let bad = bad & !self.mask[row];
             self.picture.bad[row] |= bad;
             self.picture.bad_count += bad.count_ones() as u8;
             // An array that is broken anyhow must not take long.
-            if bad != 0 && i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                let Row { weights, boost, .. } = &self.rows[row];
-                row::leave_out(total, row, suspect.sums(weights), *boost, tare::sums(&self.tare[row], bad));
+            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                let share = Share::new(bad, [codes, undriven], &self.rows[row], &self.tare[row]);
+                row::leave_out(total, row, &share, self.rows[row].boost);
             }
         }
-        self.picture.peak_codes = peak + config.dead_codes;
     }
 
     /// Works out the single taxels of some rows (a bit each) for the picture, from the frame last read.
@@ -191,11 +187,10 @@ impl Array {
     pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
         let [rows @ .., undriven] = &frame.pairs;
         let sound = Sound::new(undriven, config.dead_codes, config.sag_q32);
-        let (mut suspect, mut count) = (Suspect::default(), 0);
+        let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.suspects(sound.largest(codes)) {
-                suspect.look([codes, undriven], config.dead_codes);
-                count += (suspect.bad & !mask).count_ones();
+                count += (suspect::bad([codes, undriven], config.dead_codes) & !mask).count_ones();
             }
         }
         count

@@ -150,3 +150,55 @@ pub fn pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; ROWS], co
     }
     Total { first, second, running, largest }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{BOOST_BITS, Common, Row, boost, pass};
+
+    const ONE: f64 = (1_u64 << 32) as f64;
+
+    #[test]
+    fn the_boost_takes_the_sag_out() {
+        let (mut ends, mut usual) = (0.0_f64, 0.0_f64);
+        for x in (-1_370_000_000..=1_370_000_000).step_by(100_003) {
+            let exact = f64::from(1 << BOOST_BITS) / (1.0 - f64::from(x) / ONE);
+            let error = (f64::from(boost(x)) - exact).abs() / exact;
+            ends = ends.max(error);
+            if x.abs() < 300_000_000 {
+                usual = usual.max(error);
+            }
+        }
+        let unit = 1.0 / f64::from(1 << BOOST_BITS);
+        assert!(ends < 1.2 / 1_048_576.0 && ends > 0.8 / 1_048_576.0, "{ends:e}");
+        assert!(usual < 4.0 * unit && usual > unit, "{usual:e}");
+    }
+
+    #[test]
+    fn a_pass_is_what_its_parts_say() {
+        let codes = [[0x0102_0304, 5, 6 << 16, 0x0fff_0fff, 9], [0x0001_0002, 0, 0, 0, 0x0100_0001]];
+        let common = Common { floors: [1, 2, 1 << 16, 0x0ffe_0ffe, 3], start: 7_000, sag: 3 | 3 << 16 };
+        let weights = [[2 | 1 << 16; 5], [0xffff, 3, 0, 0, 5]];
+        let mut rows = [Row { weights, start: [1 << 20, 4], boost: 0 }; 2];
+        let total = pass(&codes, &mut rows, &common);
+        let lanes = |pair: u32| [i64::from(pair as u16 as i16), i64::from((pair >> 16) as u16 as i16)];
+        let (mut first_total, mut second_total, mut running) = (0, 0, 0);
+        for (codes, row) in codes.iter().zip(&rows) {
+            let [mut sag, mut first, mut second] = [7_000, 1 << 20, 4];
+            for place in 0..5 {
+                for lane in 0..2 {
+                    let above = lanes(codes[place])[lane] - lanes(common.floors[place])[lane];
+                    sag += 3 * above;
+                    first += above * lanes(weights[0][place])[lane];
+                    second += above * lanes(weights[1][place])[lane];
+                }
+            }
+            assert_eq!(row.boost, boost(sag as i32));
+            first_total += (first * i64::from(row.boost)) >> 32;
+            second_total += (second * i64::from(row.boost)) >> 32;
+            running += first_total >> 2;
+        }
+        assert_eq!([total.first, total.second, total.running].map(i64::from), [first_total, second_total, running]);
+        // The second row's codes below their floors are huge.
+        assert_eq!(total.largest, 0xffff_fffe, "{:x}", total.largest);
+    }
+}

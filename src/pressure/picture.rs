@@ -20,7 +20,8 @@ pub struct Picture {
     pub moment_y: i32,
     /// Largest of the taxels as they were last developed, at least 0.
     pub peak: i32,
-    /// The highest code above its column's undriven level, in any taxel of a row without a bad one: how near the array is to saturation.
+    /// The highest code of a taxel above its column's undriven level: how near the array is to saturation. 0 where a taxel is dead or
+    /// saturated, masked ones too.
     pub peak_codes: u16,
     /// A bit for each column that is masked, dead or saturated, for each row.
     pub bad: [u16; ROWS],

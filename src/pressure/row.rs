@@ -1,5 +1,6 @@
 //! The rows' sums: ten codes as five pairs, two taxels an instruction where the target has such.
 
+use super::suspect::Share;
 use super::{CODE_BITS, GAIN_BITS, each};
 use crate::frame::{COLUMNS, ROWS, SATURATED};
 use lanes::{BOOST_BITS, Common, Pairs, Total};
@@ -72,8 +73,9 @@ pub(super) fn sixteenths(total: &Total) -> [i32; 3] {
     ]
 }
 
-/// Takes the sums of a row's bad taxels out of a pass, and puts in the tares, in sixteenths, that these taxels have.
-pub(super) fn leave_out(total: &mut Total, row: usize, sums: [i32; 2], boost: i32, tares: [i32; 2]) {
+/// Takes taxels of a row, and their tares, out of a pass.
+pub(super) fn leave_out(total: &mut Total, row: usize, share: &Share, boost: i32) {
+    let Share { sums, tares } = share;
     let first = (tares[0] << (GAIN_BITS - COARSER - CODE_BITS)).wrapping_sub(lanes::add_high(0, sums[0], boost));
     let second = (tares[1] << (MOMENT_BITS - COARSER - CODE_BITS)).wrapping_sub(lanes::add_high(0, sums[1], boost));
     total.first = total.first.wrapping_add(first);

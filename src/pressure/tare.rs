@@ -76,16 +76,3 @@ impl Array {
         (*line, *line_x) = (sum, moment);
     }
 }
-
-/// Sum and moment of the tares of some columns (a bit each) of a row, in sixteenths.
-pub(super) fn sums(tares: &[i32; COLUMNS], columns: u16) -> [i32; 2] {
-    let [mut sum, mut moment, mut left] = [0, 0, i32::from(columns)];
-    while left != 0 {
-        let column = left.trailing_zeros() as usize;
-        left &= left - 1;
-        let tare = tares.get(column).map_or(0, |tare| tare >> (TARE_BITS - CODE_BITS));
-        sum += tare;
-        moment += tare * row::weight(column);
-    }
-    [sum, moment]
-}

@@ -132,18 +132,14 @@ fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
     // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.
     let reach = radius + half_pitch + (half_pitch >> 1);
     for (row, bad) in picture.bad.iter().enumerate() {
-        let mut bad = *bad;
+        let mut left = u32::from(*bad);
         let dy = (2 * row as i32 + 1 - COLUMNS as i32) * half_pitch - y;
-        let mut column = 0;
-        while bad != 0 {
-            if bad & 1 != 0 {
-                let dx = (2 * column + 1 - COLUMNS as i32) * half_pitch - x;
-                if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
-                    return false;
-                }
+        while left != 0 {
+            let dx = (2 * left.trailing_zeros() as i32 + 1 - COLUMNS as i32) * half_pitch - x;
+            if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
+                return false;
             }
-            bad >>= 1;
-            column += 1;
+            left &= left - 1;
         }
     }
     true

@@ -83,7 +83,7 @@ impl Pipeline {
     }
 
     /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
-    pub fn stop(&mut self, fault: Fault) -> &Status {
+    pub fn stop(&mut self, fault: Fault) {
         self.status.mode = Mode::Fault;
         self.status.fault.get_or_insert(fault);
         if self.press.running() {
@@ -91,15 +91,13 @@ impl Pipeline {
             self.status.identification = self.press.outcome();
         }
         self.status.duty = self.motion.coast();
-        &self.status
     }
 
     /// Works out every taxel of the frame last stepped with, for those who look at the whole picture: the step itself works out the
     /// few that it needs. The peak is then that frame's, too.
-    pub fn develop(&mut self, frame: &Frame) -> &Status {
+    pub fn develop(&mut self, frame: &Frame) {
         self.array.develop(frame, ALL_ROWS);
         self.status.contact.peak_pa = self.array.picture().peak_pa(&self.config);
-        &self.status
     }
 
     /// What the last step reported.
@@ -132,12 +130,15 @@ impl Pipeline {
         // What the array feels, where it can be trusted: the bridge does not wait for the rest.
         let watched = self.watched();
         let picture = self.array.read(frame, &self.config);
-        if let Some(fault) = monitor::broken(picture, sense, &self.config).filter(|_| watched) {
-            return (Duty::ZERO, self.stop(fault));
+        let broken = monitor::array_broken(picture, &self.config);
+        let fault = if sense.bridge_fault { Some(Fault::Bridge) } else { broken };
+        if let Some(fault) = fault.filter(|_| watched) {
+            self.stop(fault);
+            return (Duty::ZERO, &self.status);
         }
         // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything to fit to
         // in a broken array.
-        let sound = monitor::array_broken(picture, &self.config).is_none();
+        let sound = broken.is_none();
         let fits = sound && self.status.mode != Mode::Identify;
         if sound {
             self.array.develop(frame, self.rows_wanted());
@@ -168,7 +169,7 @@ impl Pipeline {
         }
 
         // What to do about it.
-        let mode = self.next_mode(asked, command, &contact, sense);
+        let mode = self.next_mode(asked, command, &contact, sense, sound);
         self.status.mode = mode;
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
@@ -199,12 +200,15 @@ impl Pipeline {
     }
 
     /// A look at a frame that is still being scanned, filled up from the frame before: stops where its array is broken, and tells
-    /// so. A taxel that fails just after it was read is seen a frame later; without this look the step would judge it only at
+    /// whether. A taxel that fails just after it was read is seen a frame later; without this look the step would judge it only at
     /// that frame's end.
-    pub fn glance(&mut self, frame: &Frame) -> Option<&Status> {
+    pub fn glance(&mut self, frame: &Frame) -> bool {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
-        broken.then(|| self.stop(Fault::ArrayBroken))
+        if broken {
+            self.stop(Fault::ArrayBroken);
+        }
+        broken
     }
 
     /// Rows of which somebody looks at single taxels in this frame, a bit each.
@@ -250,7 +254,7 @@ impl Pipeline {
     }
 
     /// The mode table of [`crate::safety`], with what each change of mode prepares.
-    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sense: &Sense) -> Mode {
+    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sense: &Sense, sound: bool) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
         let mode = match self.status.mode {
             Mode::Fault if asked.clear && !command.torque => {
@@ -276,7 +280,7 @@ impl Pipeline {
                 wanted
             }
             _ if !command.torque => {
-                self.follow_drift(contact);
+                self.follow_drift(contact, sound);
                 Mode::Off
             }
             Mode::Off => Mode::Off,
@@ -288,7 +292,7 @@ impl Pipeline {
             Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => Mode::Force,
             Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => Mode::Force,
             Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
-                self.follow_drift(contact);
+                self.follow_drift(contact, sound);
                 wanted
             }
         };
@@ -299,8 +303,7 @@ impl Pipeline {
     }
 
     /// Lets the baseline follow drift where nothing is touched.
-    fn follow_drift(&mut self, contact: &Contact) {
-        let sound = monitor::array_broken(self.array.picture(), &self.config).is_none();
+    fn follow_drift(&mut self, contact: &Contact, sound: bool) {
         let untouched = sound && contact.force < self.config.contact_off;
         if self.tared && self.config.params.baseline_follows != 0 && untouched {
             self.array.follow_drift();

@@ -91,6 +91,37 @@ fn an_encoder_that_stands_still() {
     assert!(board.world.travel_mm() < 2.0, "{} mm", board.world.travel_mm());
 }
 
+/// Noise in a few frames looks like an indentation that the encoder does not see; a lasting one is no noise. For 2 ms: then a motor that
+/// is driven and does not turn is stalled.
+#[test]
+fn a_short_rise_at_no_force_is_not_a_frozen_encoder() {
+    for (lasting, expected) in [(4, None), (5, Some(Fault::EncoderFrozen))] {
+        let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).unwrap());
+        board.tare_and_enable();
+        for _ in 0..100 {
+            board.step();
+        }
+        let mut risen = board.frame;
+        for (row, column) in (0..10).flat_map(|row| (0..10).map(move |column| (row, column))) {
+            risen.set_code(row, column, risen.code(row, column) + 2);
+        }
+        let (quiet, mut sequence, mut fault) = (board.frame, board.frame.sequence, None);
+        for number in 0..20 {
+            sequence += 1;
+            let frame = if number % 10 < lasting { risen } else { quiet };
+            let frame = fingertip::frame::Frame { sequence, ..frame };
+            let status = *board.pipeline.step(&frame, &board.sense, &board.command).1;
+            let touching = status.contact.force >= board.pipeline.config().contact_off;
+            assert_eq!(touching, number % 10 < lasting, "{} N", status.contact.force.0);
+            fault = status.fault;
+            if fault.is_some() {
+                break;
+            }
+        }
+        assert_eq!(fault, expected, "{lasting} frames");
+    }
+}
+
 #[test]
 fn an_array_that_stands_still() {
     let mut board = holding(1_000);

@@ -125,7 +125,7 @@ impl State {
             return;
         }
         self.parts.scan.copy_so_far(&mut self.frame);
-        if self.parts.pipeline.glance(&self.frame).is_some() {
+        if self.parts.pipeline.glance(&self.frame) {
             self.parts.bridge.sleep();
             self.publish();
         }

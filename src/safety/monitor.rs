@@ -12,6 +12,8 @@ use crate::units::Millimetres;
 const BLIND_INDENTATION: Millimetres = Millimetres::from_bits((1 << 24) * 15 / 100);
 /// Travel that must not leave the picture of a contact unchanged to the last bit (0.2 mm).
 const BLIND_TRAVEL: Millimetres = Millimetres::from_bits((1 << 24) / 5);
+/// So many frames in a row: near no force the indentation is steep, and noise alone can make that of one frame or two.
+const BLIND_FRAMES: u8 = 5;
 /// The motor must turn within this time when it is driven hard and nothing is touched, ns.
 const STALL_NS: u32 = 3_000_000;
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
@@ -39,6 +41,7 @@ pub struct Monitor {
     encoder: i32,
     indentation: Millimetres,
     modelled: bool,
+    blind_frames: u8,
     stalled_ns: u32,
     sums: [i32; 3],
     travel: Millimetres,
@@ -92,13 +95,21 @@ impl Monitor {
             self.modelled = view.modelled;
             self.indentation = view.contact.indentation;
         }
-        if view.sense.encoder != self.encoder {
+        let moved = view.sense.encoder != self.encoder;
+        if moved {
             self.encoder = view.sense.encoder;
             self.indentation = view.contact.indentation;
             self.stalled_ns = 0;
-        } else if touching && distance(view.contact.indentation, self.indentation) > BLIND_INDENTATION {
-            return Some(Fault::EncoderFrozen);
-        } else if !touching && view.motion.drive.acceleration().saturating_abs() > config.current_limit / 8 {
+        }
+        if touching && distance(view.contact.indentation, self.indentation) > BLIND_INDENTATION {
+            self.blind_frames = self.blind_frames.saturating_add(1);
+            if self.blind_frames >= BLIND_FRAMES {
+                return Some(Fault::EncoderFrozen);
+            }
+        } else {
+            self.blind_frames = 0;
+        }
+        if !moved && !touching && view.motion.drive.acceleration().saturating_abs() > config.current_limit / 8 {
             self.stalled_ns += config.timing.frame_ns();
             if self.stalled_ns > STALL_NS {
                 return Some(Fault::EncoderFrozen);
@@ -113,11 +124,6 @@ impl Monitor {
         }
         (distance(travel, self.travel) > BLIND_TRAVEL).then_some(Fault::ArrayFrozen)
     }
-}
-
-/// A broken bridge or array: what a frame shows before its contact is read.
-pub fn broken(picture: &Picture, sense: &Sense, config: &Config) -> Option<Fault> {
-    if sense.bridge_fault { Some(Fault::Bridge) } else { array_broken(picture, config) }
 }
 
 /// A broken array: nothing is to be read off it.

@@ -144,7 +144,8 @@ proptest! {
     fn a_stop_from_outside_is_latched(params in any_params(), before in any_inputs(60), after in any_inputs(60)) {
         let mut run = Run::new(&params, true);
         run.take(&before);
-        let status = *run.pipeline.stop(Fault::LostFrames);
+        run.pipeline.stop(Fault::LostFrames);
+            let status = *run.pipeline.status();
         prop_assert_eq!((status.mode, status.duty), (Mode::Fault, Duty::ZERO));
         prop_assert!(status.fault.is_some());
         run.before = status;

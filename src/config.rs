@@ -89,16 +89,16 @@ pub struct Config {
     pub counts_max: i32,
     /// l1 (Q31), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
     pub observer_gains: [i32; 3],
-    /// k_v in 1/s.
-    pub speed_gain_per_s: i32,
+    /// k_v in 1/s, Q18.
+    pub speed_gain_q18_per_s: i32,
     /// k in 1/s.
     pub position_gain_per_s: i32,
     /// 1 / (2 k) in s, Q32.
     pub half_over_slope_q32: i32,
     /// 1 / (2 k^2) in s^2, Q40.
     pub half_over_slope2_q40: i32,
-    /// c in 1/s, Q8.
-    pub damping_q8_per_s: i32,
+    /// c in 1/s, Q17: at most 16,384, a motor that stops within less than a frame.
+    pub damping_q17_per_s: i32,
     /// g V_max, Q8 mm/s^2.
     pub voltage_limit: i32,
     /// g R i_max, Q8 mm/s^2.
@@ -169,8 +169,8 @@ impl Config {
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
-        let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
-        let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
+        let voltage_limit = limit(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
+        let current_limit = limit(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
         // The full duty for the supply's voltage: 32767 for a mV at 1 mV.
         let duty_gain = f32::from(Duty::FULL) * exp2(23) / exp2(voltage_shift) * 1e3 / g;
@@ -196,14 +196,14 @@ impl Config {
                 narrow(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
                 narrow(gap * gap * gap / (frame_s * frame_s)),
             ],
-            speed_gain_per_s: speed_gain as i32,
+            speed_gain_q18_per_s: narrow(speed_gain * exp2(18)),
             position_gain_per_s: slope as i32,
             half_over_slope_q32: narrow(0.5 / slope * exp2(32)),
             half_over_slope2_q40: narrow(0.5 / (slope * slope) * exp2(40)),
-            damping_q8_per_s: narrow(c * exp2(8)),
+            damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,
             current_limit,
-            slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            slew_limit: limit(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             brake: brake(current_limit.min(voltage_limit)),
             acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
             voltage_shift,
@@ -244,6 +244,11 @@ fn wide(value: f32) -> i64 {
 /// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
 fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
+}
+
+/// The same for a limit of the drive: at most 2^29, 2097 m/s^2, see [`crate::control::drive`].
+fn limit(value: f32) -> i32 {
+    narrow(value).min(1 << 29)
 }
 
 /// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a quarter and

@@ -30,7 +30,7 @@ pub mod profile;
 use crate::config::Config;
 use crate::safety::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond2};
-use arith::product;
+use arith::{held, high, product};
 use drive::Drive;
 use observer::Observer;
 use profile::Reference;
@@ -56,14 +56,15 @@ impl SpeedLoop {
     /// The duty that makes the tip follow a speed reference.
     #[inline(always)]
     pub fn follow(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        let speed = self.observer.speed.to_bits();
-        // c v, the acceleration that the back-EMF takes away (Q8).
-        let back_emf = product(speed, config.damping_q8_per_s, 16);
-        // k_v in 1/s (Q0) times Q16 speed, to Q8 acceleration.
-        let wanted = product(reference.speed.to_bits().saturating_sub(speed), config.speed_gain_per_s, 8)
-            .saturating_add(reference.acceleration.to_bits())
-            .saturating_add(back_emf)
-            .saturating_sub(self.observer.disturbance.to_bits());
+        // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted: so
+        // no product here leaves 32 bits. Accelerations are Q4, of which 28 bits are Q8's 32.
+        let speed = held(self.observer.speed.to_bits(), 28);
+        let behind = held(reference.speed.to_bits().saturating_sub(speed), 30);
+        // c v, the acceleration that the back-EMF takes away.
+        let back_emf = high(speed << 3, config.damping_q17_per_s);
+        let wanted = high(behind << 2, config.speed_gain_q18_per_s) + (reference.acceleration.to_bits() >> 4) + back_emf
+            - (self.observer.disturbance.to_bits() >> 4);
+        let [wanted, back_emf] = [held(wanted, 28) << 4, held(back_emf, 28) << 4];
         self.drive.apply(wanted, back_emf, supply_mv, config, limits)
     }
 

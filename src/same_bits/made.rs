@@ -95,11 +95,11 @@ fn add_config(mix: &mut Mix, config: &Config) {
         jump,
         counts_max,
         observer_gains: [l1, l2, l3],
-        speed_gain_per_s,
+        speed_gain_q18_per_s,
         position_gain_per_s,
         half_over_slope_q32,
         half_over_slope2_q40,
-        damping_q8_per_s,
+        damping_q17_per_s,
         voltage_limit,
         current_limit,
         slew_limit,
@@ -130,14 +130,14 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [jump, voltage_shift, duty_gain] {
         mix.add(*number);
     }
-    for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_per_s, position_gain_per_s] {
+    for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_q18_per_s, position_gain_per_s] {
         mix.add(*number);
     }
     for speed in [speed_max, approach] {
         mix.add(speed.to_bits());
     }
     for number in
-        [half_over_slope_q32, half_over_slope2_q40, damping_q8_per_s, voltage_limit, current_limit, slew_limit]
+        [half_over_slope_q32, half_over_slope2_q40, damping_q17_per_s, voltage_limit, current_limit, slew_limit]
     {
         mix.add(*number);
     }

@@ -86,12 +86,12 @@ extern "C" fn reference(bench: &mut Bench) {
 
 extern "C" fn follow(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
+    bench.duty = bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
 }
 
 extern "C" fn apply(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
+    bench.duty = bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
 }
 
 impl<'a> Bench<'a> {

@@ -64,7 +64,7 @@ pub fn any_params() -> impl Strategy<Value = Params> {
 /// The configuration, with what the loop's arithmetic relies on.
 pub fn config(params: &Params) -> Config {
     let config = Config::new(params).expect("allowed");
-    assert!(config.speed_gain_per_s >= 1 && config.position_gain_per_s >= 1, "{params:?}");
+    assert!(config.speed_gain_q18_per_s >= 1 && config.position_gain_per_s >= 1, "{params:?}");
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
@@ -73,7 +73,7 @@ pub fn config(params: &Params) -> Config {
     // Below what their type holds: they were not cut to fit.
     assert!(positive.iter().chain(&config.observer_gains).all(|value| (1..i32::MAX).contains(value)), "{config:?}");
     // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
-    let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q8_per_s];
+    let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q17_per_s];
     assert!(limits.iter().all(|value| *value >= 0), "{config:?}");
     config
 }

@@ -12,7 +12,7 @@ use super::guess::{Guess, Pressed};
 use super::step::{Bench, Equations};
 use super::sums::{self, from_sums};
 use super::view::{Scale, View};
-use super::{TAXELS_MIN, confidence, covers};
+use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers};
 use crate::config::Config;
 use crate::frame::ROWS;
 use crate::pipeline::Contact;
@@ -26,6 +26,8 @@ const ROW_STEP: usize = 3;
 const ASTRAY_MAX: u8 = 12;
 /// With fewer live taxels than this in the model's contact there are other contacts that look the same.
 const TAXELS_LEAST: i32 = 8;
+/// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times as large.
+const TAXELS_SURE: i32 = 12;
 /// Fractional bits of the ratio of the force to the sum.
 const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
@@ -261,7 +263,9 @@ impl Fit {
         }
         let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);
         self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
-        if self.confidence > 0 && self.equations.misfit.taxels >= TAXELS_LEAST {
+        let taxels = self.equations.misfit.taxels;
+        let sure = self.confidence >= CONFIDENCE_LEAST || taxels >= TAXELS_SURE;
+        if self.confidence > 0 && taxels >= TAXELS_LEAST && (sure || self.fitted.is_some()) {
             // At the mean of the frames, where noise counts least.
             let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
             let rest = self.followed(&guess, Newtons::from_bits(mean));

@@ -5,7 +5,7 @@ use super::host::{Inputs, fail, say};
 use super::packed;
 use fingertip::config::Config;
 use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
-use fingertip::pressure::{Array, Calibration, Picture, TARE_FRAMES};
+use fingertip::pressure::{Array, CODE_BITS, Calibration, Picture, TARE_FRAMES};
 use fixed::types::I16F16;
 
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
@@ -203,17 +203,19 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     }
 }
 
-fn seen(picture: &Picture) -> (Sums<i32>, bool) {
-    let Picture { sum, moment_x, moment_y, peak, bad_count, .. } = *picture;
+fn seen(picture: &Picture, peak: i32) -> (Sums<i32>, bool) {
+    let Picture { sum, moment_x, moment_y, bad_count, .. } = *picture;
     (Sums { sum, moment_x, moment_y, peak }, bad_count > 0)
 }
 
 extern "C" fn firmware(bench: &mut Bench) {
-    (bench.out, bench.suspect) = seen(bench.array.read(&bench.frame, &bench.config));
+    let picture = bench.array.read(&bench.frame, &bench.config);
+    (bench.out, bench.suspect) = seen(picture, i32::from(picture.peak_codes) << CODE_BITS);
 }
 
 extern "C" fn all_taxels(bench: &mut Bench) {
-    (bench.out, bench.suspect) = seen(bench.array.read_all(&bench.frame, &bench.config));
+    let picture = bench.array.read_all(&bench.frame, &bench.config);
+    (bench.out, bench.suspect) = seen(picture, picture.peak);
 }
 
 /// Taxel by taxel, in 32 and 64 bits.

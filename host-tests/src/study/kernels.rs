@@ -131,13 +131,13 @@ pub const KERNELS: &[Kernel] = &[
         title: "Frame to force, centre and flags",
         text: "100 taxels: offset, gain, the driven row's sag, tare, then sum, moments, and whether a taxel is dead or saturated; \
             256 frames of a simulated array with gains of 0.8 to 1.2, indentations of 0.1 to 5 mm. The error is that of the arithmetic: force and \
-            centre by the sums, against those by exact sums of the same codes and gains, less those of the frame without contact. All but \
-            `Array::read` find a peak as well: `Array::read_all` and those that work taxel by taxel the largest taxel, the packed ones the largest code.",
+            centre by the sums, against those by exact sums of the same codes and gains, less those of the frame without contact. All find \
+            a peak as well: `Array::read_all` and those that work taxel by taxel the largest taxel, `Array::read` and the packed ones the largest code.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Frames,
         why: "`Array::read_all` works out every taxel as well: for the bus when it asks. The loop takes `Array::read` in each \
-            frame, and single taxels of two rows at most.",
+            frame, and single taxels of one or two rows.",
     },
     Kernel {
         name: "fit-clean",

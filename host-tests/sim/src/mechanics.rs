@@ -3,6 +3,7 @@
 //! Everything that stores energy is asked for its mean slope over the step's way (a discrete gradient), so the step's energy balance holds
 //! to rounding at any length: friction and the winding take what they take, and nothing appears from nowhere.
 
+mod acting;
 pub mod body;
 pub mod contact;
 pub mod elastic;

@@ -113,15 +113,13 @@ impl<E: Set> World<E> {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
             finger.contact.relax(0.5 * dt_s, x_mm);
-            let force_n = finger.contact.law().force_n(x_mm);
-            finger.contact.bear(force_n);
+            finger.contact.bear(x_mm);
         }
     }
 
     /// Each against an object that stands fast.
     fn advance_fingers(&mut self, time_s: f64) {
         let dt_s = self.dt_s;
-        let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let surface_mm = surface_mm(finger.setup(), index, &self.body);
             let end = finger.solve(|contact: &Contact<_>, from_mm, to_mm| {
@@ -130,6 +128,7 @@ impl<E: Set> World<E> {
             finger.finish(&end, surface_mm);
             if let Some(grip) = finger.contact.effects.grip() {
                 let drawn_s = overlap_s([time_s, time_s + dt_s], [grip.drift_from_s, f64::INFINITY]);
+                let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
                 let force_n = finger.contact.law().force_n(finger.flank_mm() - surface_mm);
                 (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, dt_s);

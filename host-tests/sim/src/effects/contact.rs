@@ -117,6 +117,10 @@ pub trait Stages {
     }
     /// Counts the building of the shape's tables as a call of its effects.
     fn shape_built(&mut self) {}
+    /// Whether there is a [`Memory`].
+    fn forgets(&self) -> bool {
+        false
+    }
     /// The sum of [`Memory::forgotten_n`].
     fn forgotten_n(&mut self) -> f64 {
         0.0
@@ -126,6 +130,10 @@ pub trait Stages {
     /// The sum of [`Series::mm_per_n`].
     fn mm_per_n(&mut self) -> f64 {
         0.0
+    }
+    /// Whether there is a [`Strength`].
+    fn breaks(&self) -> bool {
+        false
     }
     /// The product of [`Strength::left`].
     fn left(&mut self, _force_n: f64) -> f64 {
@@ -193,6 +201,10 @@ impl Stages for Named {
         self.shape.iter_mut().for_each(|effect| effect.call(|_| ()));
     }
 
+    fn forgets(&self) -> bool {
+        !self.memory.is_empty()
+    }
+
     fn forgotten_n(&mut self) -> f64 {
         self.memory.iter_mut().map(|effect| effect.call(|part| part.forgotten_n())).sum()
     }
@@ -203,6 +215,10 @@ impl Stages for Named {
 
     fn mm_per_n(&mut self) -> f64 {
         self.series.iter_mut().map(|effect| effect.call(|part| part.mm_per_n())).sum()
+    }
+
+    fn breaks(&self) -> bool {
+        !self.strength.is_empty()
     }
 
     fn left(&mut self, force_n: f64) -> f64 {

@@ -118,6 +118,10 @@ pub trait Encoder: Send {
 
 /// The stages as the finger calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
+    /// Whether none of the stages holds an effect: the finger then asks for none.
+    fn none(&self) -> bool {
+        true
+    }
     /// All inertia added.
     fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
         0.0
@@ -157,6 +161,7 @@ impl Stages for () {}
 /// The named effects.
 #[derive(Default)]
 pub struct Named {
+    any: bool,
     inertia: Vec<Metered<dyn Inertia>>,
     electric: Vec<Metered<dyn Electric>>,
     resist: Vec<Metered<dyn Resist>>,
@@ -177,6 +182,7 @@ impl Named {
             Part::Encoder(part) => self.encoder.push(Metered::new(name, part)),
             other => return Some(other),
         }
+        self.any = true;
         None
     }
 
@@ -190,6 +196,10 @@ impl Named {
 }
 
 impl Stages for Named {
+    fn none(&self) -> bool {
+        !self.any
+    }
+
     fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
         self.inertia.iter_mut().map(|effect| effect.call(|part| part.kg_m2(m_per_rad))).sum()
     }

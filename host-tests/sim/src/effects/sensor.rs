@@ -75,6 +75,10 @@ pub trait Codes: Send {
 
 /// The stages as the readout calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
+    /// Whether none of the stages holds an effect: the readout is then ideal, and asks for no stage.
+    fn none(&self) -> bool {
+        true
+    }
     /// All effects of the stage, in order.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
     /// As [`Stages::pressure`].
@@ -92,6 +96,7 @@ impl Stages for () {}
 /// The named effects.
 #[derive(Default)]
 pub struct Named {
+    any: bool,
     pressure: Vec<Metered<dyn Pressure>>,
     conductance: Vec<Metered<dyn Conductance>>,
     network: Vec<Metered<dyn Network>>,
@@ -110,6 +115,7 @@ impl Named {
             Part::Codes(part) => self.codes.push(Metered::new(name, part)),
             other => return Some(other),
         }
+        self.any = true;
         None
     }
 
@@ -125,6 +131,10 @@ impl Named {
 }
 
 impl Stages for Named {
+    fn none(&self) -> bool {
+        !self.any
+    }
+
     fn pressure(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
         self.pressure.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, time_s, kpa)));
     }
@@ -149,18 +159,25 @@ impl Stages for Named {
 /// The readout of one finger's array.
 pub struct Readout {
     array: Array,
+    volts_per_siemens: f64,
     siemens: [Row; ROWS],
 }
 
 impl Readout {
     /// Of an array whose row switches are perfect; what its `row_ohm` and `settle_tau_s` say is the effects' to say.
     pub fn new(array: &Array) -> Self {
-        let array = Array { row_ohm: 0.0, settle_tau_s: 0.0, ..*array };
-        Self { array, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
+        let volts_per_siemens = array.feedback_ohm * array.drive_v;
+        Self { array: *array, volts_per_siemens, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
     }
 
     /// The codes of a slot sampled at a time, its row under these pressures (not looked at where no row is driven).
+    #[inline]
     pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
+        // A row that no effect may look at between the stages stays in registers all the way.
+        if stages.none() { self.through(&mut (), slot, time_s, kpa) } else { self.through(stages, slot, time_s, kpa) }
+    }
+
+    fn through(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
         let array = &self.array;
         let mut volts = [array.ground_v; COLUMNS];
         if let Some(row) = self.siemens.get_mut(slot) {
@@ -170,8 +187,8 @@ impl Readout {
             stages.conductance(slot, time_s, row);
             let mut seen = *row;
             stages.network(slot, &self.siemens, &mut seen);
-            for (volts, more) in volts.iter_mut().zip(array.row_volts(&seen)) {
-                *volts += more;
+            for (volts, siemens) in volts.iter_mut().zip(seen) {
+                *volts += siemens * self.volts_per_siemens;
             }
         }
         stages.volts(slot, time_s, &mut volts);

@@ -69,14 +69,20 @@ impl<C: Stages> Contact<C> {
 
     /// Lets the tip forget for a while at an overlap.
     pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
+        if !self.effects.forgets() {
+            return;
+        }
         let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm));
         self.effects.relax(dt_s, (elastic_n >= self.forgotten_n).then_some(elastic_n));
         self.forgotten_n = self.effects.forgotten_n();
     }
 
-    /// Lets the object bear a force.
-    pub fn bear(&mut self, force_n: f64) {
-        self.left = self.effects.left(force_n / self.left);
+    /// Lets the object bear the force of an overlap.
+    pub fn bear(&mut self, x_mm: f64) {
+        if self.effects.breaks() {
+            let force_n = self.law().force_n(x_mm);
+            self.left = self.effects.left(force_n / self.left);
+        }
     }
 
     /// Means of a row's taxels at an overlap.

@@ -1,11 +1,11 @@
 //! One finger: shaft, winding, gear, tip and its contact.
 
+use super::acting::{Acts, resistive};
 use super::contact::Contact;
-use crate::effects::drive::{Circuit, Friction, Stages};
+use crate::effects::drive::{Circuit, Friction};
 use crate::effects::{contact, drive};
 use core::f64::consts::TAU;
-use host_tests::plant::drive::{Acting, Resistance, Rotor, Shaft, Source};
-use host_tests::plant::readout::decay;
+use host_tests::plant::drive::{Rotor, Shaft};
 use host_tests::plant::{Bridge, Setup};
 
 /// Rounds of a step's solution at most, and the share of the speed at which they end.
@@ -115,16 +115,19 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             torque_nm_per_a: self.setup.motor.torque_nm_per_a,
         };
         self.circuit = base;
-        self.drive.circuit(&mut self.circuit);
-        self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
         self.friction = Friction::default();
-        let middle = self.shaft.speed_rad_per_s + 0.5 * dt_s * self.rad_per_s2;
-        self.drive.friction(middle, &mut self.friction);
+        if !self.drive.none() {
+            self.drive.circuit(&mut self.circuit);
+            let middle = self.shaft.speed_rad_per_s + 0.5 * dt_s * self.rad_per_s2;
+            self.drive.friction(middle, &mut self.friction);
+        }
+        self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
     }
 
     /// Where the step prepared ends against a load: its mean force between two places of the pressing flank. Changes nothing.
     pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
         let mut acting = Acts {
+            alone: self.drive.none(),
             drive: &mut self.drive,
             circuit: &self.circuit,
             open: self.bridge == Bridge::Coast,
@@ -146,10 +149,14 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         if self.dt_s > 0.0 {
             self.rad_per_s2 = (self.shaft.speed_rad_per_s - self.before.speed_rad_per_s) / self.dt_s;
         }
-        self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
-        self.tip_mm = self.drive.tip_mm(self.flank_mm(), surface_mm);
+        self.tip_mm = self.flank_mm();
         let turns = self.shaft.angle_rad / TAU;
-        self.count = self.drive.count((turns * self.setup.motor.encoder_counts_per_turn).floor() as i32);
+        self.count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        if !self.drive.none() {
+            self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
+            self.tip_mm = self.drive.tip_mm(self.tip_mm, surface_mm);
+            self.count = self.drive.count(self.count);
+        }
     }
 
     /// Puts it at rest at a travel, as if carried there.
@@ -223,85 +230,5 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         let winding_j = 0.5 * self.circuit.henry * self.winding_a * self.winding_a;
         let turning_j = 0.5 * self.rotor.inertia_kg_m2 * speed * speed;
         1e3 * (turning_j + winding_j + self.drive.potential_j(self.shaft.angle_rad))
-    }
-}
-
-/// The source without what an inductance adds.
-fn resistive(circuit: &Circuit, open: bool) -> Source {
-    if open {
-        return Source::OPEN;
-    }
-    let ohms = circuit.winding_ohm + circuit.bridge_ohm + circuit.duty * circuit.duty * circuit.source_ohm;
-    Source { volts: circuit.duty * circuit.source_v, ohms, ..Source::OPEN }
-}
-
-/// What acts on a finger's shaft.
-struct Acts<'a, D, L> {
-    drive: &'a mut D,
-    circuit: &'a Circuit,
-    open: bool,
-    friction: &'a Friction,
-    mm_per_rad: f64,
-    load_n: L,
-    torque_nm_per_a: f64,
-    winding_a: f64,
-    square_a2_s: f64,
-}
-
-impl<D, L> Acts<'_, D, L> {
-    /// exp(-x) and its mean from 0 to x, x the time in units of L / R.
-    fn kept(&self, dt_s: f64, ohms: f64) -> [f64; 2] {
-        let x = dt_s * ohms / self.circuit.henry;
-        let end = decay(x);
-        let mean = if x < 0.01 {
-            1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
-        } else {
-            (1.0 - end) / x
-        };
-        [end, mean]
-    }
-}
-
-impl<D: Stages, L: Fn(f64, f64) -> f64> Acting for Acts<'_, D, L> {
-    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
-        let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
-        let load_nm = self.mm_per_rad * 1e-3 * load_n;
-        let shared = self.friction.load_share * load_nm;
-        Resistance {
-            load_nm: load_nm + self.drive.potential_nm(from_rad, to_rad),
-            sliding_nm: self.friction.sliding_nm + shared,
-            holding_nm: self.friction.holding_nm + shared,
-        }
-    }
-
-    fn source(&self, dt_s: f64) -> Source {
-        let source = resistive(self.circuit, self.open);
-        if self.circuit.henry == 0.0 || self.open {
-            return source;
-        }
-        // Exact for a speed that holds: i = i_end + (i_0 - i_end) exp(-t R / L).
-        let [_, mean] = self.kept(dt_s, source.ohms);
-        let given = 1.0 - mean;
-        Source { ohms: source.ohms / given, kept_a: mean * self.winding_a, ..source }
-    }
-
-    fn viscous_nm_s(&self) -> f64 {
-        self.friction.viscous_nm_s
-    }
-
-    fn took(&mut self, dt_s: f64, mean_rad_per_s: f64) {
-        let source = resistive(self.circuit, self.open);
-        let end_a = (source.volts - self.torque_nm_per_a * mean_rad_per_s) / source.ohms;
-        if self.circuit.henry == 0.0 || self.open {
-            self.winding_a = end_a;
-            self.square_a2_s += end_a * end_a * dt_s;
-            return;
-        }
-        let [end, mean] = self.kept(dt_s, source.ohms);
-        let over_a = self.winding_a - end_a;
-        self.winding_a = end_a + over_a * end;
-        // Mean of the square: the transient's own mean square is mean (1 + end) / 2.
-        let square = end_a * (end_a + 2.0 * over_a * mean) + over_a * over_a * mean * 0.5 * (1.0 + end);
-        self.square_a2_s += square * dt_s;
     }
 }

@@ -20,13 +20,22 @@ impl Clock {
 
     /// From another instant to this one: below 0 where it is to come.
     pub fn since(self, other: Self) -> f64 {
-        (self.0 - other.0) as f64 / FS
+        let fs = self.0 - other.0;
+        // The same number either way; the shorter is much quicker, and holds for two and a half hours.
+        i64::try_from(fs).map_or_else(|_| long(fs), |fs| fs as f64) / FS
     }
 
     /// Since the clock began.
     pub fn time_s(self) -> f64 {
         self.since(Self(0))
     }
+}
+
+/// Not to be worked out where it is not asked for.
+#[cold]
+#[inline(never)]
+fn long(fs: i128) -> f64 {
+    fs as f64
 }
 
 fn whole(seconds: f64) -> i128 {

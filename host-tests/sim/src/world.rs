@@ -138,6 +138,7 @@ impl<E: Set> World<E> {
 
     /// Fingers and object, round by round: mean forces from the ends, ends from the mean forces. Where they agree, what one gains the
     /// others lose, in momentum and in energy.
+    #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
         let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);

@@ -177,6 +177,7 @@ impl Readout {
         if stages.none() { self.through(&mut (), slot, time_s, kpa) } else { self.through(stages, slot, time_s, kpa) }
     }
 
+    #[inline(never)]
     fn through(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
         let array = &self.array;
         let mut volts = [array.ground_v; COLUMNS];

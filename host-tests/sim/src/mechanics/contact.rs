@@ -92,14 +92,13 @@ impl<C: Stages> Contact<C> {
         }
         let law = self.law();
         let d_mm = law.depth_mm(x_mm);
+        if law.forgotten_n == 0.0 && law.left == 1.0 {
+            return self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
+        }
         // At the first touch of a shaped surface both forces may round to 0.
         let elastic_n = self.elastic.force_n(d_mm);
         let share = if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left };
-        let mut kpa = self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
-        if share != 1.0 {
-            kpa.iter_mut().for_each(|kpa| *kpa *= share);
-        }
-        kpa
+        self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row).map(|kpa| kpa * share)
     }
 
     /// Where the centre of pressure is at an indentation, from where the tip's axis meets the surface.

@@ -81,27 +81,31 @@ impl Pressures {
     }
 
     fn knot(&mut self, stages: &impl Stages, root: usize, place: usize) -> &[Row; ROWS] {
-        let Self { tip, pitch_mm, centre_mm, knots, .. } = self;
-        knots[root][place].get_or_insert_with(|| {
-            let d_mm = (root as f64 * ROOT) * (root as f64 * ROOT);
-            let shift_mm = (place as f64 - PLACES as f64) * PLACE_MM;
-            Box::new(shares(stages, tip, *pitch_mm, [centre_mm[0], centre_mm[1] + shift_mm], d_mm))
-        })
+        match &mut self.knots[root][place] {
+            Some(knot) => knot,
+            none => {
+                let d_mm = (root as f64 * ROOT) * (root as f64 * ROOT);
+                let shift_mm = (place as f64 - PLACES as f64) * PLACE_MM;
+                let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
+                none.insert(Box::new(shares(stages, &self.tip, self.pitch_mm, centre_mm, d_mm)))
+            }
+        }
     }
 }
 
-/// The means as shares of the peak.
+/// The means as shares of the peak. Once for each knot: not to be in the way of what is done for each row.
+#[cold]
 fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d_mm: f64) -> [Row; ROWS] {
     if d_mm == 0.0 {
         return [[0.0; COLUMNS]; ROWS];
     }
     let peak_kpa = tip.modulus_kpa * d_mm / tip.radius_mm;
     let flattened = tip.flattened(d_mm);
+    let shaped = stages.shaped();
     core::array::from_fn(|row| {
         core::array::from_fn(|column| {
             let cell = Cell::at(pitch_mm, centre_mm, row, column);
-            let mean =
-                if stages.shaped() { shape::mean_kpa(stages, tip, d_mm, &cell) } else { cell.mean_kpa(&flattened) };
+            let mean = if shaped { shape::mean_kpa(stages, tip, d_mm, &cell) } else { cell.mean_kpa(&flattened) };
             mean / peak_kpa
         })
     })

@@ -7,8 +7,18 @@ use sim::world::World;
 
 const WALL_MM: f64 = 0.3;
 
-/// Random lengths of step, kicks now and then, the bridge open or braking. Between kicks the energy of finger, contact and body never
-/// rises. `share` is that of the relaxation named.
+/// The whole circuit of a scene without effects, Ohm and V; torque constant, Nm/A.
+const CIRCUIT_OHM: f64 = 2.83 + 0.7;
+const SOURCE_V: f64 = 6.0;
+const TORQUE_NM_PER_A: f64 = 5.35e-3;
+/// Of the effects below.
+const SAG_OHM: f64 = 2.0;
+const HENRY: f64 = 70e-6;
+const COPPER_PER_K: f64 = 0.0039;
+const MAGNET_PER_K: f64 = -0.001;
+
+/// Random lengths of step, kicks now and then, the bridge open, braking or driven. Between kicks the energy of finger, contact and body
+/// never rises by more than the source gives less what the circuit's resistance takes. `share` is that of the relaxation named.
 fn never_rises(text: &str, share: f64) {
     let scene = format!("[object]\ndistance_mm = {WALL_MM:?}\n{text}");
     let mut moving = world(&scene);
@@ -23,7 +33,8 @@ fn never_rises(text: &str, share: f64) {
         let contact_mj = if share > 0.0 { relaxing_mj(world, share) } else { world.contact_mj(0) };
         finger.energy_mj() + contact_mj + body_mj + along_mj
     };
-    let (mut before, mut scale_mj, mut touched) = (0.0, 0.0_f64, 0);
+    let (mut before, mut scale_mj) = (0.0, 0.0_f64);
+    let (mut touched, mut given_mj, mut taken_mj) = (0, 0.0, 0.0);
     let mut bridge = Bridge::Coast;
     for step in 0..1_000_000_u32 {
         if step % 500 == 0 {
@@ -35,15 +46,68 @@ fn never_rises(text: &str, share: f64) {
             moving.fingers_mut()[0].launch(towards * (20.0 + 200.0 * random.f64()));
             before = energy(&moving);
             scale_mj = scale_mj.max(before);
-            bridge = if random.bool() { Bridge::Coast } else { Bridge::Driven { duty: 0.0 } };
+            bridge = match random.u8(0..3) {
+                0 => Bridge::Coast,
+                1 => Bridge::Driven { duty: 0.0 },
+                _ => Bridge::Driven { duty: 0.6 * random.f64() - 0.3 },
+            };
         }
-        moving.advance(0.0, 1e-6 * (1.0 + 99.0 * random.f64()), &[bridge]);
+        let dt_s = 1e-6 * (1.0 + 99.0 * random.f64());
+        let fed = Fed::by(text, bridge, &mut moving);
+        moving.advance(0.0, dt_s, &[bridge]);
         touched += u32::from(moving.force_n(0) > 0.0);
         let now = energy(&moving);
-        assert!(now <= before + 2e-11 * scale_mj, "{text}: {now} after {before} mJ in step {step}");
+        let fed_mj = fed.at_most_mj(dt_s, &moving);
+        assert!(
+            now <= before + fed_mj + 2e-11 * scale_mj,
+            "{text}: {now} after {before} and {fed_mj} mJ in step {step}"
+        );
+        given_mj += fed_mj.max(0.0);
+        taken_mj += (-fed_mj).max(0.0);
         before = now;
     }
     assert!(touched > 50_000, "{text}: touched for {touched} steps");
+    assert!(given_mj > 100.0 && taken_mj > 100.0, "{text}: {given_mj} mJ given, {taken_mj} mJ taken");
+}
+
+/// What feeds the motor through a step, from its start.
+struct Fed {
+    volts: f64,
+    ohms: f64,
+    torque_nm_per_a: f64,
+    henry: f64,
+    angle_rad: f64,
+    current_a: f64,
+}
+
+impl Fed {
+    fn by(text: &str, bridge: Bridge, world: &mut World<Named>) -> Self {
+        let (duty, open) = match bridge {
+            Bridge::Coast => (0.0, f64::INFINITY),
+            Bridge::Driven { duty } => (duty, 1.0),
+        };
+        let sag_ohm = if text.contains("supply_sag") { SAG_OHM * duty * duty } else { 0.0 };
+        let warmer_k = world.truth(0, false).winding_c - 25.0;
+        let finger = &world.fingers()[0];
+        Self {
+            volts: duty * SOURCE_V,
+            ohms: open * (CIRCUIT_OHM + sag_ohm + 2.83 * COPPER_PER_K * warmer_k),
+            torque_nm_per_a: TORQUE_NM_PER_A * (1.0 + MAGNET_PER_K * warmer_k),
+            henry: if text.contains("winding_inductance") { HENRY } else { 0.0 },
+            angle_rad: finger.shaft().angle_rad,
+            current_a: finger.current_a(),
+        }
+    }
+
+    /// By the charge that went through, u V dt = R q + k angle + L di, and as a current that varies heats more than its mean.
+    fn at_most_mj(&self, dt_s: f64, world: &World<Named>) -> f64 {
+        let finger = &world.fingers()[0];
+        let turned_rad = finger.shaft().angle_rad - self.angle_rad;
+        let more_a = if self.henry > 0.0 { finger.current_a() - self.current_a } else { 0.0 };
+        let charge_c = (self.volts * dt_s - self.torque_nm_per_a * turned_rad - self.henry * more_a) / self.ohms;
+        let heat_j = if charge_c == 0.0 { 0.0 } else { self.ohms * charge_c * charge_c / dt_s };
+        1e3 * (self.volts * charge_c - heat_j)
+    }
 }
 
 /// Energy of a tip on a plane that remembers q, mJ: E(d) - g q d + g (q d_q - E(d_q)), F_e(d_q) = q, at the indentation or, off the
@@ -79,12 +143,18 @@ passive! {
     backlash: "[effects.backlash]\n", 0.0;
     thermal: "[effects.thermal_derating]\n", 0.0;
     relaxation: "[effects.relaxation]\nshare = 0.5\ntau_s = 0.01\n", 0.5;
+    inertia: "[effects.inertia]\ngear_g_cm2 = 0.7\nfinger_g = 300.0\n", 0.0;
+    supply_sag: "[effects.supply_sag]\nsource_ohm = 2.0\n", 0.0;
+    tilted_plane: "[effects.tilted_plane]\nalong_columns_deg = 12.0\nalong_rows_deg = -5.0\n", 0.0;
+    cylinder: "[effects.cylinder]\n", 0.0;
     sphere: "[effects.sphere]\n", 0.0;
     edge: "[effects.edge]\n", 0.0;
     stiffness: "[effects.object_stiffness]\n", 0.0;
     mass: "[effects.object_mass]\nmass_g = 50.0\n", 0.0;
     mass_and_grip: "[effects.object_mass]\nmass_g = 50.0\n[effects.tangential]\n", 0.0;
     breakable: "[effects.breakable_object]\n", 0.0;
-    all: "[effects.dry_friction]\n[effects.stribeck]\n[effects.gear_efficiency]\n[effects.cogging]\n[effects.winding_inductance]\n\
-          [effects.sphere]\n[effects.object_stiffness]\n[effects.object_mass]\nmass_g = 50.0\n[effects.tangential]\n", 0.0;
+    all: "[effects.dry_friction]\n[effects.stribeck]\n[effects.viscous_friction]\n[effects.gear_efficiency]\n[effects.cogging]\n\
+          [effects.backlash]\n[effects.inertia]\n[effects.winding_inductance]\n[effects.supply_sag]\nsource_ohm = 2.0\n\
+          [effects.thermal_derating]\n[effects.tilted_plane]\n[effects.sphere]\n[effects.object_stiffness]\n\
+          [effects.breakable_object]\n[effects.object_mass]\nmass_g = 50.0\n[effects.tangential]\n", 0.0;
 }

@@ -15,7 +15,10 @@ pub struct Host {
     next: usize,
     period_s: f64,
     goal_n: f64,
+    /// When it sends next: so many periods after its last packet that was no repetition.
     send_s: f64,
+    said_s: f64,
+    repeats: u64,
     flying: VecDeque<(f64, f64)>,
     arrived_n: f64,
     arrived_s: f64,
@@ -51,6 +54,8 @@ impl Host {
             period_s: scene.table("host").number("period_ms") * 1e-3,
             goal_n: 0.0,
             send_s: 0.0,
+            said_s: 0.0,
+            repeats: 0,
             flying: VecDeque::new(),
             arrived_n: 0.0,
             arrived_s: 0.0,
@@ -112,7 +117,12 @@ impl Host {
 
     fn send(&mut self, at_s: f64, stages: &mut impl Stages) {
         self.sent += 1;
-        self.send_s = at_s + self.period_s;
+        // Counted, as a sum of periods would drift.
+        if at_s != self.send_s {
+            (self.said_s, self.repeats) = (at_s, 0);
+        }
+        self.repeats += 1;
+        self.send_s = self.said_s + self.repeats as f64 * self.period_s;
         let goal_n = self.reader.as_ref().map_or(self.goal_n, |reader| reader.grip.goal_n(self.goal_n));
         match stages.pass(at_s) {
             Some(arrives_s) => {

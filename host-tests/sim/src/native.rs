@@ -1,7 +1,7 @@
 //! The native board: the same core on the host, closed over the world.
 //!
 //! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came of a frame acts
-//! three slots after its end. Time is counted in whole femtoseconds, so a run is the same at any hour of the day.
+//! three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
 
 mod clock;
 mod digest;
@@ -54,16 +54,25 @@ pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimErro
 /// # Errors
 /// As [`simulate`].
 pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
-    simulate_from::<E>(scene, 0.0, watch)
+    simulate_from::<E>(scene, Begun::default(), watch)
 }
 
-/// The same with the board's clock begun so long before; it changes nothing.
+/// Where time stands when a run begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Begun {
+    /// The board's clock; it changes nothing.
+    pub clock_s: f64,
+    /// The scene's time once the fingers are tared: what it holds before is left out.
+    pub scene_s: f64,
+}
+
+/// The same with time begun elsewhere.
 ///
 /// # Errors
 /// As [`simulate`].
-pub fn simulate_from<E: Set>(scene: &Scene, begun_s: f64, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    let mut board = Board::<E>::new(scene, begun_s)?;
+    let mut board = Board::<E>::new(scene, begun)?;
     board.run(scene, watch);
     Ok(Summary {
         virtual_s: board.time_s(),
@@ -93,13 +102,14 @@ struct Board<E: Set> {
     clock: Clock,
     /// The scene's start.
     start: Clock,
+    begun: Begun,
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
 }
 
 impl<E: Set> Board<E> {
-    fn new(scene: &Scene, begun_s: f64) -> Result<Self, SimError> {
+    fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
         let params = controller::params(scene);
         let config = Config::new(&params).map_err(SimError::Controller)?;
         let setup = controller::setup(scene);
@@ -129,8 +139,9 @@ impl<E: Set> Board<E> {
             units,
             bridges,
             params,
-            clock: Clock::from_start(begun_s),
+            clock: Clock::from_start(begun.clock_s),
             start: Clock::default(),
+            begun,
             slot_s,
             longest_s,
             digest: Digest::new(),
@@ -143,6 +154,7 @@ impl<E: Set> Board<E> {
         let tare_frames = TARE_FRAMES + 2;
         self.start = self.clock;
         self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);
+        self.start.go_back(self.begun.scene_s);
         for unit in &mut self.units {
             unit.command.tare_request = 1;
         }
@@ -150,6 +162,7 @@ impl<E: Set> Board<E> {
             self.frame(watch);
         }
         self.start = self.clock;
+        self.start.go_back(self.begun.scene_s);
         for unit in &mut self.units {
             unit.command.torque = true;
             unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;

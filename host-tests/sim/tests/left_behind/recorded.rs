@@ -4,6 +4,7 @@ use crate::{native, wall};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use mcap::{MessageStream, Writer};
 use sim::cli;
+use sim::metrics::shown;
 use sim::recording::{Recorder, replay};
 use sim::report::{Report, Trace, page};
 use sim::run::run;
@@ -40,7 +41,7 @@ fn a_recording_replays_to_the_bit() {
 fn two_fingers_are_measured_recorded_and_drawn_each() {
     let scene = cli::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/grasp.toml"), &[], None).unwrap();
     let path = folder("grasp").join("grasp.mcap");
-    let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
+    let mut recorder = Recorder::new(&path, &scene, 1).unwrap();
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(&scene, &native, &mut [&mut recorder, &mut trace]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();
@@ -57,6 +58,30 @@ fn two_fingers_are_measured_recorded_and_drawn_each() {
     let page =
         page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
     assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains(">finger 1</th>"));
+
+    // Each has its own, wherever it is shown.
+    assert_ne!(one, other);
+    let row = page.split("<code>peak_force_n</code>").last().unwrap().split("</tr>").next().unwrap();
+    let cells: Vec<_> =
+        row.split("<td class=\"number\">").skip(1).map(|cell| cell.split('<').next().unwrap()).collect();
+    assert_eq!(cells, [one.max(other), one, other].map(|peak_n| shown(Some(peak_n))));
+    let bytes = fs::read(&path).unwrap();
+    for (number, peak_n) in [one, other].into_iter().enumerate() {
+        let tracks = &trace.fingers[number];
+        assert_eq!(tracks.force.points().iter().map(|(_, force_n)| *force_n).fold(0.0, f64::max), peak_n);
+        assert_eq!(tracks.maps.len(), 10);
+        let sum = |map: &[[f64; 10]; 10]| map.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
+        let (time_s, last) = tracks.maps.last().unwrap();
+        let (_, force_n) = tracks.force.points().into_iter().rfind(|(at_s, _)| at_s <= time_s).unwrap();
+        assert!((sum(last) / force_n - 1.0).abs() < 0.01, "{} for {force_n} N", sum(last));
+        let topic = format!("/finger{number}/scalars");
+        let messages = MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+        let forces_n = messages.filter(|message| message.channel.topic == topic).map(|message| {
+            serde_json::from_slice::<serde_json::Value>(&message.data).unwrap()["true_force_n"].as_f64().unwrap()
+        });
+        let recorded_n = forces_n.fold(0.0, f64::max);
+        assert!((recorded_n - peak_n).abs() < 1e-12, "{recorded_n} of {peak_n} N");
+    }
 }
 
 #[test]

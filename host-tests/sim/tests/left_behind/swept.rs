@@ -1,10 +1,12 @@
 //! Sweeps, shards and merging.
 
 use crate::{SCENE, native};
+use sim::cli;
 use sim::sweep::{Plan, Table, merge, sweep};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn folder(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("swept").join(name);
@@ -67,6 +69,28 @@ fn shards_merged_are_the_whole_byte_for_byte() {
 }
 
 #[test]
+fn runs_are_numbered_point_by_point_and_seed_by_seed() {
+    let (_, table) = whole("order");
+    let column = |name: &str| table.head.iter().position(|known| known == name).unwrap();
+    let number = |row: &Vec<String>, name: &str| row[column(name)].parse::<f64>().unwrap();
+    let shown = ["run", "tip.modulus_kpa", "tip.radius_mm", "seed"];
+    let rows: Vec<_> = table.rows.iter().map(|row| shown.map(|name| number(row, name))).collect();
+    let mut expected = Vec::new();
+    for modulus_kpa in [240.0, 250.0, 260.0] {
+        for radius_mm in [9.5, 10.5] {
+            expected.extend([1.0, 2.0].map(|seed| [expected.len() as f64 + seed, modulus_kpa, radius_mm, seed]));
+        }
+    }
+    assert_eq!(rows, expected);
+    // And what a row says is what was run.
+    let row = &table.rows[7];
+    let set = ["duration_s=0.04", "object.distance_mm=0.5", "tip.modulus_kpa=250", "tip.radius_mm=10.5"];
+    let scene = cli::load(SCENE, &set.map(String::from), Some(2)).unwrap();
+    let mut last = sim::metrics::Meter::default();
+    assert_eq!(row[column("digest")], native(&scene, &mut last).unwrap().digest);
+}
+
+#[test]
 fn a_stopped_sweep_goes_on_where_it_stood() {
     let (out, table) = whole("stopped");
     let expected = files(&out);
@@ -74,15 +98,28 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
     let runs = String::from_utf8(expected["runs.csv"].clone()).unwrap();
     let kept: String = runs.split_inclusive('\n').take(7).collect();
     let cut = runs.lines().nth(7).unwrap();
-    fs::write(out.join("runs.csv.part"), kept + &cut[..cut.len() / 2]).unwrap();
-    let ran = std::sync::atomic::AtomicUsize::new(0);
+    let part = out.join("runs.csv.part");
+    fs::write(&part, kept.clone() + &cut[..cut.len() / 2]).unwrap();
+    // A try that gets no farther leaves the six.
+    sweep(&plan(&out, [1, 1]), &|_, _| Err("stopped".into())).unwrap_err();
+    assert_eq!(fs::read_to_string(&part).unwrap(), kept);
+    let ran = AtomicUsize::new(0);
     let again = sweep(&plan(&out, [1, 1]), &|scene, watch| {
-        ran.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        ran.fetch_add(1, Ordering::Relaxed);
         native(scene, watch)
     });
     assert_eq!(again.unwrap(), table);
     assert_eq!(ran.into_inner(), 6);
     assert_eq!(files(&out), expected);
+    // What another sweep of the same columns left is not taken up.
+    fs::write(&part, kept).unwrap();
+    let ran = AtomicUsize::new(0);
+    let other = Plan { seeds: 1, ..plan(&out, [1, 1]) };
+    let other = sweep(&other, &|scene, watch| {
+        ran.fetch_add(1, Ordering::Relaxed);
+        native(scene, watch)
+    });
+    assert_eq!((other.unwrap().rows.len(), ran.into_inner()), (6, 6));
 }
 
 #[test]

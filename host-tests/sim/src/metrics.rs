@@ -40,6 +40,8 @@ pub enum Worst {
     Least,
     /// All of them together.
     Sum,
+    /// That of the finger whose first fault came first.
+    FirstFault,
 }
 
 /// Every name that `[[expect]]` may ask for: `peak_force_n` of the scene, `finger0.peak_force_n` of one finger.
@@ -72,6 +74,11 @@ impl Meter {
             Worst::Largest => f64::max,
             Worst::Least => f64::min,
             Worst::Sum => core::ops::Add::add,
+            Worst::FirstFault => {
+                let faulty = self.0.iter().filter_map(|finger| Some((finger, finger.first_fault?.1)));
+                let first = faulty.min_by(|(_, a_s), (_, b_s)| a_s.total_cmp(b_s)).map(|(finger, _)| finger);
+                return (metric.value)(first.or(self.0.first())?);
+            }
         };
         values?.into_iter().reduce(fold)
     }
@@ -129,6 +136,7 @@ pub fn page() -> String {
             Worst::Largest => "the largest",
             Worst::Least => "the least",
             Worst::Sum => "the sum",
+            Worst::FirstFault => "the first in time",
         };
         page += &format!("| `{name}` | {about} | {several} |\n");
     }

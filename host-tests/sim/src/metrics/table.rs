@@ -2,7 +2,7 @@
 
 use super::finger::{DROPPED_MM, Finger, LIMITS};
 use super::{Metric, Worst};
-use Worst::{Largest, Least, Sum};
+use Worst::{FirstFault, Largest, Least, Sum};
 
 const fn metric(
     name: &'static str,
@@ -37,8 +37,8 @@ pub const METRICS: &[Metric] = &[
     metric("travel_max_mm", Largest, "farthest way of the tip from its start", |f| Some(f.travel_max_mm)),
     metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
     metric("faults_count", Sum, "faults that stopped the motor", |f| Some(f64::from(f.faults))),
-    metric("fault_number", Largest, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
-    metric("fault_ms", Least, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
+    metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
+    metric("fault_ms", FirstFault, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
     metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
     metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
     metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),

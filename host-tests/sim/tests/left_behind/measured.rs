@@ -1,10 +1,14 @@
 //! Metrics and bounds.
 
 use crate::{native, wall};
+use fingertip::frame::{Frame, Sense};
+use fingertip::pipeline::{Command, Status};
+use fingertip::safety::Fault;
 use sim::ledger;
-use sim::metrics::{self, METRICS};
+use sim::metrics::{self, METRICS, Meter};
 use sim::run::run;
 use sim::scene::Bound;
+use sim::watch::{Step, Truth, Watch};
 use std::collections::BTreeSet;
 
 #[test]
@@ -39,6 +43,38 @@ fn the_wall_is_measured() {
     assert_eq!(value("winding_max_c"), 25.0);
     assert!(outcome.measured.get("fault_ms").is_none() && outcome.measured.get("slip_noticed_ms").is_none());
     assert!(outcome.passed(), "{}", outcome.text());
+}
+
+#[test]
+fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
+    // Each finger's fault and when it comes, if it does.
+    let measure = |fingers: [Option<(Fault, f64)>; 2]| {
+        let mut meter = Meter::default();
+        for (finger, tenth) in (0..10).flat_map(|tenth| [(0, tenth), (1, tenth)]) {
+            let time_s = f64::from(tenth) * 0.1;
+            let fault = fingers[finger].filter(|(_, at_s)| time_s >= *at_s).map(|(fault, _)| fault);
+            let status = Status { fault, ..Status::default() };
+            let (frame, sense, command, truth) =
+                (&Frame::EMPTY, &Sense::default(), &Command::default(), &Truth::default());
+            meter.step(&Step { finger, time_s, frame, sense, command, status: &status, truth });
+        }
+        let measured = meter.measured();
+        ["fault_number", "fault_ms", "faults_count"].map(|name| measured.get(name))
+    };
+    let (low, high) = (Fault::ArrayBroken, Fault::SupplyLow);
+    let number = |fault: Fault| Some(f64::from(fault as u8));
+    assert!(number(low) < number(high));
+    for (first, second) in [(low, high), (high, low)] {
+        let expected = [number(first), Some(1e3 * 0.3), Some(2.0)];
+        let close = |measured: [Option<f64>; 3]| {
+            measured.iter().zip(expected).all(|(a, b)| (a.unwrap() - b.unwrap()).abs() < 1e-9)
+        };
+        assert!(close(measure([Some((first, 0.25)), Some((second, 0.6))])));
+        assert!(close(measure([Some((second, 0.6)), Some((first, 0.25))])));
+    }
+    let alone = measure([None, Some((high, 0.25))]);
+    assert!(alone[0] == number(high) && alone[1].is_some() && alone[2] == Some(1.0), "{alone:?}");
+    assert_eq!(measure([None, None]), [Some(0.0), None, Some(0.0)]);
 }
 
 #[test]

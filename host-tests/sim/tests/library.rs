@@ -2,11 +2,13 @@
 //! compression test come out of its scene.
 
 use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use sim::metrics::Verdict;
 use sim::native::simulate;
 use sim::registry;
 use sim::run::run;
-use sim::scene::{Scene, library};
+use sim::scene::{Bound, Scene, library};
 use sim::watch::{Step, Watch};
+use std::collections::BTreeSet;
 use std::thread;
 
 fn scene(name: &str) -> Scene {
@@ -33,6 +35,71 @@ fn every_scene_of_the_library_holds_its_bounds() {
         runs.into_iter().flat_map(|run| run.join().expect("no panic")).collect()
     });
     assert!(broken.is_empty(), "{broken:#?}");
+}
+
+/// What breaks a scene's bounds: keys to set, one at a time. Beside them the sides of bounds that no key reaches: they only notice what is
+/// better than the finger can be.
+type Breakers = (&'static str, &'static [&'static str], &'static [(&'static str, &'static str)]);
+
+/// A supply that is too low, and a sensor that shows half as much again as there is.
+const LOW: &str = "supply.source_v=3";
+const MORE: &str = "controller.codes_per_kpa_milli=36000";
+
+#[rustfmt::skip]
+const BREAKERS: &[Breakers] = &[
+    ("compression", &[LOW, MORE], &[("steady_error_max_mn", "min")]),
+    ("everything", &[LOW, "effects.breakable_object.force_n=0.1", MORE], &[]),
+    ("grasp", &[LOW, "object.centre_x_mm=7", "object.shake_g=0", "hand.lift_mm=12"], &[]),
+    ("hot_hour", &[LOW, "controller.codes_per_kpa_milli=16000", "controller.codes_per_kpa_milli=24600", "tip.modulus_kpa=400"], &[]),
+    ("impact", &[LOW, MORE, "controller.approach_um_per_s=200000", "object.distance_mm=1.0"], &[]),
+    ("noisy_supply", &[LOW, "effects.object_mass.mass_g=200", MORE], &[("steady_error_rms_mn", "min")]),
+    ("off_the_array", &[LOW, MORE], &[("steady_error_max_mn", "min")]),
+    ("paper_cup", &[LOW, MORE, "effects.breakable_object.force_n=0.1"], &[("steady_error_rms_mn", "min")]),
+    ("raspberry", &[LOW, MORE], &[]),
+    ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20"], &[("slip_noticed_ms", "min")]),
+    ("soft_ball", &[LOW, MORE], &[("steady_error_max_mn", "min")]),
+    ("step_ladder", &[LOW, "controller.inertia_ug_m2=300", "effects.object_mass.mass_g=200"], &[("rise_ms", "min"), ("settling_ms", "min"), ("steady_error_max_mn", "min")]),
+    ("tilted_plane", &[LOW, "controller.codes_per_kpa_milli=16000", "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5"], &[("steady_error_max_mn", "min")]),
+    ("wall", &[LOW, MORE], &[]),
+    ("worn_sensor", &[LOW, MORE, "effects.broken_taxels.dead=[]"], &[]),
+];
+
+/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here.
+fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
+    let sides = |verdict: &Verdict| {
+        let Verdict { bound: Bound { metric, min, max }, value, .. } = verdict;
+        let held = [
+            (min.is_some(), "min", value.is_some_and(|value| min.is_some_and(|min| value < min))),
+            (max.is_some(), "max", value.is_some_and(|value| max.is_some_and(|max| value > max))),
+        ];
+        let metric = metric.clone();
+        held.into_iter().filter(|(is, ..)| *is).map(move |(_, side, broken)| ((metric.clone(), side), broken))
+    };
+    let mut all = BTreeSet::new();
+    let mut broken = BTreeSet::new();
+    for key in keys {
+        let scene = sim::cli::load(name, &[(*key).into()], None).unwrap_or_else(|error| panic!("{error}"));
+        let outcome = run(&scene, &|scene, watch| Ok(simulate(scene, watch)?), &mut []).expect("it runs");
+        for (side, breaks) in outcome.verdicts.iter().flat_map(sides) {
+            all.insert(side.clone());
+            broken.extend(breaks.then_some(side));
+        }
+    }
+    all.difference(&broken).cloned().collect()
+}
+
+#[test]
+fn each_bound_of_the_library_breaks_on_either_side_when_something_is_wrong() {
+    let names: Vec<&str> = BREAKERS.iter().map(|(name, ..)| *name).collect();
+    assert_eq!(names, library::names().expect("the library is there"));
+    thread::scope(|scope| {
+        for (name, keys, never) in BREAKERS {
+            scope.spawn(move || {
+                let never = never.iter().map(|(metric, side)| ((*metric).into(), *side)).collect();
+                assert_eq!(unbroken(name, keys), never, "{name}");
+            });
+        }
+    });
 }
 
 #[test]

@@ -117,10 +117,8 @@ pub trait Stages {
     }
     /// Counts the building of the shape's tables as a call of its effects.
     fn shape_built(&mut self) {}
-    /// Whether there is a [`Memory`].
-    fn forgets(&self) -> bool {
-        false
-    }
+    /// Whether there is a [`Memory`]: without one, none is asked.
+    fn forgets(&self) -> bool;
     /// The sum of [`Memory::forgotten_n`].
     fn forgotten_n(&mut self) -> f64 {
         0.0
@@ -131,10 +129,8 @@ pub trait Stages {
     fn mm_per_n(&mut self) -> f64 {
         0.0
     }
-    /// Whether there is a [`Strength`].
-    fn breaks(&self) -> bool {
-        false
-    }
+    /// Whether there is a [`Strength`]: without one, none is asked.
+    fn breaks(&self) -> bool;
     /// The product of [`Strength::left`].
     fn left(&mut self, _force_n: f64) -> f64 {
         1.0
@@ -151,7 +147,15 @@ pub trait Stages {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-impl Stages for () {}
+impl Stages for () {
+    fn forgets(&self) -> bool {
+        false
+    }
+
+    fn breaks(&self) -> bool {
+        false
+    }
+}
 
 /// The named effects.
 #[derive(Default)]

@@ -119,9 +119,7 @@ pub trait Encoder: Send {
 /// The stages as the finger calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
     /// Whether none of the stages holds an effect: the finger then asks for none.
-    fn none(&self) -> bool {
-        true
-    }
+    fn none(&self) -> bool;
     /// All inertia added.
     fn inertia_kg_m2(&mut self, _m_per_rad: f64) -> f64 {
         0.0
@@ -156,7 +154,11 @@ pub trait Stages {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-impl Stages for () {}
+impl Stages for () {
+    fn none(&self) -> bool {
+        true
+    }
+}
 
 /// The named effects.
 #[derive(Default)]

@@ -76,9 +76,7 @@ pub trait Codes: Send {
 /// The stages as the readout calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
     /// Whether none of the stages holds an effect: the readout is then ideal, and asks for no stage.
-    fn none(&self) -> bool {
-        true
-    }
+    fn none(&self) -> bool;
     /// All effects of the stage, in order.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
     /// As [`Stages::pressure`].
@@ -91,7 +89,11 @@ pub trait Stages {
     fn codes(&mut self, _slot: usize, _time_s: f64, _codes: &mut Row) {}
 }
 
-impl Stages for () {}
+impl Stages for () {
+    fn none(&self) -> bool {
+        true
+    }
+}
 
 /// The named effects.
 #[derive(Default)]

@@ -1,12 +1,14 @@
 //! What effects cost that are compiled in but not named: runs a scene without its effects, by turns with none compiled and with all,
-//! and prints the ratios of the times: the pairs' median, and of the quickest run of each, which a busy machine disturbs least.
+//! and prints the ratios of the times: the pairs' median, and of the quickest run of each, which a busy machine disturbs least. Then names
+//! effects without magnitude, each alone and all together: together they cost at most the sum, or cost grew faster than their number.
 //!
 //! `cargo run --profile host -p sim --example unnamed-cost -- [SCENE] [PAIRS]`
 
 use sim::cli;
 use sim::effects::set::{Named, Set};
 use sim::native::simulate_with;
-use sim::scene::Scene;
+use sim::registry::{self, Description};
+use sim::scene::{Scene, read, text};
 use sim::watch::{Step, Watch};
 use std::error::Error;
 use std::time::Instant;
@@ -21,6 +23,24 @@ fn seconds<E: Set>(scene: &Scene) -> Result<f64, Box<dyn Error>> {
     let begun = Instant::now();
     simulate_with::<E>(scene, &mut Nobody)?;
     Ok(begun.elapsed().as_secs_f64())
+}
+
+/// The scene with these effects alone, without magnitude.
+fn named(scene: &Scene, effects: &[&'static Description]) -> Result<Scene, Box<dyn Error>> {
+    let tables: String = effects.iter().map(|effect| text::zero(effect)).collect();
+    let effects = read("named.toml", &format!("about = \"\"\nduration_s = 1\n{tables}"), &[])?.effects;
+    Ok(Scene { effects, ..scene.clone() })
+}
+
+/// The times of a scene's runs over those without effects, run by turns: the median of what they take more.
+fn more(scene: &Scene, bare: &Scene, pairs: usize) -> Result<f64, Box<dyn Error>> {
+    let mut more = Vec::new();
+    for _ in 0..pairs {
+        let without = seconds::<Named>(bare)?;
+        more.push(seconds::<Named>(scene)? / without - 1.0);
+    }
+    more.sort_by(f64::total_cmp);
+    Ok(more[pairs / 2])
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -53,6 +73,16 @@ fn main() -> Result<(), Box<dyn Error>> {
         at(0.25),
         at(0.75),
         quickest[1] / quickest[0]
+    );
+    let all: Vec<_> = registry::all().collect();
+    let mut sum = 0.0;
+    for effect in &all {
+        sum += more(&named(&scene, &[effect])?, &scene, pairs.div_ceil(5))?;
+    }
+    println!(
+        "without magnitude: all {} named take {:.2} of that time more, each alone {sum:.2} in sum",
+        all.len(),
+        more(&named(&scene, &all)?, &scene, pairs.div_ceil(5))?
     );
     Ok(())
 }

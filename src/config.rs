@@ -5,6 +5,7 @@
 
 use crate::contact::Geometry;
 use crate::control::BRAKE_SHARE_Q8;
+use crate::frame::COLUMNS;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
@@ -64,6 +65,8 @@ pub struct Config {
 
     /// See [`Params::row_sag_ppb_per_code`], as a share in Q32.
     pub sag_q32: u16,
+    /// The same for as many codes as dead taxels of a whole row would show at most.
+    pub sag_of_dead_q32: i32,
     /// See [`Params::dead_codes`].
     pub dead_codes: u16,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
@@ -163,6 +166,7 @@ impl Config {
         let beta = (1.0 - half_angle) / (1.0 + half_angle);
         let gap = 1.0 - beta;
 
+        let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
         let codes_per_kpa = p.codes_per_kpa_milli as f32 * 1e-3;
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
@@ -178,7 +182,8 @@ impl Config {
             params: *p,
             timing,
             tip,
-            sag_q32: (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16,
+            sag_q32,
+            sag_of_dead_q32: COLUMNS as i32 * p.dead_codes * i32::from(sag_q32),
             dead_codes: p.dead_codes as u16,
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),

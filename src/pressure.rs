@@ -103,7 +103,7 @@ impl Array {
         if self.picture.bad_count != 0 {
             (self.picture.bad, self.picture.bad_count) = (self.mask, 0);
         }
-        let sound = Sound::new(undriven, config.dead_codes, config.sag_q32);
+        let sound = Sound::new(undriven, config);
         let mut total = lanes::pass(rows, &mut self.rows, &sound.common);
         let largest = row::larger_lane(total.largest);
         self.picture.undriven_max = sound.undriven_max;
@@ -186,7 +186,7 @@ impl Array {
     /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
     pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
         let [rows @ .., undriven] = &frame.pairs;
-        let sound = Sound::new(undriven, config.dead_codes, config.sag_q32);
+        let sound = Sound::new(undriven, config);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.suspects(sound.largest(codes)) {

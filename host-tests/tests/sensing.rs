@@ -60,7 +60,7 @@ fn the_sag_of_the_driven_row_is_taken_out() {
     let setup = Setup::default();
     let mut bench = Bench::new(&setup);
     let with = bench.press(2.5);
-    bench.config.sag_q32 = 0;
+    (bench.config.sag_q32, bench.config.sag_of_dead_q32) = (0, 0);
     bench.world.place(0.0);
     bench.tare();
     let without = bench.press(2.5);

@@ -2,6 +2,7 @@
 
 use super::suspect::Share;
 use super::{CODE_BITS, GAIN_BITS, each};
+use crate::config::Config;
 use crate::frame::{COLUMNS, ROWS, SATURATED};
 use lanes::{BOOST_BITS, Common, Pairs, Total};
 
@@ -22,12 +23,13 @@ pub(super) struct Sound {
 impl Sound {
     /// From the slot with nothing driven.
     #[inline(always)]
-    pub fn new(undriven: &Pairs, dead_codes: u16, sag_q32: u16) -> Self {
+    pub fn new(undriven: &Pairs, config: &Config) -> Self {
+        let Config { dead_codes, sag_q32, sag_of_dead_q32, .. } = *config;
         let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
         let common = Common {
             // No lane carries for codes of 12 bits.
             floors: each(|place| undriven[place].wrapping_add(dead)),
-            start: COLUMNS as i32 * i32::from(dead_codes) * i32::from(sag_q32),
+            start: sag_of_dead_q32,
             sag: lanes::pair(sag_q32 as i16, sag_q32 as i16),
         };
         Self { common, undriven_max: highest(*undriven), dead_codes }

@@ -5,7 +5,7 @@ use super::host::{Inputs, fail, say};
 use super::packed;
 use fingertip::config::Config;
 use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
-use fingertip::pressure::{Array, CODE_BITS, Calibration, Picture, TARE_FRAMES};
+use fingertip::pressure::{Array, Calibration, Picture, TARE_FRAMES};
 use fixed::types::I16F16;
 
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
@@ -64,6 +64,8 @@ pub struct Float<T> {
 
 #[derive(Clone, Copy)]
 enum Format {
+    /// Where the firmware leaves it: sixteenths, in the array's picture.
+    Picture,
     /// Fractional bits of a code.
     Fixed(u32),
     Single,
@@ -81,8 +83,8 @@ const VARIANTS: [(&str, Kernel, Format); 10] = [
     ("f32", single, Format::Single),
     ("f64", double, Format::Double),
     ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
-    ("**Array::read**", firmware, Format::Fixed(4)),
-    ("**Array::read_all**", all_taxels, Format::Fixed(4)),
+    ("**Array::read**", firmware, Format::Picture),
+    ("**Array::read_all**", all_taxels, Format::Picture),
 ];
 
 /// Measures all variants over the next section of inputs: gains, the frame without contact, frames.
@@ -97,11 +99,13 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
         for _ in 0..count {
             bench.frame = read(inputs);
             pass_on(*region, kernel, &mut bench);
+            bench.collect(format);
             if bench.suspect {
                 fail("a sound frame is flagged");
             }
             let Bench { out, out_single, out_double, .. } = &bench;
             match format {
+                Format::Picture => say(format_args!("i4 {} i4 {} i4 {}", out.sum, out.moment_x, out.moment_y)),
                 Format::Fixed(bits) => {
                     say(format_args!("i{bits} {} i{bits} {} i{bits} {}", out.sum, out.moment_x, out.moment_y));
                 }
@@ -120,12 +124,24 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
             let sound = bench.frame;
             bench.frame.set_code(3, 4, code);
             kernel(&mut bench);
+            bench.collect(format);
             if !bench.suspect {
                 fail("a bad taxel is not flagged");
             }
             bench.frame = sound;
         }
         *region += 1;
+    }
+}
+
+impl Bench {
+    /// What the firmware's way left in the array.
+    fn collect(&mut self, format: Format) {
+        if let Format::Picture = format {
+            let Picture { sum, moment_x, moment_y, peak, bad_count, .. } = *self.array.picture();
+            self.out = Sums { sum, moment_x, moment_y, peak };
+            self.suspect = bad_count > 0;
+        }
     }
 }
 
@@ -203,19 +219,12 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     }
 }
 
-fn seen(picture: &Picture, peak: i32) -> (Sums<i32>, bool) {
-    let Picture { sum, moment_x, moment_y, bad_count, .. } = *picture;
-    (Sums { sum, moment_x, moment_y, peak }, bad_count > 0)
-}
-
 extern "C" fn firmware(bench: &mut Bench) {
-    let picture = bench.array.read(&bench.frame, &bench.config);
-    (bench.out, bench.suspect) = seen(picture, i32::from(picture.peak_codes) << CODE_BITS);
+    bench.array.read(&bench.frame, &bench.config);
 }
 
 extern "C" fn all_taxels(bench: &mut Bench) {
-    let picture = bench.array.read_all(&bench.frame, &bench.config);
-    (bench.out, bench.suspect) = seen(picture, picture.peak);
+    bench.array.read_all(&bench.frame, &bench.config);
 }
 
 /// Taxel by taxel, in 32 and 64 bits.

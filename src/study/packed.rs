@@ -9,10 +9,6 @@ use fingertip::frame::{BANK_COLUMNS, ROWS, SATURATED};
 type Pairs = [u32; BANK_COLUMNS];
 
 const ONES: u32 = lanes::pair(1, 1);
-/// -9, -7 .. -1 in the low halves, 1, 3 .. 9 in the high ones.
-const WEIGHTS: Pairs =
-    [lanes::pair(-9, 1), lanes::pair(-7, 3), lanes::pair(-5, 5), lanes::pair(-3, 7), lanes::pair(-1, 9)];
-
 /// A row's sums.
 struct Row {
     /// Net codes, unweighted.
@@ -37,7 +33,7 @@ impl Frame {
     }
 
     #[inline(always)]
-    fn row<const GAINS: bool>(&mut self, codes: &Pairs, undriven: &Pairs, first: &Pairs, second: &Pairs) -> Row {
+    fn row(&mut self, codes: &Pairs, undriven: &Pairs, first: &Pairs, second: &Pairs) -> Row {
         const SOUND: u32 = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
         let mut row = Row { codes: 0, sum: 0, moment: 0 };
         let mut take = |place: usize| {
@@ -45,9 +41,7 @@ impl Frame {
             self.signs |= lanes::sub(net, self.dead) | lanes::sub(SOUND, codes[place]);
             self.peaks = larger(self.peaks, net);
             row.codes = lanes::dot(net, ONES, row.codes);
-            if GAINS {
-                row.sum = lanes::dot(net, first[place], row.sum);
-            }
+            row.sum = lanes::dot(net, first[place], row.sum);
             row.moment = lanes::dot(net, second[place], row.moment);
         };
         // Written out: the compiler would keep a loop where it builds for size.
@@ -91,7 +85,7 @@ fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
     let [rows @ .., undriven] = &bench.frame.pairs;
     let mut weight = 1 - ROWS as i32;
     for ((codes, gain), weighted) in rows.iter().zip(&bench.gain).zip(&bench.weighted) {
-        let row = frame.row::<true>(codes, undriven, gain, weighted);
+        let row = frame.row(codes, undriven, gain, weighted);
         let (sum, moment) = read(&row, bench.config.sag_q32.into());
         out.sum += sum;
         out.moment_x += moment;
@@ -102,21 +96,39 @@ fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
     frame.finish(bench, out, &tare, 8 - bits);
 }
 
-/// Every taxel counts alike.
+/// Every taxel counts alike: the codes are added up column by column, and the levels taken off at the end.
 pub extern "C" fn plain(bench: &mut Bench) {
-    let mut frame = Frame::new(bench);
-    let mut out = Sums::default();
     let [rows @ .., undriven] = &bench.frame.pairs;
-    let mut weight = 1 - ROWS as i32;
-    for codes in rows {
-        let row = frame.row::<false>(codes, undriven, &WEIGHTS, &WEIGHTS);
-        out.sum += row.codes << 4;
-        out.moment_x += row.moment << 4;
-        out.moment_y += (row.codes << 4) * weight;
-        weight += 2;
+    let dead = lanes::pair(bench.config.dead_codes as i16, bench.config.dead_codes as i16);
+    let halves = |pair: u32| [(pair & 0xffff) as i32, (pair >> 16) as i32];
+    let (mut sum, mut moment_x, mut numbered) = (0, 0, 0);
+    let (mut largest, mut highest) = (0, 0);
+    for place in 0..BANK_COLUMNS {
+        let levels = undriven[place];
+        let floors = levels.wrapping_add(dead);
+        // Ten codes of 12 bits fit a lane.
+        let mut column = 0_u32;
+        for (number, codes) in (1..).zip(rows) {
+            let codes = codes[place];
+            column += codes;
+            numbered = lanes::dot(codes, lanes::pair(number, number), numbered);
+            largest = lanes::larger(largest, lanes::sub(codes, floors));
+        }
+        highest = lanes::larger(highest, levels);
+        let ([left, right], [left_level, right_level]) = (halves(column), halves(levels));
+        let (left, right) = (left - ROWS as i32 * left_level, right - ROWS as i32 * right_level);
+        sum += left + right;
+        moment_x += (left + right) * (2 * place as i32 - 9) + 10 * right;
+        // 1 + 2 + .. 10 levels.
+        numbered -= 55 * (left_level + right_level);
     }
-    let tare = bench.plain_tare;
-    frame.finish(bench, out, &tare, 0);
+    let [low, high] = halves(largest);
+    let peak = low.max(high) + i32::from(bench.config.dead_codes);
+    let [low, high] = halves(highest);
+    bench.suspect = peak + low.max(high) >= i32::from(SATURATED);
+    let Sums { sum: tare, moment_x: tare_x, moment_y: tare_y, .. } = bench.plain_tare;
+    let moment_y = 2 * numbered - 11 * sum;
+    bench.out = Sums { sum: (sum << 4) - tare, moment_x: (moment_x << 4) - tare_x, moment_y: (moment_y << 4) - tare_y, peak };
 }
 
 /// Each taxel by its gain.

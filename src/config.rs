@@ -173,8 +173,8 @@ impl Config {
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
-        let voltage_limit = limit(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
-        let current_limit = limit(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
+        let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
+        let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
         // The full duty for the supply's voltage: 32767 for a mV at 1 mV.
         let duty_gain = f32::from(Duty::FULL) * exp2(23) / exp2(voltage_shift) * 1e3 / g;
@@ -208,7 +208,7 @@ impl Config {
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,
             current_limit,
-            slew_limit: limit(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
+            slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             brake: brake(current_limit.min(voltage_limit)),
             acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
             voltage_shift,
@@ -249,11 +249,6 @@ fn wide(value: f32) -> i64 {
 /// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
 fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
-}
-
-/// The same for a limit of the drive: at most 2^29, 2097 m/s^2, see [`crate::control::drive`].
-fn limit(value: f32) -> i32 {
-    narrow(value).min(1 << 29)
 }
 
 /// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a quarter and

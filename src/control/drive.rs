@@ -30,18 +30,16 @@ impl Drive {
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     #[inline(always)]
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        let (mut applied, mut cut) = (wanted, 0);
-        let mut hold = |middle: i32, reach: i32, limit: u16| {
-            if !is_near(applied, middle, reach) {
-                applied = end(applied, middle, reach);
-                cut |= limit;
-            }
-        };
-        hold(self.voltage, config.slew_limit, Limits::SLEW);
-        hold(back_emf, config.current_limit, Limits::CURRENT);
-        hold(0, voltage_limit(supply_mv, config), Limits::VOLTAGE);
-        if cut != 0 {
-            limits.set(cut);
+        let slewed = near(wanted, self.voltage, config.slew_limit);
+        let within_current = near(slewed, back_emf, config.current_limit);
+        let applied = near(within_current, 0, voltage_limit(supply_mv, config));
+        if applied != wanted {
+            let flag = |cut, flag| if cut { flag } else { 0 };
+            limits.set(
+                flag(slewed != wanted, Limits::SLEW)
+                    | flag(within_current != slewed, Limits::CURRENT)
+                    | flag(applied != within_current, Limits::VOLTAGE),
+            );
         }
         self.voltage = applied;
         self.net = applied.saturating_sub(back_emf);
@@ -49,18 +47,11 @@ impl Drive {
     }
 }
 
-/// Whether a value is no further than `reach` from `middle`, in one comparison: as the reach, and the voltage or the value, are at most
-/// 2^29 or 2^30, nothing that is far away comes near by wrapping.
+/// The value nearest to `value` that is no further than `reach` from `middle`. (`clamp` would have to prove that the
+/// bounds are in order.)
 #[inline(always)]
-fn is_near(value: i32, middle: i32, reach: i32) -> bool {
-    value.wrapping_sub(middle).wrapping_add(reach).cast_unsigned() <= reach.cast_unsigned() << 1
-}
-
-/// The end of the reach on the value's side. Out of the way of what happens in most frames.
-#[cold]
-#[inline(never)]
-fn end(value: i32, middle: i32, reach: i32) -> i32 {
-    if value > middle { middle.saturating_add(reach) } else { middle.saturating_sub(reach) }
+fn near(value: i32, middle: i32, reach: i32) -> i32 {
+    value.max(middle.saturating_sub(reach)).min(middle.saturating_add(reach))
 }
 
 /// g V for the largest voltage: the motor's, or the supply where that has less.

@@ -73,11 +73,30 @@ impl Host {
 
     /// Lets the host read the controller where it is time to: the reading arrives later, or not at all. Times never fall.
     pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
-        let Some(reader) = self.reader.as_mut().filter(|reader| reader.read_s <= time_s) else { return };
-        reader.read_s = time_s + reader.period_s;
-        if let Some(asked_s) = stages.pass(time_s) {
-            reader.answers.push_back((Grip::answered_s(asked_s), reading()));
+        if let Some(asked_s) = self.ask(time_s, time_s, stages) {
+            self.hear(Grip::answered_s(asked_s), reading());
         }
+    }
+
+    /// Asks for a reading where that is due by a time, at `now_s` or when it is due, whichever is later. Says when the request
+    /// arrives at the controller; none where nothing is due, or where the request is lost. Times never fall.
+    pub fn ask(&mut self, now_s: f64, until_s: f64, stages: &mut impl Stages) -> Option<f64> {
+        let reader = self.reader.as_mut().filter(|reader| reader.read_s <= until_s)?;
+        let at_s = reader.read_s.max(now_s);
+        reader.read_s = at_s + reader.period_s;
+        stages.pass(at_s)
+    }
+
+    /// A reading came in at a time: it is judged when that time has come.
+    pub fn hear(&mut self, at_s: f64, reading: Reading) {
+        if let Some(reader) = &mut self.reader {
+            reader.answers.push_back((at_s, reading));
+        }
+    }
+
+    /// Whether it reads the controller.
+    pub fn reads(&self) -> bool {
+        self.reader.is_some()
     }
 
     /// The next packet that arrives by a time: when, and its goal. Times never fall.

@@ -201,6 +201,22 @@ impl<E: Set> World<E> {
         finger.contact.row_kpa(x_mm, row)
     }
 
+    /// The same at a time before the last step's end, below 0, or behind it: then all goes on as it did in it.
+    pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
+        if off_s < 0.0 {
+            return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
+        }
+        let ahead_s = off_s;
+        let mut body = self.body;
+        if self.dt_s > 0.0 {
+            let (v0, v1) = (self.body_before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
+            body.place_mm[0] += ahead_s * (v1 + 0.5 * (v1 - v0) * ahead_s / self.dt_s);
+        }
+        let finger = &mut self.fingers[index];
+        let x_mm = finger.flank_ahead_mm(ahead_s) - surface_mm(finger.setup(), index, &body);
+        finger.contact.row_kpa(x_mm, row)
+    }
+
     fn overlap_mm(&self, index: usize) -> f64 {
         let finger = &self.fingers[index];
         finger.flank_mm() - surface_mm(finger.setup(), index, &self.body)

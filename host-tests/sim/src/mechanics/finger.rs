@@ -150,13 +150,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             self.rad_per_s2 = (self.shaft.speed_rad_per_s - self.before.speed_rad_per_s) / self.dt_s;
         }
         self.tip_mm = self.flank_mm();
-        let turns = self.shaft.angle_rad / TAU;
-        self.count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         if !self.drive.none() {
             self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
             self.tip_mm = self.drive.tip_mm(self.tip_mm, surface_mm);
-            self.count = self.drive.count(self.count);
         }
+        self.count = self.count_ahead(0.0);
     }
 
     /// Puts it at rest at a travel, as if carried there.
@@ -188,6 +186,22 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         let (v0, v1) = (self.before.speed_rad_per_s, self.shaft.speed_rad_per_s);
         let angle = self.before.angle_rad + since_s * (v0 + 0.5 * (v1 - v0) * since_s / self.dt_s);
         angle * self.mm_per_rad
+    }
+
+    fn angle_ahead_rad(&self, ahead_s: f64) -> f64 {
+        self.shaft.angle_rad + ahead_s * (self.shaft.speed_rad_per_s + 0.5 * self.rad_per_s2 * ahead_s)
+    }
+
+    /// Travel of the pressing flank a while behind the last step, where all goes on as it did in it.
+    pub fn flank_ahead_mm(&self, ahead_s: f64) -> f64 {
+        self.angle_ahead_rad(ahead_s) * self.mm_per_rad
+    }
+
+    /// What the encoder then reads.
+    pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
+        let turns = self.angle_ahead_rad(ahead_s) / TAU;
+        let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        if self.drive.none() { count } else { self.drive.count(count) }
     }
 
     /// Travel of the tip.

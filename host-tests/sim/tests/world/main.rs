@@ -9,5 +9,6 @@ mod drive;
 mod energy;
 mod hard;
 mod object;
+mod off_step;
 mod pressures;
 mod wall;

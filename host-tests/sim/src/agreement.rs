@@ -2,7 +2,7 @@
 //!
 //! Both begin with the script. They cannot be alike to the bit: the emulated board's frames run on through the script's times, so a
 //! goal is taken up to two frames sooner or later; its duty acts some microseconds beside the native board's; its PWM counts in
-//! steps; its rows are sampled in a world that moves in steps of 10 us. All but the PWM's steps is a shift in time. So the bound is
+//! steps; a row is sampled where its conversions begin, not at its slot's end. All but the PWM's steps is a shift in time. So the bound is
 //! a tube: at each time the second board lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond
 //! them by a little: [`BEYOND_N`] and [`BEYOND_MM`].
 

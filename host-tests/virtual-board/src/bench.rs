@@ -17,7 +17,7 @@ use rigless::snapshot::{self, Reader, Store, Writer};
 use rigless::soc::stm32f427::generated::{GPIOC, TIM1};
 use rigless::time::VirtualNanos;
 
-/// The world's step.
+/// The plant's step, and the least of a scene's world.
 pub const STEP_NS: u64 = 10_000;
 /// How often the log is read out.
 const LOG_NS: u64 = 1_000_000;
@@ -50,7 +50,11 @@ pub struct Bench {
     world_ns: u64,
     bridge: Bridge,
     encoder: i32,
+    encoder_ns: u64,
     resets: usize,
+    grid_ns: u64,
+    follows_frames: bool,
+    frames: u64,
 }
 
 impl Bench {
@@ -59,6 +63,10 @@ impl Bench {
     /// # Errors
     /// The image's log cannot be decoded.
     pub fn new(front_end: Shared, image: &Firmware) -> Result<Self, Error> {
+        let (grid_ns, follows_frames) = {
+            let world = &front_end.lock().world;
+            (world.grid_ns(), world.follows_frames())
+        };
         Ok(Self {
             next_ns: STEP_NS,
             front_end,
@@ -73,7 +81,11 @@ impl Bench {
             world_ns: 0,
             bridge: Bridge::Coast,
             encoder: 0,
+            encoder_ns: 0,
             resets: 0,
+            grid_ns,
+            follows_frames,
+            frames: 0,
         })
     }
 
@@ -108,12 +120,36 @@ impl Bench {
             self.trace.add(at_ns, Record::Bridge(on(bridge)));
         }
         self.bridge = bridge;
+        self.front_end.lock().world.hold(bridge);
     }
 
     fn advance_world(&mut self, to_ns: u64) {
         if to_ns > self.world_ns {
             self.front_end.lock().world.advance(self.world_ns, to_ns, self.bridge);
             self.world_ns = to_ns;
+        }
+    }
+
+    fn turn_encoder(&mut self, board: &mut FingerBoard, now_ns: u64) {
+        let counts = self.front_end.lock().world.encoder_counts(now_ns);
+        if counts != self.encoder && now_ns > self.encoder_ns {
+            let left = counts.wrapping_sub(self.encoder);
+            self.encoder += board.part.turn_encoder(self.encoder_ns, now_ns, left);
+        }
+        self.encoder_ns = now_ns;
+    }
+
+    /// The part had something to do at an instant between two of the grid. Where that was the end of a frame the image looks at the
+    /// encoder next.
+    pub fn stopped(&mut self, board: &mut FingerBoard, at_ns: u64) {
+        if !self.follows_frames {
+            return;
+        }
+        let frames = self.front_end.lock().counts.frames;
+        if frames != self.frames {
+            self.frames = frames;
+            self.advance_world(at_ns);
+            self.turn_encoder(board, at_ns);
         }
     }
 
@@ -126,11 +162,7 @@ impl Bench {
         if let Some(recorder) = &mut self.recorder {
             recorder.look(now_ns, &self.front_end.lock().world, self.bridge);
         }
-        let counts = self.front_end.lock().world.encoder_counts();
-        if counts != self.encoder {
-            let left = counts.wrapping_sub(self.encoder);
-            self.encoder += session.board_mut().part.turn_encoder(now_ns - STEP_NS, now_ns, left);
-        }
+        self.turn_encoder(session.board_mut(), now_ns);
         for byte in session.board_mut().wire().take_received() {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));
             self.received.push(byte);
@@ -149,7 +181,7 @@ impl Bench {
 
     /// The instant of the grid to stop at next.
     pub fn next_stop(&mut self) -> VirtualNanos {
-        self.next_ns += STEP_NS;
+        self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
         VirtualNanos(self.next_ns)
     }
 }
@@ -157,9 +189,9 @@ impl Bench {
 impl Store for Bench {
     fn store(&self, to: &mut Writer) -> Result<(), snapshot::Error> {
         let Self { next_ns, front_end, trace, latency, bridge_edges, log, received, core_held, flash, .. } = self;
-        let Self { world_ns, bridge, encoder, resets, .. } = self;
+        let Self { world_ns, bridge, encoder, encoder_ns, resets, .. } = self;
         to.put(&(next_ns, trace, latency, bridge_edges, log.state(), received, core_held, flash))?;
-        to.put(&(world_ns, bridge, encoder, resets))?;
+        to.put(&(world_ns, bridge, encoder, encoder_ns, resets))?;
         to.put(&*front_end.lock())
     }
 
@@ -168,7 +200,7 @@ impl Store for Bench {
         (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held, self.flash) =
             from.take()?;
         self.log.set_state(log.0, log.1);
-        (self.world_ns, self.bridge, self.encoder, self.resets) = from.take()?;
+        (self.world_ns, self.bridge, self.encoder, self.encoder_ns, self.resets) = from.take()?;
         *self.front_end.lock() = from.take::<FrontEnd>()?;
         Ok(())
     }

@@ -6,13 +6,14 @@
 //! conversions a frame cost 22 events. Not modelled: injected group, continuous and
 //! discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
 
-use crate::front_end::Shared;
+use crate::front_end::{Shared, Slot};
 use crate::scan_timer::COMPARE_1;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::ADC2;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sqr1, sqr2, sqr3, sr};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
+use rigless::soc::stm32f427::peripherals::tim::UPDATE_REQUEST;
 use rigless::soc::{FieldSpec, Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
@@ -50,9 +51,11 @@ const SEQUENCE: [(Register, &FieldSpec); 16] = [
 /// Conversions under way, all of them over at the event.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Running {
-    event: EventId,
+    event: Option<EventId>,
     begun_ns: u64,
     ranks: usize,
+    /// In a scene: whether the frame ends with it.
+    last: Option<bool>,
 }
 
 /// ADC1, ADC2 or ADC3.
@@ -98,12 +101,34 @@ impl Converter {
     }
 
     fn begin(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+        self.begin_in(None, registers, context);
+    }
+
+    /// The next slot of a scene: the sequence of the one before is over, and one begins at the trigger. It is an event only where
+    /// somebody waits for it: at the frame's end.
+    fn next_slot(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        if let Some(running) = self.running.take_if(|running| running.event.is_none()) {
+            self.finish(running, registers, context);
+        }
+        if self.nth == 0 {
+            self.front_end.lock().begin_slot(context.now().0);
+        }
+        let control = registers.get(Register::Cr2);
+        if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
+            let slot = self.front_end.lock().slot;
+            self.begin_in(slot, registers, context);
+            self.refresh(registers, context);
+        }
+    }
+
+    fn begin_in(&mut self, slot: Option<Slot>, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
         let control = registers.get(Register::Cr2);
         if !cr2::ADON.is_set(control) || self.running.is_some() || sr::OVR.is_set(self.status) || self.clock_hz == 0 {
             return;
         }
         let by_dma = cr2::DMA.is_set(control);
-        if by_dma && !self.front_end.lock().waiting[self.nth].is_empty() {
+        // What a scene's last slot left is being fetched at this very instant.
+        if by_dma && slot.is_none() && !self.front_end.lock().waiting[self.nth].is_empty() {
             self.status = sr::OVR.set(self.status, 1);
             return;
         }
@@ -115,10 +140,12 @@ impl Converter {
         let cycles: u64 = (self.rank..self.rank + ranks)
             .map(|rank| Self::sampling_cycles(registers, Self::input(registers, rank)) + CONVERSION_CYCLES)
             .sum();
-        let begun_ns = context.now().0;
-        let event = context.schedule(VirtualNanos(self.after(begun_ns, cycles)));
+        let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
+        let last = slot.map(|slot| slot.last);
+        let done = VirtualNanos(self.after(begun_ns, cycles));
+        let event = (last != Some(false)).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
-        self.running = Some(Running { event, begun_ns, ranks });
+        self.running = Some(Running { event, begun_ns, ranks, last });
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -143,7 +170,7 @@ impl Converter {
             registers.set(Register::Dr, u64::from(*word));
         }
         if complete && self.nth == 1 {
-            front_end.sequence_done(context.now().0);
+            front_end.sequence_done(context.now().0, running.last);
         }
         drop(front_end);
         if complete || cr2::EOCS.is_set(control) {
@@ -153,7 +180,7 @@ impl Converter {
             // The streams take all that waits; the line falls by itself.
             context.request(DMA_REQUEST, Level::High);
         }
-        if !complete {
+        if !complete && running.last.is_none() {
             self.begin(registers, context);
         }
     }
@@ -209,9 +236,20 @@ impl Device for Converter {
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
+        } else if change.instance == "TIM8" && change.request == UPDATE_REQUEST && change.level == Level::High {
+            let mut front_end = self.front_end.lock();
+            if front_end.slot.is_none() || front_end.trigger_cut {
+                return;
+            }
+            front_end.counts.triggers += 1;
+            drop(front_end);
+            self.next_slot(registers, context);
+            if self.nth == 0 {
+                context.write_to(ADC2.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
+            }
         } else if change.instance == "TIM8" && change.request == COMPARE_1 {
             let mut front_end = self.front_end.lock();
-            if front_end.trigger_cut {
+            if front_end.trigger_cut || front_end.slot.is_some() {
                 return;
             }
             front_end.counts.triggers += 1;
@@ -250,6 +288,7 @@ impl Device for Converter {
         match register {
             Register::Sr => self.status &= value,
             Register::Cr2 => self.write_cr2(registers, context),
+            Register::Dr if self.front_end.lock().slot.is_some() => return self.next_slot(registers, context),
             Register::Dr => return self.triggered(registers, context),
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);
@@ -263,7 +302,7 @@ impl Device for Converter {
     }
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        if let Some(running) = self.running.take_if(|running| running.event == event) {
+        if let Some(running) = self.running.take_if(|running| running.event == Some(event)) {
             self.finish(running, registers, context);
             self.refresh(registers, context);
         }

@@ -25,6 +25,19 @@ struct Drive {
     since_ns: u64,
 }
 
+/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time later. Nothing
+/// that the image can see depends on when that is worked out before the next slot begins, so it is then that the codes are made: one
+/// event a slot, and one at the frame's end, in place of three.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Slot {
+    /// From the update to the trigger.
+    pub edge_ns: u64,
+    /// When the converters begin in this slot.
+    pub begun_ns: u64,
+    /// No row is driven: the frame ends with it.
+    pub last: bool,
+}
+
 /// What the columns settle to under the drive of that place and under the one before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
 
@@ -52,6 +65,8 @@ pub struct FrontEnd {
     pub scan_interrupt_lost: bool,
     /// What the converters have done.
     pub counts: ScanCounts,
+    /// In a scene: the slot that has begun.
+    pub slot: Option<Slot>,
     /// Words of each converter that nobody has fetched yet.
     pub waiting: [VecDeque<u16>; 3],
     /// Newest first: a sample just before an edge still sees what was before it.
@@ -65,8 +80,10 @@ pub struct Shared(Arc<Mutex<FrontEnd>>);
 impl Shared {
     /// A front end with no row driven.
     pub fn new(world: Surroundings) -> Self {
+        let slot = world.follows_frames().then(Slot::default);
         Self(Arc::new(Mutex::new(FrontEnd {
             world,
+            slot,
             trigger_cut: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
@@ -129,9 +146,17 @@ impl FrontEnd {
         }
     }
 
+    /// A slot of a scene begins, with the one before it done: behind the last row comes one without.
+    pub fn begin_slot(&mut self, at_ns: u64) {
+        let last = self.drives[0].rows == 1 << (ROWS - 1);
+        if let Some(slot) = &mut self.slot {
+            *slot = Slot { begun_ns: at_ns + slot.edge_ns, last, ..*slot };
+        }
+    }
+
     /// A scanning converter's sequence is complete: with no row driven after one was, so is the frame.
-    pub fn sequence_done(&mut self, at_ns: u64) {
-        if self.drives[0].rows == 0 && self.drives[1].rows != 0 {
+    pub fn sequence_done(&mut self, at_ns: u64, last: Option<bool>) {
+        if last.unwrap_or(self.drives[0].rows == 0 && self.drives[1].rows != 0) {
             self.counts.frames += 1;
             self.counts.frame_end_ns = at_ns;
             if let Surroundings::Scene(finger) = &mut self.world {

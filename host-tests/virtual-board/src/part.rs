@@ -91,7 +91,7 @@ impl Part {
         let mut part = Self {
             chip,
             converters: Self::converters(&front_end),
-            scan_timer: ScanTimer::new(RESET_HZ),
+            scan_timer: ScanTimer::new(RESET_HZ, front_end.clone()),
             streams: Streams::new(front_end.clone()),
             inputs: Inputs { quarter: 0, bridge_well: true },
             front_end,
@@ -179,7 +179,7 @@ impl Mcu for Part {
         self.chip.reset(at, cause);
         self.streams = Streams::new(self.front_end.clone());
         self.converters = Self::converters(&self.front_end);
-        self.scan_timer = ScanTimer::new(RESET_HZ);
+        self.scan_timer = ScanTimer::new(RESET_HZ, self.front_end.clone());
         self.front_end.lock().restart(at.0);
         self.drive_inputs(at);
     }

@@ -1,6 +1,10 @@
 //! A timer that tells the part what the crate's own keeps to itself: its first channel's edge, and that its update
 //! request was served.
+//!
+//! In a scene the edge is no event of its own: the converters are told how long after each update it comes, see
+//! [`crate::front_end::Slot`].
 
+use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::soc::RegisterSpec;
@@ -20,14 +24,37 @@ pub struct ScanTimer {
     timer: Tim<Advanced>,
     updates_served: u64,
     reference: Level,
+    clock_hz: u64,
+    /// In a scene: from an update to the edge, in the timer's ticks.
+    edge_ticks: u64,
+    #[serde(skip)]
+    front_end: Option<Shared>,
 }
 
 type Register = <Advanced as Family>::Register;
 
 impl ScanTimer {
     /// Out of reset, on a clock.
-    pub fn new(clock_hz: u64) -> Self {
-        Self { timer: Tim::with_clock(clock_hz, Counter::Narrow), updates_served: 0, reference: Level::Low }
+    pub fn new(clock_hz: u64, front_end: Shared) -> Self {
+        Self {
+            timer: Tim::with_clock(clock_hz, Counter::Narrow),
+            updates_served: 0,
+            reference: Level::Low,
+            clock_hz,
+            edge_ticks: 0,
+            front_end: Some(front_end),
+        }
+    }
+
+    /// Keeps the first channel's compare from the timer in a scene: it would be an event in each slot.
+    fn take_edge(&mut self, ticks: u64, registers: &mut RegisterFile) -> bool {
+        let Some(front_end) = &self.front_end else { return false };
+        let mut front_end = front_end.lock();
+        let Some(slot) = &mut front_end.slot else { return false };
+        self.edge_ticks = ticks;
+        slot.edge_ns = (ticks * 1_000_000_000).div_ceil(self.clock_hz.max(1));
+        registers.set(Register::Ccr1, 0);
+        true
     }
 
     fn announce(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -70,7 +97,8 @@ impl Device for ScanTimer {
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::write(&mut self.timer, register, value, registers, context);
+        let taken = register == Register::Ccr1 && self.take_edge(value, registers);
+        Device::write(&mut self.timer, register, if taken { 0 } else { value }, registers, context);
         self.announce(registers, context);
     }
 
@@ -84,6 +112,7 @@ impl Device for ScanTimer {
     }
 
     fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.clock_hz = hz;
         Device::on_clock(&mut self.timer, hz, registers, context);
         self.announce(registers, context);
     }
@@ -107,7 +136,9 @@ impl Store for ScanTimer {
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), Error> {
+        let front_end = self.front_end.take();
         *self = from.take()?;
+        self.front_end = front_end;
         Ok(())
     }
 }

@@ -85,6 +85,7 @@ impl Driver<FingerBoard> for Hall {
                 let next = if self.halt(session, stop, host) { self.bench.next_stop() } else { stop.at };
                 session.run_until(next);
             }
+            Settled::Stop(stop) => self.bench.stopped(session.board_mut(), stop.at.0),
             _ => {}
         }
     }

@@ -1,5 +1,6 @@
 //! What lies around the board: the plant of `host-tests`, or one finger in the world of a scene.
 
+use crate::bench::STEP_NS;
 use crate::scene::finger::Finger;
 use host_tests::plant::{Bridge, World};
 use serde::{Deserialize, Serialize};
@@ -32,8 +33,28 @@ impl Surroundings {
         let dt_s = (to_ns - from_ns) as f64 * 1e-9;
         match self {
             Self::Plant(world) => world.advance(dt_s, bridge),
-            Self::Scene(finger) => finger.advance(to_ns, bridge),
+            Self::Scene(finger) => finger.advance(to_ns),
         }
+    }
+
+    /// The bridge does this from now on. The plant is told with each step.
+    pub fn hold(&mut self, bridge: Bridge) {
+        if let Self::Scene(finger) = self {
+            finger.bridge = bridge;
+        }
+    }
+
+    /// The grid of instants at which it must be stepped.
+    pub fn grid_ns(&self) -> u64 {
+        match self {
+            Self::Plant(_) => STEP_NS,
+            Self::Scene(finger) => finger.grid_ns(),
+        }
+    }
+
+    /// Whether it is stepped where a frame ends, too: its grid is coarser than what the control step would notice.
+    pub fn follows_frames(&self) -> bool {
+        matches!(self, Self::Scene(_))
     }
 
     /// The supply at the bridge.
@@ -44,11 +65,11 @@ impl Surroundings {
         }
     }
 
-    /// What the timer in encoder mode has counted, unwrapped.
-    pub fn encoder_counts(&self) -> i32 {
+    /// What the timer in encoder mode has counted by an instant, unwrapped.
+    pub fn encoder_counts(&self, at_ns: u64) -> i32 {
         match self {
             Self::Plant(world) => world.encoder_counts(),
-            Self::Scene(finger) => finger.encoder_counts(),
+            Self::Scene(finger) => finger.encoder_counts(at_ns),
         }
     }
 

@@ -105,7 +105,7 @@ fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast
             .with(|stand| {
                 const TIM3_CNT: u64 = 0x4000_0424;
                 let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
-                (counted as u16, stand.bench.front_end.lock().world.encoder_counts() as u16)
+                (counted as u16, stand.bench.front_end.lock().world.encoder_counts(stand.stop.at.0) as u16)
             })
             .expect("it runs");
         assert_ne!(turned, 0);

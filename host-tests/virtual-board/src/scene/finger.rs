@@ -1,7 +1,6 @@
 //! The board's end of a scene: the world behind the pins, and what only it knows, frame by frame.
 
 use super::joint::Joint;
-use crate::bench::STEP_NS;
 use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
 use host_tests::plant::Bridge;
 use host_tests::plant::setup::Array;
@@ -69,6 +68,10 @@ pub struct Finger {
     pub clock: Clock,
     /// Whether frames to come bring their true pressures.
     pub wants_pressures: bool,
+    /// What the bridge does from now on.
+    pub bridge: Bridge,
+    /// The world stands still until then.
+    from_s: f64,
     joint: Joint,
     sensor: sensor::Named,
     readout: Readout,
@@ -103,6 +106,8 @@ impl Finger {
         let finger = |(joint, sensor)| Self {
             clock,
             wants_pressures: false,
+            bridge: Bridge::Coast,
+            from_s: moves_from_s,
             joint,
             sensor,
             readout: Readout::new(&setup.array),
@@ -114,13 +119,14 @@ impl Finger {
         Ok(joints.into_iter().zip(sensors).map(finger).collect())
     }
 
-    /// Goes to an instant of the board with the bridge held. Where fingers share the world it moves by whole steps of the grid, and
-    /// a duty acts from the beginning of the step in which it is written.
-    pub fn advance(&mut self, to_ns: u64, bridge: Bridge) {
-        let to_s = self.clock.time_s(to_ns);
-        if to_s > self.joint.now_s() && (to_ns.is_multiple_of(STEP_NS) || !self.joint.shared()) {
-            self.joint.advance(to_ns, to_s, bridge);
-        }
+    /// Goes to an instant of the board with the bridge held.
+    pub fn advance(&mut self, to_ns: u64) {
+        self.joint.advance(to_ns, &self.clock, self.bridge);
+    }
+
+    /// The world's grid: it must come to each of its instants.
+    pub fn grid_ns(&self) -> u64 {
+        self.joint.grid_ns()
     }
 
     /// The supply at the bridge.
@@ -128,9 +134,9 @@ impl Finger {
         self.joint.supply_v()
     }
 
-    /// What the encoder has counted.
-    pub fn encoder_counts(&self) -> i32 {
-        self.joint.encoder_counts()
+    /// What the encoder has counted by an instant of the board.
+    pub fn encoder_counts(&self, at_ns: u64) -> i32 {
+        self.joint.encoder_counts(self.clock.time_s(at_ns))
     }
 
     /// The converters' reference.
@@ -158,8 +164,8 @@ impl Finger {
             // No scan drives two rows at once; a firmware that does sees its amplifiers at the rail.
             _ => return [Array::CODES as u16 - 1; COLUMNS],
         };
-        let kpa = if slot < ROWS { self.joint.row_kpa(slot) } else { [0.0; COLUMNS] };
-        let time_s = self.clock.time_s(begun_ns).max(self.joint.now_s());
+        let time_s = self.clock.time_s(begun_ns).max(self.from_s);
+        let kpa = if slot < ROWS { self.joint.row_kpa(time_s, slot) } else { [0.0; COLUMNS] };
         let codes = self.readout.codes(&mut self.sensor, slot, time_s, &kpa);
         for (column, code) in codes.into_iter().enumerate() {
             self.frame.set_code(slot.min(SLOTS - 1), column, code);
@@ -169,6 +175,7 @@ impl Finger {
 
     /// The last slot of a frame was converted.
     pub fn frame_done(&mut self, number: u64, end_ns: u64) {
+        self.advance(end_ns);
         let time_s = self.joint.now_s();
         let (sense, truth) = self.joint.look(self.wants_pressures);
         self.frame.sequence = number as u32;

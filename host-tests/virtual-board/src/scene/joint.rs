@@ -1,9 +1,11 @@
 //! The world of a scene, which the fingers' boards share.
 //!
-//! Each board runs on a thread of its own. Where there are two they meet at every step of the world's grid: the last to come moves
-//! the world on, and none goes on before. What a board sees between two meetings is the same whichever comes first, so a run repeats
-//! exactly.
+//! Each board runs on a thread of its own. One board alone moves the world on whenever it must. Two meet at every step of the world's
+//! grid: the last to come moves the world on, and none goes on before. What a board sees between two meetings is the same whichever
+//! comes first, so a run repeats exactly. Its duty acts on the whole step, as its mean.
 
+use super::finger::Clock;
+use crate::bench::STEP_NS;
 use fingertip::frame::{COLUMNS, Sense};
 use host_tests::plant::Bridge;
 use sim::SimError;
@@ -28,6 +30,7 @@ struct Meeting {
     state: Mutex<State>,
     moved: Condvar,
     longest_s: f64,
+    grid_ns: u64,
 }
 
 impl Meeting {
@@ -40,7 +43,39 @@ impl Meeting {
 pub struct Joint {
     finger: usize,
     meeting: Arc<Meeting>,
+    shared: bool,
+    held: Held,
 }
+
+/// What the bridge did since the last meeting.
+struct Held {
+    from_ns: u64,
+    until_ns: u64,
+    duty_ns: f64,
+    last: Bridge,
+}
+
+impl Held {
+    fn hold(&mut self, to_ns: u64, bridge: Bridge) {
+        if let Bridge::Driven { duty } = bridge {
+            self.duty_ns += duty * to_ns.saturating_sub(self.until_ns) as f64;
+        }
+        (self.until_ns, self.last) = (self.until_ns.max(to_ns), bridge);
+    }
+
+    /// One that does as much, on the average; it coasts where it did at the end.
+    fn mean(&mut self) -> Bridge {
+        let duty = std::mem::take(&mut self.duty_ns) / (self.until_ns - self.from_ns) as f64;
+        self.from_ns = self.until_ns;
+        match self.last {
+            Bridge::Coast => Bridge::Coast,
+            Bridge::Driven { .. } => Bridge::Driven { duty },
+        }
+    }
+}
+
+/// Steps of the grid that fit a millisecond.
+const GRIDS_NS: [u64; 3] = [100_000, 50_000, 20_000];
 
 impl Drop for Joint {
     fn drop(&mut self) {
@@ -66,17 +101,49 @@ impl Joint {
             now_s,
             closed: false,
         };
-        let meeting = Arc::new(Meeting { state: Mutex::new(state), moved: Condvar::new(), longest_s });
-        Ok((0..fingers).map(|finger| Self { finger, meeting: meeting.clone() }).collect())
+        let longest_ns = (longest_s * 1e9).round() as u64;
+        let grid_ns = GRIDS_NS.into_iter().find(|grid_ns| *grid_ns <= longest_ns).unwrap_or(STEP_NS);
+        let meeting = Arc::new(Meeting { state: Mutex::new(state), moved: Condvar::new(), longest_s, grid_ns });
+        let joint = |finger| Self {
+            finger,
+            meeting: meeting.clone(),
+            shared: fingers > 1,
+            held: Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast },
+        };
+        Ok((0..fingers).map(joint).collect())
     }
 
-    /// Whether other fingers share the world.
-    pub fn shared(&self) -> bool {
-        self.meeting.lock().bridges.len() > 1
+    /// The world's grid: it moves on at least that often.
+    pub fn grid_ns(&self) -> u64 {
+        self.meeting.grid_ns
     }
 
-    /// Goes on to an instant of the board, which is this time of the scene, with this finger's bridge held.
-    pub fn advance(&self, to_ns: u64, to_s: f64, bridge: Bridge) {
+    /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by whole steps of the
+    /// grid.
+    pub fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
+        let to_s = clock.time_s(to_ns);
+        if !self.shared {
+            let mut state = self.meeting.lock();
+            state.bridges[self.finger] = bridge;
+            return state.advance(to_s, self.meeting.longest_s);
+        }
+        if to_s <= self.now_s() {
+            // It stands still, and nobody waits for anybody.
+            self.held = Held { from_ns: to_ns, until_ns: to_ns, duty_ns: 0.0, last: bridge };
+            return;
+        }
+        // The emulator may come to an instant of the grid an instruction late, with something done there first.
+        while let next_ns = (self.held.from_ns / self.meeting.grid_ns + 1) * self.meeting.grid_ns
+            && next_ns <= to_ns
+        {
+            self.held.hold(next_ns, bridge);
+            let mean = self.held.mean();
+            self.meet(next_ns, clock.time_s(next_ns), mean);
+        }
+        self.held.hold(to_ns, bridge);
+    }
+
+    fn meet(&self, to_ns: u64, to_s: f64, bridge: Bridge) {
         let mut state = self.meeting.lock();
         state.bridges[self.finger] = bridge;
         state.reached_ns[self.finger] = to_ns;
@@ -95,19 +162,28 @@ impl Joint {
         self.meeting.lock().now_s
     }
 
+    /// How far the world is behind a time of the scene.
+    fn behind_s(state: &State, time_s: f64) -> f64 {
+        (time_s - state.now_s).max(0.0)
+    }
+
     /// The supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.meeting.lock().world.fingers()[self.finger].supply_v()
     }
 
-    /// What the encoder has counted.
-    pub fn encoder_counts(&self) -> i32 {
-        self.meeting.lock().world.fingers()[self.finger].count()
+    /// What the encoder has counted by a time.
+    pub fn encoder_counts(&self, time_s: f64) -> i32 {
+        let mut state = self.meeting.lock();
+        let ahead_s = Self::behind_s(&state, time_s);
+        state.world.fingers_mut()[self.finger].count_ahead(ahead_s)
     }
 
-    /// Mean pressures on a row's taxels.
-    pub fn row_kpa(&self, row: usize) -> [f64; COLUMNS] {
-        self.meeting.lock().world.row_kpa(self.finger, f64::INFINITY, row)
+    /// Mean pressures on a row's taxels at a time.
+    pub fn row_kpa(&self, time_s: f64, row: usize) -> [f64; COLUMNS] {
+        let mut state = self.meeting.lock();
+        let off_s = time_s - state.now_s;
+        state.world.row_off_kpa(self.finger, off_s, row)
     }
 
     /// Encoder and supply, and what is true.
@@ -139,5 +215,51 @@ impl State {
             self.world.advance(from_s + part as f64 * part_s, part_s, &self.bridges);
         }
         self.now_s = to_s;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::effects::set::{Parts, Set};
+    use sim::mechanics::body::Surroundings;
+    use sim::scene::controller;
+
+    const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
+
+    fn two() -> Vec<Joint> {
+        let text = "about = \"two\"\nduration_s = 1.0\n[hand]\nfingers = 2\n";
+        let scene = sim::scene::read("test.toml", text, &[]).unwrap_or_else(|errors| panic!("{errors}"));
+        let effects = (0..2).map(|finger| Named::of(&scene, finger));
+        let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
+        let world = World::new(&controller::setup(&scene), &Surroundings::of(&scene), effects);
+        Joint::all(&scene, world, 0.0).expect("the world is sound")
+    }
+
+    #[test]
+    fn a_duty_acts_for_as_long_as_it_was_there() {
+        let mut held = Held { from_ns: 0, until_ns: 0, duty_ns: 0.0, last: Bridge::Coast };
+        held.hold(100, DRIVEN(0.5));
+        held.hold(400, DRIVEN(-0.5));
+        assert_eq!(held.mean(), DRIVEN(-0.25));
+        held.hold(500, DRIVEN(0.5));
+        assert_eq!(held.mean(), DRIVEN(0.5));
+        held.hold(600, Bridge::Coast);
+        assert_eq!(held.mean(), Bridge::Coast);
+    }
+
+    #[test]
+    fn boards_meet_though_one_comes_late_to_the_grid() {
+        let mut joints = two();
+        let clock = Clock::new(0);
+        let (grid_ns, mut late) = (joints[0].grid_ns(), joints.remove(1));
+        let mut early = joints.remove(0);
+        std::thread::scope(|scope| {
+            scope.spawn(|| (1..=50).for_each(|step| early.advance(step * grid_ns, &clock, DRIVEN(0.5))));
+            scope.spawn(|| (1..=50).for_each(|step| late.advance(step * grid_ns + 8, &clock, DRIVEN(0.5))));
+        });
+        assert_eq!(early.now_s(), clock.time_s(50 * grid_ns));
+        assert_eq!(late.encoder_counts(early.now_s()), early.encoder_counts(early.now_s()));
+        assert!(early.encoder_counts(early.now_s()) > 10);
     }
 }

@@ -8,6 +8,8 @@ use crate::image::Firmware;
 use crate::log::{Log, LogLine};
 use crate::measure::{BridgeEdge, Latency};
 use crate::recorder::Recorder;
+use crate::scene::host::Host as SceneHost;
+use crate::surroundings::Surroundings;
 use crate::trace::{Record, Trace};
 use crate::wire::TimedByte;
 use host_tests::plant::Bridge;
@@ -45,6 +47,8 @@ pub struct Bench {
     pub core_held: bool,
     /// What the image wrote to the flash.
     pub flash: Kept,
+    /// The host of a scene, once the board is set up.
+    pub host: Option<Box<SceneHost>>,
     /// Samples the world where somebody asked for it; a snapshot does not keep it.
     pub recorder: Option<Recorder>,
     world_ns: u64,
@@ -77,6 +81,7 @@ impl Bench {
             received: Vec::new(),
             core_held: false,
             flash: Kept::default(),
+            host: None,
             recorder: None,
             world_ns: 0,
             bridge: Bridge::Coast,
@@ -173,6 +178,10 @@ impl Bench {
             if std::mem::take(&mut self.core_held) {
                 host.hold(false);
             }
+        }
+        if let (Some(host), Surroundings::Scene(finger)) = (&mut self.host, &mut self.front_end.lock().world) {
+            let (received, seen) = (std::mem::take(&mut self.received), finger.take_seen());
+            host.turn(now_ns, now_ns + self.grid_ns, received, seen, session.board_mut().wire());
         }
         if now_ns.is_multiple_of(LOG_NS) {
             self.log.drain(now_ns, host);

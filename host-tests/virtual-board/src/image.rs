@@ -36,6 +36,13 @@ impl Firmware {
         &self.elf
     }
 
+    /// The address of an item of the firmware's, by the end of its path: module and name.
+    pub fn item(&self, module: &str, name: &str) -> Option<u64> {
+        // As both ways of mangling write it.
+        let path = format!("{}{module}{}{name}", module.len(), name.len());
+        self.symbols.iter().find(|(of, _)| of.contains(&path)).map(|(_, address)| *address)
+    }
+
     /// The address of a symbol.
     pub fn symbol(&self, name: &str) -> Option<u64> {
         self.symbols.iter().find(|(of, _)| of == name).map(|(_, address)| *address)

@@ -145,12 +145,8 @@ impl Rig {
         T: Send + 'static,
         F: FnOnce(&mut Stand<'_>) -> T + Send + 'static,
     {
-        let (answer, answered) = mpsc::channel();
-        self.order(Order::Do(Box::new(move |stand| {
-            // The rig waits for the answer, so it is taken.
-            let _ = answer.send(job(stand));
-        })))?;
-        answered.recv().map_err(|_| self.broken())
+        let asked = self.ask(job)?;
+        self.answer(&asked)
     }
 
     /// The plant, to look at or to change.
@@ -206,6 +202,42 @@ impl Rig {
     pub fn snapshot(&mut self, path: &Path) -> Result<(), Error> {
         let file = self.with(|stand| stand.snapshot())??;
         std::fs::write(path, file).map_err(|source| Error::WriteSnapshot { path: path.into(), source })
+    }
+
+    /// Does something where the run will then stand, and does not wait.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn post<F>(&mut self, job: F) -> Result<(), Error>
+    where
+        F: FnOnce(&mut Stand<'_>) + Send + 'static,
+    {
+        self.order(Order::Do(Box::new(job)))
+    }
+
+    /// Asks something where the run will then stand, and does not wait: [`Rig::answer`] does.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn ask<T, F>(&mut self, job: F) -> Result<mpsc::Receiver<T>, Error>
+    where
+        T: Send + 'static,
+        F: FnOnce(&mut Stand<'_>) -> T + Send + 'static,
+    {
+        let (answer, answered) = mpsc::channel();
+        self.post(move |stand| {
+            // Where nobody waits any more nobody misses it.
+            let _ = answer.send(job(stand));
+        })?;
+        Ok(answered)
+    }
+
+    /// What was asked before.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn answer<T>(&mut self, asked: &mpsc::Receiver<T>) -> Result<T, Error> {
+        asked.recv().map_err(|_| self.broken())
     }
 
     fn order(&mut self, order: Order) -> Result<(), Error> {

@@ -1,9 +1,14 @@
 //! A scene on the emulated board: the flash image, unmodified, in the world that the scene names.
 //!
 //! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's goals over
-//! the bus at the times at which the scene's link lets them through; once a millisecond it reads the status registers, where no goal is in the way. A step of
-//! the run is what such a read says, together with the frame that it was made from and what was true at that frame's end. What the
-//! core has inside and no register shows is not in it, so a recording of such a run cannot be fed through the core again.
+//! the bus at the times at which the scene's link lets them through; it reads the status registers once a millisecond, and when its
+//! grip asks for it. A step of the run is what an answer says, together with the frame that it was made from and what was true at that
+//! frame's end. What the core has inside and no register shows is not in it, so a recording of such a run cannot be fed through the
+//! core again.
+//!
+//! What makes a run slow are the instants at which the emulated core is stopped, and the code that must be translated because it was
+//! stopped in it. So the world moves on where something depends on it, and else in steps of [`finger::Finger::grid_ns`]; a slot of the
+//! scan is one event ([`crate::front_end::Slot`]), and the host takes its turns where the core stands anyway.
 //!
 //! The world stands still until a millisecond before the scene's start: the boards come up and are tared in it.
 //!
@@ -11,9 +16,11 @@
 
 pub mod bus;
 pub mod finger;
-mod host;
+pub mod host;
 mod joint;
 
+use crate::bench::Bench;
+use crate::surroundings::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
 use fingertip::config::Config;
@@ -21,18 +28,21 @@ use fingertip::link::table::address;
 use fingertip::pressure::TARE_FRAMES;
 use fingertip::store::{self, Record};
 use host::Host;
+use rigless::soc::Width;
 use sim::SimError;
+use sim::effects::link::Stages as _;
+use sim::effects::set::{Named, Set as _};
 use sim::scene::{Scene, controller};
 use sim::watch::{Controller, Summary, Watch};
 use std::path::Path;
 use std::time::Instant;
 
-/// One millisecond of the board: how often the host reads and plans.
+/// One millisecond of the board: how often the host reads.
 const MS: u64 = 1_000_000;
 /// The scan and the guards have settled by then.
 const BOOT_NS: u64 = 20 * MS;
 /// From the end of a tare to the scene's start: the host sets the board up.
-const SET_UP_NS: u64 = 8 * MS;
+const SET_UP_NS: u64 = 9 * MS;
 /// An answer takes at most this long.
 const WAIT_NS: u64 = 2 * MS;
 /// 3 Mbaud by the protocol's code, and no pause before a reply: a read a millisecond leaves room for goals.
@@ -54,32 +64,48 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
     let options =
         Options { presets: vec![(flash::SECTOR.start, store::encode(&record).to_vec())], ..Options::default() };
-    let mut units = Vec::new();
-    for finger in Finger::all(scene, Clock::new(start_ns), moves_from_s)? {
+    let mut rigs = Vec::new();
+    // As on the native board, all boards have the first one's clock.
+    let mut clock = Clock::new(start_ns);
+    let mut clock_link = Named::of(scene, 0).link;
+    for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {
         let mut rig = Rig::new(image, finger, &options)?;
         set_up(&mut rig, scene, start_ns)?;
-        units.push((rig, Host::new(scene, units.len(), start_ns)));
+        let offset = frame_offset(&mut rig)?;
+        let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, offset);
+        rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
+        rigs.push(rig);
     }
-    watch.begin(&vec![Controller { params, calibration: None }; units.len()]);
+    watch.begin(&vec![Controller { params, calibration: None }; rigs.len()]);
     let mut now_ns = start_ns - MS;
-    while units[0].1.time_s(now_ns) < scene.duration_s {
-        // As on the native board, all boards have the first one's clock.
-        let second_s = units[0].1.second_s(now_ns);
-        for (rig, host) in &mut units {
-            host.send(rig, second_s, watch)?;
+    while clock.time_s(now_ns) < scene.duration_s {
+        let time_s = clock.time_s(now_ns);
+        let second_s = clock_link.second_s(time_s);
+        clock.run_at(now_ns, second_s);
+        let mut made = Vec::new();
+        for (number, rig) in rigs.iter_mut().enumerate() {
+            let wants = watch.wants_pressures(number, time_s);
+            rig.post(move |stand| begin(stand.bench, now_ns, second_s, wants))?;
+            rig.set_out(now_ns + MS)?;
+            made.push(
+                rig.ask(move |stand| stand.bench.host.as_mut().map(|host| (host.take_shown(), host.trouble(now_ns))))?,
+            );
         }
         now_ns += MS;
-        units.iter_mut().try_for_each(|(rig, _)| rig.set_out(now_ns))?;
-        units.iter_mut().try_for_each(|(rig, _)| rig.await_reached())?;
-        for (rig, host) in &mut units {
-            host.receive(rig, watch)?;
+        for (rig, made) in rigs.iter_mut().zip(made) {
+            rig.await_reached()?;
+            let (shown, trouble) = rig.answer(&made)?.unwrap_or_default();
+            shown.iter().for_each(|shown| watch.step(&shown.step()));
+            if let Some(why) = trouble {
+                return Err(Error::Host { at_ms: now_ns as f64 * 1e-6, why: why.into() });
+            }
         }
     }
-    let (mut costs, mut digests) = (Vec::new(), Vec::new());
-    for (rig, host) in &mut units {
+    let (mut costs, mut digests) = (clock_link.costs().collect::<Vec<_>>(), Vec::new());
+    for rig in &mut rigs {
         rig.check_gaps()?;
         costs.extend(rig.finger(|finger| finger.costs())?);
-        costs.extend(host.costs());
+        costs.extend(rig.with(|stand| stand.bench.host.as_ref().map_or(Vec::new(), |host| host.costs().collect()))?);
         digests.push(rig.trace_hash()?);
     }
     Ok(Summary {
@@ -90,6 +116,17 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     })
 }
 
+/// A millisecond begins.
+fn begin(bench: &mut Bench, now_ns: u64, second_s: f64, wants_pressures: bool) {
+    if let Surroundings::Scene(finger) = &mut bench.front_end.lock().world {
+        finger.clock.run_at(now_ns, second_s);
+        finger.wants_pressures = wants_pressures;
+    }
+    if let Some(host) = &mut bench.host {
+        host.run_at(now_ns, second_s);
+    }
+}
+
 /// Tares and enables torque before the scene begins.
 fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     rig.run_until_ns(BOOT_NS)?;
@@ -98,7 +135,7 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
         return Err(Error::Host { at_ms: reset.at_ns as f64 * 1e-6, why });
     }
     write_u8(rig, "tare", address::TARE, 1)?;
-    rig.run_until_ns(start_ns - 3 * MS)?;
+    rig.run_until_ns(start_ns - 4 * MS)?;
     let watchdog_ms = scene.table("host").whole("watchdog_ms");
     if watchdog_ms > 0 {
         let code = (watchdog_ms + WATCHDOG_MS - 1) / WATCHDOG_MS;
@@ -107,14 +144,36 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     write_u8(rig, "torque enable", address::TORQUE_ENABLE, 1)?;
     // Goals are not answered, so that the line is free for reads.
     write_u8(rig, "status return level", address::STATUS_RETURN_LEVEL, 1)?;
-    rig.run_until_ns(start_ns - MS)?;
-    if rig.now_ns() > start_ns - MS {
+    rig.run_until_ns(start_ns - 2 * MS)?;
+    if rig.now_ns() > start_ns - 2 * MS {
         return Err(Error::Host {
             at_ms: rig.now_ns() as f64 * 1e-6,
             why: "setting the board up took too long".into(),
         });
     }
     Ok(())
+}
+
+/// From the converters' number of a frame to the image's own, which the image counts where the symbol says.
+///
+/// The status alone does not tell it: by how many frames an answer is late at the least depends on the load of the core.
+fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
+    let Some(address) = rig.image().item("scan", "SEQUENCE") else {
+        let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
+        return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why });
+    };
+    let mut offset = i32::MIN;
+    // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right one.
+    for _ in 0..3 {
+        rig.run_until_ns(rig.now_ns() + MS / 10)?;
+        let (number, frames) = rig.with(move |stand| {
+            let number = stand.host.read(address, Width::W32).unwrap_or(0) as u32;
+            (number, stand.bench.front_end.lock().counts.frames as u32)
+        })?;
+        offset = offset.max(number.wrapping_sub(frames) as i32);
+    }
+    rig.run_until_ns(rig.now_ns().next_multiple_of(MS))?;
+    Ok(offset as u32)
 }
 
 fn write_u8(rig: &mut Rig, doing: &str, register: u16, value: u8) -> Result<(), Error> {

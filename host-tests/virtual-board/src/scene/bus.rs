@@ -15,6 +15,8 @@ pub const ID: u8 = 1;
 pub const BYTE_NS: u64 = 3_334;
 /// Bytes of a goal's packet.
 pub const GOAL_BYTES: u64 = 16;
+/// Bytes of a read's packet.
+pub const READ_BYTES: u64 = 14;
 /// The status registers, read at once.
 const FROM: u16 = address::PRESENT_MODE;
 const BYTES: u16 = address::SUPPLY_MV - FROM;

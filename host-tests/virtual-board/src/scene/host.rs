@@ -1,22 +1,34 @@
-//! The scene's host: writes goals when the link lets them through, reads the status once a millisecond.
+//! The scene's host on the bus of one board: it writes goals when the link lets them through, and reads the status.
+//!
+//! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes out where the line
+//! is free for it and for its answer, and where the one before was answered: once a millisecond to see what the board does, and when the
+//! grip of `[host]` asks for a reading. Each answer is shown, beside the frame that it was made from.
 
 use super::MS;
-use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener};
-use super::finger::{Clock, Finger, Seen};
-use crate::{Error, Rig};
+use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener, READ_BYTES};
+use super::finger::{Clock, Seen};
+use crate::wire::{TimedByte, Wire};
 use fingertip::config::newtons;
 use fingertip::pipeline::{Command, Status};
 use fingertip::safety::Limits;
-use sim::effects::link::{self, Stages as _};
-use sim::effects::set::{Named, Parts, Set};
+use sim::effects::link::Named;
+use sim::host::grip::Reading;
 use sim::scene::Scene;
-use sim::watch::{Cost, Step, Watch};
+use sim::watch::{Cost, Step};
 use std::collections::VecDeque;
 
 /// The line is busy with a read and its answer for at most so long.
 const READ_NS: u64 = 450_000;
-/// A goal's packet on the line.
+/// What was not answered by then never is.
+const LOST_NS: u64 = 10 * MS;
+/// Packets on the line.
 const GOAL_NS: u64 = GOAL_BYTES * BYTE_NS;
+const REQUEST_NS: u64 = READ_BYTES * BYTE_NS;
+/// The line rests so long between two packets, for the board to take them for two: a packet begins where the emulated part next has
+/// something to do, which may be a slot of the scan later.
+const GAP_NS: u64 = 10 * BYTE_NS;
+/// Frames that are kept until an answer speaks of them.
+const FRAMES: usize = 128;
 
 /// A goal on its way.
 #[derive(Clone, Copy, Debug)]
@@ -26,11 +38,42 @@ struct Goal {
     goal_mn: i32,
 }
 
+/// A read that is not answered yet.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    at_ns: u64,
+    for_grip: bool,
+}
+
+/// What there is to show of a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    finger: usize,
+    seen: Seen,
+    command: Command,
+    status: Status,
+}
+
+impl Shown {
+    /// For the watchers.
+    pub fn step(&self) -> Step<'_> {
+        Step {
+            finger: self.finger,
+            time_s: self.seen.time_s,
+            frame: &self.seen.frame,
+            sense: &self.seen.sense,
+            command: &self.command,
+            status: &self.status,
+            truth: &self.seen.truth,
+        }
+    }
+}
+
 /// The host of one finger during a run.
 pub struct Host {
     finger: usize,
     host: sim::host::Host,
-    link: link::Named,
+    link: Named,
     clock: Clock,
     start_ns: u64,
     watchdog_ns: u64,
@@ -38,23 +81,34 @@ pub struct Host {
     goals: VecDeque<Goal>,
     /// When the last of them is through.
     line_free_ns: u64,
+    /// When requests of the grip are to arrive.
+    asks_ns: VecDeque<u64>,
+    asked: Option<Asked>,
+    /// When to read next, to see what the board does.
+    look_ns: u64,
     command: Command,
     listener: Listener,
     status: Status,
-    /// From the converters' number of a frame to the board's own, as far as it was seen.
-    offset: i32,
-    /// The frames of the millisecond before: an early answer speaks of its last.
-    before: Vec<Seen>,
-    /// The number of the frame that was shown last.
-    shown: u64,
+    /// From the converters' number of a frame to the board's own.
+    offset: u32,
+    frames: VecDeque<Seen>,
+    shown: Vec<Shown>,
+    /// The number of the frame that was shown last, and when that was.
+    newest: u64,
+    shown_ns: u64,
     /// When the last goal arrived.
     heard_ns: u64,
 }
 
+impl std::fmt::Debug for Host {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Host").field("finger", &self.finger).field("asked", &self.asked).finish_non_exhaustive()
+    }
+}
+
 impl Host {
-    /// Before the start.
-    pub fn new(scene: &Scene, finger: usize, start_ns: u64) -> Self {
-        let Parts { link, .. } = Named::of(scene, finger);
+    /// Before the start, with what lies between it and the board, and between the converters' numbers of frames and the board's.
+    pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         Self {
             finger,
@@ -65,59 +119,24 @@ impl Host {
             watchdog_ns: watchdog_ms * MS,
             goals: VecDeque::new(),
             line_free_ns: 0,
+            asks_ns: VecDeque::new(),
+            asked: None,
+            look_ns: 0,
             command: Command { torque: true, tare_request: 1, ..Command::default() },
             listener: Listener::default(),
             status: Status::default(),
-            offset: i32::MIN,
-            before: Vec::new(),
-            shown: 0,
+            offset,
+            frames: VecDeque::new(),
+            shown: Vec::new(),
+            newest: 0,
+            shown_ns: start_ns,
             heard_ns: start_ns,
         }
     }
 
-    /// The scene's time at an instant of the board.
-    pub fn time_s(&self, now_ns: u64) -> f64 {
-        self.clock.time_s(now_ns)
-    }
-
-    /// How long a second of the board lasts from an instant on.
-    pub fn second_s(&mut self, now_ns: u64) -> f64 {
-        self.link.second_s(self.clock.time_s(now_ns))
-    }
-
-    /// Puts on the line what is due in the millisecond to come.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn send(&mut self, rig: &mut Rig, second_s: f64, watch: &mut dyn Watch) -> Result<(), Error> {
-        let now_ns = rig.now_ns();
-        self.clock.run_at(now_ns, second_s);
-        let wants = watch.wants_pressures(self.finger, self.clock.time_s(now_ns));
-        rig.finger(move |finger| {
-            finger.clock.run_at(now_ns, second_s);
-            finger.wants_pressures = wants;
-        })?;
-        let sends = self.plan(now_ns);
-        rig.with(move |stand| {
-            let wire = stand.session.board_mut().wire();
-            sends.iter().for_each(|(from_ns, bytes)| wire.send(*from_ns, bytes));
-        })
-    }
-
-    /// Shows what came in the millisecond that is over.
-    ///
-    /// # Errors
-    /// The emulator stopped, or the board is not ready.
-    pub fn receive(&mut self, rig: &mut Rig, watch: &mut dyn Watch) -> Result<(), Error> {
-        let received = rig.take_received()?;
-        let answered_ns = received.first().map_or(0, |timed| timed.at_ns - BYTE_NS);
-        let read = received.into_iter().filter_map(|timed| self.listener.push(timed.byte)).last();
-        let seen = rig.finger(Finger::take_seen)?;
-        if let Some(read) = read {
-            self.status = read;
-            self.find_offset(answered_ns, &seen);
-        }
-        self.look(read.is_some(), seen, rig.now_ns(), watch)
+    /// From an instant on a second of the board lasts so long.
+    pub fn run_at(&mut self, at_ns: u64, second_s: f64) {
+        self.clock.run_at(at_ns, second_s);
     }
 
     /// What the link's effects have cost.
@@ -125,92 +144,136 @@ impl Host {
         self.link.costs()
     }
 
-    /// What goes on the line in the millisecond to come, and from when.
-    fn plan(&mut self, now_ns: u64) -> Vec<(u64, Vec<u8>)> {
-        let mut sends = Vec::new();
-        let until_s = self.clock.time_s(now_ns + MS + GOAL_NS);
-        while let Some((arrives_s, goal_n)) = self.host.arrival(until_s, &mut self.link) {
-            // Ends when it is to arrive; the line carries one packet after another.
-            let from_ns = self.clock.at_ns(arrives_s).saturating_sub(GOAL_NS).max(self.line_free_ns);
-            let goal_mn = (goal_n * 1e3 + 0.5).floor() as i32;
-            self.line_free_ns = from_ns + GOAL_NS + 2 * BYTE_NS;
-            self.goals.push_back(Goal { arrives_ns: from_ns + GOAL_NS, goal_mn });
-            sends.push((from_ns, bus::goal(goal_mn)));
-        }
-        if let Some(at_ns) = self.read_at_ns(now_ns) {
-            sends.push((at_ns, bus::read()));
-            sends.sort_by_key(|(from_ns, _)| *from_ns);
-        }
-        sends
+    /// What there is to show since the last time.
+    pub fn take_shown(&mut self) -> Vec<Shown> {
+        std::mem::take(&mut self.shown)
     }
 
-    /// When the line is free for a read in the millisecond to come, if it is.
+    /// Why the board is not fit for the scene, if so.
+    pub fn trouble(&self, now_ns: u64) -> Option<&'static str> {
+        if now_ns <= self.start_ns + MS {
+            None
+        } else if self.status.limits.has(Limits::NOT_TARED) {
+            Some("the tare has not ended before the scene's start")
+        } else if self.status.sequence == 0 {
+            Some("the board does not answer a read")
+        } else {
+            None
+        }
+    }
+
+    /// A turn: takes in what came from the board and the frames made since the last one, and puts on the line what is to go out until
+    /// the next one.
+    pub fn turn(&mut self, now_ns: u64, next_ns: u64, received: Vec<TimedByte>, seen: Vec<Seen>, wire: &mut Wire) {
+        self.frames.extend(seen);
+        while self.frames.len() > FRAMES {
+            self.frames.pop_front();
+        }
+        for timed in received {
+            if let Some(status) = self.listener.push(timed.byte) {
+                self.answered(status, timed.at_ns);
+            }
+        }
+        // Where reads are rare the frames between are shown beside what was read last.
+        if self.watchdog_ns > 0 && now_ns >= self.shown_ns + MS {
+            let newest = self.frames.back().copied();
+            newest.into_iter().for_each(|seen| self.show(seen, now_ns));
+        }
+        self.send(now_ns, next_ns, wire);
+    }
+
+    fn answered(&mut self, status: Status, at_ns: u64) {
+        self.status = status;
+        if self.asked.take().is_some_and(|asked| asked.for_grip) {
+            self.host.hear(self.clock.time_s(at_ns), Reading::of(&status));
+        }
+        let number = status.sequence.wrapping_sub(self.offset);
+        if let Some(seen) = self.frames.iter().find(|seen| seen.number as u32 == number).copied() {
+            self.show(seen, at_ns);
+        }
+    }
+
+    fn show(&mut self, seen: Seen, now_ns: u64) {
+        if seen.number <= self.newest {
+            return;
+        }
+        (self.newest, self.shown_ns) = (seen.number, now_ns);
+        let at_ns = self.clock.at_ns(seen.time_s);
+        while let Some(goal) = self.goals.pop_front_if(|goal| goal.arrives_ns <= at_ns) {
+            self.command.goal = newtons(goal.goal_mn);
+        }
+        self.shown.push(Shown { finger: self.finger, seen, command: self.command, status: self.status });
+    }
+
+    fn send(&mut self, now_ns: u64, next_ns: u64, wire: &mut Wire) {
+        let until_s = self.clock.time_s(next_ns + GOAL_NS);
+        while let Some((arrives_s, goal_n)) = self.host.arrival(until_s, &mut self.link) {
+            // Ends when it is to arrive; the line carries one packet after another.
+            let from_ns = self.clock.at_ns(arrives_s).saturating_sub(GOAL_NS).max(self.line_free_ns).max(now_ns);
+            let goal_mn = (goal_n * 1e3 + 0.5).floor() as i32;
+            self.line_free_ns = from_ns + GOAL_NS + GAP_NS;
+            self.goals.push_back(Goal { arrives_ns: from_ns + GOAL_NS, goal_mn });
+            wire.send(from_ns, &bus::goal(goal_mn));
+        }
+        if now_ns >= self.start_ns {
+            let (now_s, until_s) = (self.clock.time_s(now_ns), self.clock.time_s(next_ns));
+            if let Some(arrives_s) = self.host.ask(now_s, until_s, &mut self.link) {
+                self.asks_ns.push_back(self.clock.at_ns(arrives_s));
+            }
+        }
+        if self.asked.is_none_or(|asked| now_ns > asked.at_ns + LOST_NS) {
+            self.asked = self.read(now_ns, next_ns);
+            if let Some(asked) = self.asked {
+                wire.send(asked.at_ns, &bus::read());
+                self.line_free_ns = asked.at_ns + REQUEST_NS + GAP_NS;
+            }
+        }
+    }
+
+    /// A read that goes out before the next turn, if one is due and the line is free for it.
+    fn read(&mut self, now_ns: u64, next_ns: u64) -> Option<Asked> {
+        let for_grip = self.asks_ns.front().is_some_and(|arrives_ns| *arrives_ns < next_ns + REQUEST_NS);
+        let due_ns =
+            if for_grip { self.asks_ns[0].saturating_sub(REQUEST_NS) } else { self.look_due_ns(now_ns, next_ns)? };
+        let at_ns = self.free_from_ns(due_ns.max(now_ns));
+        if at_ns >= next_ns {
+            return None;
+        }
+        if for_grip {
+            self.asks_ns.pop_front();
+        }
+        self.look_ns = (at_ns + 1).next_multiple_of(MS);
+        Some(Asked { at_ns, for_grip })
+    }
+
+    /// From when the line is free of goals for as long as a read takes.
+    fn free_from_ns(&self, mut at_ns: u64) -> u64 {
+        for Goal { arrives_ns, .. } in &self.goals {
+            if at_ns < arrives_ns + GAP_NS && arrives_ns - GOAL_NS < at_ns + READ_NS {
+                at_ns = arrives_ns + GAP_NS;
+            }
+        }
+        at_ns
+    }
+
+    /// When to look at the board next.
     ///
     /// The board's bus watchdog counts a read as a sign of life. Where a scene sets it, a read therefore comes only right behind a
     /// goal, and once more when the watchdog must have tripped.
-    fn read_at_ns(&mut self, now_ns: u64) -> Option<u64> {
-        let until_ns = now_ns + MS;
-        let (mut at_ns, mut behind) = (now_ns, false);
-        for Goal { arrives_ns, .. } in &self.goals {
-            if at_ns < arrives_ns + 2 * BYTE_NS && arrives_ns - GOAL_NS < at_ns + READ_NS {
-                at_ns = arrives_ns + 2 * BYTE_NS;
-            }
-            if (now_ns..until_ns).contains(arrives_ns) {
-                (behind, self.heard_ns) = (true, *arrives_ns);
-            }
+    fn look_due_ns(&mut self, now_ns: u64, next_ns: u64) -> Option<u64> {
+        let due = (self.look_ns < next_ns).then_some(self.look_ns);
+        if self.watchdog_ns == 0 || now_ns < self.start_ns {
+            return due;
         }
-        if at_ns + READ_NS > until_ns {
+        let arrived = self.goals.iter().rfind(|goal| (now_ns..next_ns).contains(&goal.arrives_ns));
+        if let Some(goal) = arrived {
+            self.heard_ns = goal.arrives_ns;
+            return Some(goal.arrives_ns);
+        }
+        if now_ns < self.heard_ns + 2 * self.watchdog_ns + 20 * MS {
             return None;
         }
-        if self.watchdog_ns > 0 && !behind && now_ns >= self.start_ns {
-            if now_ns < self.heard_ns + 2 * self.watchdog_ns + 20 * MS {
-                return None;
-            }
-            self.heard_ns = now_ns;
-        }
-        Some(at_ns)
-    }
-
-    /// The status is of the newest frame that had ended when the answer began, or of the one before where the control step was
-    /// still under way: the larger difference is the numbers' own.
-    fn find_offset(&mut self, answered_ns: u64, seen: &[Seen]) {
-        if let Some(newest) = self.before.iter().chain(seen).rfind(|seen| seen.end_ns < answered_ns) {
-            self.offset = self.offset.max(self.status.sequence.wrapping_sub(newest.number as u32) as i32);
-        }
-    }
-
-    /// A step for the watchers, of what came in this millisecond.
-    fn look(&mut self, read: bool, seen: Vec<Seen>, now_ns: u64, watch: &mut dyn Watch) -> Result<(), Error> {
-        if now_ns > self.start_ns && self.status.limits.has(Limits::NOT_TARED) {
-            let why = "the tare has not ended before the scene's start".into();
-            return Err(Error::Host { at_ms: now_ns as f64 * 1e-6, why });
-        }
-        if now_ns > self.start_ns && self.status.sequence == 0 {
-            return Err(Error::Host { at_ms: now_ns as f64 * 1e-6, why: "the board does not answer a read".into() });
-        }
-        // The frame that the status speaks of. A millisecond without an answer shows nothing, but where reads are rare: then the newest.
-        let number = self.status.sequence.wrapping_sub(self.offset as u32);
-        let of_status = |seen: &&Seen| read && seen.number as u32 == number;
-        let frame = self.before.iter().chain(&seen).find(of_status);
-        let newest = seen.last().filter(|_| !read && self.watchdog_ns > 0);
-        let frame = frame.or(newest);
-        if let Some(frame) = frame.filter(|frame| frame.number > self.shown) {
-            self.shown = frame.number;
-            let at_ns = self.clock.at_ns(frame.time_s);
-            while let Some(goal) = self.goals.pop_front_if(|goal| goal.arrives_ns <= at_ns) {
-                self.command.goal = newtons(goal.goal_mn);
-            }
-            watch.step(&Step {
-                finger: self.finger,
-                time_s: frame.time_s,
-                frame: &frame.frame,
-                sense: &frame.sense,
-                command: &self.command,
-                status: &self.status,
-                truth: &frame.truth,
-            });
-        }
-        self.before = seen;
-        Ok(())
+        self.heard_ns = now_ns;
+        Some(now_ns)
     }
 }

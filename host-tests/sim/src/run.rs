@@ -84,7 +84,7 @@ impl Outcome {
         }
         let _ = writeln!(text, "\n{}", ledger::text(&self.summary));
         let ratio = if *wall_s > 0.0 { virtual_s / wall_s } else { f64::INFINITY };
-        let _ = writeln!(text, "{virtual_s:.3} s simulated in {wall_s:.3} s: {ratio:.1} times real time");
+        let _ = writeln!(text, "{virtual_s:.3} s simulated in {wall_s:.3} s: {ratio:.2} times real time");
         let _ = writeln!(text, "digest {digest}");
         let broken: Vec<_> = self.verdicts.iter().filter(|verdict| !verdict.held).collect();
         for verdict in &broken {

@@ -1,0 +1,39 @@
+//! The library of scenes on the emulated board: each runs with the flash image, and holds what it promises on the native board.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::image;
+use sim::run::run;
+use sim::scene::library;
+use std::sync::Mutex;
+use std::thread;
+use virtual_board::scene::simulate;
+
+/// Runs a scene. Says which bounds it breaks.
+fn broken(name: &str) -> Vec<String> {
+    let scene = sim::cli::load(name, &[], None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []);
+    let outcome = outcome.unwrap_or_else(|error| panic!("{name}: {error}"));
+    println!("{name}: {:.2} times real time", outcome.summary.virtual_s / outcome.summary.wall_s);
+    let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
+    verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value)).collect()
+}
+
+#[test]
+fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
+    let mut names = library::names().expect("the library is there");
+    assert!(names.len() >= 14, "{names:?}");
+    // The longest begins first: it takes as long as all others together.
+    names.sort_by_key(|name| name == "hot_hour");
+    let left = Mutex::new(names);
+    let next = || left.lock().expect("nobody panics there").pop();
+    let broken: Vec<String> = thread::scope(|scope| {
+        let work = || std::iter::from_fn(next).flat_map(|name| broken(&name)).collect::<Vec<_>>();
+        let workers: Vec<_> =
+            (0..thread::available_parallelism().map_or(1, usize::from)).map(|_| scope.spawn(work)).collect();
+        workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
+    });
+    assert!(broken.is_empty(), "{broken:#?}");
+}

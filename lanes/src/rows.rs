@@ -61,7 +61,8 @@ pub fn portable_pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; 
     for (codes, row) in codes.iter().zip(rows) {
         let ([mut first, mut second], mut sag) = (row.start, common.start);
         let [firsts, seconds] = &row.weights;
-        for (((code, floor), first_weight), second_weight) in codes.iter().zip(&common.floors).zip(firsts).zip(seconds) {
+        for (((code, floor), first_weight), second_weight) in codes.iter().zip(&common.floors).zip(firsts).zip(seconds)
+        {
             let above = portable::sub(*code, *floor);
             sag = portable::dot(above, common.sag, sag);
             first = portable::dot(above, *first_weight, first);

@@ -61,7 +61,9 @@ impl Host {
 
     async fn answer(&mut self, mut bytes: &[u8], reply: &mut Reply) {
         let received = Instant::now();
-        self.pictures.renew().await;
+        if Server::may_ask_for_taxels(bytes) {
+            self.pictures.renew().await;
+        }
         while !bytes.is_empty() {
             let snapshot = self.pictures.snapshot(self.boot);
             let taken = self.server.feed(bytes, &snapshot, reply);

@@ -128,7 +128,8 @@ pub extern "C" fn plain(bench: &mut Bench) {
     bench.suspect = peak + low.max(high) >= i32::from(SATURATED);
     let Sums { sum: tare, moment_x: tare_x, moment_y: tare_y, .. } = bench.plain_tare;
     let moment_y = 2 * numbered - 11 * sum;
-    bench.out = Sums { sum: (sum << 4) - tare, moment_x: (moment_x << 4) - tare_x, moment_y: (moment_y << 4) - tare_y, peak };
+    bench.out =
+        Sums { sum: (sum << 4) - tare, moment_x: (moment_x << 4) - tare_x, moment_y: (moment_y << 4) - tare_y, peak };
 }
 
 /// Each taxel by its gain.

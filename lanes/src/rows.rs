@@ -87,7 +87,7 @@ pub use portable_pass as pass;
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 #[inline(always)]
 pub fn pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; ROWS], common: &Common) -> Total {
-    const { assert!(ROWS > 0 && ROWS % 2 == 0) };
+    const { assert!(ROWS > 0 && ROWS.is_multiple_of(2)) };
     let (first, second, running, largest);
     // SAFETY: reads the codes, the rows and what is common, writes each row's boost; the types hold their lengths and places,
     // and the codes' end ends the loop, which takes two rows a turn. The stack is as it was at the end, and so are r6 and r7,

@@ -58,7 +58,7 @@ const BREAKERS: &[Breakers] = &[
     ("raspberry", &[LOW, MORE], &[]),
     ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20"], &[("slip_noticed_ms", "min")]),
     ("soft_ball", &[LOW, MORE], &[("steady_error_max_mn", "min")]),
-    ("step_ladder", &[LOW, "controller.inertia_ug_m2=300", "effects.object_mass.mass_g=200"], &[("rise_ms", "min"), ("settling_ms", "min"), ("steady_error_max_mn", "min")]),
+    ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "effects.object_mass.mass_g=200"], &[("rise_ms", "min"), ("settling_ms", "min"), ("steady_error_max_mn", "min")]),
     ("tilted_plane", &[LOW, "controller.codes_per_kpa_milli=16000", "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5"], &[("steady_error_max_mn", "min")]),
     ("wall", &[LOW, MORE], &[]),
     ("worn_sensor", &[LOW, MORE, "effects.broken_taxels.dead=[]"], &[]),

@@ -110,8 +110,8 @@ pub struct Config {
     pub slew_limit: i32,
     /// Least, usual and largest deceleration that the profile counts on, Q8 mm/s^2.
     pub brake: [i32; 3],
-    /// g in mm/s^2 for a mV, Q16.
-    pub acceleration_per_mv_q16: i64,
+    /// Share of [`Params::voltage_max_mv`] that is a mV, Q32.
+    pub share_per_mv_q32: u32,
     /// Left shift that takes [`Config::voltage_limit`] to 31 bits.
     pub voltage_shift: u32,
     /// Duty (Q15) for a g V shifted so, Q31, times the supply in mV.
@@ -210,7 +210,7 @@ impl Config {
             current_limit,
             slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             brake: brake(current_limit.min(voltage_limit)),
-            acceleration_per_mv_q16: wide(g * 1e-3 * exp2(16)),
+            share_per_mv_q32: u32::MAX / p.voltage_max_mv.unsigned_abs().max(1),
             voltage_shift,
             duty_gain: wide(duty_gain).min(u32::MAX.into()) as u32,
             speed_max: speed(p.speed_max_um_per_s),

@@ -56,6 +56,13 @@ impl SpeedLoop {
     /// The duty that makes the tip follow a speed reference.
     #[inline(always)]
     pub fn follow(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
+        self.pull(reference, supply_mv, config, limits);
+        self.drive.duty(supply_mv, config)
+    }
+
+    /// The law, and the limits of what it asks for: the voltage.
+    #[inline(always)]
+    pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
         // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted: so
         // no product here leaves 32 bits. Accelerations are Q4, of which 28 bits are Q8's 32.
         let speed = held(self.observer.speed.to_bits(), 28);
@@ -66,7 +73,7 @@ impl SpeedLoop {
             high(behind << 2, config.speed_gain_q18_per_s) + (reference.acceleration.to_bits() >> 4) + back_emf
                 - (self.observer.disturbance.to_bits() >> 4);
         let [wanted, back_emf] = [held(wanted, 28) << 4, held(back_emf, 28) << 4];
-        self.drive.apply(wanted, back_emf, supply_mv, config, limits)
+        self.drive.apply(wanted, back_emf, supply_mv, config, limits);
     }
 
     /// Takes the encoder's count of this frame into the observer, which then stands at this instant.

@@ -57,7 +57,7 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 18] = [
+const KERNELS: [(&str, Kernel, When); 19] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
@@ -66,6 +66,7 @@ const KERNELS: [(&str, Kernel, When); 18] = [
     ("observer", observe, Driving),
     ("goal and profile", reference, Driving),
     ("speed law and limits", follow, Driving),
+    ("duty from the voltage", duty, Driving),
     ("contact, whole, moments", read_moments, When::Contact),
     ("contact, whole, followed", follow_whole, When::Contact),
     ("contact, whole, one", read_one, When::Contact),
@@ -108,7 +109,11 @@ extern "C" fn reference(bench: &mut Bench) {
 
 extern "C" fn follow(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.duty = bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
+    bench.motion.pull(bench.reference, supply_mv, bench.config, &mut bench.limits);
+}
+
+extern "C" fn duty(bench: &mut Bench) {
+    bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
 }
 
 fn read(bench: &mut Bench, refined: Refined) {

@@ -25,14 +25,15 @@ impl Drive {
         self.net
     }
 
-    /// Cuts the wanted g V to what slew, current and voltage allow, and gives the duty that makes it from this supply.
+    /// Cuts the wanted g V to what slew, current and voltage allow.
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     #[inline(always)]
-    pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
+    pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
         let slewed = near(wanted, self.voltage, config.slew_limit);
         let within_current = near(slewed, back_emf, config.current_limit);
-        let applied = near(within_current, 0, voltage_limit(supply_mv, config));
+        let most = voltage_limit(supply_mv, config);
+        let applied = within_current.max(-most).min(most);
         if applied != wanted {
             let flag = |cut, flag| if cut { flag } else { 0 };
             limits.set(
@@ -43,7 +44,17 @@ impl Drive {
         }
         self.voltage = applied;
         self.net = applied.saturating_sub(back_emf);
-        duty(applied, supply_mv, config)
+    }
+
+    /// V / V_supply by one 32-bit division: the duty that makes the voltage from this supply.
+    #[inline(always)]
+    pub fn duty(&self, supply_mv: u16, config: &Config) -> Duty {
+        // Below 2 mV the gain would not fit 31 bits.
+        let supply_mv = u32::from(supply_mv.max(2));
+        // Its rounding costs half a unit of the duty at most.
+        let gain = (config.duty_gain.wrapping_add(supply_mv / 2) / supply_mv).cast_signed();
+        let duty = nearest_share(self.voltage.wrapping_shl(config.voltage_shift), gain);
+        Duty(duty.max(i16::MIN.into()).min(i16::MAX.into()) as i16)
     }
 }
 
@@ -60,18 +71,7 @@ fn voltage_limit(supply_mv: u16, config: &Config) -> i32 {
     if i32::from(supply_mv) >= config.params.voltage_max_mv {
         return config.voltage_limit;
     }
-    // g V per mV (Q16) times mV, to Q8.
-    let supply = (i64::from(supply_mv) * config.acceleration_per_mv_q16) >> 8;
-    supply.min(config.voltage_limit.into()) as i32
-}
-
-/// V / V_supply by one 32-bit division, for a g V that the supply can make.
-#[inline(always)]
-fn duty(voltage: i32, supply_mv: u16, config: &Config) -> Duty {
-    // Below 2 mV the gain would not fit 31 bits.
-    let supply_mv = u32::from(supply_mv.max(2));
-    // Its rounding costs half a unit of the duty at most.
-    let gain = (config.duty_gain.wrapping_add(supply_mv / 2) / supply_mv).cast_signed();
-    let duty = nearest_share(voltage.wrapping_shl(config.voltage_shift), gain);
-    Duty(duty.max(i16::MIN.into()).min(i16::MAX.into()) as i16)
+    // The supply's share of the motor's voltage, Q32.
+    let share = u32::from(supply_mv).wrapping_mul(config.share_per_mv_q32);
+    ((u64::from(config.voltage_limit.cast_unsigned()) * u64::from(share)) >> 32) as i32
 }

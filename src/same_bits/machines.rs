@@ -187,8 +187,8 @@ pub const STEPS: [Step; 26] = [
     ("Drive::apply", |m, s, mix| {
         let [wanted, back_emf, supply_mv, _] = s.words;
         let mut limits = Limits::default();
-        let duty = m.drive.apply(wanted, back_emf, supply_mv as u16, &m.config, &mut limits);
-        mix.add(duty.0);
+        m.drive.apply(wanted, back_emf, supply_mv as u16, &m.config, &mut limits);
+        mix.add(m.drive.duty(supply_mv as u16, &m.config).0);
         mix.add(limits.0);
         mix.add(m.drive.acceleration());
     }),

@@ -105,7 +105,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         current_limit,
         slew_limit,
         brake: [brake_least, brake_usual, brake_most],
-        acceleration_per_mv_q16,
+        share_per_mv_q32,
         voltage_shift,
         duty_gain,
         speed_max,
@@ -126,10 +126,10 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for length in [half_pitch, travel_max, clearance] {
         mix.add(length.to_bits());
     }
-    for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40, acceleration_per_mv_q16] {
+    for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
         mix.add(*number);
     }
-    for number in [jump, voltage_shift, duty_gain] {
+    for number in [jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }
     for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_q18_per_s, position_gain_per_s] {

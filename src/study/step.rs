@@ -48,7 +48,7 @@ const OBSERVER: usize = 3;
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 7] = [
+const PARTS: [(&str, Kernel, bool); 8] = [
     ("**Array::read**", read, false),
     ("**Array::develop, two rows**", develop, false),
     ("**contact::from_sums**", sums, false),
@@ -56,6 +56,7 @@ const PARTS: [(&str, Kernel, bool); 7] = [
     ("**goal and profile**", reference, true),
     ("**speed law with limits**", follow, true),
     ("**limits alone, Drive::apply**", apply, true),
+    ("**duty from the voltage**", duty, true),
 ];
 
 extern "C" fn step(bench: &mut Bench) {
@@ -86,12 +87,16 @@ extern "C" fn reference(bench: &mut Bench) {
 
 extern "C" fn follow(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.duty = bench.motion.follow(bench.reference, supply_mv, bench.config, &mut bench.limits);
+    bench.motion.pull(bench.reference, supply_mv, bench.config, &mut bench.limits);
 }
 
 extern "C" fn apply(bench: &mut Bench) {
     let supply_mv = bench.record.sense.supply_mv;
-    bench.duty = bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
+    bench.motion.drive.apply(bench.wanted, 0, supply_mv, bench.config, &mut bench.limits);
+}
+
+extern "C" fn duty(bench: &mut Bench) {
+    bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
 }
 
 impl<'a> Bench<'a> {

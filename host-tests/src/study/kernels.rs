@@ -165,8 +165,8 @@ pub const KERNELS: &[Kernel] = &[
         title: "Controller step",
         text: "A proportional and integral controller by increments with a slew limit and an output limit that wind nothing up, y = y1 + 1.591 e - 1.53 e1, \
             2048 steps. The error is that against the same law in arbitrary precision. What the firmware does instead has no \
-            row here, as it answers another question: it takes a speed, its slope and a disturbance, holds voltage, current and slew, and \
-            divides by the supply. It is the *speed law with limits* among the parts of the step below.",
+            row here, as it answers another question: it takes a speed, its slope and a disturbance, and holds voltage, current and \
+            slew. It is the *speed law with limits* among the parts of the step below; the *duty from the voltage* is the division by the supply.",
         error: "output error, share of the range",
         other: None,
         measure: Measure::Control,

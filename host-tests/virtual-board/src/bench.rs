@@ -188,10 +188,15 @@ impl Bench {
         }
     }
 
-    /// The instant of the grid to stop at next.
-    pub fn next_stop(&mut self) -> VirtualNanos {
+    /// Looks ahead to the next instant of the grid.
+    pub fn go_on(&mut self) {
         self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
-        VirtualNanos(self.next_ns)
+    }
+
+    /// Where to stop next: at the instant of the grid, or where the host begins to send before it. A byte begins at a stop.
+    pub fn next_stop(&self, board: &mut FingerBoard, now: VirtualNanos) -> VirtualNanos {
+        let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
+        VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))
     }
 }
 

@@ -25,7 +25,6 @@ const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clo
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("a divider divides");
 /// USART2 in the part's list.
 pub const BUS_PORT: usize = 1;
-const TIM1: usize = 0;
 const PORT_A: usize = 0;
 const PORT_C: usize = 2;
 /// TIM1's alternate function on PA8 and PA9.
@@ -76,12 +75,8 @@ impl FingerBoard {
             return 0.0;
         }
         let channel = Channel::new(channel).expect("timers have channels 1 and 2");
-        let (timer, registers) = self.part.chip.advanced_timer(TIM1);
-        match timer.pulse(channel, registers) {
-            Some(pulse) => pulse.width.0 as f64 / pulse.period.0 as f64,
-            None if timer.output(channel, registers) == Some(Level::High) => 1.0,
-            None => 0.0,
-        }
+        let (timer, registers) = self.part.pwm_timer();
+        timer.high_share(channel, registers)
     }
 }
 

@@ -23,6 +23,7 @@ pub mod log;
 pub mod measure;
 pub mod part;
 pub mod pins;
+pub mod pwm_timer;
 pub mod recorder;
 pub mod report;
 pub mod rig;

@@ -7,9 +7,10 @@ use crate::board::BUS_PORT;
 use crate::converter::Converter;
 use crate::flash;
 use crate::front_end::Shared;
+use crate::pwm_timer::PwmTimer;
 use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
-use rigless::device::{Device, ErasedDevice, Level, ResetCause};
+use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
@@ -22,9 +23,8 @@ use serde::{Deserialize, Serialize};
 
 /// What the buses run at out of reset: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
-/// TIM3 in the part's list of timers, and TIM1 in that of the advanced ones.
+/// TIM3 in the part's list of timers.
 const TIM3: usize = 1;
-const TIM1: usize = 0;
 
 /// The least time between two edges of the encoder: more than the timer's filter takes.
 const EDGE_NS: u64 = 250;
@@ -35,6 +35,7 @@ enum Model {
     /// The crate's part.
     Chip,
     Converter(usize),
+    PwmTimer,
     ScanTimer,
     Streams,
     /// Nobody: the image does not use the SPIs, and they would hear every request of the scan.
@@ -53,9 +54,10 @@ pub struct Inputs {
 /// The microcontroller.
 #[derive(Debug)]
 pub struct Part {
-    /// All that the crate's part has; its own converters and TIM8 are not used.
+    /// All that the crate's part has; its own converters, TIM1 and TIM8 are not used.
     pub chip: Stm32f427,
     converters: [Converter; 3],
+    pwm_timer: PwmTimer,
     scan_timer: ScanTimer,
     streams: Streams,
     inputs: Inputs,
@@ -63,12 +65,14 @@ pub struct Part {
     layout: Bus,
     laying_out: bool,
     wiring: Vec<Model>,
+    /// TIM1 on the bus.
+    pwm_slot: usize,
 }
 
 store!(Part {
     values: [inputs],
-    parts: [chip, converters, scan_timer, streams],
-    built: [front_end, layout, laying_out, wiring],
+    parts: [chip, converters, pwm_timer, scan_timer, streams],
+    built: [front_end, layout, laying_out, wiring, pwm_slot],
 });
 
 impl Part {
@@ -82,6 +86,8 @@ impl Part {
         for (nth, name) in CONVERTERS.iter().enumerate() {
             wiring[chip.bus().slot(name)?] = Model::Converter(nth);
         }
+        let pwm_slot = chip.bus().slot("TIM1")?;
+        wiring[pwm_slot] = Model::PwmTimer;
         wiring[chip.bus().slot("TIM8")?] = Model::ScanTimer;
         wiring[chip.bus().slot("DMA2")?] = Model::Streams;
         for name in SERIAL_INTERFACES {
@@ -91,6 +97,7 @@ impl Part {
         let mut part = Self {
             chip,
             converters: Self::converters(&front_end),
+            pwm_timer: PwmTimer::new(RESET_HZ),
             scan_timer: ScanTimer::new(RESET_HZ, front_end.clone()),
             streams: Streams::new(front_end.clone()),
             inputs: Inputs { quarter: 0, bridge_well: true },
@@ -98,6 +105,7 @@ impl Part {
             layout,
             laying_out: false,
             wiring,
+            pwm_slot,
         };
         part.drive_inputs(VirtualNanos(0));
         Ok(part)
@@ -110,6 +118,11 @@ impl Part {
     /// Whether the emulator is laying out memory just now: then the bus is one that knows who programs the flash.
     pub fn set_laying_out(&mut self, laying_out: bool) {
         self.laying_out = laying_out;
+    }
+
+    /// The bridge's timer and its registers.
+    pub fn pwm_timer(&self) -> (&PwmTimer, &RegisterFile) {
+        (&self.pwm_timer, self.chip.bus().slots()[self.pwm_slot].registers())
     }
 
     /// The front end that the converters are on.
@@ -136,9 +149,8 @@ impl Part {
         self.inputs.bridge_well = well;
         let level = Level::from(well);
         self.hold_pin(at, 1, 12, level);
-        self.chip.drive_advanced_timer(at, TIM1, |timer, registers, context| {
-            timer.drive_break(level, registers, context);
-        });
+        let (registers, mut context) = self.chip.bus_mut().drive(at, self.pwm_slot);
+        self.pwm_timer.drive_break(level, registers, &mut context);
     }
 
     fn drive_encoder(&mut self, at: VirtualNanos) {
@@ -179,6 +191,7 @@ impl Mcu for Part {
         self.chip.reset(at, cause);
         self.streams = Streams::new(self.front_end.clone());
         self.converters = Self::converters(&self.front_end);
+        self.pwm_timer = PwmTimer::new(RESET_HZ);
         self.scan_timer = ScanTimer::new(RESET_HZ, self.front_end.clone());
         self.front_end.lock().restart(at.0);
         self.drive_inputs(at);
@@ -194,6 +207,7 @@ impl Mcu for Part {
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
         let own: Option<&mut dyn ErasedDevice> = match self.wiring.get(slot) {
             Some(Model::Converter(nth)) => Some(&mut self.converters[*nth]),
+            Some(Model::PwmTimer) => Some(&mut self.pwm_timer),
             Some(Model::ScanTimer) => Some(&mut self.scan_timer),
             Some(Model::Streams) => Some(&mut self.streams),
             Some(Model::None) => None,

@@ -50,6 +50,12 @@ impl Hall {
         Self { bench, orders, reached, firmware, until_ns, begun: false }
     }
 
+    /// From an instant of the grid to the next stop.
+    fn go_on(&mut self, session: &mut Session<FingerBoard>, stop: Stop) -> VirtualNanos {
+        self.bench.go_on();
+        self.bench.next_stop(session.board_mut(), stop.at)
+    }
+
     /// Takes orders until one says to run on; false when nobody will order any more.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let Self { bench, orders, reached, firmware, until_ns, begun } = self;
@@ -82,7 +88,7 @@ impl Driver<FingerBoard> for Hall {
             }
             // A run from a snapshot comes back first to where it was taken, inside that halt.
             Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {
-                let next = if self.halt(session, stop, host) { self.bench.next_stop() } else { stop.at };
+                let next = if self.halt(session, stop, host) { self.go_on(session, stop) } else { stop.at };
                 session.run_until(next);
             }
             Settled::Stop(stop) => self.bench.stopped(session.board_mut(), stop.at.0),
@@ -91,10 +97,13 @@ impl Driver<FingerBoard> for Hall {
     }
 
     fn on_stop(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> Option<VirtualNanos> {
+        if stop.at.0 < self.bench.next_ns {
+            return Some(self.bench.next_stop(session.board_mut(), stop.at));
+        }
         self.bench.step(session, host);
         if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
             return None;
         }
-        Some(self.bench.next_stop())
+        Some(self.go_on(session, stop))
     }
 }

@@ -31,6 +31,11 @@ impl Wire {
         self.outgoing.extend(bytes.iter().map(|byte| (from_ns, *byte)));
     }
 
+    /// From when on the next byte may go out.
+    pub fn sends_ns(&self) -> Option<u64> {
+        self.outgoing.front().map(|(from_ns, _)| *from_ns)
+    }
+
     /// Bytes that have not started yet.
     pub fn pending(&self) -> usize {
         self.outgoing.len()

@@ -73,10 +73,13 @@ pub struct Begun {
 pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
     let mut board = Board::<E>::new(scene, begun)?;
+    board.tare(watch);
+    let set_up_s = started.elapsed().as_secs_f64();
     board.run(scene, watch);
     Ok(Summary {
         virtual_s: board.time_s(),
-        wall_s: started.elapsed().as_secs_f64(),
+        set_up_s,
+        wall_s: started.elapsed().as_secs_f64() - set_up_s,
         ledger: board.costs(scene),
         digest: board.digest.hex(),
     })
@@ -148,7 +151,7 @@ impl<E: Set> Board<E> {
         })
     }
 
-    fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
+    fn tare(&mut self, watch: &mut dyn Watch) {
         let controller = Controller { params: self.params, calibration: None };
         watch.begin(&vec![controller; self.units.len()]);
         let tare_frames = TARE_FRAMES + 2;
@@ -163,6 +166,9 @@ impl<E: Set> Board<E> {
         }
         self.start = self.clock;
         self.start.go_back(self.begun.scene_s);
+    }
+
+    fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
         for unit in &mut self.units {
             unit.command.torque = true;
             unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;

@@ -63,6 +63,7 @@ impl Outcome {
             "simulated": true,
             "seed": scene.seed,
             "virtual_s": self.summary.virtual_s,
+            "set_up_wall_s": self.summary.set_up_s,
             "wall_s": self.summary.wall_s,
             "digest": self.summary.digest,
             "passed": self.passed(),
@@ -75,7 +76,7 @@ impl Outcome {
 
     /// For people: the bounds, every metric, the ledger.
     pub fn text(&self) -> String {
-        let Summary { virtual_s, wall_s, digest, .. } = &self.summary;
+        let Summary { virtual_s, set_up_s, wall_s, digest, .. } = &self.summary;
         let mut text = String::new();
         let width = self.measured.0.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &self.measured.0 {
@@ -84,7 +85,10 @@ impl Outcome {
         }
         let _ = writeln!(text, "\n{}", ledger::text(&self.summary));
         let ratio = if *wall_s > 0.0 { virtual_s / wall_s } else { f64::INFINITY };
-        let _ = writeln!(text, "{virtual_s:.3} s simulated in {wall_s:.3} s: {ratio:.2} times real time");
+        let _ = writeln!(
+            text,
+            "{virtual_s:.3} s simulated in {wall_s:.3} s: {ratio:.2} times real time (and {set_up_s:.3} s to power up and tare)"
+        );
         let _ = writeln!(text, "digest {digest}");
         let broken: Vec<_> = self.verdicts.iter().filter(|verdict| !verdict.held).collect();
         for verdict in &broken {

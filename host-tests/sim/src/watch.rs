@@ -103,7 +103,9 @@ pub struct Cost {
 pub struct Summary {
     /// Virtual time.
     pub virtual_s: f64,
-    /// Wall time.
+    /// Wall time before the scene begins: to build the world, to power the boards up and to tare them.
+    pub set_up_s: f64,
+    /// Wall time of the scene.
     pub wall_s: f64,
     /// What each named effect cost, in the scene's order.
     pub ledger: Vec<Cost>,

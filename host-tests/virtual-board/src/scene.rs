@@ -1,7 +1,7 @@
 //! A scene on the emulated board: the flash image, unmodified, in the world that the scene names.
 //!
 //! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's goals over
-//! the bus at the times at which the scene's link lets them through; it reads the status registers once a millisecond, and when its
+//! the bus at the times at which the scene's link lets them through; it reads the status registers once in ten frames, and when its
 //! grip asks for it. A step of the run is what an answer says, together with the frame that it was made from and what was true at that
 //! frame's end. What the core has inside and no register shows is not in it, so a recording of such a run cannot be fed through the
 //! core again.
@@ -58,7 +58,8 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     let begun = Instant::now();
     let params = controller::params(scene);
     let config = Config::new(&params).map_err(SimError::Controller)?;
-    let tare_ns = u64::from(TARE_FRAMES + 2) * u64::from(config.timing.frame_ns());
+    let frame_ns = u64::from(config.timing.frame_ns());
+    let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
     let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
     let moves_from_s = -(MS as f64) * 1e-9;
     let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
@@ -72,11 +73,12 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
         let mut rig = Rig::new(image, finger, &options)?;
         set_up(&mut rig, scene, start_ns)?;
         let offset = frame_offset(&mut rig)?;
-        let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, offset);
+        let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, frame_ns, offset);
         rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
         rigs.push(rig);
     }
     watch.begin(&vec![Controller { params, calibration: None }; rigs.len()]);
+    let set_up_s = begun.elapsed().as_secs_f64();
     let mut now_ns = start_ns - MS;
     while clock.time_s(now_ns) < scene.duration_s {
         let time_s = clock.time_s(now_ns);
@@ -110,7 +112,8 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     }
     Ok(Summary {
         virtual_s: scene.duration_s,
-        wall_s: begun.elapsed().as_secs_f64(),
+        set_up_s,
+        wall_s: begun.elapsed().as_secs_f64() - set_up_s,
         ledger: sim::ledger::by_effect(scene, &costs),
         digest: digests.join(" "),
     })

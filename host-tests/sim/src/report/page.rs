@@ -44,7 +44,8 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                         (ledger(report))
                         p.note {
                             (shown(Some(summary.virtual_s))) " s simulated in " (shown(Some(summary.wall_s)))
-                            " s. Digest " code { (summary.digest) }
+                            " s, behind " (shown(Some(summary.set_up_s))) " s to power up and tare. Digest "
+                            code { (summary.digest) }
                         }
                     }
                     @if !report.ablated.is_empty() {

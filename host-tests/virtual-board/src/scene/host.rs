@@ -1,7 +1,7 @@
 //! The scene's host on the bus of one board: it writes goals when the link lets them through, and reads the status.
 //!
 //! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes out where the line
-//! is free for it and for its answer, and where the one before was answered: once a millisecond to see what the board does, and when the
+//! is free for it and for its answer, and where the one before was answered: once in ten frames to see what the board does, and when the
 //! grip of `[host]` asks for a reading. Each answer is shown, beside the frame that it was made from.
 
 use super::MS;
@@ -27,6 +27,8 @@ const REQUEST_NS: u64 = READ_BYTES * BYTE_NS;
 /// The line rests so long between two packets, for the board to take them for two: a packet begins where the emulated part next has
 /// something to do, which may be a slot of the scan later.
 const GAP_NS: u64 = 10 * BYTE_NS;
+/// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the emulator's.
+const LOOK_FRAMES: u64 = 10;
 /// Frames that are kept until an answer speaks of them.
 const FRAMES: usize = 128;
 
@@ -84,8 +86,9 @@ pub struct Host {
     /// When requests of the grip are to arrive.
     asks_ns: VecDeque<u64>,
     asked: Option<Asked>,
-    /// When to read next, to see what the board does.
+    /// When to read next, to see what the board does, and how often: in whole milliseconds.
     look_ns: u64,
+    look_every_ns: u64,
     command: Command,
     listener: Listener,
     status: Status,
@@ -107,8 +110,9 @@ impl std::fmt::Debug for Host {
 }
 
 impl Host {
-    /// Before the start, with what lies between it and the board, and between the converters' numbers of frames and the board's.
-    pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, offset: u32) -> Self {
+    /// Before the start, with the time of a frame, what lies between it and the board, and between the converters' numbers of frames
+    /// and the board's.
+    pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         Self {
             finger,
@@ -122,6 +126,7 @@ impl Host {
             asks_ns: VecDeque::new(),
             asked: None,
             look_ns: 0,
+            look_every_ns: ((LOOK_FRAMES * frame_ns + MS / 2) / MS).max(1) * MS,
             command: Command { torque: true, tare_request: 1, ..Command::default() },
             listener: Listener::default(),
             status: Status::default(),
@@ -151,7 +156,7 @@ impl Host {
 
     /// Why the board is not fit for the scene, if so.
     pub fn trouble(&self, now_ns: u64) -> Option<&'static str> {
-        if now_ns <= self.start_ns + MS {
+        if now_ns <= self.start_ns + self.look_every_ns {
             None
         } else if self.status.limits.has(Limits::NOT_TARED) {
             Some("the tare has not ended before the scene's start")
@@ -175,7 +180,7 @@ impl Host {
             }
         }
         // Where reads are rare the frames between are shown beside what was read last.
-        if self.watchdog_ns > 0 && now_ns >= self.shown_ns + MS {
+        if self.watchdog_ns > 0 && now_ns >= self.shown_ns + self.look_every_ns {
             let newest = self.frames.back().copied();
             newest.into_iter().for_each(|seen| self.show(seen, now_ns));
         }
@@ -242,7 +247,7 @@ impl Host {
         if for_grip {
             self.asks_ns.pop_front();
         }
-        self.look_ns = (at_ns + 1).next_multiple_of(MS);
+        self.look_ns = (at_ns + 1).next_multiple_of(self.look_every_ns);
         Some(Asked { at_ns, for_grip })
     }
 

@@ -102,7 +102,20 @@ impl FrontEnd {
     /// A row's pin changed.
     pub fn drive_row(&mut self, row: usize, high: bool, at_ns: u64) {
         let bit = 1 << row;
-        let rows = if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit };
+        self.drive_rows(if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit }, at_ns);
+    }
+
+    /// In a scene: a word on its way to the rows' port, to set the pins of its lower half and reset those of its upper. It ends here:
+    /// that the pins follow is seen where the board is in the plant, and the port's model costs more than the rest of a slot.
+    pub fn take_row_word(&mut self, word: u64, at_ns: u64) -> bool {
+        if self.slot.is_some() {
+            let [set, reset] = [word as u16, (word >> 16) as u16].map(|pins| pins & ((1 << ROWS) - 1));
+            self.drive_rows(self.drives[0].rows & !reset | set, at_ns);
+        }
+        self.slot.is_some()
+    }
+
+    fn drive_rows(&mut self, rows: u16, at_ns: u64) {
         if self.drives[0].since_ns != at_ns {
             self.drives.rotate_right(1);
         }

@@ -119,8 +119,8 @@ impl Rig {
         self.await_reached()
     }
 
-    /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. Nothing may be asked
-    /// before [`Rig::await_reached`].
+    /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is posted or
+    /// asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
     ///
     /// # Errors
     /// The emulator stopped.

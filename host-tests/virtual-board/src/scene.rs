@@ -27,14 +27,16 @@ use fingertip::config::Config;
 use fingertip::link::table::address;
 use fingertip::pressure::TARE_FRAMES;
 use fingertip::store::{self, Record};
-use host::Host;
+use host::{Host, Shown};
 use rigless::soc::Width;
 use sim::SimError;
 use sim::effects::link::Stages as _;
 use sim::effects::set::{Named, Set as _};
 use sim::scene::{Scene, controller};
 use sim::watch::{Controller, Summary, Watch};
+use std::collections::VecDeque;
 use std::path::Path;
+use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
 /// One millisecond of the board: how often the host reads.
@@ -80,26 +82,29 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     watch.begin(&vec![Controller { params, calibration: None }; rigs.len()]);
     let set_up_s = begun.elapsed().as_secs_f64();
     let mut now_ns = start_ns - MS;
-    while clock.time_s(now_ns) < scene.duration_s {
-        let time_s = clock.time_s(now_ns);
-        let second_s = clock_link.second_s(time_s);
-        clock.run_at(now_ns, second_s);
-        let mut made = Vec::new();
-        for (number, rig) in rigs.iter_mut().enumerate() {
-            let wants = watch.wants_pressures(number, time_s);
-            rig.post(move |stand| begin(stand.bench, now_ns, second_s, wants))?;
-            rig.set_out(now_ns + MS)?;
-            made.push(
-                rig.ask(move |stand| stand.bench.host.as_mut().map(|host| (host.take_shown(), host.trouble(now_ns))))?,
-            );
+    let mut ahead = VecDeque::new();
+    while clock.time_s(now_ns) < scene.duration_s || !ahead.is_empty() {
+        if clock.time_s(now_ns) < scene.duration_s {
+            let time_s = clock.time_s(now_ns);
+            let second_s = clock_link.second_s(time_s);
+            clock.run_at(now_ns, second_s);
+            for (number, rig) in rigs.iter_mut().enumerate() {
+                let wants = watch.wants_pressures(number, time_s);
+                ahead.push_back(set_out(rig, now_ns, second_s, wants)?);
+            }
+            now_ns += MS;
+            // The boards go on while what they did is looked at.
+            if ahead.len() == rigs.len() {
+                continue;
+            }
         }
-        now_ns += MS;
-        for (rig, made) in rigs.iter_mut().zip(made) {
+        for rig in &mut rigs {
+            let Some(made) = ahead.pop_front() else { break };
             rig.await_reached()?;
-            let (shown, trouble) = rig.answer(&made)?.unwrap_or_default();
+            let (shown, trouble) = rig.answer(&made)?;
             shown.iter().for_each(|shown| watch.step(&shown.step()));
             if let Some(why) = trouble {
-                return Err(Error::Host { at_ms: now_ns as f64 * 1e-6, why: why.into() });
+                return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why: why.into() });
             }
         }
     }
@@ -116,6 +121,19 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
         wall_s: begun.elapsed().as_secs_f64() - set_up_s,
         ledger: sim::ledger::by_effect(scene, &costs),
         digest: digests.join(" "),
+    })
+}
+
+/// What a millisecond gave to show, and what is wrong with the board, if anything.
+type Made = (Vec<Shown>, Option<&'static str>);
+
+/// Sends a board through a millisecond.
+fn set_out(rig: &mut Rig, now_ns: u64, second_s: f64, wants_pressures: bool) -> Result<Receiver<Made>, Error> {
+    rig.post(move |stand| begin(stand.bench, now_ns, second_s, wants_pressures))?;
+    rig.set_out(now_ns + MS)?;
+    rig.ask(move |stand| {
+        let host = stand.bench.host.as_mut();
+        host.map_or_else(Made::default, |host| (host.take_shown(), host.trouble(now_ns)))
     })
 }
 

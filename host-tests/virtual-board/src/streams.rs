@@ -8,6 +8,7 @@
 use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
+use rigless::soc::stm32f427::generated::GPIOB;
 use rigless::soc::stm32f427::generated::dma2::{Register, s0cr, s0fcr};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
@@ -25,6 +26,8 @@ const COMPLETE: u64 = 1 << 5;
 const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 /// The stream whose interrupt says that a frame is complete.
 const SCAN_STREAM: usize = 2;
+/// The set and reset register of the row drives' port.
+const ROW_PORT: u64 = GPIOB.base + 0x18;
 /// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
 const FETCH: u64 = 0x100;
 
@@ -265,7 +268,10 @@ impl Device for Streams {
     fn on_access(&mut self, token: u64, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let stream = (token & !FETCH) as usize;
         if token & FETCH != 0 && self.streams[stream].running {
-            context.write_to(self.streams[stream].peripheral, Width::W32, value, token & !FETCH);
+            let to = self.streams[stream].peripheral;
+            if to != ROW_PORT || !self.front_end.lock().take_row_word(value, context.now().0) {
+                context.write_to(to, Width::W32, value, token & !FETCH);
+            }
             self.count(stream, 1, registers);
             self.refresh(registers, context);
         }

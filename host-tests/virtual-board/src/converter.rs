@@ -3,7 +3,7 @@
 //!
 //! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
 //! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
-//! conversions a frame cost 22 events. In a scene they cost one, see [`Slot`]. Not modelled: injected group, continuous and
+//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected group, continuous and
 //! discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
 
 use crate::front_end::{Shared, Slot};
@@ -13,7 +13,6 @@ use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::ADC2;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sqr1, sqr2, sqr3, sr};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
-use rigless::soc::stm32f427::peripherals::tim::UPDATE_REQUEST;
 use rigless::soc::{FieldSpec, Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
@@ -54,8 +53,8 @@ struct Running {
     event: Option<EventId>,
     begun_ns: u64,
     ranks: usize,
-    /// In a scene: whether the frame ends with it.
-    last: Option<bool>,
+    /// In a scene.
+    slot: Option<Slot>,
 }
 
 /// ADC1, ADC2 or ADC3.
@@ -110,12 +109,12 @@ impl Converter {
         if let Some(running) = self.running.take_if(|running| running.event.is_none()) {
             self.finish(running, registers, context);
         }
-        if self.nth == 0 {
-            self.front_end.lock().begin_slot(context.now().0);
-        }
+        let mut front_end = self.front_end.lock();
+        front_end.counts.triggers += u64::from(self.nth == 0);
+        let slot = front_end.scan.as_ref().map(|scan| scan.slot);
+        drop(front_end);
         let control = registers.get(Register::Cr2);
         if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
-            let slot = self.front_end.lock().slot;
             self.begin_in(slot, registers, context);
             self.refresh(registers, context);
         }
@@ -141,11 +140,10 @@ impl Converter {
             .map(|rank| Self::sampling_cycles(registers, Self::input(registers, rank)) + CONVERSION_CYCLES)
             .sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
-        let last = slot.map(|slot| slot.last);
         let done = VirtualNanos(self.after(begun_ns, cycles));
-        let event = (last != Some(false)).then(|| context.schedule(done));
+        let event = slot.is_none_or(|slot| slot.rows == 0).then(|| context.schedule(done));
         self.status = sr::STRT.set(self.status, 1);
-        self.running = Some(Running { event, begun_ns, ranks, last });
+        self.running = Some(Running { event, begun_ns, ranks, slot });
     }
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -165,12 +163,12 @@ impl Converter {
         if !by_dma {
             front_end.waiting[self.nth].clear();
         }
-        front_end.convert(self.nth, samples.iter().copied().take(running.ranks));
+        front_end.convert(self.nth, running.slot, samples.iter().copied().take(running.ranks));
         if let Some(word) = front_end.waiting[self.nth].front() {
             registers.set(Register::Dr, u64::from(*word));
         }
         if complete && self.nth == 1 {
-            front_end.sequence_done(context.now().0, running.last);
+            front_end.sequence_done(context.now().0, running.slot);
         }
         drop(front_end);
         if complete || cr2::EOCS.is_set(control) {
@@ -180,7 +178,7 @@ impl Converter {
             // The streams take all that waits; the line falls by itself.
             context.request(DMA_REQUEST, Level::High);
         }
-        if !complete && running.last.is_none() {
+        if !complete && running.slot.is_none() {
             self.begin(registers, context);
         }
     }
@@ -232,24 +230,13 @@ impl Device for Converter {
     }
 
     /// The part's description sends requests to the first converter only, so this one hands the trigger on: as a write
-    /// to the second's data register, which is read-only and means nothing else there.
+    /// to the second's data register, which is read-only and means nothing else there. In a scene [`crate::streams`] triggers both so.
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
-        } else if change.instance == "TIM8" && change.request == UPDATE_REQUEST && change.level == Level::High {
-            let mut front_end = self.front_end.lock();
-            if front_end.slot.is_none() || front_end.trigger_cut {
-                return;
-            }
-            front_end.counts.triggers += 1;
-            drop(front_end);
-            self.next_slot(registers, context);
-            if self.nth == 0 {
-                context.write_to(ADC2.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
-            }
         } else if change.instance == "TIM8" && change.request == COMPARE_1 {
             let mut front_end = self.front_end.lock();
-            if front_end.trigger_cut || front_end.slot.is_some() {
+            if front_end.trigger_cut || front_end.scan.is_some() {
                 return;
             }
             front_end.counts.triggers += 1;
@@ -288,7 +275,7 @@ impl Device for Converter {
         match register {
             Register::Sr => self.status &= value,
             Register::Cr2 => self.write_cr2(registers, context),
-            Register::Dr if self.front_end.lock().slot.is_some() => return self.next_slot(registers, context),
+            Register::Dr if self.front_end.lock().scan.is_some() => return self.next_slot(registers, context),
             Register::Dr => return self.triggered(registers, context),
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);

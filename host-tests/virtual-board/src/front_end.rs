@@ -25,17 +25,30 @@ struct Drive {
     since_ns: u64,
 }
 
-/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time later. Nothing
-/// that the image can see depends on when that is worked out before the next slot begins, so it is then that the codes are made: one
-/// event a slot, and one at the frame's end, in place of three.
+/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time later.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Slot {
-    /// From the update to the trigger.
-    pub edge_ns: u64,
-    /// When the converters begin in this slot.
+    /// When the converters begin in it.
     pub begun_ns: u64,
-    /// No row is driven: the frame ends with it.
-    pub last: bool,
+    /// The rows that are driven; in the frame's last there are none.
+    pub rows: u16,
+}
+
+/// The scan of a scene. The image hears of it when half of the rows are driven, then looks at how far it is, and hears of it again when
+/// a frame is complete. Nothing else that it can see depends on when the slots in between are worked out. So that is done for all of them
+/// at once, by then: four events a frame in place of three a slot.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Scan {
+    /// From an update to the trigger.
+    pub edge_ns: u64,
+    /// Updates whose words are still to be moved.
+    pub due_ns: VecDeque<u64>,
+    /// Words that the rows' stream has moved in its round, and those of a round.
+    pub words: [usize; 2],
+    /// Since half of the rows were driven the image looked at how far the streams are.
+    pub looked: bool,
+    /// The slot that was begun last.
+    pub slot: Slot,
 }
 
 /// What the columns settle to under the drive of that place and under the one before it.
@@ -65,8 +78,8 @@ pub struct FrontEnd {
     pub scan_interrupt_lost: bool,
     /// What the converters have done.
     pub counts: ScanCounts,
-    /// In a scene: the slot that has begun.
-    pub slot: Option<Slot>,
+    /// In a scene.
+    pub scan: Option<Scan>,
     /// Words of each converter that nobody has fetched yet.
     pub waiting: [VecDeque<u16>; 3],
     /// Newest first: a sample just before an edge still sees what was before it.
@@ -80,10 +93,10 @@ pub struct Shared(Arc<Mutex<FrontEnd>>);
 impl Shared {
     /// A front end with no row driven.
     pub fn new(world: Surroundings) -> Self {
-        let slot = world.follows_frames().then(Slot::default);
+        let scan = world.follows_frames().then(Scan::default);
         Self(Arc::new(Mutex::new(FrontEnd {
             world,
-            slot,
+            scan,
             trigger_cut: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
@@ -105,14 +118,16 @@ impl FrontEnd {
         self.drive_rows(if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit }, at_ns);
     }
 
-    /// In a scene: a word on its way to the rows' port, to set the pins of its lower half and reset those of its upper. It ends here:
-    /// that the pins follow is seen where the board is in the plant, and the port's model costs more than the rest of a slot.
-    pub fn take_row_word(&mut self, word: u64, at_ns: u64) -> bool {
-        if self.slot.is_some() {
+    /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a slot. It ends
+    /// here: that the pins follow is seen where the board is in the plant.
+    pub fn begin_slot(&mut self, word: u64, words: [usize; 2]) {
+        if let Some(scan) = &mut self.scan {
             let [set, reset] = [word as u16, (word >> 16) as u16].map(|pins| pins & ((1 << ROWS) - 1));
-            self.drive_rows(self.drives[0].rows & !reset | set, at_ns);
+            let begun_ns = scan.due_ns.pop_front().unwrap_or(0) + scan.edge_ns;
+            scan.words = words;
+            scan.looked &= words[0] != words[1] / 2;
+            scan.slot = Slot { begun_ns, rows: scan.slot.rows & !reset | set };
         }
-        self.slot.is_some()
     }
 
     fn drive_rows(&mut self, rows: u16, at_ns: u64) {
@@ -125,22 +140,51 @@ impl FrontEnd {
     /// The part was reset: its pins let go of the rows, and what it had converted is gone.
     pub fn restart(&mut self, at_ns: u64) {
         self.waiting = Default::default();
+        self.scan = self.scan.take().map(|_| Scan::default());
         for row in 0..ROWS {
             self.drive_row(row, false, at_ns);
         }
     }
 
+    /// In a scene, while the rows are driven: so many updates on, the image hears of the scan.
+    pub fn updates_to_sleep(&self) -> Option<usize> {
+        let scan = self.scan.as_ref()?;
+        let [moved, round] = scan.words;
+        let begun = (moved + scan.due_ns.len()) % round.max(1);
+        let half = round / 2;
+        (round > 0).then_some(if begun < half {
+            half - begun
+        } else if begun > half && scan.looked {
+            round - begun
+        } else {
+            1
+        })
+    }
+
+    /// In a scene: when the next updates will be.
+    pub fn expect(&mut self, updates_ns: impl Iterator<Item = u64>) {
+        if let (Some(scan), Surroundings::Scene(finger)) = (&self.scan, &mut self.world) {
+            let [moved, round] = scan.words;
+            let slots = (moved + scan.due_ns.len()..).map(|word| word % round.max(1));
+            let rows = slots.map(|slot| if slot < ROWS { 1 << slot } else { 0 });
+            finger.expect(updates_ns.map(|at_ns| at_ns + scan.edge_ns).zip(rows));
+        }
+    }
+
     /// A converter's inputs sampled at these instants: the words wait to be fetched.
-    pub fn convert(&mut self, converter: usize, samples: impl ExactSizeIterator<Item = (usize, u64)>) {
+    pub fn convert(
+        &mut self,
+        converter: usize,
+        slot: Option<Slot>,
+        samples: impl ExactSizeIterator<Item = (usize, u64)>,
+    ) {
         if converter < COLUMN_INPUTS.len() {
             self.counts.conversions += samples.len() as u64;
         }
         let reference_v = self.world.reference_v();
         let word = |volts: f64| (volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16;
         let mut settled = None;
-        let mut begun_ns = None;
         for (input, at_ns) in samples {
-            let begun_ns = *begun_ns.get_or_insert(at_ns);
             let word = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
                 Some(Some(place)) => {
                     let column = converter * COLUMN_INPUTS[0].len() + place;
@@ -149,7 +193,9 @@ impl FrontEnd {
                         Surroundings::Plant(world) => {
                             word(column_volts(world, &self.drives, newest, column, at_ns, &mut settled))
                         }
-                        Surroundings::Scene(finger) => finger.code(column, self.drives[newest].rows, begun_ns),
+                        Surroundings::Scene(finger) => {
+                            slot.map_or(0, |slot| finger.code(column, slot.rows, slot.begun_ns))
+                        }
                     }
                 }
                 None if input == SUPPLY_INPUT => word(self.world.supply_v() / SUPPLY_RATIO),
@@ -159,17 +205,9 @@ impl FrontEnd {
         }
     }
 
-    /// A slot of a scene begins, with the one before it done: behind the last row comes one without.
-    pub fn begin_slot(&mut self, at_ns: u64) {
-        let last = self.drives[0].rows == 1 << (ROWS - 1);
-        if let Some(slot) = &mut self.slot {
-            *slot = Slot { begun_ns: at_ns + slot.edge_ns, last, ..*slot };
-        }
-    }
-
     /// A scanning converter's sequence is complete: with no row driven after one was, so is the frame.
-    pub fn sequence_done(&mut self, at_ns: u64, last: Option<bool>) {
-        if last.unwrap_or(self.drives[0].rows == 0 && self.drives[1].rows != 0) {
+    pub fn sequence_done(&mut self, at_ns: u64, slot: Option<Slot>) {
+        if slot.map_or(self.drives[0].rows == 0 && self.drives[1].rows != 0, |slot| slot.rows == 0) {
             self.counts.frames += 1;
             self.counts.frame_end_ns = at_ns;
             if let Surroundings::Scene(finger) = &mut self.world {

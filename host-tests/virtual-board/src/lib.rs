@@ -28,6 +28,7 @@ pub mod recorder;
 pub mod report;
 pub mod rig;
 pub mod scan_timer;
+pub mod scan_updates;
 pub mod scene;
 pub mod serve;
 pub mod stack;

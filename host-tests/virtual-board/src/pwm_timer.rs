@@ -8,7 +8,6 @@
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
 use rigless::soc::RegisterSpec;
-use rigless::soc::stm32f427::generated::tim1::Register as Tim1;
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim};
 use rigless::time::{EventId, VirtualNanos};
 
@@ -46,7 +45,7 @@ impl PwmTimer {
 
     /// What is written is in use by then: the period under way has ended, at a whole instant.
     fn wake(&mut self, registers: &RegisterFile, now: VirtualNanos) {
-        let cycles = (registers.get(Tim1::Arr) + 1) * (registers.get(Tim1::Psc) + 1);
+        let cycles = (registers.get(Register::Arr) + 1) * (registers.get(Register::Psc) + 1);
         self.awake_until_ns = now.0 + (cycles * 1_000_000_000).div_ceil(self.clock_hz.max(1)) + 1;
     }
 }

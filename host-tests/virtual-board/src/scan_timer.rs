@@ -1,13 +1,15 @@
 //! A timer that tells the part what the crate's own keeps to itself: its first channel's edge, and that its update
 //! request was served.
 //!
-//! In a scene the edge is no event of its own: the converters are told how long after each update it comes, see
-//! [`crate::front_end::Slot`].
+//! In a scene the edge is no event of its own, and of the updates only those are that the image hears of, see
+//! [`crate::front_end::Scan`]: the timer sleeps through the others, and catches up with them.
 
 use crate::front_end::Shared;
+use crate::scan_updates::Updates;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::soc::RegisterSpec;
+use rigless::soc::stm32f427::generated::tim1::cr1;
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim, UPDATE_REQUEST};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
@@ -25,8 +27,9 @@ pub struct ScanTimer {
     updates_served: u64,
     reference: Level,
     clock_hz: u64,
-    /// In a scene: from an update to the edge, in the timer's ticks.
-    edge_ticks: u64,
+    updates: Updates,
+    /// In a scene: the event for which it sleeps.
+    wake: Option<EventId>,
     #[serde(skip)]
     front_end: Option<Shared>,
 }
@@ -41,7 +44,8 @@ impl ScanTimer {
             updates_served: 0,
             reference: Level::Low,
             clock_hz,
-            edge_ticks: 0,
+            updates: Updates::default(),
+            wake: None,
             front_end: Some(front_end),
         }
     }
@@ -50,11 +54,17 @@ impl ScanTimer {
     fn take_edge(&mut self, ticks: u64, registers: &mut RegisterFile) -> bool {
         let Some(front_end) = &self.front_end else { return false };
         let mut front_end = front_end.lock();
-        let Some(slot) = &mut front_end.slot else { return false };
-        self.edge_ticks = ticks;
-        slot.edge_ns = (ticks * 1_000_000_000).div_ceil(self.clock_hz.max(1));
+        let Some(scan) = &mut front_end.scan else { return false };
+        scan.edge_ns = (ticks * 1_000_000_000).div_ceil(self.clock_hz.max(1));
         registers.set(Register::Ccr1, 0);
         true
+    }
+
+    fn forget(&mut self) {
+        self.reference = Level::Low;
+        self.updates_served = self.timer.dma_requests().update;
+        self.updates.stop();
+        self.wake = None;
     }
 
     fn announce(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -68,9 +78,50 @@ impl ScanTimer {
         let updates = self.timer.dma_requests().update;
         if updates != self.updates_served {
             // The controller moves one item for a request and does not touch the timer, so the request ends here.
+            let passed = (updates - self.updates_served) as usize;
             self.updates_served = updates;
+            self.tell_due(passed, context.now().0);
             self.timer.acknowledge(UPDATE_REQUEST, registers, context);
+            self.sleep(context);
         }
+    }
+
+    /// In a scene: these updates passed, or while the timer stands the image made one.
+    fn tell_due(&mut self, passed: usize, now_ns: u64) {
+        let Some(front_end) = &self.front_end else { return };
+        if let Some(scan) = &mut front_end.lock().scan {
+            scan.due_ns.extend(self.updates.next_ns(passed));
+            if !self.updates.running() {
+                scan.due_ns.push_back(now_ns);
+            }
+        }
+        self.updates.pass(passed);
+    }
+
+    /// In a scene: sleeps until the update of which the image hears next.
+    fn sleep(&mut self, context: &mut DeviceContext<'_>) {
+        let Some(front_end) = &self.front_end else { return };
+        let mut front_end = front_end.lock();
+        self.wake = front_end.updates_to_sleep().and_then(|count| {
+            let at_ns = self.updates.next_ns(count).next_back()?;
+            front_end.expect(self.updates.next_ns(count));
+            Some(context.schedule(VirtualNanos(at_ns)))
+        });
+    }
+
+    /// What the image writes may start or stop the timer.
+    fn follow(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+        let runs = cr1::CEN.is_set(registers.get(Register::Cr1));
+        if runs == self.updates.running() {
+            return;
+        }
+        if runs {
+            let cycles = (registers.get(Register::Arr) + 1) * (registers.get(Register::Psc) + 1);
+            self.updates.start(context.now().0, cycles);
+        } else {
+            self.updates.stop();
+        }
+        self.sleep(context);
     }
 }
 
@@ -100,10 +151,16 @@ impl Device for ScanTimer {
         let taken = register == Register::Ccr1 && self.take_edge(value, registers);
         Device::write(&mut self.timer, register, if taken { 0 } else { value }, registers, context);
         self.announce(registers, context);
+        self.follow(registers, context);
     }
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        Device::on_event(&mut self.timer, event, registers, context);
+        match self.wake {
+            None => Device::on_event(&mut self.timer, event, registers, context),
+            // To be looked at makes it catch up.
+            Some(wake) if wake == event => drop(Device::read(&mut self.timer, Register::Cnt, registers, context)),
+            Some(_) => return,
+        }
         self.announce(registers, context);
     }
 
@@ -113,20 +170,19 @@ impl Device for ScanTimer {
 
     fn on_clock(&mut self, hz: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.clock_hz = hz;
+        self.updates.clock(hz, context.now().0);
         Device::on_clock(&mut self.timer, hz, registers, context);
         self.announce(registers, context);
     }
 
     fn reset(&mut self) {
         Device::reset(&mut self.timer);
-        self.reference = Level::Low;
-        self.updates_served = self.timer.dma_requests().update;
+        self.forget();
     }
 
     fn reset_line(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         Device::reset_line(&mut self.timer, registers, context);
-        self.reference = Level::Low;
-        self.updates_served = self.timer.dma_requests().update;
+        self.forget();
     }
 }
 

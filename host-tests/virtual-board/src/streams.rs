@@ -8,11 +8,12 @@
 use crate::front_end::Shared;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
-use rigless::soc::stm32f427::generated::GPIOB;
 use rigless::soc::stm32f427::generated::dma2::{Register, s0cr, s0fcr};
+use rigless::soc::stm32f427::generated::{ADC1, ADC2};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
 use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
 
 const STREAMS: usize = 8;
 /// Registers of a stream, and the first stream's first.
@@ -26,8 +27,8 @@ const COMPLETE: u64 = 1 << 5;
 const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 /// The stream whose interrupt says that a frame is complete.
 const SCAN_STREAM: usize = 2;
-/// The set and reset register of the row drives' port.
-const ROW_PORT: u64 = GPIOB.base + 0x18;
+/// A converter's data register, by its offset: to write to it is what triggers it in a scene.
+const DATA_REGISTER: u64 = 0x4c;
 /// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
 const FETCH: u64 = 0x100;
 
@@ -137,8 +138,14 @@ impl Streams {
         state.control = get(registers, stream, Row::Control);
         state.peripheral = get(registers, stream, Row::Peripheral);
         state.memory = get(registers, stream, Row::Memory0);
-        if let Some(Source::Converter(nth)) = source(registers, stream) {
-            self.take_words(stream, nth, registers, context);
+        match source(registers, stream) {
+            Some(Source::Converter(nth)) => self.take_words(stream, nth, registers, context),
+            Some(Source::ScanTimer) => {
+                if let Some(scan) = &mut self.front_end.lock().scan {
+                    (scan.words, scan.due_ns) = ([0, items as usize], VecDeque::new());
+                }
+            }
+            None => {}
         }
     }
 
@@ -159,6 +166,22 @@ impl Streams {
             context.write_to(at, width, value, stream as u64);
             self.count(stream, count as u64, registers);
         }
+    }
+
+    /// In a scene a row's word ends here: it begins a slot of both converters, and where more updates have passed, it is the next one's
+    /// turn.
+    fn begin_slot(&mut self, stream: usize, word: u64, context: &mut DeviceContext<'_>) -> bool {
+        let state = &self.streams[stream];
+        let mut front_end = self.front_end.lock();
+        front_end.begin_slot(word, [(state.items - state.left) as usize, state.items as usize]);
+        let Some(scan) = &front_end.scan else { return false };
+        for converter in [ADC1, ADC2] {
+            context.write_to(converter.base + DATA_REGISTER, Width::W32, 0, stream as u64);
+        }
+        if !scan.due_ns.is_empty() && state.running {
+            context.read_from(state.next_address(4), Width::W32, stream as u64 | FETCH);
+        }
+        true
     }
 
     /// Items have been moved.
@@ -268,11 +291,10 @@ impl Device for Streams {
     fn on_access(&mut self, token: u64, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let stream = (token & !FETCH) as usize;
         if token & FETCH != 0 && self.streams[stream].running {
-            let to = self.streams[stream].peripheral;
-            if to != ROW_PORT || !self.front_end.lock().take_row_word(value, context.now().0) {
-                context.write_to(to, Width::W32, value, token & !FETCH);
-            }
             self.count(stream, 1, registers);
+            if !self.begin_slot(stream, value, context) {
+                context.write_to(self.streams[stream].peripheral, Width::W32, value, token & !FETCH);
+            }
             self.refresh(registers, context);
         }
     }
@@ -282,6 +304,16 @@ impl Device for Streams {
         self.stop(stream, registers);
         raise(registers, stream, TRANSFER_ERROR);
         self.refresh(registers, context);
+    }
+
+    fn read(&mut self, read: Register, _registers: &mut RegisterFile, _context: &mut DeviceContext<'_>) -> Option<u64> {
+        let of_stream = read.index().checked_sub(FIRST_ROW).map(|row| row % STREAM_ROWS);
+        if of_stream == Some(Row::Count as usize)
+            && let Some(scan) = &mut self.front_end.lock().scan
+        {
+            scan.looked = true;
+        }
+        None
     }
 
     fn write(&mut self, written: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {

@@ -12,6 +12,7 @@ use sim::mechanics::body::Surroundings;
 use sim::scene::{Scene, controller};
 use sim::watch::{Cost, Truth};
 use sim::world::World;
+use std::collections::VecDeque;
 
 /// A frame as the converters made it, and the world at its end.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +77,9 @@ pub struct Finger {
     sensor: sensor::Named,
     readout: Readout,
     reference_v: f64,
-    sampled: Option<(u64, [u16; COLUMNS])>,
+    /// Slots to come, and those sampled: the instants at which they begin.
+    expected: VecDeque<(u64, u16)>,
+    sampled: VecDeque<(u64, u16, [u16; COLUMNS])>,
     frame: Frame,
     seen: Vec<Seen>,
 }
@@ -112,15 +115,28 @@ impl Finger {
             sensor,
             readout: Readout::new(&setup.array),
             reference_v: setup.array.reference_v,
-            sampled: None,
+            expected: VecDeque::new(),
+            sampled: VecDeque::new(),
             frame: Frame::EMPTY,
             seen: Vec::new(),
         };
         Ok(joints.into_iter().zip(sensors).map(finger).collect())
     }
 
+    /// These slots are to come, with the rows driven in them. They may be asked for later than they begin, when the world has moved on:
+    /// it lets them be sampled before.
+    pub fn expect(&mut self, slots: impl Iterator<Item = (u64, u16)>) {
+        let mut slots = slots.peekable();
+        let first_ns = slots.peek().map_or(0, |(begun_ns, _)| *begun_ns);
+        self.expected.retain(|(begun_ns, _)| *begun_ns < first_ns);
+        self.expected.extend(slots);
+    }
+
     /// Goes to an instant of the board with the bridge held.
     pub fn advance(&mut self, to_ns: u64) {
+        while let Some((begun_ns, rows)) = self.expected.pop_front_if(|(begun_ns, _)| *begun_ns < to_ns) {
+            self.slot(rows, begun_ns);
+        }
         self.joint.advance(to_ns, &self.clock, self.bridge);
     }
 
@@ -147,14 +163,17 @@ impl Finger {
     /// A column's code in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both converters
     /// see one and the same readout of the slot.
     pub fn code(&mut self, column: usize, rows: u16, begun_ns: u64) -> u16 {
-        let codes = match self.sampled {
-            Some((of_ns, codes)) if of_ns == begun_ns => codes,
-            _ => {
-                let codes = self.slot_codes(rows, begun_ns);
-                self.sampled.insert((begun_ns, codes)).1
-            }
-        };
-        codes[column]
+        self.slot(rows, begun_ns)[column]
+    }
+
+    fn slot(&mut self, rows: u16, begun_ns: u64) -> [u16; COLUMNS] {
+        if let Some((_, _, codes)) = self.sampled.iter().find(|(ns, driven, _)| (*ns, *driven) == (begun_ns, rows)) {
+            return *codes;
+        }
+        let codes = self.slot_codes(rows, begun_ns);
+        self.sampled.truncate(SLOTS - 1);
+        self.sampled.push_front((begun_ns, rows, codes));
+        codes
     }
 
     fn slot_codes(&mut self, rows: u16, begun_ns: u64) -> [u16; COLUMNS] {

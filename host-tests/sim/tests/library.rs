@@ -41,30 +41,33 @@ fn every_scene_of_the_library_holds_its_bounds() {
 /// says nothing.
 type Breakers = (&'static str, &'static [&'static str]);
 
-/// A supply that is too low, and a sensor that shows half as much again as there is.
+/// A supply that is too low: the finger stops with a fault.
 const LOW: &str = "supply.source_v=3";
+/// A controller that reads too little and presses half as much again, and one that reads too much and presses two thirds.
 const MORE: &str = "controller.codes_per_kpa_milli=36000";
+const LESS: &str = "controller.codes_per_kpa_milli=16000";
 
 #[rustfmt::skip]
 const BREAKERS: &[Breakers] = &[
-    ("compression", &[LOW, MORE]),
-    ("everything", &[LOW, "effects.breakable_object.force_n=0.1", MORE]),
-    ("grasp", &[LOW, "object.centre_x_mm=7", "object.shake_g=0", "hand.lift_mm=12"]),
-    ("hot_hour", &[LOW, "controller.codes_per_kpa_milli=16000", "controller.codes_per_kpa_milli=24600", "tip.modulus_kpa=400"]),
-    ("impact", &[LOW, MORE, "controller.approach_um_per_s=200000", "object.distance_mm=1.0"]),
-    ("noisy_supply", &[LOW, "effects.object_mass.mass_g=200", MORE, "effects.noise.rms_codes=0"]),
-    ("off_the_array", &[LOW, MORE, "object.centre_x_mm=3"]),
-    ("paper_cup", &[LOW, MORE, "effects.breakable_object.force_n=0.1", "array.gain_codes_per_kpa=200"]),
-    ("raspberry", &[LOW, MORE]),
+    ("compression", &[LOW, MORE, "controller.force_max_mn=1000"]),
+    ("everything", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", "effects.tangential.still=0.05", "object.distance_mm=1.0"]),
+    ("grasp", &[LOW, "object.centre_x_mm=7", "object.distance_mm=0.5", "object.shake_g=0", "hand.lift_mm=12", "host.grip_most_n=0.9", "effects.tangential.still=0.1"]),
+    ("hot_hour", &[LOW, LESS, "controller.codes_per_kpa_milli=24600", "effects.thermal_derating.ambient_c=25", "effects.thermal_derating.ambient_c=60"]),
+    ("impact", &[LOW, MORE, LESS, "controller.approach_um_per_s=200000", "object.distance_mm=1.0"]),
+    ("noisy_supply", &[LOW, MORE, LESS, "effects.noise.rms_codes=0"]),
+    ("off_the_array", &[LOW, MORE, LESS, "object.centre_x_mm=3"]),
+    ("paper_cup", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", "array.gain_codes_per_kpa=200"]),
+    ("raspberry", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.9"]),
     ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20", "effects.tangential.drift_mm_per_s=1"]),
-    ("soft_ball", &[LOW, MORE, "effects.object_stiffness.yield_mm_per_n=0.2", "effects.object_stiffness.yield_mm_per_n=1"]),
-    ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "controller.modulus_pa=100000", "effects.object_mass.mass_g=200"]),
-    ("tilted_plane", &[LOW, "controller.codes_per_kpa_milli=16000", "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5", "motor.encoder_counts_per_turn=65536"]),
-    ("wall", &[LOW, MORE]),
-    ("worn_sensor", &[LOW, MORE, "effects.broken_taxels.dead=[]"]),
+    ("soft_ball", &[LOW, MORE, LESS, "effects.object_stiffness.yield_mm_per_n=0.2", "effects.object_stiffness.yield_mm_per_n=1"]),
+    ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "controller.modulus_pa=100000", "controller.force_max_mn=50"]),
+    ("tilted_plane", &[LOW, LESS, MORE, "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5", "motor.encoder_counts_per_turn=65536"]),
+    ("wall", &[MORE, LESS]),
+    ("worn_sensor", &[LOW, MORE, LESS, "effects.broken_taxels.dead=[]", "effects.creep.rate_percent_per_decade=0"]),
 ];
 
-/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here.
+/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here, and a finger that
+/// stopped with a fault breaks only that it must not.
 fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     let sides = |verdict: &Verdict| {
         let Verdict { bound: Bound { metric, min, max }, value, .. } = verdict;
@@ -80,9 +83,10 @@ fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     for key in keys {
         let scene = sim::cli::load(name, &[(*key).into()], None).unwrap_or_else(|error| panic!("{error}"));
         let outcome = run(&scene, &|scene, watch| Ok(simulate(scene, watch)?), &mut []).expect("it runs");
+        let stopped = outcome.measured.get("faults_count") != Some(0.0);
         for (side, breaks) in outcome.verdicts.iter().flat_map(sides) {
             all.insert(side.clone());
-            broken.extend(breaks.then_some(side));
+            broken.extend((breaks && (!stopped || side.0 == "faults_count")).then_some(side));
         }
     }
     all.difference(&broken).cloned().collect()
@@ -106,10 +110,10 @@ fn the_readme_shows_the_wall_as_it_is() {
     assert!(readme.contains(wall) && wall.lines().count() <= 25);
 }
 
-/// The first of the many seeds for which these scenes are made; `cargo xtask sweep` runs them all.
+/// The first of the many seeds for which these scenes hold; `cargo xtask sweep` runs them all.
 #[test]
 fn what_depends_on_chance_holds_for_more_than_one_seed() {
-    let broken: Vec<String> = ["raspberry", "grasp", "slip_and_recovery"]
+    let broken: Vec<String> = ["raspberry", "grasp", "slip_and_recovery", "noisy_supply", "paper_cup", "worn_sensor"]
         .into_iter()
         .flat_map(|name| (1..=10).flat_map(move |seed| broken(name, Some(seed))))
         .collect();

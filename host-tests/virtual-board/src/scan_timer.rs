@@ -24,12 +24,13 @@ const CHANNEL_1: Channel = Channel::new(1).expect("timers have a channel 1");
 #[serde(bound(deserialize = "'de: 'static"))]
 pub struct ScanTimer {
     timer: Tim<Advanced>,
+    updates_seen: u64,
     updates_served: u64,
     reference: Level,
     clock_hz: u64,
     updates: Updates,
-    /// In a scene: the event for which it sleeps.
-    wake: Option<EventId>,
+    /// In a scene: the event for which it sleeps, and the updates until then.
+    wake: Option<(EventId, usize)>,
     #[serde(skip)]
     front_end: Option<Shared>,
 }
@@ -41,6 +42,7 @@ impl ScanTimer {
     pub fn new(clock_hz: u64, front_end: Shared) -> Self {
         Self {
             timer: Tim::with_clock(clock_hz, Counter::Narrow),
+            updates_seen: 0,
             updates_served: 0,
             reference: Level::Low,
             clock_hz,
@@ -62,7 +64,8 @@ impl ScanTimer {
 
     fn forget(&mut self) {
         self.reference = Level::Low;
-        self.updates_served = self.timer.dma_requests().update;
+        self.updates_seen = self.timer.dma_requests().update;
+        self.updates_served = self.updates_seen;
         self.updates.stop();
         self.wake = None;
     }
@@ -76,18 +79,18 @@ impl ScanTimer {
             }
         }
         let updates = self.timer.dma_requests().update;
-        if updates != self.updates_served {
+        if updates != self.updates_seen {
             // The controller moves one item for a request and does not touch the timer, so the request ends here.
-            let passed = (updates - self.updates_served) as usize;
-            self.updates_served = updates;
-            self.tell_due(passed, context.now().0);
+            self.updates_seen = updates;
+            self.tell_due(updates.saturating_sub(self.updates_served) as usize, context.now().0);
             self.timer.acknowledge(UPDATE_REQUEST, registers, context);
             self.sleep(context);
         }
     }
 
-    /// In a scene: these updates passed, or while the timer stands the image made one.
+    /// In a scene: so many updates passed, or while the timer stands the image made one.
     fn tell_due(&mut self, passed: usize, now_ns: u64) {
+        self.updates_served += passed as u64;
         let Some(front_end) = &self.front_end else { return };
         if let Some(scan) = &mut front_end.lock().scan {
             scan.due_ns.extend(self.updates.next_ns(passed));
@@ -105,7 +108,7 @@ impl ScanTimer {
         self.wake = front_end.updates_to_sleep().and_then(|count| {
             let at_ns = self.updates.next_ns(count).next_back()?;
             front_end.expect(self.updates.next_ns(count));
-            Some(context.schedule(VirtualNanos(at_ns)))
+            Some((context.schedule(VirtualNanos(at_ns)), count))
         });
     }
 
@@ -156,12 +159,19 @@ impl Device for ScanTimer {
 
     fn on_event(&mut self, event: EventId, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         match self.wake {
-            None => Device::on_event(&mut self.timer, event, registers, context),
-            // To be looked at makes it catch up.
-            Some(wake) if wake == event => drop(Device::read(&mut self.timer, Register::Cnt, registers, context)),
-            Some(_) => return,
+            None => {
+                Device::on_event(&mut self.timer, event, registers, context);
+                self.announce(registers, context);
+            }
+            // The timer itself catches up when the image looks at it next.
+            Some((wake, passed)) if wake == event => {
+                self.tell_due(passed, context.now().0);
+                context.request(UPDATE_REQUEST, Level::High);
+                context.request(UPDATE_REQUEST, Level::Low);
+                self.sleep(context);
+            }
+            Some(_) => {}
         }
-        self.announce(registers, context);
     }
 
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {

@@ -280,6 +280,10 @@ impl Device for Streams {
                     self.refresh(registers, context);
                 }
                 Source::ScanTimer => {
+                    // In a scene a request stands for all updates that passed.
+                    if self.front_end.lock().scan.as_ref().is_some_and(|scan| scan.due_ns.is_empty()) {
+                        return;
+                    }
                     let at = self.streams[*stream].next_address(4);
                     context.read_from(at, Width::W32, *stream as u64 | FETCH);
                 }

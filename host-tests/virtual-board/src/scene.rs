@@ -7,8 +7,9 @@
 //! core again.
 //!
 //! What makes a run slow are the instants at which the emulated core is stopped, and the code that must be translated because it was
-//! stopped in it. So the world moves on where something depends on it, and else in steps of [`finger::Finger::grid_ns`]; a slot of the
-//! scan is one event ([`crate::front_end::Slot`]), and the host takes its turns where the core stands anyway.
+//! stopped in it. So the world moves on where something depends on it, and else in steps of [`finger::Finger::grid_ns`]; the
+//! scan's slots are worked out together ([`crate::front_end::Scan`]), the bridge's timer sleeps ([`crate::pwm_timer`]), and the host takes
+//! its turns where the core stands anyway.
 //!
 //! The world stands still until a millisecond before the scene's start: the boards come up and are tared in it.
 //!

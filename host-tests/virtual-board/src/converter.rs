@@ -1,10 +1,10 @@
 //! The converters with what the crate's own lack: the external trigger, two of them at once, and the array at their
 //! inputs.
 //!
-//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
-//! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
-//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected group, continuous and
-//! discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
+//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the words wait
+//! together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110 conversions a frame cost
+//! 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected group, continuous and discontinuous
+//! mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
 
 use crate::front_end::{Shared, Slot};
 use crate::scan_timer::COMPARE_1;

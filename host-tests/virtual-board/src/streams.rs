@@ -5,50 +5,25 @@
 //! not, the requests below, half and full transfer, transfer errors, the registers' protection while a stream runs. Asking
 //! for more is told to the run.
 
+mod registers;
+
 use crate::front_end::Shared;
+use registers::*;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
-use rigless::soc::stm32f427::generated::dma2::{Register, s0cr, s0fcr};
+use rigless::soc::stm32f427::generated::dma2::{Register, s0cr};
 use rigless::soc::stm32f427::generated::{ADC1, ADC2};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-const STREAMS: usize = 8;
-/// Registers of a stream, and the first stream's first.
-const STREAM_ROWS: usize = 6;
-const FIRST_ROW: usize = 4;
-/// A stream's flags in the status registers.
-const TRANSFER_ERROR: u64 = 1 << 3;
-const HALF: u64 = 1 << 4;
-const COMPLETE: u64 = 1 << 5;
-/// Where each stream's flags begin, RM0390 9.5.1.
-const FLAG_SHIFT: [u32; 4] = [0, 6, 16, 22];
 /// The stream whose interrupt says that a frame is complete.
 const SCAN_STREAM: usize = 2;
 /// A converter's data register, by its offset: to write to it is what triggers it in a scene.
 const DATA_REGISTER: u64 = 0x4c;
 /// An access's token: the stream, and whether it was the read of a word on its way to a peripheral.
 const FETCH: u64 = 0x100;
-
-/// Who asks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
-    Converter(usize),
-    ScanTimer,
-}
-
-/// Stream, channel, who asks there: the rows of RM0390 table 29 that are wired.
-const REQUESTS: [(usize, u64, Source); 7] = [
-    (0, 0, Source::Converter(0)),
-    (4, 0, Source::Converter(0)),
-    (2, 1, Source::Converter(1)),
-    (3, 1, Source::Converter(1)),
-    (0, 2, Source::Converter(2)),
-    (1, 2, Source::Converter(2)),
-    (1, 7, Source::ScanTimer),
-];
 
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Stream {
@@ -71,55 +46,6 @@ pub struct Streams {
 }
 
 store!(Streams { values: [streams], parts: [], built: [front_end] });
-
-/// A stream's registers that matter, by their place among its six.
-#[derive(Clone, Copy)]
-enum Row {
-    Control = 0,
-    Count = 1,
-    Peripheral = 2,
-    Memory0 = 3,
-    Fifo = 5,
-}
-
-fn register(stream: usize, row: Row) -> Register {
-    Register::from_index(FIRST_ROW + STREAM_ROWS * stream + row as usize).expect("eight streams of six registers")
-}
-
-fn get(registers: &RegisterFile, stream: usize, row: Row) -> u64 {
-    registers.get(register(stream, row))
-}
-
-fn status(stream: usize) -> (Register, u32) {
-    (if stream < 4 { Register::Lisr } else { Register::Hisr }, FLAG_SHIFT[stream % 4])
-}
-
-fn raise(registers: &mut RegisterFile, stream: usize, flags: u64) {
-    let (register, shift) = status(stream);
-    registers.set(register, registers.get(register) | flags << shift);
-}
-
-fn source(registers: &RegisterFile, stream: usize) -> Option<Source> {
-    let channel = s0cr::CHSEL.get(get(registers, stream, Row::Control));
-    REQUESTS.iter().find(|(at, on, _)| *at == stream && *on == channel).map(|(_, _, source)| *source)
-}
-
-/// Whether a stream is set up in a way that is modelled.
-fn fits(registers: &RegisterFile, stream: usize) -> bool {
-    let control = get(registers, stream, Row::Control);
-    let plain = s0cr::MINC.is_set(control)
-        && !s0cr::PINC.is_set(control)
-        && !s0cr::DBM.is_set(control)
-        && !s0cr::PFCTRL.is_set(control)
-        && !s0fcr::DMDIS.is_set(get(registers, stream, Row::Fifo));
-    let shape = (s0cr::DIR.get(control), s0cr::PSIZE.get(control));
-    plain
-        && match source(registers, stream) {
-            Some(Source::Converter(_)) => shape == (0, 1),
-            Some(Source::ScanTimer) => shape == (1, 2),
-            None => false,
-        }
-}
 
 impl Streams {
     /// Out of reset.

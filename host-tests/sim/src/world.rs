@@ -102,8 +102,10 @@ impl<E: Set> World<E> {
         self.dt_s = dt_s;
         self.body_before = self.body;
         for (index, (finger, bridge)) in self.fingers.iter_mut().zip(bridges).enumerate() {
-            let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
-            finger.contact.relax(0.5 * dt_s, x_mm);
+            if !finger.contact.effects.none() {
+                let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
+                finger.contact.relax(0.5 * dt_s, x_mm);
+            }
             finger.prepare(dt_s, *bridge);
         }
         match self.mass_kg {
@@ -111,6 +113,9 @@ impl<E: Set> World<E> {
             Some(mass_kg) => self.advance_together(mass_kg, time_s),
         }
         for (index, finger) in self.fingers.iter_mut().enumerate() {
+            if finger.contact.effects.none() {
+                continue;
+            }
             let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
             finger.contact.relax(0.5 * dt_s, x_mm);
             finger.contact.bear(x_mm);
@@ -126,6 +131,9 @@ impl<E: Set> World<E> {
                 contact.law().mean_n(from_mm - surface_mm, to_mm - surface_mm)
             });
             finger.finish(&end, surface_mm);
+            if finger.contact.effects.none() {
+                continue;
+            }
             if let Some(grip) = finger.contact.effects.grip() {
                 let drawn_s = overlap_s([time_s, time_s + dt_s], [grip.drift_from_s, f64::INFINITY]);
                 let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
@@ -233,10 +241,10 @@ impl<E: Set> World<E> {
     }
 
     /// What a finger's control step learns beside the frame.
-    pub fn sense(&self, finger: usize, bus_silent_ms: u16) -> Sense {
-        let finger = &self.fingers[finger];
+    pub fn sense(&mut self, finger: usize, bus_silent_ms: u16) -> Sense {
+        let finger = &mut self.fingers[finger];
         let supply_mv = (finger.supply_v() * 1e3 + 0.5).clamp(0.0, f64::from(u16::MAX)) as u16;
-        Sense { encoder: finger.count(), supply_mv, bus_silent_ms, bridge_fault: false, answer_ticks: 0 }
+        Sense { encoder: finger.count_ahead(0.0), supply_mv, bus_silent_ms, bridge_fault: false, answer_ticks: 0 }
     }
 
     /// What is true of a finger, with the pressures if they are wanted.

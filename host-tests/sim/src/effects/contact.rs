@@ -107,6 +107,8 @@ pub trait Body: Send {
 
 /// The stages as the contact calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
+    /// Whether none of the stages holds an effect: a step of the contact then asks for none.
+    fn none(&self) -> bool;
     /// Whether the surface is other than a plane.
     fn shaped(&self) -> bool {
         false
@@ -148,6 +150,10 @@ pub trait Stages {
 }
 
 impl Stages for () {
+    fn none(&self) -> bool {
+        true
+    }
+
     fn forgets(&self) -> bool {
         false
     }
@@ -160,6 +166,7 @@ impl Stages for () {
 /// The named effects.
 #[derive(Default)]
 pub struct Named {
+    any: bool,
     shape: Vec<Metered<dyn Shape>>,
     memory: Vec<Metered<dyn Memory>>,
     series: Vec<Metered<dyn Series>>,
@@ -180,6 +187,7 @@ impl Named {
             Part::Body(part) => self.body.push(Metered::new(name, part)),
             other => return Some(other),
         }
+        self.any = true;
         None
     }
 
@@ -193,6 +201,10 @@ impl Named {
 }
 
 impl Stages for Named {
+    fn none(&self) -> bool {
+        !self.any
+    }
+
     fn shaped(&self) -> bool {
         self.shape.iter().any(|effect| !effect.part().plain())
     }
@@ -237,6 +249,7 @@ impl Stages for Named {
         self.body.iter_mut().map(|effect| effect.call(|part| part.mass_kg())).reduce(|all, more| all + more)
     }
 
+    #[inline]
     fn tell(&self, truth: &mut Truth) {
         self.strength.iter().for_each(|effect| effect.part().tell(truth));
     }

@@ -2,8 +2,8 @@
 //!
 //! A step of the drive asks each stage once: what feeds the winding (circuit), what takes energy from the shaft (friction). Torques
 //! that store energy (potential) are asked for at every round of the step's solution, and give the mean over the step's way, so that
-//! none is lost. After the step the winding's heat, the tip's place behind the gear's play and the encoder's count follow. Without effects
-//! there is a rotor without friction, a winding that is a resistance, an ideal source, and a rigid transmission.
+//! none is lost. After the step the winding's heat and the tip's place behind the gear's play follow; the encoder's count is worked out
+//! where it is read. Without effects there is a rotor without friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
 mod backlash;
 mod cogging;
@@ -112,7 +112,7 @@ pub trait Play: Send {
 
 /// Acts on the encoder's count.
 pub trait Encoder: Send {
-    /// What is read for a count.
+    /// What is read for a count; asked for as often as it is read, so it remembers nothing.
     fn read(&mut self, count: i32) -> i32;
 }
 
@@ -239,6 +239,7 @@ impl Stages for Named {
         self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part.read(count)))
     }
 
+    #[inline]
     fn tell(&self, truth: &mut Truth) {
         self.electric.iter().for_each(|effect| effect.part().tell(truth));
     }

@@ -71,6 +71,7 @@ impl Named {
 }
 
 impl Stages for Named {
+    #[inline]
     fn second_s(&mut self, time_s: f64) -> f64 {
         self.clock.iter_mut().map(|effect| effect.call(|part| part.second_s(time_s))).product()
     }

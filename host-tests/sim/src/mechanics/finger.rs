@@ -26,7 +26,6 @@ pub struct Finger<D, C> {
     rad_per_s2: f64,
     winding_a: f64,
     tip_mm: f64,
-    count: i32,
     bridge: Bridge,
     circuit: Circuit,
     friction: Friction,
@@ -74,7 +73,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             rad_per_s2: 0.0,
             winding_a: 0.0,
             tip_mm: 0.0,
-            count: 0,
             bridge,
             circuit,
             friction: Friction::default(),
@@ -154,7 +152,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
             self.tip_mm = self.drive.tip_mm(self.tip_mm, surface_mm);
         }
-        self.count = self.count_ahead(0.0);
     }
 
     /// Puts it at rest at a travel, as if carried there.
@@ -197,7 +194,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.angle_ahead_rad(ahead_s) * self.mm_per_rad
     }
 
-    /// What the encoder then reads.
+    /// What the encoder reads a while behind the last step; now, at 0.
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
         let turns = self.angle_ahead_rad(ahead_s) / TAU;
         let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
@@ -217,11 +214,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
     /// Speed of the tip where the gear drives it.
     pub fn speed_mm_per_s(&self) -> f64 {
         self.shaft.speed_rad_per_s * self.mm_per_rad
-    }
-
-    /// What the encoder reads.
-    pub fn count(&self) -> i32 {
-        self.count
     }
 
     /// Current in the winding.

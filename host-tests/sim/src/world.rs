@@ -46,6 +46,8 @@ pub struct World<E: Set> {
     body: Body,
     body_before: Body,
     dt_s: f64,
+    /// Whether no contact holds an effect: then a step does without what only effects change.
+    bare: bool,
 }
 
 /// Which way a finger pushes.
@@ -60,7 +62,8 @@ impl<E: Set> World<E> {
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
         let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
         let body = Body::default();
-        Self { fingers, around: *around, mass_kg, body, body_before: body, dt_s: 0.0 }
+        let bare = fingers.iter().all(|finger| finger.contact.effects.none());
+        Self { fingers, around: *around, mass_kg, body, body_before: body, dt_s: 0.0, bare }
     }
 
     /// Refuses a step that is too long for the steepest contact.
@@ -101,45 +104,59 @@ impl<E: Set> World<E> {
     pub fn advance(&mut self, time_s: f64, dt_s: f64, bridges: &[Bridge]) {
         self.dt_s = dt_s;
         self.body_before = self.body;
-        for (index, (finger, bridge)) in self.fingers.iter_mut().zip(bridges).enumerate() {
-            if !finger.contact.effects.none() {
-                let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
-                finger.contact.relax(0.5 * dt_s, x_mm);
-            }
+        if !self.bare {
+            self.relax(false);
+        }
+        for (finger, bridge) in self.fingers.iter_mut().zip(bridges) {
             finger.prepare(dt_s, *bridge);
         }
         match self.mass_kg {
             None => self.advance_fingers(time_s),
             Some(mass_kg) => self.advance_together(mass_kg, time_s),
         }
-        for (index, finger) in self.fingers.iter_mut().enumerate() {
-            if finger.contact.effects.none() {
-                continue;
+        if !self.bare {
+            self.relax(true);
+        }
+    }
+
+    /// Lets the tips forget for half a step, and where it ends there, the object bear what it came to.
+    #[inline(never)]
+    fn relax(&mut self, ends: bool) {
+        for index in 0..self.fingers.len() {
+            let x_mm = self.overlap_mm(index);
+            self.fingers[index].contact.relax(0.5 * self.dt_s, x_mm);
+            if ends {
+                self.fingers[index].contact.bear(x_mm);
             }
-            let x_mm = finger.flank_mm() - surface_mm(finger.setup(), index, &self.body);
-            finger.contact.relax(0.5 * dt_s, x_mm);
-            finger.contact.bear(x_mm);
         }
     }
 
     /// Each against an object that stands fast.
     fn advance_fingers(&mut self, time_s: f64) {
-        let dt_s = self.dt_s;
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let surface_mm = surface_mm(finger.setup(), index, &self.body);
             let end = finger.solve(|contact: &Contact<_>, from_mm, to_mm| {
                 contact.law().mean_n(from_mm - surface_mm, to_mm - surface_mm)
             });
             finger.finish(&end, surface_mm);
-            if finger.contact.effects.none() {
-                continue;
-            }
+        }
+        if !self.bare {
+            self.draw(time_s);
+        }
+    }
+
+    /// Moves the object by along the surfaces, as the scene does where it stands fast.
+    #[inline(never)]
+    fn draw(&mut self, time_s: f64) {
+        let until_s = time_s + self.dt_s;
+        for (index, finger) in self.fingers.iter_mut().enumerate() {
             if let Some(grip) = finger.contact.effects.grip() {
-                let drawn_s = overlap_s([time_s, time_s + dt_s], [grip.drift_from_s, f64::INFINITY]);
-                let lifted_mm = self.around.hand_mm(time_s + dt_s) - self.around.hand_mm(time_s);
+                let drawn_s = overlap_s([time_s, until_s], [grip.drift_from_s, f64::INFINITY]);
+                let lifted_mm = self.around.hand_mm(until_s) - self.around.hand_mm(time_s);
                 let way_mm = grip.drift_mm_per_s * drawn_s - lifted_mm;
+                let surface_mm = surface_mm(finger.setup(), index, &self.body);
                 let force_n = finger.contact.law().force_n(finger.flank_mm() - surface_mm);
-                (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, dt_s);
+                (_, finger.contact.along) = finger.contact.along.moved(&grip, force_n, way_mm, self.dt_s);
             }
         }
     }
@@ -214,14 +231,13 @@ impl<E: Set> World<E> {
         if off_s < 0.0 {
             return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
         }
-        let ahead_s = off_s;
         let mut body = self.body;
         if self.dt_s > 0.0 {
             let (v0, v1) = (self.body_before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
-            body.place_mm[0] += ahead_s * (v1 + 0.5 * (v1 - v0) * ahead_s / self.dt_s);
+            body.place_mm[0] += off_s * (v1 + 0.5 * (v1 - v0) * off_s / self.dt_s);
         }
         let finger = &mut self.fingers[index];
-        let x_mm = finger.flank_ahead_mm(ahead_s) - surface_mm(finger.setup(), index, &body);
+        let x_mm = finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body);
         finger.contact.row_kpa(x_mm, row)
     }
 

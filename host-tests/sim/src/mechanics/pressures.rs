@@ -25,17 +25,18 @@ pub struct Pressures {
     pitch_mm: f64,
     centre_mm: [f64; 2],
     deepest_mm: f64,
-    knots: Vec<Vec<Option<Box<[Row; ROWS]>>>>,
+    peak_per_mm: f64,
+    /// For each place of the centre by the root, beginning with the knot before the first: the shares are even in the root.
+    knots: Vec<Vec<Knot>>,
 }
 
-/// Where between the knots a contact is: what a frame asks for row by row.
-#[derive(Clone, Copy, Debug)]
-pub struct Place {
-    root: [f64; 4],
-    from: usize,
-    place: [f64; 4],
-    at: usize,
-    peak_kpa: f64,
+/// All taxels' means as shares of the peak, once they are worked out.
+type Knot = Option<Box<[Row; ROWS]>>;
+
+/// The four knots around a root.
+struct Around {
+    place: usize,
+    root: usize,
 }
 
 impl Pressures {
@@ -43,58 +44,70 @@ impl Pressures {
     pub fn new(tip: Tip, pitch_mm: f64, centre_mm: [f64; 2]) -> Self {
         let deepest_mm = Tip::DEEPEST * tip.radius_mm;
         let roots = (deepest_mm.sqrt() / ROOT) as usize + 4;
-        let knots = (0..roots).map(|_| vec![None; 2 * PLACES + 1]).collect();
-        Self { tip, pitch_mm, centre_mm, deepest_mm, knots }
+        let knots = (0..=2 * PLACES).map(|_| vec![None; roots]).collect();
+        let peak_per_mm = tip.modulus_kpa / tip.radius_mm;
+        Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots }
     }
 
     /// Means of one row at an indentation, with the centre shifted along the rows.
+    #[inline]
     pub fn row_kpa(&mut self, stages: &impl Stages, d_mm: f64, shift_mm: f64, row: usize) -> Row {
-        if d_mm <= 0.0 {
-            return [0.0; COLUMNS];
+        let mut kpa = [0.0; COLUMNS];
+        if d_mm > 0.0 {
+            while let Err(missing) = self.between(d_mm, shift_mm, row, &mut kpa) {
+                self.work_out(stages, missing);
+            }
         }
-        let place = self.place(d_mm, shift_mm);
-        self.at(stages, &place, row)
+        kpa
     }
 
-    fn place(&self, d_mm: f64, shift_mm: f64) -> Place {
+    /// Sets the means between the knots, or says which are not worked out yet.
+    fn between(&self, d_mm: f64, shift_mm: f64, row: usize, kpa: &mut Row) -> Result<(), Around> {
         let d_mm = d_mm.min(self.deepest_mm);
-        let (from, root) = weights(d_mm.sqrt() / ROOT);
-        let steps = (shift_mm / PLACE_MM + PLACES as f64).clamp(1.0, 2.0 * PLACES as f64 - 2.0);
-        let (at, place) = weights(steps);
-        Place { root, from, place, at, peak_kpa: self.tip.modulus_kpa * d_mm / self.tip.radius_mm }
-    }
-
-    fn at(&mut self, stages: &impl Stages, place: &Place, row: usize) -> Row {
+        let (root, weights) = weigh(d_mm.sqrt() / ROOT);
+        let peak_kpa = self.peak_per_mm * d_mm;
+        if shift_mm == 0.0 {
+            // At a knot, as where nothing moves along the surface, it alone counts.
+            let [a, b, c, d] = self.around(PLACES, root, row)?;
+            let [wa, wb, wc, wd] = weights.map(|weight| weight * peak_kpa);
+            *kpa = core::array::from_fn(|n| positive(wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n]));
+            return Ok(());
+        }
+        let (place, along) = weigh((shift_mm / PLACE_MM + PLACES as f64).clamp(1.0, 2.0 * PLACES as f64 - 2.0));
         let mut sum = [0.0; COLUMNS];
-        for (j, along) in place.place.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-            for (i, weight) in place.root.iter().enumerate().filter(|(_, weight)| **weight != 0.0) {
-                // The shares are even in the root: the knot before the first is the one behind it.
-                let root = (place.from + i).abs_diff(1);
-                let weight = along * weight * place.peak_kpa;
-                let knot = self.knot(stages, root, place.at + j - 1);
-                for (sum, share) in sum.iter_mut().zip(&knot[row]) {
-                    *sum += weight * share;
-                }
+        for (next, along) in along.into_iter().enumerate() {
+            let [a, b, c, d] = self.around(place + next - 1, root, row)?;
+            let [wa, wb, wc, wd] = weights.map(|weight| along * weight * peak_kpa);
+            for (n, sum) in sum.iter_mut().enumerate() {
+                *sum += wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n];
             }
         }
-        sum.map(|kpa| kpa.max(0.0))
+        *kpa = sum.map(positive);
+        Ok(())
     }
 
-    fn knot(&mut self, stages: &impl Stages, root: usize, place: usize) -> &[Row; ROWS] {
-        match &mut self.knots[root][place] {
-            Some(knot) => knot,
-            none => {
-                let d_mm = (root as f64 * ROOT) * (root as f64 * ROOT);
-                let shift_mm = (place as f64 - PLACES as f64) * PLACE_MM;
-                let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
-                none.insert(Box::new(shares(stages, &self.tip, self.pitch_mm, centre_mm, d_mm)))
-            }
+    /// A row at the four knots around a root.
+    #[inline(always)]
+    fn around(&self, place: usize, root: usize, row: usize) -> Result<[&Row; 4], Around> {
+        match &self.knots[place][root..root + 4] {
+            [Some(a), Some(b), Some(c), Some(d)] => Ok([&a[row], &b[row], &c[row], &d[row]]),
+            _ => Err(Around { place, root }),
+        }
+    }
+
+    /// Where a contact comes by for the first time: not to be in the way of what is done for each row.
+    #[cold]
+    fn work_out(&mut self, stages: &impl Stages, around: Around) {
+        let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
+        let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
+        for (at, knot) in self.knots[around.place].iter_mut().enumerate().skip(around.root).take(4) {
+            let root = (at as f64 - 1.0) * ROOT;
+            knot.get_or_insert_with(|| Box::new(shares(stages, &self.tip, self.pitch_mm, centre_mm, root * root)));
         }
     }
 }
 
-/// The means as shares of the peak. Once for each knot: not to be in the way of what is done for each row.
-#[cold]
+/// The means as shares of the peak.
 fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d_mm: f64) -> [Row; ROWS] {
     if d_mm == 0.0 {
         return [[0.0; COLUMNS]; ROWS];
@@ -111,10 +124,15 @@ fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d
     })
 }
 
+/// What is above 0, and 0 else: the lines overshoot where a taxel begins to feel the rim.
+fn positive(kpa: f64) -> f64 {
+    if kpa > 0.0 { kpa } else { 0.0 }
+}
+
 /// The lower knot and the weights of the four around a place.
-fn weights(place: f64) -> (usize, [f64; 4]) {
-    let knot = place as usize;
-    let t = place - knot as f64;
+fn weigh(place: f64) -> (usize, [f64; 4]) {
+    let knot = place as i32;
+    let t = place - f64::from(knot);
     let (t2, t3) = (t * t, t * t * t);
     let weights = [
         0.5 * (-t + 2.0 * t2 - t3),
@@ -122,5 +140,5 @@ fn weights(place: f64) -> (usize, [f64; 4]) {
         0.5 * (t + 4.0 * t2 - 3.0 * t3),
         0.5 * (t3 - t2),
     ];
-    (knot, weights)
+    (knot as usize, weights)
 }

@@ -20,7 +20,7 @@ use crate::world::{World, WorldError};
 pub use clock::Clock;
 use digest::Digest;
 use fingertip::config::{Config, ConfigError, newtons};
-use fingertip::frame::{COLUMNS, Frame, SLOTS};
+use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, SLOTS};
 use fingertip::pipeline::{Command, Pipeline};
 use fingertip::pressure::TARE_FRAMES;
 use host_tests::native::bridge;
@@ -226,8 +226,8 @@ impl<E: Set> Board<E> {
         for (finger, unit) in self.units.iter_mut().enumerate() {
             let kpa = if slot < SLOTS - 1 { self.world.row_kpa(finger, since_s, slot) } else { [0.0; COLUMNS] };
             let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
-            for (column, code) in codes.into_iter().enumerate() {
-                unit.frame.set_code(slot, column, code);
+            for (column, pair) in unit.frame.pairs[slot].iter_mut().enumerate() {
+                *pair = u32::from(codes[column]) | u32::from(codes[column + BANK_COLUMNS]) << 16;
             }
         }
     }

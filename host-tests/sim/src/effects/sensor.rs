@@ -162,6 +162,7 @@ impl Stages for Named {
 pub struct Readout {
     array: Array,
     volts_per_siemens: f64,
+    codes_per_volt: f64,
     siemens: [Row; ROWS],
 }
 
@@ -169,7 +170,8 @@ impl Readout {
     /// Of an array whose row switches are perfect; what its `row_ohm` and `settle_tau_s` say is the effects' to say.
     pub fn new(array: &Array) -> Self {
         let volts_per_siemens = array.feedback_ohm * array.drive_v;
-        Self { array: *array, volts_per_siemens, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
+        let codes_per_volt = Array::CODES / array.reference_v;
+        Self { array: *array, volts_per_siemens, codes_per_volt, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
     }
 
     /// The codes of a slot sampled at a time, its row under these pressures (not looked at where no row is driven).
@@ -186,7 +188,10 @@ impl Readout {
         if let Some(row) = self.siemens.get_mut(slot) {
             let mut kpa = *kpa;
             stages.pressure(slot, time_s, &mut kpa);
-            *row = kpa.map(|kpa| (array.preload_siemens + array.siemens_per_kpa * kpa).max(0.0));
+            *row = core::array::from_fn(|column| {
+                let loaded = array.preload_siemens + array.siemens_per_kpa * kpa[column];
+                if loaded > 0.0 { loaded } else { 0.0 }
+            });
             stages.conductance(slot, time_s, row);
             let mut seen = *row;
             stages.network(slot, &self.siemens, &mut seen);
@@ -195,9 +200,9 @@ impl Readout {
             }
         }
         stages.volts(slot, time_s, &mut volts);
-        let mut codes = volts.map(|volts| volts / array.reference_v * Array::CODES);
+        let mut codes = volts.map(|volts| volts * self.codes_per_volt);
         stages.codes(slot, time_s, &mut codes);
-        // What becomes an integer is cut: rounded down, as it is not below 0.
-        codes.map(|code| code.clamp(0.0, Array::CODES - 1.0) as u16)
+        // What becomes an integer is cut: rounded down, and 0 below it.
+        codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
     }
 }

@@ -139,7 +139,7 @@ impl Rotor {
             let against = against_nm(&acting.resistance(from.angle_rad, to_rad), direction);
             let free = from.speed_rad_per_s + half * (drive - against);
             mean_speed = free / slowing;
-            if ((source.volts - k * mean_speed) / source.ohms).abs() > source.limit_a {
+            if (source.volts - k * mean_speed).abs() > source.limit_a * source.ohms {
                 let current = self.current_a(&source, mean_speed);
                 mean_speed = from.speed_rad_per_s + half * (k * current - against);
             }

@@ -115,6 +115,7 @@ impl Elastic {
     }
 
     /// Mean force between two indentations: the difference in energy over the way.
+    #[inline]
     pub fn mean_n(&self, d0: f64, d1: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => mean_square(*n_per_mm2, d0, d1),

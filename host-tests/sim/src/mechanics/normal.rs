@@ -25,10 +25,12 @@ pub struct Law<'a> {
 
 impl Law<'_> {
     /// The tip's indentation at an overlap; negative where there is none.
+    #[inline]
     pub fn depth_mm(&self, x_mm: f64) -> f64 {
-        if self.mm_per_n == 0.0 || x_mm <= 0.0 {
-            return x_mm;
-        }
+        if self.mm_per_n == 0.0 || x_mm <= 0.0 { x_mm } else { self.yielding_mm(x_mm) }
+    }
+
+    fn yielding_mm(&self, x_mm: f64) -> f64 {
         // Between these two d + c N(d) - x changes its sign; it rises and bends upwards, so Newton from above never leaves.
         let free_mm = self.elastic.depth_mm(self.forgotten_n);
         if x_mm <= free_mm {
@@ -81,6 +83,7 @@ impl Law<'_> {
     }
 
     /// Mean force between two overlaps: the difference in energy over the way.
+    #[inline]
     pub fn mean_n(&self, x0: f64, x1: f64) -> f64 {
         if x0 <= 0.0 && x1 <= 0.0 {
             return 0.0;
@@ -102,6 +105,7 @@ impl Law<'_> {
         (self.elastic.force_n(d_mm) - self.forgotten_n).max(0.0)
     }
 
+    #[inline]
     fn tip_mean_n(&self, d0: f64, d1: f64) -> f64 {
         if self.forgotten_n == 0.0 {
             return self.elastic.mean_n(d0, d1);

@@ -109,6 +109,6 @@ pub struct Summary {
     pub wall_s: f64,
     /// What each named effect cost, in the scene's order.
     pub ledger: Vec<Cost>,
-    /// SHA-256 over every frame, sense, command and status of the run, in order.
+    /// XXH3 of 128 bits over every frame, sense, command, duty and status of the run, in order.
     pub digest: String,
 }

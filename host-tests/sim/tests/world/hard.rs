@@ -80,7 +80,7 @@ fn scenes_of_no_time_and_of_one_frame_end() {
         let text = format!("duration_s = {duration}\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n");
         let summary = sim::simulate(&scene(&text), &mut last).unwrap();
         assert_eq!(last.steps, u64::from(fingertip::pressure::TARE_FRAMES) + 2 + frames, "{duration} s");
-        assert_eq!(summary.digest.len(), 64);
+        assert_eq!(summary.digest.len(), 32);
     }
 }
 

@@ -13,14 +13,16 @@ use crate::host::Host;
 use crate::host::grip::Reading;
 use crate::ledger;
 use crate::mechanics::body::Surroundings;
+use crate::mechanics::contact::Place;
 use crate::scene::Scene;
 use crate::scene::controller;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
 pub use clock::Clock;
+use core::ops::Range;
 use digest::Digest;
 use fingertip::config::{Config, ConfigError, newtons};
-use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, SLOTS};
+use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::pipeline::{Command, Pipeline};
 use fingertip::pressure::TARE_FRAMES;
 use host_tests::native::bridge;
@@ -202,7 +204,7 @@ impl<E: Set> Board<E> {
     }
 
     /// Moves the world through slots under the same duty, and samples each at its end.
-    fn slots(&mut self, slots: core::ops::Range<usize>, slot_s: f64) {
+    fn slots(&mut self, slots: Range<usize>, slot_s: f64) {
         let at_once = (self.longest_s / slot_s).max(1.0) as usize;
         let parts = (slot_s / self.longest_s).ceil().max(1.0);
         let mut from = slots.start;
@@ -212,22 +214,30 @@ impl<E: Set> Board<E> {
             for part in 0..parts as usize {
                 self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
             }
-            for step in 1..=count {
-                self.clock.go_on(slot_s);
-                let since_s = if step == count { f64::INFINITY } else { slot_s * step as f64 };
-                self.sample(from + step - 1, since_s);
-            }
+            self.sample(from..from + count, slot_s);
             from += count;
         }
     }
 
-    fn sample(&mut self, slot: usize, since_s: f64) {
-        let time_s = self.time_s();
+    /// Samples slots that the world's last step went through, each at its end.
+    fn sample(&mut self, slots: Range<usize>, slot_s: f64) {
+        let begun = self.clock;
         for (finger, unit) in self.units.iter_mut().enumerate() {
-            let kpa = if slot < SLOTS - 1 { self.world.row_kpa(finger, since_s, slot) } else { [0.0; COLUMNS] };
-            let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
-            for (column, pair) in unit.frame.pairs[slot].iter_mut().enumerate() {
-                *pair = u32::from(codes[column]) | u32::from(codes[column + BANK_COLUMNS]) << 16;
+            let mut places = [Place::NOWHERE; ROWS];
+            for (slot, place) in places.iter_mut().enumerate().take(slots.end).skip(slots.start) {
+                let gone = slot + 1 - slots.start;
+                let since_s = if gone == slots.len() { f64::INFINITY } else { slot_s * gone as f64 };
+                *place = self.world.place(finger, since_s);
+            }
+            self.clock = begun;
+            for slot in slots.clone() {
+                self.clock.go_on(slot_s);
+                let kpa = places.get(slot).map_or([0.0; COLUMNS], |place| self.world.placed_kpa(finger, place, slot));
+                let time_s = self.clock.since(self.start);
+                let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
+                for (column, pair) in unit.frame.pairs[slot].iter_mut().enumerate() {
+                    *pair = u32::from(codes[column]) | u32::from(codes[column + BANK_COLUMNS]) << 16;
+                }
             }
         }
     }

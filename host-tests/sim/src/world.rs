@@ -1,5 +1,7 @@
 //! The world of a scene: its fingers and what they touch, moved on by steps.
 
+mod rows;
+
 use crate::effects::contact::Stages as _;
 use crate::effects::drive::Stages as _;
 use crate::effects::set::Set;
@@ -7,7 +9,7 @@ use crate::mechanics::body::{Body, Surroundings, overlap_s};
 use crate::mechanics::contact::Contact;
 use crate::mechanics::finger::Finger;
 use crate::watch::Truth;
-use fingertip::frame::{COLUMNS, Sense};
+use fingertip::frame::Sense;
 use host_tests::plant::setup::Tip;
 use host_tests::plant::{Bridge, Setup};
 
@@ -211,34 +213,6 @@ impl<E: Set> World<E> {
                 finger.contact.along = *state;
             }
         }
-    }
-
-    /// Mean pressures on a row's taxels, at a time within the last step.
-    pub fn row_kpa(&mut self, index: usize, since_s: f64, row: usize) -> [f64; COLUMNS] {
-        let mut body = self.body;
-        if since_s < self.dt_s {
-            let (before, t) = (&self.body_before, since_s / self.dt_s);
-            let (v0, v1) = (before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
-            body.place_mm[0] = before.place_mm[0] + since_s * (v0 + 0.5 * (v1 - v0) * t);
-        }
-        let finger = &mut self.fingers[index];
-        let x_mm = finger.flank_within_mm(since_s) - surface_mm(finger.setup(), index, &body);
-        finger.contact.row_kpa(x_mm, row)
-    }
-
-    /// The same at a time before the last step's end, below 0, or behind it: then all goes on as it did in it.
-    pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
-        if off_s < 0.0 {
-            return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
-        }
-        let mut body = self.body;
-        if self.dt_s > 0.0 {
-            let (v0, v1) = (self.body_before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
-            body.place_mm[0] += off_s * (v1 + 0.5 * (v1 - v0) * off_s / self.dt_s);
-        }
-        let finger = &mut self.fingers[index];
-        let x_mm = finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body);
-        finger.contact.row_kpa(x_mm, row)
     }
 
     fn overlap_mm(&self, index: usize) -> f64 {

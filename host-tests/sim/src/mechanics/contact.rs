@@ -2,7 +2,7 @@
 
 use super::elastic::Elastic;
 use super::normal::Law;
-use super::pressures::Pressures;
+use super::pressures::{Between, Pressures};
 use super::shape;
 use crate::effects::contact::{Grip, Stages};
 use fingertip::frame::COLUMNS;
@@ -23,6 +23,19 @@ pub struct Contact<C> {
     pub n_per_mm_along: f64,
     forgotten_n: f64,
     left: f64,
+}
+
+/// How a contact touches: all that its rows have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    between: Between,
+    /// Of the pressures that the indentation alone gives.
+    share: f64,
+}
+
+impl Place {
+    /// Nowhere.
+    pub const NOWHERE: Self = Self { between: Between::NOTHING, share: 1.0 };
 }
 
 /// How the patch is stretched along the surface, and how far it slipped.
@@ -85,20 +98,28 @@ impl<C: Stages> Contact<C> {
         }
     }
 
-    /// Means of a row's taxels at an overlap.
-    pub fn row_kpa(&mut self, x_mm: f64, row: usize) -> [f64; COLUMNS] {
+    /// How it touches at an overlap.
+    #[inline]
+    pub fn place(&self, x_mm: f64) -> Place {
         if x_mm <= 0.0 {
-            return [0.0; COLUMNS];
+            return Place::NOWHERE;
         }
         let law = self.law();
         let d_mm = law.depth_mm(x_mm);
+        let between = self.pressures.between(d_mm, self.along.stretch_mm);
         if law.forgotten_n == 0.0 && law.left == 1.0 {
-            return self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row);
+            return Place { between, share: 1.0 };
         }
         // At the first touch of a shaped surface both forces may round to 0.
         let elastic_n = self.elastic.force_n(d_mm);
-        let share = if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left };
-        self.pressures.row_kpa(&self.effects, d_mm, self.along.stretch_mm, row).map(|kpa| kpa * share)
+        Place { between, share: if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left } }
+    }
+
+    /// Means of a row's taxels where it touches like this.
+    #[inline]
+    pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
+        let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
+        if place.share == 1.0 { kpa } else { kpa.map(|kpa| kpa * place.share) }
     }
 
     /// Where the centre of pressure is at an indentation, from where the tip's axis meets the surface.

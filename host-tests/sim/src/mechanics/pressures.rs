@@ -33,6 +33,20 @@ pub struct Pressures {
 /// All taxels' means as shares of the peak, once they are worked out.
 type Knot = Option<Box<[Row; ROWS]>>;
 
+/// Where between the knots a contact is: what its rows have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Between {
+    root: usize,
+    weights: [f64; 4],
+    peak_kpa: f64,
+    shift_mm: f64,
+}
+
+impl Between {
+    /// No contact.
+    pub const NOTHING: Self = Self { root: 0, weights: [0.0; 4], peak_kpa: 0.0, shift_mm: 0.0 };
+}
+
 /// The four knots around a root.
 struct Around {
     place: usize,
@@ -49,23 +63,32 @@ impl Pressures {
         Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots }
     }
 
-    /// Means of one row at an indentation, with the centre shifted along the rows.
+    /// Where an indentation is, with the centre shifted along the rows.
     #[inline]
-    pub fn row_kpa(&mut self, stages: &impl Stages, d_mm: f64, shift_mm: f64, row: usize) -> Row {
+    pub fn between(&self, d_mm: f64, shift_mm: f64) -> Between {
+        if d_mm <= 0.0 {
+            return Between::NOTHING;
+        }
+        let d_mm = d_mm.min(self.deepest_mm);
+        let (root, weights) = weigh(d_mm.sqrt() / ROOT);
+        Between { root, weights, peak_kpa: self.peak_per_mm * d_mm, shift_mm }
+    }
+
+    /// Means of one row.
+    #[inline]
+    pub fn row_kpa(&mut self, stages: &impl Stages, between: &Between, row: usize) -> Row {
         let mut kpa = [0.0; COLUMNS];
-        if d_mm > 0.0 {
-            while let Err(missing) = self.between(d_mm, shift_mm, row, &mut kpa) {
+        if between.peak_kpa > 0.0 {
+            while let Err(missing) = self.sum(between, row, &mut kpa) {
                 self.work_out(stages, missing);
             }
         }
         kpa
     }
 
-    /// Sets the means between the knots, or says which are not worked out yet.
-    fn between(&self, d_mm: f64, shift_mm: f64, row: usize, kpa: &mut Row) -> Result<(), Around> {
-        let d_mm = d_mm.min(self.deepest_mm);
-        let (root, weights) = weigh(d_mm.sqrt() / ROOT);
-        let peak_kpa = self.peak_per_mm * d_mm;
+    /// Sets the means, or says which knots are not worked out yet.
+    fn sum(&self, between: &Between, row: usize, kpa: &mut Row) -> Result<(), Around> {
+        let Between { root, weights, peak_kpa, shift_mm } = *between;
         if shift_mm == 0.0 {
             // At a knot, as where nothing moves along the surface, it alone counts.
             let [a, b, c, d] = self.around(PLACES, root, row)?;

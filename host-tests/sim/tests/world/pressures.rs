@@ -1,6 +1,6 @@
 //! Taxel means from the table against the fine integral.
 
-use fingertip::frame::ROWS;
+use fingertip::frame::{COLUMNS, ROWS};
 use host_tests::plant::cells::Cell;
 use host_tests::plant::setup::Tip;
 use sim::mechanics::pressures::Pressures;
@@ -34,7 +34,8 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
         let peak_kpa = 250.0 * d_mm / 10.0;
         let mut sum = 0.0;
         for row in 0..ROWS {
-            let means = table.row_kpa(&(), d_mm, shift_mm, row);
+            let between = table.between(d_mm, shift_mm);
+            let means = table.row_kpa(&(), &between, row);
             sum += means.iter().sum::<f64>();
             // Every taxel of some rows: the fine integral is slow.
             if (row + case) % 3 == 0 {
@@ -52,13 +53,18 @@ fn means_are_within_a_thousandth_of_the_peak_and_add_up() {
     assert!(worst_sum < 1e-3, "the sum is off by {worst_sum:e}");
 }
 
+fn row_kpa(table: &mut Pressures, d_mm: f64) -> [f64; COLUMNS] {
+    let between = table.between(d_mm, 0.0);
+    table.row_kpa(&(), &between, 4)
+}
+
 #[test]
 fn the_order_of_asking_does_not_matter() {
     let depths: Vec<f64> = (1..200).map(|n| f64::from(n) * 0.01).collect();
     let mut forth = Pressures::new(Tip::default(), PITCH_MM, [0.1, 0.2]);
     let mut back = Pressures::new(Tip::default(), PITCH_MM, [0.1, 0.2]);
-    let up: Vec<_> = depths.iter().map(|d| forth.row_kpa(&(), *d, 0.0, 4)).collect();
-    let mut down: Vec<_> = depths.iter().rev().map(|d| back.row_kpa(&(), *d, 0.0, 4)).collect();
+    let up: Vec<_> = depths.iter().map(|d| row_kpa(&mut forth, *d)).collect();
+    let mut down: Vec<_> = depths.iter().rev().map(|d| row_kpa(&mut back, *d)).collect();
     down.reverse();
     assert_eq!(up, down);
 }

@@ -63,6 +63,10 @@ impl Device for PwmTimer {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        // No edge changes it, so the timer sleeps on: a break does, at once.
+        if register == Register::Bdtr {
+            return None;
+        }
         Device::read(&mut self.timer, register, registers, context)
     }
 

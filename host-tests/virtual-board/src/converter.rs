@@ -99,10 +99,6 @@ impl Converter {
         begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
     }
 
-    fn begin(&mut self, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
-        self.begin_in(None, registers, context);
-    }
-
     /// The next slot of a scene: the sequence of the one before is over, and one begins at the trigger. It is an event only where
     /// somebody waits for it: at the frame's end.
     fn next_slot(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -113,14 +109,10 @@ impl Converter {
         front_end.counts.triggers += u64::from(self.nth == 0);
         let slot = front_end.scan.as_ref().map(|scan| scan.slot);
         drop(front_end);
-        let control = registers.get(Register::Cr2);
-        if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
-            self.begin_in(slot, registers, context);
-            self.refresh(registers, context);
-        }
+        self.triggered(slot, registers, context);
     }
 
-    fn begin_in(&mut self, slot: Option<Slot>, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+    fn begin(&mut self, slot: Option<Slot>, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
         let control = registers.get(Register::Cr2);
         if !cr2::ADON.is_set(control) || self.running.is_some() || sr::OVR.is_set(self.status) || self.clock_hz == 0 {
             return;
@@ -179,7 +171,7 @@ impl Converter {
             context.request(DMA_REQUEST, Level::High);
         }
         if !complete && running.slot.is_none() {
-            self.begin(registers, context);
+            self.begin(None, registers, context);
         }
     }
 
@@ -196,10 +188,10 @@ impl Converter {
         }
     }
 
-    fn triggered(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+    fn triggered(&mut self, slot: Option<Slot>, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let control = registers.get(Register::Cr2);
         if cr2::EXTEN.get(control) & 1 == 1 && cr2::EXTSEL.get(control) == TIM8_CC1 {
-            self.begin(registers, context);
+            self.begin(slot, registers, context);
             self.refresh(registers, context);
         }
     }
@@ -217,7 +209,7 @@ impl Converter {
             (self.running, self.rank) = (None, 0);
             self.front_end.lock().waiting[self.nth].clear();
         } else if cr2::SWSTART.is_set(value) {
-            self.begin(registers, context);
+            self.begin(None, registers, context);
         }
     }
 }
@@ -241,7 +233,7 @@ impl Device for Converter {
             }
             front_end.counts.triggers += 1;
             drop(front_end);
-            self.triggered(registers, context);
+            self.triggered(None, registers, context);
             if self.nth == 0 {
                 context.write_to(ADC2.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
             }
@@ -276,7 +268,7 @@ impl Device for Converter {
             Register::Sr => self.status &= value,
             Register::Cr2 => self.write_cr2(registers, context),
             Register::Dr if self.front_end.lock().scan.is_some() => return self.next_slot(registers, context),
-            Register::Dr => return self.triggered(registers, context),
+            Register::Dr => return self.triggered(None, registers, context),
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);
                 if cr1::RES.get(control) != 0 || cr1::DISCEN.is_set(control) || cr1::AWDEN.is_set(control) {

@@ -3,6 +3,7 @@
 //! The script's client sees the board only over its bus; the figures are of the simulated world's true force.
 //! A second run of the same script, cut by a snapshot and continued from it, must leave the same trace.
 
+pub mod bus;
 pub mod figures;
 pub mod flashable;
 pub mod pictures;

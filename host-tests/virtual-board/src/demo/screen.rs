@@ -1,6 +1,7 @@
 //! What is seen while it runs: a live heat map where there is a terminal, a line for each phase elsewhere.
 
-use super::script::{Phase, Poll, Watch};
+use super::bus::Poll;
+use super::script::{Phase, Watch};
 use host_tests::heatmap::{self, Pressures};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;

@@ -13,10 +13,11 @@
 #![no_std]
 #![no_main]
 
-use core::fmt::Write;
+mod host;
+
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_rt::{ExceptionFrame, exception};
-use cortex_m_semihosting::{debug, hio, nr, syscall};
+use cortex_m_semihosting::debug;
 use embassy_executor::Spawner;
 use fingertip::config::Config;
 use fingertip::params::Params;
@@ -24,6 +25,7 @@ use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
 use fingertip::same_bits::Comparison;
 use fingertip::units::Duty;
+use host::{File, command_line, fail, say};
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
@@ -35,7 +37,7 @@ const INPUTS_A_WATCH: u32 = 16;
 #[embassy_executor::main]
 async fn main(_spawner: Spawner) {
     let Some(mut syst) = cortex_m::Peripherals::take().map(|peripherals| peripherals.SYST) else {
-        fail(format_args!("the peripherals are taken"))
+        fail("the peripherals are taken")
     };
     syst.set_clock_source(SystClkSource::Core);
     syst.set_reload(TICKS_MAX);
@@ -44,7 +46,7 @@ async fn main(_spawner: Spawner) {
     syst.enable_counter();
 
     let mut line = [0; 256];
-    let (name, rest) = command_line(&mut line);
+    let (name, rest) = words(command_line(&mut line));
     if name == b"same-bits\0" {
         compare(rest, &mut syst);
     } else {
@@ -58,7 +60,7 @@ fn compare(words: &[u8], syst: &mut SYST) {
     let words = core::str::from_utf8(words).unwrap_or_default();
     let (inputs, spoilt) = words.split_once(' ').unwrap_or((words, ""));
     let inputs = inputs.parse::<u32>();
-    let (Ok(inputs), Ok(mut comparison)) = (inputs, Comparison::new()) else { fail(format_args!("no inputs to take")) };
+    let (Ok(inputs), Ok(mut comparison)) = (inputs, Comparison::new()) else { fail("no inputs to take") };
     for index in 0..inputs {
         if index % INPUTS_A_WATCH == 0 {
             syst.clear_current();
@@ -75,17 +77,17 @@ fn compare(words: &[u8], syst: &mut SYST) {
 
 /// Replays a recording.
 async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
-    let recording = Recording::open(name);
+    let recording = File::open(name);
     let mut count = [0; 4];
     let mut magic = [0; MAGIC.len()];
     recording.read(&mut magic);
     if magic != MAGIC {
-        fail(format_args!("no recording of this version"))
+        fail("no recording of this version")
     }
     recording.read(&mut count);
     let count = u32::from_le_bytes(count);
 
-    let Ok(config) = Config::new(&Params::DEFAULT) else { fail(format_args!("the default parameters are refused")) };
+    let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
     let mut pipeline = Pipeline::new(&config);
     let mut digest = Digest::new();
     let loop_ticks = ticks(syst, spin);
@@ -150,60 +152,17 @@ fn inject(failure: &[u8]) {
             cortex_m::asm::nop();
         },
         b"" => {}
-        _ => fail(format_args!("no such failure to inject")),
+        _ => fail("no such failure to inject"),
     }
 }
 
-/// The recording's name with a 0 at its end, and the failure to inject.
-fn command_line(line: &mut [u8; 256]) -> (&[u8], &[u8]) {
-    let mut request = [line.as_mut_ptr() as usize, line.len()];
-    // SAFETY: the request names a buffer and its length, both valid until the call returns.
-    let error = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, request.as_mut_ptr() as usize) };
-    let length = line.iter().position(|byte| *byte == 0);
-    let (Some(length), 0) = (length, error) else { fail(format_args!("no command line")) };
-    let split = line[..length].iter().position(|byte| *byte == b' ').unwrap_or(length);
+/// Splits the command line behind its first word, which then ends with a 0.
+fn words(line: &mut [u8]) -> (&[u8], &[u8]) {
+    let length = line.len() - 1;
+    let split = line.iter().position(|byte| *byte == b' ').unwrap_or(length);
     line[split] = 0;
     let (name, rest) = line.split_at(split + 1);
     (name, rest.get(..length.saturating_sub(split + 1)).unwrap_or_default())
-}
-
-/// A file on the host.
-struct Recording {
-    handle: usize,
-}
-
-impl Recording {
-    fn open(name: &[u8]) -> Self {
-        // SAFETY: the name is a buffer that ends with a 0, which the length leaves out.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), nr::open::R_BINARY, name.len() - 1) };
-        if handle == usize::MAX {
-            fail(format_args!("cannot open the recording"))
-        }
-        Self { handle }
-    }
-
-    fn read(&self, bytes: &mut [u8]) {
-        // SAFETY: the buffer is valid for its length, and the call returns when it is filled.
-        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) };
-        if missing != 0 {
-            fail(format_args!("the recording ends early"))
-        }
-    }
-}
-
-fn say(text: core::fmt::Arguments) {
-    if let Ok(mut host) = hio::hstdout() {
-        // Where the host is gone, nobody is left to tell.
-        let _ = host.write_fmt(text);
-        let _ = host.write_str("\n");
-    }
-}
-
-fn fail(what: core::fmt::Arguments) -> ! {
-    say(format_args!("FAILED: {what}"));
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
 }
 
 #[panic_handler]

@@ -15,8 +15,9 @@ mod fit;
 mod force;
 #[path = "../study/frame.rs"]
 mod frame;
-#[path = "../study/host.rs"]
 mod host;
+#[path = "../study/inputs.rs"]
+mod inputs;
 #[path = "../study/number.rs"]
 mod number;
 #[path = "../study/packed.rs"]
@@ -35,7 +36,8 @@ mod step;
 use cortex_m_semihosting::debug;
 use fingertip::config::Config;
 use fingertip::params::Params;
-use host::{Inputs, fail, say};
+use host::{fail, say};
+use inputs::Inputs;
 use scalar::Tools;
 
 /// Only returns.

@@ -5,10 +5,11 @@
 #![no_std]
 #![no_main]
 
+mod host;
+
 use core::arch::asm;
-use core::fmt::Write;
 use core::hint::black_box;
-use cortex_m_semihosting::{debug, hio, nr, syscall};
+use cortex_m_semihosting::debug;
 use fingertip::config::Config;
 use fingertip::contact::{self, Fit, Refined};
 use fingertip::control::SpeedLoop;
@@ -21,6 +22,7 @@ use fingertip::pressure::{ALL_ROWS, Array, Picture};
 use fingertip::record::{MAGIC, Record};
 use fingertip::safety::{Limits, Mode};
 use fingertip::units::{Duty, Millimetres};
+use host::{File, command_line, fail, say};
 
 /// What the kernels read and write.
 struct Bench<'a> {
@@ -147,7 +149,7 @@ extern "C" fn read_full(bench: &mut Bench) {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut line = [0; 256];
-    let recording = Recording::open(command_line(&mut line));
+    let recording = File::open(command_line(&mut line));
     let mut head = [0; MAGIC.len() + 4];
     recording.read(&mut head);
     let (magic, count) = head.split_at(MAGIC.len());
@@ -257,59 +259,7 @@ fn pushed_over_the_edge(picture: &Picture) -> Picture {
     pushed
 }
 
-/// The recording's name, with a 0 at its end.
-fn command_line(line: &mut [u8; 256]) -> &[u8] {
-    let mut request = [line.as_mut_ptr() as usize, line.len()];
-    // SAFETY: the request names a buffer and its length, both valid until the call returns.
-    let error = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, request.as_mut_ptr() as usize) };
-    let length = line.iter().position(|byte| *byte == 0);
-    let (Some(length), 0) = (length, error) else { fail("no command line") };
-    &line[..=length]
-}
-
-/// A file on the host.
-struct Recording {
-    handle: usize,
-}
-
-impl Recording {
-    fn open(name: &[u8]) -> Self {
-        // SAFETY: the name is a buffer that ends with a 0, which the length leaves out.
-        let handle = unsafe { syscall!(OPEN, name.as_ptr(), nr::open::R_BINARY, name.len() - 1) };
-        if handle == usize::MAX {
-            fail("cannot open the recording")
-        }
-        Self { handle }
-    }
-
-    fn read(&self, bytes: &mut [u8]) {
-        // SAFETY: the buffer is valid for its length, and the call returns when it is filled.
-        let missing = unsafe { syscall!(READ, self.handle, bytes.as_mut_ptr(), bytes.len()) };
-        if missing != 0 {
-            fail("the recording ends early")
-        }
-    }
-}
-
-fn say(text: core::fmt::Arguments) {
-    if let Ok(mut host) = hio::hstdout() {
-        // Where the host is gone, nobody is left to tell.
-        let _ = host.write_fmt(text);
-        let _ = host.write_str("\n");
-    }
-}
-
-fn fail(what: &str) -> ! {
-    say(format_args!("FAILED: {what}"));
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
-}
-
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo) -> ! {
-    say(format_args!("FAILED: {}", info.message()));
-    loop {
-        debug::exit(debug::EXIT_FAILURE);
-    }
+    fail(info.message())
 }

@@ -3,7 +3,8 @@
 //! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. What is cut never enters y1: nothing winds up.
 
 use super::call::pass_on;
-use super::host::{Inputs, say};
+use super::inputs::Inputs;
+use crate::host::say;
 use dsp_process::SplitProcess;
 use fixed::types::I16F16;
 use idsp::iir::{Biquad, BiquadClamp, DirectForm1};

@@ -1,7 +1,8 @@
 //! From a picture to a contact: from a single one, and followed from frame to frame at each effort.
 
 use super::call::pass_on;
-use super::host::{Inputs, fail, say};
+use super::inputs::Inputs;
+use crate::host::{fail, say};
 use fingertip::config::Config;
 use fingertip::contact::{self, Effort, Fit, Refined};
 use fingertip::frame::{COLUMNS, ROWS};

@@ -1,8 +1,9 @@
 //! From a frame to the sums that force and centre are read from, the peak, and whether a taxel is dead or saturated.
 
 use super::call::pass_on;
-use super::host::{Inputs, fail, say};
+use super::inputs::Inputs;
 use super::packed;
+use crate::host::{fail, say};
 use fingertip::config::Config;
 use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
 use fingertip::pressure::{Array, Calibration, Picture, TARE_FRAMES};

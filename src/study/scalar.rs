@@ -1,7 +1,8 @@
 //! Kernels of one or two numbers: the same inputs for every variant, each in the variant's own format.
 
 use super::call::{Registers, pass};
-use super::host::{Inputs, say};
+use super::inputs::Inputs;
+use crate::host::say;
 use fingertip::config::Config;
 use fingertip::model::Tip;
 use fixed::types::I16F16;

@@ -1,7 +1,8 @@
 //! The loop as it is, over the recorded stimulus: the whole step at each effort, and its parts.
 
 use super::call::pass_on;
-use super::host::{Inputs, say};
+use super::inputs::Inputs;
+use crate::host::say;
 use fingertip::config::Config;
 use fingertip::contact::{self, Effort};
 use fingertip::control::SpeedLoop;

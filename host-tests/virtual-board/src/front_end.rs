@@ -51,6 +51,14 @@ pub struct Scan {
     pub slot: Slot,
 }
 
+impl Scan {
+    /// The slot that begins so many updates after the next.
+    fn slot_after(&self, updates: usize) -> usize {
+        let [moved, round] = self.words;
+        (moved + self.due_ns.len() + updates) % round.max(1)
+    }
+}
+
 /// What the columns settle to under the drive of that place and under the one before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
 
@@ -115,7 +123,11 @@ impl FrontEnd {
     /// A row's pin changed.
     pub fn drive_row(&mut self, row: usize, high: bool, at_ns: u64) {
         let bit = 1 << row;
-        self.drive_rows(if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit }, at_ns);
+        let rows = if high { self.drives[0].rows | bit } else { self.drives[0].rows & !bit };
+        if self.drives[0].since_ns != at_ns {
+            self.drives.rotate_right(1);
+        }
+        self.drives[0] = Drive { rows, since_ns: at_ns };
     }
 
     /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a slot. It ends
@@ -130,13 +142,6 @@ impl FrontEnd {
         }
     }
 
-    fn drive_rows(&mut self, rows: u16, at_ns: u64) {
-        if self.drives[0].since_ns != at_ns {
-            self.drives.rotate_right(1);
-        }
-        self.drives[0] = Drive { rows, since_ns: at_ns };
-    }
-
     /// The part was reset: its pins let go of the rows, and what it had converted is gone.
     pub fn restart(&mut self, at_ns: u64) {
         self.waiting = Default::default();
@@ -149,8 +154,7 @@ impl FrontEnd {
     /// In a scene, while the rows are driven: so many updates on, the image hears of the scan.
     pub fn updates_to_sleep(&self) -> Option<usize> {
         let scan = self.scan.as_ref()?;
-        let [moved, round] = scan.words;
-        let begun = (moved + scan.due_ns.len()) % round.max(1);
+        let ([_, round], begun) = (scan.words, scan.slot_after(0));
         let half = round / 2;
         (round > 0).then_some(if begun < half {
             half - begun
@@ -164,8 +168,7 @@ impl FrontEnd {
     /// In a scene: when the next updates will be.
     pub fn expect(&mut self, updates_ns: impl Iterator<Item = u64>) {
         if let (Some(scan), Surroundings::Scene(finger)) = (&self.scan, &mut self.world) {
-            let [moved, round] = scan.words;
-            let slots = (moved + scan.due_ns.len()..).map(|word| word % round.max(1));
+            let slots = (0..).map(|updates| scan.slot_after(updates));
             let rows = slots.map(|slot| if slot < ROWS { 1 << slot } else { 0 });
             finger.expect(updates_ns.map(|at_ns| at_ns + scan.edge_ns).zip(rows));
         }

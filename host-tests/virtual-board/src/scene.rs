@@ -80,13 +80,14 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
         rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
         rigs.push(rig);
     }
-    watch.begin(&vec![Controller { params, calibration: None }; rigs.len()]);
+    let fingers = rigs.len();
+    watch.begin(&vec![Controller { params, calibration: None }; fingers]);
     let set_up_s = begun.elapsed().as_secs_f64();
     let mut now_ns = start_ns - MS;
     let mut ahead = VecDeque::new();
-    while clock.time_s(now_ns) < scene.duration_s || !ahead.is_empty() {
-        if clock.time_s(now_ns) < scene.duration_s {
-            let time_s = clock.time_s(now_ns);
+    loop {
+        let time_s = clock.time_s(now_ns);
+        if time_s < scene.duration_s {
             let second_s = clock_link.second_s(time_s);
             clock.run_at(now_ns, second_s);
             for (number, rig) in rigs.iter_mut().enumerate() {
@@ -95,12 +96,13 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
             }
             now_ns += MS;
             // The boards go on while what they did is looked at.
-            if ahead.len() == rigs.len() {
+            if ahead.len() == fingers {
                 continue;
             }
+        } else if ahead.is_empty() {
+            break;
         }
-        for rig in &mut rigs {
-            let Some(made) = ahead.pop_front() else { break };
+        for (rig, made) in rigs.iter_mut().zip(ahead.drain(..fingers)) {
             rig.await_reached()?;
             let (shown, trouble) = rig.answer(&made)?;
             shown.iter().for_each(|shown| watch.step(&shown.step()));

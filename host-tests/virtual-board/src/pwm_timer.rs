@@ -103,3 +103,56 @@ impl Device for PwmTimer {
         Device::reset_line(&mut self.timer, registers, context);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rigless::mcu::{Operate, Single};
+    use rigless::soc::Width;
+    use rigless::soc::stm32f427::builder;
+    use rigless::soc::stm32f427::generated::TIM1;
+
+    const CLOCK_HZ: u64 = 168_000_000;
+    /// 25 kHz.
+    const PERIOD_NS: u64 = 40_000;
+
+    fn write(part: &mut Single<PwmTimer>, at_ns: u64, offset: u64, value: u64) {
+        let written = part.write(VirtualNanos(at_ns), TIM1.base + offset, Width::W32, value);
+        assert_eq!(written, Ok(()));
+    }
+
+    fn share(part: &mut Single<PwmTimer>) -> f64 {
+        let (timer, registers) = part.pair();
+        timer.high_share(Channel::new(1).expect("a channel"), registers)
+    }
+
+    /// Runs to an instant as the emulator does; says how often it was stopped.
+    fn run(part: &mut Single<PwmTimer>, to_ns: u64) -> usize {
+        let mut stops = 0;
+        while let Some(at) = part.next_event().filter(|at| at.0 <= to_ns) {
+            part.advance_to(at);
+            stops += 1;
+        }
+        stops
+    }
+
+    #[test]
+    fn a_duty_is_in_use_from_the_next_period_on_and_nothing_wakes_after_it() {
+        let timer = PwmTimer::new(CLOCK_HZ);
+        let mut part = Single::new(builder(), "TIM1", timer).expect("the part has a TIM1");
+        // Period, PWM mode 1 with preload, output on, main output on; begin.
+        for (offset, value) in [(0x2c, 6_719), (0x18, 0x68), (0x20, 1), (0x44, 1 << 15), (0x14, 1), (0x00, 0x81)] {
+            write(&mut part, 0, offset, value);
+        }
+        for (period, ticks) in [(3, 3_360), (10, 1_680), (11, 5_040)] {
+            let before = share(&mut part);
+            run(&mut part, period * PERIOD_NS + 10_000);
+            write(&mut part, period * PERIOD_NS + 10_000, 0x34, ticks);
+            run(&mut part, (period + 1) * PERIOD_NS - 1);
+            assert_eq!(share(&mut part), before, "in period {period}");
+            run(&mut part, (period + 1) * PERIOD_NS);
+            assert_eq!(share(&mut part), ticks as f64 / 6_720.0, "behind period {period}");
+        }
+        assert!(run(&mut part, 1_000 * PERIOD_NS) <= 2);
+    }
+}

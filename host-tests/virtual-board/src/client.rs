@@ -2,11 +2,12 @@
 //!
 //! It talks to a serial port of the operating system, so it gets one end of a pseudo-terminal; at the other end each
 //! packet that it sends becomes a transaction of the rig. Virtual time passes only inside transactions, so what the client
-//! does repeats exactly. The client measures its timeouts on the wall clock; its end is opened at 50 baud, which a
-//! pseudo-terminal ignores but which makes these timeouts seconds long.
+//! does repeats exactly. The client measures its timeouts on the wall clock, by the time that a packet takes at the port's
+//! speed. Its end is opened at 1 baud, which a pseudo-terminal ignores: the shortest of these timeouts is then two minutes of a
+//! board that hangs. A packet that the board leaves unanswered in virtual time is answered at once by [`SILENCE`].
 
 use crate::error::Error;
-use crate::link::packet_length;
+use crate::link::{is_whole, packet_length};
 use crate::rig::Rig;
 use dynamixel2::Bus;
 use serial2::SerialPort;
@@ -16,8 +17,10 @@ use std::time::Duration;
 /// The client's end of the bus.
 pub type Client = Bus<Vec<u8>, Vec<u8>>;
 
-/// How long the client's timeouts believe a byte to take: long.
-const CLIENT_BAUD: u32 = 50;
+/// The client's timeouts believe a byte to take 10 s.
+const CLIENT_BAUD: u32 = 1;
+/// A status packet of an ID that no device has (253 is reserved): the client fails with `InvalidPacketId`.
+const SILENCE: [u8; 11] = [0xff, 0xff, 0xfd, 0, 253, 4, 0, 0x55, 0, 0x01, 0x24];
 /// The client's buffers: larger than any packet of the image.
 const BUFFER: usize = 2048;
 /// The `errno` of a pseudo-terminal whose other end is closed.
@@ -65,7 +68,8 @@ impl Rig {
             {
                 let packet: Vec<u8> = bytes.drain(..length).collect();
                 let reply = self.transact(&packet, wait_ns)?;
-                near.write_all(&reply)?;
+                let answered = reply.len() >= SILENCE.len() && is_whole(&reply);
+                near.write_all(if answered { &reply } else { &SILENCE })?;
             }
         }
     }

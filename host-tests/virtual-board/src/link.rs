@@ -1,9 +1,10 @@
 //! The bus from the host's side: bytes at their time, a byte stream, and whole transactions.
 
 use crate::error::Error;
-use crate::rig::Rig;
+use crate::rig::{Order, Rig};
 use crate::wire::TimedByte;
 use std::io::{Read, Write};
+use std::sync::mpsc;
 
 /// How far the run goes between two looks at what the image sent.
 const LOOK_NS: u64 = 50_000;
@@ -45,22 +46,47 @@ impl Rig {
     pub fn transact(&mut self, packet: &[u8], wait_ns: u64) -> Result<Vec<u8>, Error> {
         self.take_received()?;
         self.send(packet)?;
-        let mut reply = Vec::new();
-        let mut quiet_since_ns = self.now_ns();
-        while !is_whole(&reply) && self.now_ns() < quiet_since_ns + wait_ns {
-            self.run_until_ns(self.now_ns() + LOOK_NS)?;
-            let bytes = self.take_received()?;
-            if !bytes.is_empty() || self.unsent()? > 0 {
-                quiet_since_ns = self.now_ns();
-            }
-            reply.extend(bytes.iter().map(|timed| timed.byte));
-        }
-        Ok(reply)
+        let (answer, answered) = mpsc::channel();
+        let quiet_since_ns = self.now_ns();
+        self.order(Order::Listen(Listening { wait_ns, quiet_since_ns, reply: Vec::new(), answer }))?;
+        self.await_reached()?;
+        self.answer(&answered)
     }
 
     /// The bus as a byte stream; reading runs the board.
     pub fn stream(&mut self, wait_ns: u64) -> Stream<'_> {
         Stream { rig: self, wait_ns }
+    }
+}
+
+/// What listens for an answer while the board runs.
+#[derive(Debug)]
+pub(crate) struct Listening {
+    wait_ns: u64,
+    quiet_since_ns: u64,
+    reply: Vec<u8>,
+    answer: mpsc::Sender<Vec<u8>>,
+}
+
+impl Listening {
+    /// When to look at what has come next.
+    pub(crate) fn next_look_ns(&self, now_ns: u64) -> u64 {
+        now_ns + LOOK_NS
+    }
+
+    /// Takes in what has come; tells whether more is to be waited for.
+    pub(crate) fn hear(&mut self, now_ns: u64, received: &[TimedByte], unsent: usize) -> bool {
+        if !received.is_empty() || unsent > 0 {
+            self.quiet_since_ns = now_ns;
+        }
+        self.reply.extend(received.iter().map(|timed| timed.byte));
+        !is_whole(&self.reply) && now_ns < self.quiet_since_ns + self.wait_ns
+    }
+
+    /// Hands over what has come.
+    pub(crate) fn end(self) {
+        // Where nobody waits any more nobody misses it.
+        let _ = self.answer.send(self.reply);
     }
 }
 

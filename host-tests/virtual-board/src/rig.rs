@@ -8,6 +8,7 @@ use crate::board::FingerBoard;
 use crate::error::Error;
 use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
+use crate::link::Listening;
 use crate::scene::finger::Finger;
 use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
@@ -44,6 +45,8 @@ type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 pub(crate) enum Order {
     /// Run to an instant of the grid.
     Run(u64),
+    /// Run until an answer has come.
+    Listen(Listening),
     /// Do this where the run stands.
     Do(Job),
 }
@@ -82,7 +85,7 @@ impl Rig {
         let front_end = Shared::new(world);
         let board = FingerBoard::new(front_end.clone(), options.instructions_per_second)?;
         let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
-        let mut bench = Bench::new(front_end, &image)?;
+        let mut bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
         let (reaching, reached) = mpsc::channel();
         let resume = kept.map(|kept| kept.restore(&mut session, &digest(&images), &mut bench)).transpose()?;
@@ -240,7 +243,7 @@ impl Rig {
         asked.recv().map_err(|_| self.broken())
     }
 
-    fn order(&mut self, order: Order) -> Result<(), Error> {
+    pub(crate) fn order(&mut self, order: Order) -> Result<(), Error> {
         let sent = self.orders.as_ref().is_some_and(|orders| orders.send(order).is_ok());
         if sent { Ok(()) } else { Err(self.broken()) }
     }

@@ -3,6 +3,7 @@
 use crate::bench::Bench;
 use crate::board::FingerBoard;
 use crate::error::Error;
+use crate::link::Listening;
 use crate::rig::Order;
 use rigless::emulator::{Driver, Host, Settled, Stop};
 use rigless::session::Session;
@@ -41,13 +42,14 @@ pub(crate) struct Hall {
     reached: Sender<u64>,
     firmware: [u8; 32],
     until_ns: u64,
+    listening: Option<Listening>,
     begun: bool,
 }
 
 impl Hall {
     pub(crate) fn new(bench: Bench, orders: Receiver<Order>, reached: Sender<u64>, firmware: [u8; 32]) -> Self {
         let until_ns = bench.next_ns;
-        Self { bench, orders, reached, firmware, until_ns, begun: false }
+        Self { bench, orders, reached, firmware, until_ns, listening: None, begun: false }
     }
 
     /// From an instant of the grid to the next stop.
@@ -56,9 +58,23 @@ impl Hall {
         self.bench.next_stop(session.board_mut(), stop.at)
     }
 
+    /// Where an answer is listened for: looks at what has come, and tells whether to run on.
+    fn hears_on(&mut self, session: &mut Session<FingerBoard>) -> bool {
+        let Some(listening) = &mut self.listening else { return false };
+        let (now_ns, received) = (self.bench.next_ns, std::mem::take(&mut self.bench.received));
+        if listening.hear(now_ns, &received, session.board_mut().wire().pending()) {
+            self.until_ns = listening.next_look_ns(now_ns);
+            return true;
+        }
+        if let Some(listening) = self.listening.take() {
+            listening.end();
+        }
+        false
+    }
+
     /// Takes orders until one says to run on; false when nobody will order any more.
     fn halt(&mut self, session: &mut Session<FingerBoard>, stop: Stop, host: &mut dyn Host) -> bool {
-        let Self { bench, orders, reached, firmware, until_ns, begun } = self;
+        let Self { bench, orders, reached, firmware, until_ns, listening, begun } = self;
         if !*begun {
             bench.flash.put_back(host);
         }
@@ -70,6 +86,11 @@ impl Hall {
             match order {
                 Order::Run(until) => {
                     *until_ns = until;
+                    return true;
+                }
+                Order::Listen(begun) => {
+                    *until_ns = begun.next_look_ns(bench.next_ns);
+                    *listening = Some(begun);
                     return true;
                 }
                 Order::Do(job) => job(&mut Stand { session, host, stop, bench, firmware }),
@@ -101,7 +122,7 @@ impl Driver<FingerBoard> for Hall {
             return Some(self.bench.next_stop(session.board_mut(), stop.at));
         }
         self.bench.step(session, host);
-        if self.bench.next_ns >= self.until_ns && !self.halt(session, stop, host) {
+        if self.bench.next_ns >= self.until_ns && !self.hears_on(session) && !self.halt(session, stop, host) {
             return None;
         }
         Some(self.go_on(session, stop))

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, image};
+use common::{WAIT_NS, image, scratch};
 use host_tests::plant::{Setup, World};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
@@ -75,7 +75,7 @@ fn a_bus_error_is_a_hard_fault_that_resets() {
 
 #[test]
 fn what_is_stored_survives_a_snapshot_and_a_reboot() {
-    let file = std::env::temp_dir().join(format!("virtual-board-flash-{}.snapshot", std::process::id()));
+    let file = scratch("flash.snapshot");
     let mut rig = running(&Options::default());
     // Register 7 is the ID, register 262 stores it.
     let written = rig.client(WAIT_NS, |bus| bus.write_u8(1, 7, 42).and_then(|_| bus.write_u8(42, 262, 1)).map(drop));

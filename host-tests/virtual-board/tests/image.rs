@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, image};
+use common::{WAIT_NS, holding, image, scratch};
 use fingertip::link::table::{REGISTERS, address};
 use fingertip::params::Params;
 use host_tests::plant::{Setup, World};
@@ -89,7 +89,7 @@ fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
         assert_eq!(again.trace_hash().expect("it runs"), hash);
     }
 
-    let file = std::env::temp_dir().join(format!("virtual-board-{}.snapshot", std::process::id()));
+    let file = scratch("cut.snapshot");
     let mut cut = rig();
     cut.run_until_ns(33_000_000).expect("it runs");
     cut.snapshot(&file).expect("a snapshot is taken");

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::image;
+use common::{image, scratch};
 use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
 use sim::metrics;
 use sim::scene::{Scene, read};
@@ -151,6 +151,6 @@ fn a_scene_has_no_snapshot_and_no_plant() {
     let finger = virtual_board::scene::finger::Finger::all(&scene, clock, 0.0).expect("the scene is sound").remove(0);
     let mut rig = Rig::new(&image(), finger, &Options::default()).expect("the image starts");
     rig.run_ms(1).expect("it runs");
-    assert!(rig.snapshot(&std::env::temp_dir().join("never-written.snapshot")).is_err());
+    assert!(rig.snapshot(&scratch("never-written.snapshot")).is_err());
     assert!(matches!(rig.world(|world| world.force_n()), Err(Error::InAScene)));
 }

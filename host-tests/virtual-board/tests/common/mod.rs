@@ -3,7 +3,7 @@
 
 use fingertip::link::table::address;
 use host_tests::plant::{Setup, World};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use virtual_board::{Options, Rig};
 
@@ -41,6 +41,14 @@ pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
     read.expect("the client runs").expect("the image answers")
 }
 
+/// A file of this test program's in the build folder.
+pub fn scratch(name: &str) -> PathBuf {
+    let program = std::env::current_exe().expect("it runs");
+    let folder = program.parent().and_then(Path::parent).expect("target/host/deps").join("scratch");
+    std::fs::create_dir_all(&folder).expect("the build folder can be written");
+    folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
+}
+
 /// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
 pub fn holding() -> Rig {
     static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
@@ -56,7 +64,7 @@ pub fn holding() -> Rig {
         rig.run_ms(150).expect("it runs");
         let force_n = rig.world(|world| world.force_n()).expect("it runs");
         assert!((0.99..1.01).contains(&force_n), "{force_n} N");
-        let path = std::env::temp_dir().join(format!("virtual-board-holding-{}.snapshot", std::process::id()));
+        let path = scratch("holding.snapshot");
         rig.snapshot(&path).expect("a snapshot is taken");
         path
     });

@@ -2,7 +2,8 @@
 //!
 //! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
 //! model ([`model`]) and to what has a configuration or a state ([`machines`]); about a quarter of the numbers is
-//! outside the functions' domains. What is costly to make, [`made::MADE`], is made for every 1024th input only.
+//! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what is costly to
+//! make, [`made::MADE`], every 1024th.
 
 mod frames;
 pub mod machines;
@@ -19,7 +20,7 @@ use model::Sample;
 pub const INPUTS: u32 = 1_000_000;
 
 /// How many functions are compared.
-pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + made::MADE.len();
+pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + machines::FRAMES.len() + made::MADE.len();
 
 /// A seeded source of inputs: the upper half of a linear congruential generator.
 #[derive(Clone, Debug)]
@@ -114,13 +115,19 @@ impl Comparison {
     pub fn take(&mut self) {
         self.sample.renew(&mut self.source);
         let (by_model, rest) = self.mixes.split_at_mut(model::FUNCTIONS.len());
-        let (by_machine, by_maker) = rest.split_at_mut(machines::STEPS.len());
+        let (by_machine, rest) = rest.split_at_mut(machines::STEPS.len());
+        let (by_frame, by_maker) = rest.split_at_mut(machines::FRAMES.len());
         for ((_, function), mix) in model::FUNCTIONS.iter().zip(by_model) {
             function(&self.sample, mix);
         }
         if self.taken.is_multiple_of(made::MADE_EVERY) {
             for ((_, make), mix) in made::MADE.iter().zip(by_maker) {
                 make(&mut self.machines, &mut self.source, mix);
+            }
+        }
+        if self.taken.is_multiple_of(machines::FRAME_EVERY) {
+            for ((_, step), mix) in machines::FRAMES.iter().zip(by_frame) {
+                step(&mut self.machines, &self.sample, mix);
             }
         }
         for ((_, step), mix) in machines::STEPS.iter().zip(by_machine) {
@@ -138,9 +145,14 @@ impl Comparison {
     /// Each function's name and digest, and how many inputs it took.
     pub fn digests(&self) -> impl Iterator<Item = (&'static str, u64, u32)> + '_ {
         let made_from = FUNCTIONS - made::MADE.len();
+        let frames_from = made_from - machines::FRAMES.len();
         names().zip(&self.mixes).enumerate().map(move |(place, (name, mix))| {
-            let inputs = if place < made_from { self.taken } else { self.taken.div_ceil(made::MADE_EVERY) };
-            (name, mix.value(), inputs)
+            let every = match place {
+                place if place < frames_from => 1,
+                place if place < made_from => machines::FRAME_EVERY,
+                _ => made::MADE_EVERY,
+            };
+            (name, mix.value(), self.taken.div_ceil(every))
         })
     }
 }
@@ -148,5 +160,6 @@ impl Comparison {
 /// The functions in the order of their digests.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let model = model::FUNCTIONS.iter().map(|(name, _)| *name);
-    model.chain(machines::STEPS.iter().map(|(name, _)| *name)).chain(made::MADE.iter().map(|(name, _)| *name))
+    let machines = machines::STEPS.iter().chain(&machines::FRAMES).map(|(name, _)| *name);
+    model.chain(machines).chain(made::MADE.iter().map(|(name, _)| *name))
 }

@@ -103,34 +103,10 @@ impl Press {
     }
 }
 
-/// One step of every machine for each input.
-pub const STEPS: [Step; 26] = [
-    ("Relaxation::step", |m, s, mix| {
-        if let Some(filter) = &m.filter {
-            mix.add(filter.step(&mut m.memory, s.force).to_bits());
-        }
-    }),
-    ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
-    ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
-    ("lanes::excess", |_, s, mix| mix.add(lanes::excess(s.share_q32, s.words[0].cast_unsigned()))),
-    ("lanes::add_high", |_, s, mix| mix.add(lanes::add_high(s.words[2], s.share_q32.cast_signed(), s.words[0]))),
-    ("lanes::pass", |_, s, mix| {
-        let [first, second, third, fourth] = s.words.map(i32::cast_unsigned);
-        let pairs = [first, second, third, fourth, s.share_q32];
-        let weights = [[s.share_q32, third, first, fourth, second], [fourth, first, s.share_q32, second, third]];
-        let mut rows = [Row { weights, start: [s.words[0], s.words[3]], boost: 0 }; 2];
-        let common = Common { floors: weights[0], start: s.words[2], sag: second & 0x7fff_7fff };
-        let Total { first, second, running, largest } = lanes::pass(&[pairs, weights[1]], &mut rows, &common);
-        [first, second, running, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
-        mix.add(largest);
-    }),
-    ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
-    ("lanes::root_and_product", |_, s, mix| {
-        let [x, y, high, low] = s.words.map(i32::cast_unsigned);
-        let (root, product) = lanes::root_and_product(x, y, u64::from(high) << 32 | u64::from(low));
-        mix.add(root);
-        mix.add(product.cast_signed());
-    }),
+/// What looks at a whole frame, of 100 taxels, takes one input in so many.
+pub const FRAME_EVERY: u32 = 8;
+/// A step of every machine that looks at a whole frame.
+pub const FRAMES: [Step; 6] = [
     ("Array::read", |m, s, mix| {
         frames::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));
@@ -163,6 +139,36 @@ pub const STEPS: [Step; 26] = [
         let Rows { first, stride } = m.fit.wants();
         mix.add((first << 8 | stride) as u32);
         add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config));
+    }),
+];
+
+/// One step of every other machine for each input.
+pub const STEPS: [Step; 20] = [
+    ("Relaxation::step", |m, s, mix| {
+        if let Some(filter) = &m.filter {
+            mix.add(filter.step(&mut m.memory, s.force).to_bits());
+        }
+    }),
+    ("lanes::sub", |_, s, mix| mix.add(lanes::sub(s.share_q32, s.words[0].cast_unsigned()))),
+    ("lanes::dot", |_, s, mix| mix.add(lanes::dot(s.share_q32, s.words[0].cast_unsigned(), s.words[1]))),
+    ("lanes::excess", |_, s, mix| mix.add(lanes::excess(s.share_q32, s.words[0].cast_unsigned()))),
+    ("lanes::add_high", |_, s, mix| mix.add(lanes::add_high(s.words[2], s.share_q32.cast_signed(), s.words[0]))),
+    ("lanes::pass", |_, s, mix| {
+        let [first, second, third, fourth] = s.words.map(i32::cast_unsigned);
+        let pairs = [first, second, third, fourth, s.share_q32];
+        let weights = [[s.share_q32, third, first, fourth, second], [fourth, first, s.share_q32, second, third]];
+        let mut rows = [Row { weights, start: [s.words[0], s.words[3]], boost: 0 }; 2];
+        let common = Common { floors: weights[0], start: s.words[2], sag: second & 0x7fff_7fff };
+        let Total { first, second, running, largest } = lanes::pass(&[pairs, weights[1]], &mut rows, &common);
+        [first, second, running, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+        mix.add(largest);
+    }),
+    ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
+    ("lanes::root_and_product", |_, s, mix| {
+        let [x, y, high, low] = s.words.map(i32::cast_unsigned);
+        let (root, product) = lanes::root_and_product(x, y, u64::from(high) << 32 | u64::from(low));
+        mix.add(root);
+        mix.add(product.cast_signed());
     }),
     ("Budget::next", |m, s, mix| {
         // A whole deadline is about 2^13 ticks; the model is now and then at work.

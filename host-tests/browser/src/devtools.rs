@@ -14,8 +14,8 @@ use tungstenite::{Message, WebSocket};
 /// Why the browser did not do what was asked.
 pub type BrowserError = Box<dyn Error + Send + Sync>;
 
-/// Nothing takes longer than this, unless it hangs.
-const PATIENCE: Duration = Duration::from_secs(120);
+/// A browser that says nothing for so long hangs: the slowest machine takes a small part of it.
+const HUNG: Duration = Duration::from_secs(7200);
 /// No window, no sandbox (it needs rights that a container lacks), nothing that it does by itself.
 const FLAGS: [&str; 9] = [
     "--headless",
@@ -46,6 +46,8 @@ impl Browser {
     pub fn start(program: &Path, profile: &Path) -> Result<Self, BrowserError> {
         let mut command = Command::new(program);
         command.args(FLAGS).arg(format!("--user-data-dir={}", profile.display())).arg("about:blank");
+        // What it would leave in the user's home goes to the profile.
+        command.env("HOME", profile).env_remove("XDG_CONFIG_HOME").env_remove("XDG_CACHE_HOME");
         let mut process = command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -67,7 +69,7 @@ impl Browser {
         thread::spawn(move || lines.map_while(Result::ok).for_each(drop));
         let (socket, _) = tungstenite::connect(&address)?;
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
-            stream.set_read_timeout(Some(PATIENCE))?;
+            stream.set_read_timeout(Some(HUNG))?;
         }
         let mut browser = Self { process, socket, sent: 0, session: None, events: Vec::new() };
         let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))?;

@@ -69,8 +69,7 @@ pub struct Finger {
     pub clock: Clock,
     /// Whether frames to come bring their true pressures.
     pub wants_pressures: bool,
-    /// What the bridge does from now on.
-    pub bridge: Bridge,
+    bridge: Bridge,
     /// The world stands still until then.
     from_s: f64,
     joint: Joint,
@@ -130,6 +129,11 @@ impl Finger {
         let first_ns = slots.peek().map_or(0, |(begun_ns, _)| *begun_ns);
         self.expected.retain(|(begun_ns, _)| *begun_ns < first_ns);
         self.expected.extend(slots);
+    }
+
+    /// The bridge does this from now on.
+    pub fn hold(&mut self, bridge: Bridge) {
+        self.bridge = bridge;
     }
 
     /// Goes to an instant of the board with the bridge held.

@@ -1,7 +1,7 @@
 //! The scene's host on the bus of one board: it writes goals when the link lets them through, and reads the status.
 //!
 //! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes out where the line
-//! is free for it and for its answer, and where the one before was answered: once in ten frames to see what the board does, and when the
+//! is free for it and for its answer, and where the one before was answered: once in ten frames or more to see what the board does, and when the
 //! grip of `[host]` asks for a reading. Each answer is shown, beside the frame that it was made from.
 
 use super::MS;
@@ -29,6 +29,8 @@ const REQUEST_NS: u64 = READ_BYTES * BYTE_NS;
 const GAP_NS: u64 = 10 * BYTE_NS;
 /// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the emulator's.
 const LOOK_FRAMES: u64 = 10;
+/// In a long scene there are about so many looks, and more frames between them.
+const LOOKS: f64 = 4_000.0;
 /// Frames that are kept until an answer speaks of them.
 const FRAMES: usize = 128;
 
@@ -114,6 +116,7 @@ impl Host {
     /// and the board's.
     pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
+        let least_ns = (scene.duration_s * 1e9 / LOOKS) as u64;
         Self {
             finger,
             host: sim::host::Host::new(scene),
@@ -126,7 +129,7 @@ impl Host {
             asks_ns: VecDeque::new(),
             asked: None,
             look_ns: 0,
-            look_every_ns: ((LOOK_FRAMES * frame_ns + MS / 2) / MS).max(1) * MS,
+            look_every_ns: (((LOOK_FRAMES * frame_ns).max(least_ns) + MS / 2) / MS).max(1) * MS,
             command: Command { torque: true, tare_request: 1, ..Command::default() },
             listener: Listener::default(),
             status: Status::default(),

@@ -3,6 +3,7 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod control_table;
+pub mod demo;
 pub mod emulator;
 pub mod figures;
 pub mod fit_cases;
@@ -15,6 +16,8 @@ pub mod native;
 pub mod optimal;
 pub mod plant;
 pub mod plot;
+#[cfg(feature = "judges")]
 pub mod prove;
 pub mod stimulus;
+#[cfg(feature = "judges")]
 pub mod study;

@@ -1,11 +1,10 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
 use crate::board::FingerBoard;
-use crate::error::Error;
 use crate::flash::Kept;
 use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
-use crate::log::{Log, LogLine};
+use crate::log::{Frames, Log};
 use crate::measure::{BridgeEdge, Latency};
 use crate::recorder::Recorder;
 use crate::scene::host::Host as SceneHost;
@@ -63,21 +62,18 @@ pub struct Bench {
 
 impl Bench {
     /// At time 0.
-    ///
-    /// # Errors
-    /// The image's log cannot be decoded.
-    pub fn new(front_end: Shared, image: &Firmware) -> Result<Self, Error> {
+    pub fn new(front_end: Shared, image: &Firmware) -> Self {
         let (grid_ns, follows_frames) = {
             let world = &front_end.lock().world;
             (world.grid_ns(), world.follows_frames())
         };
-        Ok(Self {
+        Self {
             next_ns: STEP_NS,
             front_end,
             trace: Trace::default(),
             latency: Latency::default(),
             bridge_edges: Vec::new(),
-            log: Log::new(image)?,
+            log: Log::new(image),
             received: Vec::new(),
             core_held: false,
             flash: Kept::default(),
@@ -91,7 +87,7 @@ impl Bench {
             grid_ns,
             follows_frames,
             frames: 0,
-        })
+        }
     }
 
     /// The core touched a register.
@@ -210,7 +206,7 @@ impl Store for Bench {
     }
 
     fn load(&mut self, from: &mut Reader) -> Result<(), snapshot::Error> {
-        let log: (Vec<u8>, Vec<LogLine>);
+        let log: (Vec<u8>, Vec<Frames>);
         (self.next_ns, self.trace, self.latency, self.bridge_edges, log, self.received, self.core_held, self.flash) =
             from.take()?;
         self.log.set_state(log.0, log.1);

@@ -6,19 +6,16 @@
 pub mod bus;
 pub mod figures;
 pub mod flashable;
-pub mod pictures;
+pub mod play;
 pub mod screen;
-pub mod script;
-pub mod table;
 
 use crate::{Error, Options, Rig};
 use dynamixel2::TransferError;
 use figures::Figures;
-use host_tests::metrics::MetricsError;
+use host_tests::demo::Script;
 use host_tests::plant::{Setup, World};
-use host_tests::plot::PlotError;
+use play::{Run, Watch};
 use screen::Screen;
-use script::{Script, Watch};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -48,12 +45,9 @@ pub enum DemoError {
     /// The board came into a state that the script does not expect.
     #[error("{0}")]
     Unexpected(String),
-    /// The run has no figures.
+    /// The run has no figures or no pictures.
     #[error(transparent)]
-    Metrics(#[from] MetricsError),
-    /// A picture could not be drawn.
-    #[error(transparent)]
-    Plot(#[from] PlotError),
+    Judged(#[from] host_tests::demo::DemoError),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -71,7 +65,7 @@ pub enum DemoError {
 ///
 /// # Errors
 /// The image does not run, or does not do what it is asked.
-pub fn run(plan: &Plan) -> Result<(Figures, script::Run), DemoError> {
+pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
     let begun = Instant::now();
     let script = if plan.quick { Script::quick() } else { Script::whole() };
     let repeat = (!plan.quick).then(|| {
@@ -83,11 +77,11 @@ pub fn run(plan: &Plan) -> Result<(Figures, script::Run), DemoError> {
     let flash = flashable::Flashable::of(rig.image())?;
     flash.check_loaded(&mut rig)?;
     let mut screen = Screen::new(script.length_ms());
-    let mut run = script.begin(&mut rig, &mut screen)?;
-    for phase in 0..script.phases() {
-        script.play(phase, &mut rig, &mut run, &mut screen)?;
+    let mut run = Run::begin(&mut rig)?;
+    for phase in &script.0 {
+        run.play(*phase, &mut rig, &mut screen)?;
     }
-    script.end(&mut rig, &mut run)?;
+    run.end(&mut rig)?;
     let repeated = match repeat {
         Some(repeat) => {
             screen.waiting("the same run once more, cut by a snapshot, to compare the traces");
@@ -112,20 +106,20 @@ pub fn power_on(image: &Path) -> Result<Rig, DemoError> {
 fn cut(image: &Path, script: &Script) -> Result<String, DemoError> {
     let watch: &mut dyn Watch = &mut screen::Nobody;
     let mut rig = power_on(image)?;
-    let mut run = script.begin(&mut rig, watch)?;
-    let half = script.phases() / 2;
-    for phase in 0..half {
-        script.play(phase, &mut rig, &mut run, watch)?;
+    let mut run = Run::begin(&mut rig)?;
+    let (first, second) = script.0.split_at(script.0.len() / 2);
+    for phase in first {
+        run.play(*phase, &mut rig, watch)?;
     }
-    let file = std::env::temp_dir().join(format!("virtual-board-demo-{}.snapshot", std::process::id()));
+    let file = image.with_extension(format!("{}.snapshot", std::process::id()));
     rig.snapshot(&file)?;
     drop(rig);
     let restored = Rig::restore(image, &file, &Options::default());
     std::fs::remove_file(&file).map_err(|source| DemoError::Write { path: file, source })?;
     let mut rig = restored?;
-    for phase in half..script.phases() {
-        script.play(phase, &mut rig, &mut run, watch)?;
+    for phase in second {
+        run.play(*phase, &mut rig, watch)?;
     }
-    script.end(&mut rig, &mut run)?;
+    run.end(&mut rig)?;
     Ok(run.trace_hash)
 }

@@ -20,6 +20,8 @@ pub mod gaps;
 pub mod image;
 pub mod link;
 pub mod log;
+#[cfg(feature = "log")]
+pub mod log_text;
 pub mod measure;
 pub mod part;
 pub mod pins;
@@ -29,6 +31,7 @@ pub mod report;
 pub mod rig;
 pub mod scan_timer;
 pub mod scan_updates;
+#[cfg_attr(not(feature = "scenes"), path = "no_scene.rs")]
 pub mod scene;
 pub mod serve;
 pub mod stack;

@@ -1,8 +1,6 @@
-//! The image's log: defmt frames out of the RTT buffer, as a probe reads them.
+//! The image's log: defmt frames out of the RTT buffer, taken out while it runs as a probe does.
 
-use crate::error::Error;
 use crate::image::Firmware;
-use defmt_decoder::{DecodeError, Table};
 use rigless::emulator::Host;
 use rigless::soc::Width;
 use serde::{Deserialize, Serialize};
@@ -13,43 +11,33 @@ const SIZE: u64 = 32;
 const WRITTEN: u64 = 36;
 const READ: u64 = 40;
 
-/// A line that the image logged.
+/// Whole frames, still encoded.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LogLine {
-    /// When it was read out, virtual time.
+pub struct Frames {
+    /// When they were read out, virtual time.
     pub at_ns: u64,
-    /// Level, where it has one.
-    pub level: Option<String>,
-    /// The image's own timestamp and its text.
-    pub text: String,
+    /// A zero ends each of them.
+    pub bytes: Vec<u8>,
 }
 
-/// Reads the log out.
+/// Reads the log out. `log_text` makes lines of it.
 #[derive(Debug, Default)]
 pub struct Log {
-    source: Option<(u64, Table)>,
+    block: Option<u64>,
     /// What arrived since the last whole frame.
     partial: Vec<u8>,
-    /// All lines so far.
-    pub lines: Vec<LogLine>,
+    frames: Vec<Frames>,
 }
 
 impl Log {
     /// Of an image; one without a log stays silent.
-    ///
-    /// # Errors
-    /// The image has a log that this crate cannot decode.
-    pub fn new(image: &Firmware) -> Result<Self, Error> {
-        let table = Table::parse(image.elf()).map_err(|why| Error::NotAnImage {
-            path: image.path().into(),
-            why: format!("its defmt table cannot be read: {why}"),
-        })?;
-        Ok(Self { source: image.symbol("_SEGGER_RTT").zip(table), ..Self::default() })
+    pub fn new(image: &Firmware) -> Self {
+        Self { block: image.symbol("_SEGGER_RTT"), ..Self::default() }
     }
 
     /// Takes what is in the buffer; an image that has not set it up yet has nothing.
     pub fn drain(&mut self, at_ns: u64, host: &mut dyn Host) {
-        let Some((block, table)) = &self.source else { return };
+        let Some(block) = self.block else { return };
         let mut word = |offset| host.read(block + offset, Width::W32).unwrap_or(0);
         let (buffer, size, written, mut read) = (word(BUFFER), word(SIZE), word(WRITTEN), word(READ));
         if buffer == 0 || written == read || written >= size || read >= size {
@@ -63,20 +51,7 @@ impl Log {
             return;
         }
         let Some(end) = self.partial.iter().rposition(|byte| *byte == 0) else { return };
-        let mut decoder = table.new_stream_decoder();
-        decoder.received(&self.partial[..=end]);
-        self.partial.drain(..=end);
-        loop {
-            let (level, text) = match decoder.decode() {
-                Ok(frame) => {
-                    let time = frame.display_timestamp().map(|time| format!("{time} ")).unwrap_or_default();
-                    (frame.level().map(|level| level.as_str().to_owned()), format!("{time}{}", frame.display_message()))
-                }
-                Err(DecodeError::UnexpectedEof) => break,
-                Err(DecodeError::Malformed) => (None, "(a damaged log frame)".to_owned()),
-            };
-            self.lines.push(LogLine { at_ns, level, text });
-        }
+        self.frames.push(Frames { at_ns, bytes: self.partial.drain(..=end).collect() });
     }
 
     /// The image starts anew: what it had begun to write is gone.
@@ -84,13 +59,18 @@ impl Log {
         self.partial.clear();
     }
 
+    /// All frames so far.
+    pub fn frames(&self) -> &[Frames] {
+        &self.frames
+    }
+
     /// What a snapshot keeps.
-    pub fn state(&self) -> (&[u8], &[LogLine]) {
-        (&self.partial, &self.lines)
+    pub fn state(&self) -> (&[u8], &[Frames]) {
+        (&self.partial, &self.frames)
     }
 
     /// Puts that back.
-    pub fn set_state(&mut self, partial: Vec<u8>, lines: Vec<LogLine>) {
-        (self.partial, self.lines) = (partial, lines);
+    pub fn set_state(&mut self, partial: Vec<u8>, frames: Vec<Frames>) {
+        (self.partial, self.frames) = (partial, frames);
     }
 }

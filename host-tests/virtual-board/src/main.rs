@@ -16,20 +16,24 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Runs the image for some time and reports speed, frames, log and emulator gaps.
+    #[cfg(feature = "log")]
     Run(commands::run::Arguments),
     /// Touches an object, holds forces, lets go; judges the figures and draws pictures.
     Demo(commands::demo::Arguments),
     /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
     Serve(commands::serve::Arguments),
     /// Runs a scene with the image.
+    #[cfg(feature = "scenes")]
     Sim(commands::sim::Arguments),
 }
 
 fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().command {
+        #[cfg(feature = "log")]
         Command::Run(arguments) => commands::run::run(&arguments).map_err(Into::into),
         Command::Demo(arguments) => commands::demo::run(&arguments).map_err(Into::into),
         Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "scenes")]
         Command::Sim(arguments) => return commands::sim::run(&arguments),
     };
     match result {

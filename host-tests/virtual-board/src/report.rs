@@ -1,7 +1,6 @@
 //! What a run has come to so far.
 
 use crate::error::Error;
-use crate::log::LogLine;
 use crate::measure::{BridgeEdge, Latency};
 use crate::rig::Rig;
 use rigless::device::ResetCause;
@@ -48,17 +47,6 @@ impl Rig {
         self.with(|stand| {
             let resets = stand.session.resets().iter();
             resets.map(|reset| Reset { at_ns: reset.at.0, cause: cause(reset.cause) }).collect()
-        })
-    }
-
-    /// The image's log so far.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn log(&mut self) -> Result<Vec<LogLine>, Error> {
-        self.with(|stand| {
-            stand.bench.log.drain(stand.bench.next_ns, stand.host);
-            stand.bench.log.lines.clone()
         })
     }
 }

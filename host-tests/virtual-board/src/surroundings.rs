@@ -40,7 +40,7 @@ impl Surroundings {
     /// The bridge does this from now on. The plant is told with each step.
     pub fn hold(&mut self, bridge: Bridge) {
         if let Self::Scene(finger) = self {
-            finger.bridge = bridge;
+            finger.hold(bridge);
         }
     }
 

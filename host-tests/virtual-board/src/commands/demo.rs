@@ -1,7 +1,8 @@
 //! `virtual-board demo`.
 
+use host_tests::demo::{figures, pictures, table};
 use std::path::PathBuf;
-use virtual_board::demo::{self, DemoError, Plan, pictures, table};
+use virtual_board::demo::{self, DemoError, Plan};
 
 /// What to show and where to put it.
 #[derive(Debug, clap::Args)]
@@ -24,8 +25,13 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
     println!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes);
-    print!("{}", table::table(&figures));
-    for path in pictures::draw(&run, &figures, &arguments.out)? {
+    print!("{}", table::table(&figures.checks, &figures.forces));
+    println!("\ntrace    {}", figures.trace_sha256);
+    if let Some(repeated) = &figures.repeated_trace_sha256 {
+        println!("repeated {repeated}");
+    }
+    println!("time     {:.1} s of virtual time in {:.1} s", figures.virtual_time_s, figures.wall_time_s);
+    for path in pictures::draw(&run.seen, &figures.forces, &arguments.out)? {
         println!("picture  {}", path.display());
     }
     if let Some(path) = &arguments.json {
@@ -34,7 +40,7 @@ pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
         written.map_err(|source| DemoError::Write { path: path.clone(), source })?;
         println!("figures  {}", path.display());
     }
-    match figures.missed() {
+    match figures::missed(&figures.checks) {
         0 => Ok(()),
         missed => Err(DemoError::Missed(missed)),
     }

@@ -1,7 +1,8 @@
 //! What is seen while it runs: a live heat map where there is a terminal, a line for each phase elsewhere.
 
 use super::bus::Poll;
-use super::script::{Phase, Watch};
+use super::play::Watch;
+use host_tests::demo::Phase;
 use host_tests::heatmap::{self, Pressures};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -50,11 +51,7 @@ impl Screen {
 
 impl Watch for Screen {
     fn phase(&mut self, at_ms: u64, phase: Phase) {
-        let what = match phase.goal_mn {
-            0 => "let go".to_owned(),
-            goal_mn => format!("hold {} N", f64::from(goal_mn) * 1e-3),
-        };
-        let line = format!("{:7.3} s  goal: {what}", at_ms as f64 * 1e-3);
+        let line = format!("{:7.3} s  goal: {}", at_ms as f64 * 1e-3, phase.what());
         match &self.bar {
             Some(bar) => bar.println(line),
             None => println!("{line}"),
@@ -81,7 +78,7 @@ fn picture(phase: Phase, poll: &Poll, pressures: &Pressures) -> String {
     let beside = [
         String::new(),
         format!("mode         {}", format!("{:?}", poll.mode).to_lowercase()),
-        format!("goal         {:6.3} N", f64::from(phase.goal_mn) * 1e-3),
+        format!("goal         {:6.3} N", phase.goal_n()),
         format!("force        {:6.3} N", poll.force_n),
         format!("indentation  {:6.3} mm", poll.indentation_mm),
         format!("radius       {:6.3} mm", poll.radius_mm),

@@ -1,19 +1,19 @@
 //! The figures as a table for the terminal.
 
-use super::figures::{Check, Figures};
+use super::{Check, Forces};
 use std::fmt::Write as _;
 
-/// All checks, a line each, and what they were measured on.
-pub fn table(figures: &Figures) -> String {
+/// All checks, a line each, and how near each step comes to what the motor can do.
+pub fn table(checks: &[Check], forces: &Forces) -> String {
     let mut text = format!("{:<44} {:>12} {:<5} {:>16}\n", "", "measured", "", "bound");
-    for check in &figures.checks {
+    for check in checks {
         let measured = check.measured.map_or_else(|| "never".to_owned(), number);
         let verdict = if check.pass { "pass" } else { "FAIL" };
         // A write to a string does not fail.
         let _ = writeln!(text, "{:<44} {measured:>12} {:<5} {:>16}  {verdict}", check.name, check.unit, bound(check));
     }
     let _ = writeln!(text);
-    for step in &figures.steps {
+    for step in &forces.steps {
         let _ = writeln!(
             text,
             "{:.1} to {:.1} N: the motor at its limits needs {:.1} ms; the loop took {} times as long",
@@ -23,12 +23,6 @@ pub fn table(figures: &Figures) -> String {
             step.settling_to_optimal_ratio.map_or_else(|| "for ever, not".to_owned(), |ratio| format!("{ratio:.2}")),
         );
     }
-    let _ = writeln!(text, "\ntrace    {}", figures.trace_sha256);
-    if let Some(repeated) = &figures.repeated_trace_sha256 {
-        let _ = writeln!(text, "repeated {repeated}");
-    }
-    let (virtual_s, wall_s) = (figures.virtual_time_s, figures.wall_time_s);
-    let _ = writeln!(text, "time     {virtual_s:.1} s of virtual time in {wall_s:.1} s");
     text
 }
 

@@ -1,11 +1,9 @@
 //! The demonstration's pictures.
 
-use super::DemoError;
-use super::figures::Figures;
-use super::script::Run;
-use host_tests::metrics::stretch;
-use host_tests::plant::Setup;
-use host_tests::plot::{self, Map, Panel};
+use super::{DemoError, Forces, Picture, Run};
+use crate::metrics::stretch;
+use crate::plant::Setup;
+use crate::plot::{self, Map, Panel};
 use std::path::{Path, PathBuf};
 
 /// How much of a step is shown before and after its goal.
@@ -16,7 +14,7 @@ const AFTER_MS: f64 = 60.0;
 ///
 /// # Errors
 /// A file cannot be written.
-pub fn draw(run: &Run, figures: &Figures, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
+pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
     let origin_s = run.span_s[0];
     let mut trace = run.trace.clone();
     for sample in &mut trace {
@@ -24,7 +22,7 @@ pub fn draw(run: &Run, figures: &Figures, folder: &Path) -> Result<Vec<PathBuf>,
     }
     let goals: Vec<_> = run.goals.iter().map(|(at_s, goal_n)| (at_s - origin_s, *goal_n)).collect();
 
-    let touched_s = goals.first().map_or(0.0, |(at_s, _)| *at_s) + figures.touch.touched_after_ms * 1e-3;
+    let touched_s = goals.first().map_or(0.0, |(at_s, _)| *at_s) + forces.touch.touched_after_ms * 1e-3;
     let window = |zero_s: f64| stretch(&trace, zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
     let panel = |title, zero_s, time_optimal_ms| Panel {
         title,
@@ -33,16 +31,16 @@ pub fn draw(run: &Run, figures: &Figures, folder: &Path) -> Result<Vec<PathBuf>,
         shown_ms: [BEFORE_MS, AFTER_MS],
         time_optimal_ms,
     };
-    let mut panels = vec![panel(format!("First touch, goal {} N", figures.touch.goal_n), touched_s, None)];
-    for (step, (at_s, _)) in figures.steps.iter().zip(goals.iter().skip(1)) {
+    let mut panels = vec![panel(format!("First touch, goal {} N", forces.touch.goal_n), touched_s, None)];
+    for (step, (at_s, _)) in forces.steps.iter().zip(goals.iter().skip(1)) {
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
         panels.push(panel(title, *at_s, Some(step.time_optimal_ms)));
     }
-    let map = |picture: &super::script::Picture| Map {
+    let map = |picture: &Picture| Map {
         title: format!("{} N", picture.goal_n),
         pressures_kpa: picture.pressures_kpa,
-        centre_mm: picture.poll.centre_mm,
-        radius_mm: picture.poll.radius_mm,
+        centre_mm: picture.centre_mm,
+        radius_mm: picture.radius_mm,
     };
     let mut maps: Vec<_> = run.pictures.iter().collect();
     maps.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));

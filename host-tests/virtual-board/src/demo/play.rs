@@ -1,4 +1,4 @@
-//! What the demonstration does: a client on the bus that asks for forces and watches.
+//! The script played on the board: a client on the bus asks for forces and watches.
 
 use super::DemoError;
 use super::bus::{ID, Poll, ask, poll, pressures, write_u8};
@@ -9,8 +9,8 @@ use crate::measure::Latency;
 use crate::recorder::Recorder;
 use fingertip::link::table::address;
 use fingertip::safety::{Limits, Mode};
+use host_tests::demo::{self, Phase, Picture};
 use host_tests::heatmap::Pressures;
-use host_tests::metrics::Sample;
 
 /// The scan, the tare and the guards have settled by then.
 const BOOT_MS: u64 = 20;
@@ -24,49 +24,17 @@ const POLLS_A_PICTURE: u64 = 5;
 const BYTE_NS: u64 = 10_000;
 /// Bytes of a Write of four.
 const GOAL_BYTES: u64 = 16;
-/// A goal and how long it stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Phase {
-    /// The force asked for.
-    pub goal_mn: i32,
-    /// How long.
-    pub hold_ms: u64,
-    /// Whether its pressures are kept for a map.
-    pub map: bool,
-}
-
-/// The phases, the first of them a touch.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Script(Vec<Phase>);
-
-/// The array at the end of a phase.
-#[derive(Clone, Copy, Debug)]
-pub struct Picture {
-    /// The phase's goal.
-    pub goal_n: f64,
-    /// What the board said.
-    pub poll: Poll,
-    /// Pressures, kPa.
-    pub pressures_kpa: Pressures,
-}
-
 /// What came of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// When each phase's goal had reached the board, and the goal.
-    pub goals: Vec<(f64, f64)>,
+    /// The goals, the world and the pressure maps.
+    pub seen: demo::Run,
     /// All polls.
     pub polls: Vec<Poll>,
-    /// Pressure maps.
-    pub pictures: Vec<Picture>,
-    /// When torque was enabled and when it ended.
-    pub span_s: [f64; 2],
     /// The frames scanned at these times.
     pub scans: [ScanCounts; 2],
     /// The instructions executed by these times.
     pub instructions: [u64; 2],
-    /// The world; from the run's last part only where a snapshot cut it.
-    pub trace: Vec<Sample>,
     /// From conversion to duty.
     pub latency: Latency,
     /// The longest loop time, by the board's own measure.
@@ -85,45 +53,12 @@ pub trait Watch {
     fn news(&mut self, at_ms: u64, phase: Phase, poll: &Poll, pressures: Option<&Pressures>);
 }
 
-impl Script {
-    /// 10 s: touch, steps, release.
-    pub fn whole() -> Self {
-        let phase = |goal_mn, hold_ms, map| Phase { goal_mn, hold_ms, map };
-        Self(vec![
-            phase(1_000, 2_000, true),
-            phase(200, 1_500, false),
-            phase(2_000, 2_000, true),
-            phase(5_000, 2_000, true),
-            phase(1_000, 1_500, false),
-            phase(0, 1_000, false),
-        ])
-    }
-
-    /// The same goals, held for 250 ms; 500 ms for the touch.
-    pub fn quick() -> Self {
-        let Self(mut phases) = Self::whole();
-        for phase in &mut phases {
-            phase.hold_ms = 250;
-        }
-        phases[0].hold_ms = 500;
-        Self(phases)
-    }
-
-    /// How many phases it has.
-    pub fn phases(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Virtual time that its phases take.
-    pub fn length_ms(&self) -> u64 {
-        self.0.iter().map(|phase| phase.hold_ms).sum()
-    }
-
+impl Run {
     /// Boots, pings, tares and enables torque.
     ///
     /// # Errors
     /// The board does not answer, or not as it should.
-    pub fn begin(&self, rig: &mut Rig, _watch: &mut dyn Watch) -> Result<Run, DemoError> {
+    pub fn begin(rig: &mut Rig) -> Result<Self, DemoError> {
         rig.run_until_ns(BOOT_MS * 1_000_000)?;
         if let Some(reset) = rig.resets()?.first() {
             let (at_ms, cause) = (reset.at_ns as f64 * 1e-6, &reset.cause);
@@ -153,19 +88,20 @@ impl Script {
         })?;
         let now_s = rig.now_ns() as f64 * 1e-9;
         let instructions = [rig.instructions()?; 2];
-        Ok(Run { span_s: [now_s; 2], scans: [scans; 2], instructions, ..Run::default() })
+        let seen = demo::Run { span_s: [now_s; 2], ..demo::Run::default() };
+        Ok(Self { seen, scans: [scans; 2], instructions, ..Self::default() })
     }
 
     /// Plays one phase: writes its goal, then asks now and then how it goes.
     ///
     /// # Errors
     /// The board does not answer, or stopped with a fault.
-    pub fn play(&self, place: usize, rig: &mut Rig, run: &mut Run, watch: &mut dyn Watch) -> Result<(), DemoError> {
-        let phase = self.0[place];
+    pub fn play(&mut self, phase: Phase, rig: &mut Rig, watch: &mut dyn Watch) -> Result<(), DemoError> {
         let start_ns = rig.now_ns();
-        let at_ms = |rig: &Rig| (rig.now_ns() - (run.span_s[0] * 1e9).round() as u64) / 1_000_000;
+        let begun_ns = (self.seen.span_s[0] * 1e9).round() as u64;
+        let at_ms = |rig: &Rig| (rig.now_ns() - begun_ns) / 1_000_000;
         watch.phase(at_ms(rig), phase);
-        run.goals.push(((start_ns + GOAL_BYTES * BYTE_NS) as f64 * 1e-9, f64::from(phase.goal_mn) * 1e-3));
+        self.seen.goals.push(((start_ns + GOAL_BYTES * BYTE_NS) as f64 * 1e-9, phase.goal_n()));
         let goal = phase.goal_mn as u32;
         ask(rig, "goal force", move |bus| bus.write_u32(ID, address::GOAL_FORCE_MN, goal).map(drop))?;
         for tick in 1..=phase.hold_ms / POLL_MS {
@@ -174,9 +110,11 @@ impl Script {
             let pressures = if last || tick % POLLS_A_PICTURE == 0 { Some(pressures(rig)?) } else { None };
             watch.news(at_ms(rig), phase, &poll, pressures.as_ref());
             if let Some(pressures_kpa) = pressures.filter(|_| last && phase.map) {
-                run.pictures.push(Picture { goal_n: f64::from(phase.goal_mn) * 1e-3, poll, pressures_kpa });
+                let Poll { force_n, centre_mm, radius_mm, .. } = poll;
+                let picture = Picture { goal_n: phase.goal_n(), force_n, centre_mm, radius_mm, pressures_kpa };
+                self.seen.pictures.push(picture);
             }
-            run.polls.push(poll);
+            self.polls.push(poll);
             if poll.fault != 0 {
                 return Err(DemoError::Unexpected(format!("the board stopped with fault {}: {poll:?}", poll.fault)));
             }
@@ -189,32 +127,32 @@ impl Script {
     ///
     /// # Errors
     /// The board does not answer.
-    pub fn end(&self, rig: &mut Rig, run: &mut Run) -> Result<(), DemoError> {
-        run.span_s[1] = rig.now_ns() as f64 * 1e-9;
-        run.scans[1] = rig.scan_counts()?;
-        run.instructions[1] = rig.instructions()?;
-        run.loop_time_max_us = ask(rig, "loop time", |bus| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?.data;
-        run.latency = rig.latency()?;
-        run.gaps = rig.gaps()?;
-        run.trace_hash = rig.trace_hash()?;
+    pub fn end(&mut self, rig: &mut Rig) -> Result<(), DemoError> {
+        self.seen.span_s[1] = rig.now_ns() as f64 * 1e-9;
+        self.scans[1] = rig.scan_counts()?;
+        self.instructions[1] = rig.instructions()?;
+        self.loop_time_max_us = ask(rig, "loop time", |bus| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?.data;
+        self.latency = rig.latency()?;
+        self.gaps = rig.gaps()?;
+        self.trace_hash = rig.trace_hash()?;
         let recorder = rig.with(|stand| stand.bench.recorder.take())?;
-        run.trace = recorder.map(|recorder| recorder.samples).unwrap_or_default();
-        fill_in(run);
+        self.seen.trace = recorder.map(|recorder| recorder.samples).unwrap_or_default();
+        self.fill_in();
         Ok(())
     }
-}
 
-/// Puts what the client knows into the trace: the goal, and the mode and the force that it read last.
-fn fill_in(run: &mut Run) {
-    let (mut goals, mut polls) = (run.goals.iter().peekable(), run.polls.iter().peekable());
-    let (mut goal_n, mut known) = (0.0, Poll::default());
-    for sample in &mut run.trace {
-        while let Some((_, next_n)) = goals.next_if(|(at_s, _)| *at_s <= sample.time_s) {
-            goal_n = *next_n;
+    /// Puts what the client knows into the trace: the goal, and the mode and the force that it read last.
+    fn fill_in(&mut self) {
+        let (mut goals, mut polls) = (self.seen.goals.iter().peekable(), self.polls.iter().peekable());
+        let (mut goal_n, mut known) = (0.0, Poll::default());
+        for sample in &mut self.seen.trace {
+            while let Some((_, next_n)) = goals.next_if(|(at_s, _)| *at_s <= sample.time_s) {
+                goal_n = *next_n;
+            }
+            while let Some(poll) = polls.next_if(|poll| poll.at_s <= sample.time_s) {
+                known = *poll;
+            }
+            (sample.goal_n, sample.sensed_force_n, sample.mode) = (goal_n, known.force_n, known.mode);
         }
-        while let Some(poll) = polls.next_if(|poll| poll.at_s <= sample.time_s) {
-            known = *poll;
-        }
-        (sample.goal_n, sample.sensed_force_n, sample.mode) = (goal_n, known.force_n, known.mode);
     }
 }

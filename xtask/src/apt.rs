@@ -1,11 +1,17 @@
 //! Debian packages, installed where they are missing.
+//!
+//! Package lists and downloads are kept in the build folder, so apt's own lists, caches and sources stay as they are.
 
 use crate::{console::Console, paths};
 use anyhow::{Context, Result, bail};
-use std::{fs, process::Command};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
-/// Where backports come from, and the key that signs them.
-const MIRROR: &str = "http://deb.debian.org/debian";
+/// Where backports come from where apt does not say, and the key that signs them.
+const MIRROR: &str = "http://deb.debian.org/debian/";
 const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
 /// Makes sure of Debian packages.
@@ -25,12 +31,10 @@ pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         bail!("{why} needs the Debian packages `{list}`: run `sudo apt-get install {list}` and try again");
     }
     console.say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
-    if install(&missing, console).is_ok() {
-        return Ok(());
-    }
-    console.say("apt-get may know old package lists only: updating them.");
-    console.run(Command::new("apt-get").args(["update", "-qq"]))?;
-    install(&missing, console)
+    let apt = Apt::new(None)?;
+    console.run(&mut apt.command("update"))?;
+    console
+        .run(apt.command("install").args(&missing))
         .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
 }
 
@@ -39,19 +43,8 @@ pub fn all_installed(packages: &[&str]) -> bool {
     packages.iter().all(|package| installed(package))
 }
 
-fn install(packages: &[&str], console: &mut Console) -> Result<()> {
-    console.run(install_command().args(packages))
-}
-
-/// Waits for another installation under way.
-fn install_command() -> Command {
-    let mut command = Command::new("apt-get");
-    command.env("DEBIAN_FRONTEND", "noninteractive");
-    command.args(["install", "-qq", "-y", "--no-install-recommends", "-o", "DPkg::Lock::Timeout=600"]);
-    command
-}
-
-/// Installs the newest version of packages that Debian has for this release, its backports included.
+/// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a source of this
+/// call alone: apt does not know of them afterwards.
 ///
 /// # Errors
 /// No Debian, no root, or apt-get cannot get them: says what to install by hand.
@@ -68,19 +61,73 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         bail!("{why} needs a newer version of `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
     }
     console.say(&format!(
-        "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it."
+        "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
+         Apt's sources stay as they are."
     ));
-    let known = Command::new("apt-cache").arg("policy").output();
-    if !known.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).contains(&suite)) {
-        let file = format!("/etc/apt/sources.list.d/{suite}.list");
-        let line = format!("deb [signed-by={KEYRING}] {MIRROR} {suite} main\n");
-        fs::write(&file, line).with_context(|| format!("cannot write {file}"))?;
-        console.say(&format!("Added {suite} to apt's sources, in {file}."));
-    }
-    console.run(Command::new("apt-get").args(["update", "-qq"]))?;
+    let apt = Apt::new(Some(&suite))?;
+    console.run(&mut apt.command("update"))?;
     console
-        .run(install_command().args(["-t", &suite]).args(packages))
+        .run(apt.command("install").args(["-t", &suite]).args(packages))
         .with_context(|| format!("apt-get cannot install `{list}` from {suite}, which {why} needs"))
+}
+
+/// apt-get with lists, downloads and, where a suite is added, sources of its own.
+struct Apt {
+    folder: PathBuf,
+    sources: Option<PathBuf>,
+}
+
+impl Apt {
+    fn new(suite: Option<&str>) -> Result<Self> {
+        let folder = paths::target().join("apt");
+        for part in ["lists/partial", "cache/archives/partial"] {
+            fs::create_dir_all(folder.join(part)).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
+        }
+        let sources = suite.map(|suite| {
+            let file = folder.join(format!("{suite}.list"));
+            // It stands in for the system's own list, which it repeats.
+            let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
+            let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
+            fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", paths::shown(&file)))?;
+            anyhow::Ok(file)
+        });
+        Ok(Self { folder, sources: sources.transpose()? })
+    }
+
+    fn command(&self, subcommand: &str) -> Command {
+        let mut command = Command::new("apt-get");
+        command.env("DEBIAN_FRONTEND", "noninteractive").arg(subcommand).arg("-qq");
+        let mut option = |name: &str, value: &Path| {
+            command.arg("-o").arg(format!("{name}={}", value.display()));
+        };
+        option("Dir::State::Lists", &self.folder.join("lists"));
+        option("Dir::Cache", &self.folder.join("cache"));
+        if let Some(file) = &self.sources {
+            option("Dir::Etc::SourceList", file);
+        }
+        // Downloads go to a folder that apt's own user may not see.
+        command.args(["-o", "APT::Sandbox::User=root"]);
+        if subcommand == "install" {
+            // Waits for another installation under way.
+            command.args(["-y", "--no-install-recommends", "-o", "DPkg::Lock::Timeout=600"]);
+        }
+        command
+    }
+}
+
+/// The mirror that apt takes this release from.
+fn mirror() -> String {
+    let format = "$(CREATED_BY) $(RELEASE) $(REPO_URI)";
+    let targets = Command::new("apt-get").args(["indextargets", "--format", format]).output();
+    let text = targets.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
+    let mut lines = text.lines().filter_map(|line| line.strip_prefix("Packages "));
+    let found = lines.find_map(|line| line.rsplit_once(' ').filter(|(release, uri)| is_main(release, uri)));
+    found.map_or_else(|| MIRROR.into(), |(_, uri)| uri.into())
+}
+
+/// Whether this is the archive itself: not its security updates, nor somebody else's.
+fn is_main(release: &str, uri: &str) -> bool {
+    uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
 
 fn installed(package: &str) -> bool {
@@ -90,4 +137,16 @@ fn installed(package: &str) -> bool {
 
 fn is_root() -> bool {
     Command::new("id").arg("-u").output().is_ok_and(|output| output.stdout.trim_ascii() == b"0")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_main;
+
+    #[test]
+    fn backports_come_from_where_the_release_comes_from() {
+        assert!(is_main("bookworm", "http://mirror.example/debian/"));
+        assert!(!is_main("bookworm-security", "http://mirror.example/debian/"));
+        assert!(!is_main("nodistro", "https://deb.nodesource.com/node_20.x/"));
+    }
 }

@@ -1,33 +1,43 @@
 //! Running programs and saying what goes on: straight to the terminal, or captured for a stage of the tests.
 
-use crate::paths;
+use crate::{
+    paths,
+    progress::{Progress, Slow},
+};
 use anyhow::{Context, Result, bail};
 use std::{
     env,
     ffi::OsStr,
     fmt::Write as _,
-    io::{self, BufRead, BufReader, IsTerminal, Read, Write as _},
-    process::{Command, Stdio},
+    fs,
+    io::{self, BufReader, IsTerminal, Read, Write as _},
+    process::{Child, Command, Stdio},
     sync::mpsc,
     thread,
-    time::Instant,
 };
 
 /// Where programs write to.
 pub struct Console {
     /// What the programs of a stage wrote so far; `None` writes straight to the terminal.
     captured: Option<String>,
+    /// CPU time that went into compiling.
+    built_s: f64,
 }
 
 impl Console {
     /// Programs write to the terminal.
     pub fn terminal() -> Self {
-        Self { captured: None }
+        Self { captured: None, built_s: 0.0 }
+    }
+
+    /// Programs are heard, and shown where something fails.
+    pub fn captured() -> Self {
+        Self { captured: Some(String::new()), built_s: 0.0 }
     }
 
     /// A line for the user.
     pub fn say(&self, text: &str) {
-        clear_progress();
+        clear_line();
         for line in text.lines() {
             println!("{}{line}", if self.captured.is_some() { "    " } else { "" });
         }
@@ -52,22 +62,43 @@ impl Console {
             .stderr(Stdio::piped())
             .spawn()
             .with_context(|| missing(command))?;
-        let (sender, lines) = mpsc::channel();
-        for stream in [child.stdout.take().map(boxed), child.stderr.take().map(boxed)].into_iter().flatten() {
-            let sender = sender.clone();
-            thread::spawn(move || {
-                for line in BufReader::new(stream).split(b'\n').map_while(io::Result::ok) {
-                    let _ = sender.send(String::from_utf8_lossy(&line).into_owned());
-                }
-            });
-        }
-        drop(sender);
-        for line in lines {
-            show_progress(&line);
+        for Line { text: line, .. } in lines(&mut child) {
+            show_line(&line);
             let _ = writeln!(text, "{line}");
         }
         let status = child.wait()?;
-        clear_progress();
+        clear_line();
+        if status.success() { Ok(()) } else { bail!("{status}: {shown}") }
+    }
+
+    /// Runs a command of cargo's that only compiles, and shows how far it is. What cargo says is shown where it fails.
+    ///
+    /// # Errors
+    /// It does not compile.
+    pub fn build(&mut self, command: &mut Command, what: &str, slow: Slow) -> Result<()> {
+        let before_s = cpu_s();
+        let shown = show(command);
+        command.args(["--message-format", "json-render-diagnostics"]).current_dir(paths::root());
+        command.env("CARGO_TERM_PROGRESS_WHEN", "always").env("CARGO_TERM_PROGRESS_WIDTH", "400");
+        let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let mut child = child.with_context(|| missing(command))?;
+        let mut progress = Progress::new(what, slow);
+        let mut said = format!("$ {shown}\n");
+        for Line { text, error } in lines(&mut child) {
+            if !error {
+                progress.done(&text);
+            } else if !progress.hear(&text) {
+                let _ = writeln!(said, "{text}");
+            }
+        }
+        let status = child.wait()?;
+        progress.finish();
+        self.built_s += cpu_s() - before_s;
+        match &mut self.captured {
+            Some(captured) => captured.push_str(&said),
+            None if !status.success() => eprint!("{said}"),
+            None => {}
+        }
         if status.success() { Ok(()) } else { bail!("{status}: {shown}") }
     }
 
@@ -89,13 +120,56 @@ impl Console {
     }
 
     /// What the programs of a stage wrote so far.
-    pub fn captured(&self) -> &str {
+    pub fn text(&self) -> &str {
         self.captured.as_deref().unwrap_or_default()
+    }
+
+    /// CPU time that went into compiling.
+    pub fn built_s(&self) -> f64 {
+        self.built_s
     }
 }
 
-fn boxed(stream: impl Read + Send + 'static) -> Box<dyn Read + Send> {
-    Box::new(stream)
+/// A line of a program's.
+struct Line {
+    text: String,
+    /// From its standard error.
+    error: bool,
+}
+
+/// What a program writes, until it closes both of its streams.
+fn lines(child: &mut Child) -> mpsc::Receiver<Line> {
+    let (sender, lines) = mpsc::channel();
+    let output = child.stdout.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>);
+    let errors = child.stderr.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>);
+    for (stream, error) in [(output, false), (errors, true)] {
+        let Some(stream) = stream else { continue };
+        let sender = sender.clone();
+        thread::spawn(move || {
+            let mut stream = BufReader::new(stream);
+            let mut line = Vec::new();
+            while let Some(byte) = stream.by_ref().bytes().next().and_then(io::Result::ok) {
+                // Cargo ends its bar of progress with a carriage return.
+                match byte {
+                    b'\n' | b'\r' => {
+                        let text = String::from_utf8_lossy(&line).into_owned();
+                        line.clear();
+                        let _ = sender.send(Line { text, error });
+                    }
+                    _ => line.push(byte),
+                }
+            }
+        });
+    }
+    lines
+}
+
+/// CPU time of all programs that were run to their end, s; 0 where the system does not tell.
+pub fn cpu_s() -> f64 {
+    // The clock of these counts ticks a hundred times a second on every Linux.
+    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit(')').next().unwrap_or_default().split_whitespace();
+    fields.skip(13).take(2).filter_map(|ticks| ticks.parse::<f64>().ok()).sum::<f64>() / 100.0
 }
 
 /// What a program writes to its standard output; its errors go to the terminal.
@@ -133,7 +207,7 @@ fn missing(command: &Command) -> String {
     format!("cannot start {}; looked in PATH={path}", command.get_program().to_string_lossy())
 }
 
-fn show_progress(line: &str) {
+fn show_line(line: &str) {
     if io::stdout().is_terminal() {
         let short: String = line.chars().filter(|letter| !letter.is_control()).take(76).collect();
         print!("\r\x1b[2K    {short}");
@@ -141,71 +215,10 @@ fn show_progress(line: &str) {
     }
 }
 
-fn clear_progress() {
+/// Takes the line of progress away.
+pub fn clear_line() {
     if io::stdout().is_terminal() {
         print!("\r\x1b[2K");
         let _ = io::stdout().flush();
     }
-}
-
-/// A sequence of checks, each a line with its duration; what failed is shown in full.
-#[derive(Default)]
-pub struct Stages {
-    failed: Vec<String>,
-}
-
-impl Stages {
-    /// Runs a stage; `None` where it failed.
-    ///
-    /// Stages do not depend on each other's order: a stage that lacks what an earlier one failed to make fails too.
-    pub fn stage<T>(&mut self, name: &str, work: impl FnOnce(&mut Console) -> Result<T>) -> Option<T> {
-        println!("{name} ...");
-        let mut console = Console { captured: Some(String::new()) };
-        let start = Instant::now();
-        let result = work(&mut console);
-        let seconds = start.elapsed().as_secs_f64();
-        clear_progress();
-        match result {
-            Ok(value) => {
-                for line in closing_lines(console.captured()) {
-                    println!("    {line}");
-                }
-                println!("ok     {seconds:7.1} s  {name}");
-                Some(value)
-            }
-            Err(error) => {
-                println!("{}", console.captured());
-                // Again at the end, where one looks first.
-                for line in console.captured().lines().filter(|line| is_failed_test(line)) {
-                    println!("    {line}");
-                }
-                println!("{error:#}");
-                println!("FAILED {seconds:7.1} s  {name}");
-                self.failed.push(name.into());
-                None
-            }
-        }
-    }
-
-    /// The verdict.
-    ///
-    /// # Errors
-    /// Names the stages that failed.
-    pub fn finish(self, what: &str) -> Result<()> {
-        if !self.failed.is_empty() {
-            bail!("{} failed: {}", what, self.failed.join("; "));
-        }
-        println!("{what}: all passed");
-        Ok(())
-    }
-}
-
-/// Cargo's line of a test that failed.
-fn is_failed_test(line: &str) -> bool {
-    line.starts_with("test ") && line.ends_with(" ... FAILED")
-}
-
-/// Cargo's closing line of each test binary that ran a test.
-fn closing_lines(text: &str) -> impl Iterator<Item = &str> {
-    text.lines().filter(|line| line.starts_with("test result:") && !line.contains(" 0 passed; 0 failed; 0 ignored"))
 }

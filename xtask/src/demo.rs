@@ -1,12 +1,8 @@
 //! The demonstration: the flash image on the virtual board.
 
-use crate::{
-    console::{self, Console},
-    image,
-    toolchain::Choice,
-};
+use crate::{console::Console, host, image, paths, toolchain::Choice};
 use anyhow::Result;
-use std::{path::PathBuf, process::Command};
+use std::path::PathBuf;
 
 /// Flags of `cargo xtask demo`.
 #[derive(clap::Args)]
@@ -35,15 +31,18 @@ pub struct Args {
     pty: Option<PathBuf>,
 }
 
-/// Builds the flash image and runs it on the virtual board.
+/// Shows the demonstration on the native core, which is built soon, then on the flash image.
 ///
 /// # Errors
-/// The image does not build, or the demonstration misses what it must show.
+/// Something does not build, or the demonstration misses what it must show.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    if !args.serve {
+        native(args, console)?;
+    }
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
-    let mut command = virtual_board("run");
-    command.arg("--").arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
+    let mut command = host::BOARD.build(console)?;
+    command.arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
     for (flag, value) in [("--json", &args.json), ("--out", &args.out), ("--pty", &args.pty)] {
         if let Some(path) = value {
             command.arg(flag).arg(std::path::absolute(path)?);
@@ -52,17 +51,16 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     if let Some(port) = args.tcp {
         command.arg("--tcp").arg(port.to_string());
     }
-    if args.quick {
-        command.arg("--quick");
-    }
+    command.args(args.quick.then_some("--quick"));
     console.run(&mut command)
 }
 
-/// `cargo <subcommand>` for the virtual board.
-///
-/// The emulator's crate asks for a newer compiler than it needs.
-pub fn virtual_board(subcommand: &str) -> Command {
-    let mut command = console::cargo(subcommand);
-    command.args(["--profile", "host", "--package", "virtual-board", "--ignore-rust-version"]);
-    command
+/// The same script on the core compiled for this machine: something to look at while the emulator compiles.
+fn native(args: &Args, console: &mut Console) -> Result<()> {
+    let mut command = host::NATIVE_DEMO.build(console)?;
+    console.say("First on the native core: the same script and plant, no microcontroller in between.");
+    let out = paths::target().join("demo").join("native");
+    console.run(command.arg("--out").arg(&out).args(args.quick.then_some("--quick")))?;
+    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     console::{self, Console},
-    demo, figures, image, paths,
+    figures, host, image, paths,
     toolchain::Choice,
 };
 use anyhow::{Context, Result, bail};
@@ -56,8 +56,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     };
     fs::create_dir_all(&pictures).with_context(|| format!("cannot make {}", paths::shown(&pictures)))?;
     let image = image::firmware(choice, console)?;
-    let mut command = demo::virtual_board("run");
-    command.args(["--", "demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
+    let mut command = host::BOARD.build(console)?;
+    command.args(["demo", "--image"]).arg(&image.elf).arg("--json").arg(&json).arg("--out").arg(&pictures);
     console.run(&mut command)?;
     renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
 

@@ -1,9 +1,6 @@
 //! The paper's figures, drawn from the core.
 
-use crate::{
-    console::{self, Console},
-    docs, paths,
-};
+use crate::{console::Console, docs, host::Program, paths};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +27,6 @@ pub fn run(args: &Args, console: &mut Console) -> Result<()> {
 /// # Errors
 /// The folder cannot be written.
 pub fn draw(folder: &Path, console: &mut Console) -> Result<()> {
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--package", "host-tests", "--bin", "figures", "--"]);
+    let mut command = Program::tool("figures").build(console)?;
     console.run(command.arg(folder))
 }

@@ -1,6 +1,6 @@
 //! The fit of the contact, judged on many pictures.
 
-use crate::console::{self, Console};
+use crate::{console::Console, host::Program};
 use anyhow::Result;
 
 /// Flags of `cargo xtask fit`.
@@ -26,8 +26,7 @@ pub struct Args {
 /// # Errors
 /// The tables are stale, or the page lacks their place.
 pub fn run(args: &Args, console: &mut Console) -> Result<()> {
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--profile", "host", "--package", "host-tests", "--bin", "fit", "--"]);
+    let mut command = Program::tool("fit").build(console)?;
     if let Some(cases) = args.cases {
         command.args(["--cases", &cases.to_string()]);
     }

@@ -3,6 +3,7 @@
 use crate::{
     console::Console,
     paths,
+    progress::IMAGE,
     toolchain::{self, Choice, Toolchain},
 };
 use anyhow::{Context, Result, bail};
@@ -103,7 +104,7 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
 /// # Errors
 /// It does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
-    console.run(&mut build_command(toolchain, name, feature))?;
+    console.build(&mut build_command(toolchain, name, feature), &format!("the image {name}"), IMAGE)?;
     Ok(toolchain.images().join(name))
 }
 

@@ -1,8 +1,9 @@
 //! Format, lints, documentation and licences.
 
 use crate::{
-    console::{self, Console, Stages},
+    console::{self, Console},
     paths,
+    stages::Stages,
     toolchain::{self, Choice, TARGET, Toolchain},
 };
 use anyhow::{Context, Result, ensure};

@@ -1,8 +1,7 @@
 //! The contact model: on the command line, and proven.
 
-use crate::console::{self, Console};
+use crate::{console::Console, host::Program};
 use anyhow::Result;
-use std::process::Command;
 
 /// Flags of `cargo xtask prove`.
 #[derive(clap::Args)]
@@ -24,7 +23,8 @@ pub struct Args {
 /// # Errors
 /// A row is outside the domain, or the input is no table.
 pub fn answer(console: &mut Console) -> Result<()> {
-    console.run(&mut tool("model"))
+    let mut command = Program::tool("model").build(console)?;
+    console.run(&mut command)
 }
 
 /// Proves the model's error bounds: some minutes on two cores.
@@ -33,11 +33,6 @@ pub fn answer(console: &mut Console) -> Result<()> {
 /// A bound does not hold, or the figures in the documentation are stale.
 pub fn prove(args: &Args, console: &mut Console) -> Result<()> {
     let flags = [(args.quick, "--quick"), (args.write, "--write"), (args.check, "--check")];
-    console.run(tool("prove").args(flags.into_iter().filter_map(|(set, flag)| set.then_some(flag))))
-}
-
-fn tool(name: &str) -> Command {
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--profile", "host", "--package", "host-tests", "--bin", name, "--"]);
-    command
+    let mut command = Program::tool("prove").build(console)?;
+    console.run(command.args(flags.into_iter().filter_map(|(set, flag)| set.then_some(flag))))
 }

@@ -3,16 +3,26 @@
 use std::{
     env,
     path::{Path, PathBuf},
+    sync::OnceLock,
 };
 
-/// The repository's root.
+/// The repository's root, wherever it lies now: as cargo says, or else around the folder that the user is in.
 pub fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."))
+    static ROOT: OnceLock<PathBuf> = OnceLock::new();
+    ROOT.get_or_init(|| {
+        let package = env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from);
+        let here = env::current_dir().unwrap_or_default();
+        let around = here.ancestors().find(|folder| folder.join("xtask").join("Cargo.toml").is_file());
+        let root = package.as_deref().and_then(Path::parent).or(around);
+        root.unwrap_or(Path::new(".")).to_path_buf()
+    })
 }
 
 /// Cargo's build folder; everything that the commands write or install lies in it.
 pub fn target() -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+    let named = env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
+    // The commands run in the root; the user may be elsewhere.
+    named.and_then(|folder| std::path::absolute(folder).ok()).unwrap_or_else(|| root().join("target"))
 }
 
 /// A path as the user would type it: relative to the root where it lies below.

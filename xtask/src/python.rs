@@ -25,7 +25,15 @@ pub fn ensure(console: &mut Console) -> Result<PathBuf> {
         ensure!(output.status.success(), "python3 -m venv: {}", String::from_utf8_lossy(&output.stderr));
     }
     console
-        .run(Command::new(&python).args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", PACKAGE]))
+        .run(Command::new(&python).args([
+            "-m",
+            "pip",
+            "install",
+            "--quiet",
+            "--no-cache-dir",
+            "--disable-pip-version-check",
+            PACKAGE,
+        ]))
         .with_context(|| format!("pip cannot install {PACKAGE}: is a package index in reach?"))?;
     ensure!(has_package(&python), "{PACKAGE} is installed in {}, but does not import", paths::shown(&folder));
     Ok(python)

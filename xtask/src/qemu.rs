@@ -3,11 +3,12 @@
 use crate::{
     apt,
     console::{self, Console},
+    host::{self, Program},
     image, paths,
     toolchain::{self, Choice},
 };
 use anyhow::Result;
-use std::{path::PathBuf, process::Command};
+use std::path::PathBuf;
 
 const PROGRAM: &str = "qemu-system-arm";
 
@@ -26,15 +27,10 @@ pub struct Args {
 /// The image does not build, fails, hangs, or differs from the host.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
-    let mut replay = tool("qemu-host");
+    let [mut replay, mut same_bits] =
+        [Program::tool("qemu-host").build(console)?, Program::tool("same-bits").build(console)?];
     console.run(replay.arg(&image).arg(paths::target().join("stimulus")).args(&args.inject))?;
-    console.run(tool("same-bits").arg(&image))
-}
-
-fn tool(name: &str) -> Command {
-    let mut command = console::cargo("run");
-    command.args(["--package", "host-tests", "--bin", name, "--"]);
-    command
+    console.run(same_bits.arg(&image))
 }
 
 /// Runs the tests that need the emulator.
@@ -45,7 +41,7 @@ pub fn test(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
     let mut command = console::cargo("test");
     command.args(["--package", "host-tests", "--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
-    console.run(&mut command)
+    host::test(&mut command, console)
 }
 
 /// Makes sure of the emulator.

@@ -2,7 +2,7 @@
 
 use crate::{
     console::{self, Console},
-    demo, image, paths,
+    host, image,
     toolchain::Choice,
 };
 use anyhow::{Context, Result};
@@ -22,13 +22,11 @@ pub struct Args {
 /// The board does not build. Where a scene breaks its bounds, this process ends as the board's does.
 pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     if !wants_image(&args.arguments) {
-        return run("sim", &args.arguments, console);
+        return start(host::Program::sim("sim").build(console)?.args(&args.arguments));
     }
     let image = image::firmware(choice, console)?;
-    console.run(demo::virtual_board("build").arg("--quiet"))?;
-    let elf = std::path::absolute(&image.elf)?.display().to_string();
-    let arguments = [&["sim".into(), "--image".into(), elf], args.arguments.as_slice()].concat();
-    start("virtual-board", &arguments)
+    let mut command = host::SCENE_BOARD.build(console)?;
+    start(command.arg("sim").arg("--image").arg(std::path::absolute(&image.elf)?).args(&args.arguments))
 }
 
 /// Runs a sweep, on the native board.
@@ -36,7 +34,7 @@ pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 /// # Errors
 /// As [`sim`].
 pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
-    run("sweep", &args.arguments, console)
+    start(host::Program::sim("sweep").build(console)?.args(&args.arguments))
 }
 
 /// Whether a board is asked for that runs the flash image.
@@ -47,25 +45,9 @@ fn wants_image(arguments: &[String]) -> bool {
     pair || joined.any(|board| boards.contains(&board))
 }
 
-/// Builds a program of the package and starts it.
-fn run(program: &str, arguments: &[String], console: &mut Console) -> Result<()> {
-    console.run(console::cargo("build").args([
-        "--quiet",
-        "--profile",
-        "host",
-        "--package",
-        "sim",
-        "--bin",
-        program,
-    ]))?;
-    start(program, arguments)
-}
-
 /// Runs a program where the user is; this process ends as it does.
-fn start(program: &str, arguments: &[String]) -> Result<()> {
-    let path = paths::target().join("host").join(program);
-    let status = Command::new(&path).args(arguments).status();
-    let status = status.with_context(|| format!("cannot start {}", paths::shown(&path)))?;
+fn start(command: &mut Command) -> Result<()> {
+    let status = command.status().with_context(|| format!("cannot start {}", console::show(command)))?;
     if !status.success() {
         exit(status.code().unwrap_or(2));
     }

@@ -1,8 +1,11 @@
 //! What accuracy costs in time: every variant of every kernel on the emulated Cortex-M4F, judged on this machine.
 
 use crate::{
-    console::{self, Console},
-    image, paths, timing,
+    console::Console,
+    host::Program,
+    image, paths,
+    progress::IMAGE,
+    timing,
     toolchain::{self, Choice, Toolchain},
 };
 use anyhow::{Context, Result};
@@ -10,7 +13,6 @@ use std::{
     fmt::Write as _,
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 /// The image and its feature.
@@ -44,11 +46,13 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
     let folder = fs::canonicalize(&folder).with_context(|| paths::shown(&folder))?;
     let inputs = folder.join("inputs.bin");
-    console.run(judge().arg("inputs").arg(&inputs))?;
+    let judge = Program::tool("study");
+    let mut command = judge.build(console)?;
+    console.run(command.arg("inputs").arg(&inputs))?;
     let shipped = image::build(toolchain, NAME, NAME, console)?;
     let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
     let quick = measured(&build_quick(toolchain, console)?, &inputs, &folder.join("quick.txt"), console)?;
-    let mut command = judge();
+    let mut command = judge.build(console)?;
     command.arg("report").arg(&shipped).arg(&quick).args(args.check.then_some("--check"));
     for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
         if let Some(path) = path {
@@ -63,7 +67,7 @@ fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let mut command = toolchain.cargo("build");
     command.args(["--profile", PROFILE, "--package", "fingertip", "--bin", NAME, "--features", NAME]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
-    console.run(command.env("RUSTFLAGS", "-C opt-level=3"))?;
+    console.build(command.env("RUSTFLAGS", "-C opt-level=3"), "the study, as quick as can be", IMAGE)?;
     Ok(toolchain.images().with_file_name(PROFILE).join(NAME))
 }
 
@@ -81,10 +85,4 @@ fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> 
     }
     fs::write(file, text).with_context(|| format!("cannot write {}", paths::shown(file)))?;
     Ok(file.into())
-}
-
-fn judge() -> Command {
-    let mut command = console::cargo("run");
-    command.args(["--quiet", "--profile", "host", "--package", "host-tests", "--bin", "study", "--"]);
-    command
 }

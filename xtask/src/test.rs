@@ -1,12 +1,7 @@
 //! Every test, a stage each.
 
 use crate::{
-    browser,
-    console::{self, Stages},
-    demo, image, proof, python, qemu,
-    size::Sizes,
-    timing,
-    toolchain::Choice,
+    browser, console, host, image, proof, python, qemu, size::Sizes, stages::Stages, timing, toolchain::Choice,
 };
 use anyhow::{Context, Result};
 
@@ -21,7 +16,7 @@ pub struct Args {}
 /// Names the stages that failed.
 pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
-    stages.stage("core and host tests", |console| console.run(console::cargo("test").arg("--no-fail-fast")));
+    stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     let image = stages.stage("flash image", |console| {
         let image = image::firmware(choice, console)?;
         console.say(&image.summary());
@@ -38,15 +33,13 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
-        let mut command = demo::virtual_board("test");
+        let mut command = host::cargo("test", "virtual-board");
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
-        console.run(&mut command)
+        host::test(&mut command, console)
     });
     stages.stage("reports in a browser", |console| {
         let program = browser::ensure(console)?;
-        let mut command = console::cargo("test");
-        command.args(["--profile", "host", "--package", "browser"]).env("FINGERTIP_CHROMIUM", &program);
-        console.run(&mut command)
+        host::test(host::cargo("test", "browser").env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")
 }

@@ -3,7 +3,7 @@
 use crate::{
     apt,
     console::{self, Console},
-    image, paths,
+    host, image, paths, progress,
     toolchain::{self, Choice},
 };
 use anyhow::{Context, Result, bail};
@@ -20,8 +20,6 @@ const PROGRAM: &str = "qemu-system-arm";
 /// The first version with the plugin interface that the plugin speaks.
 const VERSION_MIN: u32 = 9;
 const WHY: &str = "estimating cycles on an emulated Cortex-M4F";
-/// Flags that make a plugin fast: the profile of everything that runs on this machine.
-const PROFILE: &str = "host";
 
 /// Flags of `cargo xtask timing`.
 #[derive(clap::Args)]
@@ -101,7 +99,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
     let mut command = console::cargo("test");
     command.args(["--package", "m4-timing", "--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
-    console.run(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image))
+    host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
 
 /// Measures the loop's kernels over the recorded stimulus.
@@ -171,10 +169,9 @@ fn version() -> Option<u32> {
 }
 
 fn plugin(console: &mut Console) -> Result<PathBuf> {
-    let mut command = console::cargo("build");
-    command.args(["--package", "m4-timing", "--features", "plugin", "--profile", PROFILE]);
-    console.run(&mut command)?;
-    let file = paths::target().join(PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
+    let mut command = host::cargo("build", "m4-timing");
+    console.build(command.args(["--features", "plugin"]), "the timing plugin", progress::HOST)?;
+    let file = paths::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| paths::shown(&file))
 }
 

@@ -1,0 +1,77 @@
+//! Programs of the workspace that run on this machine: built with a line of progress, then started.
+
+use crate::{
+    console::{self, Console},
+    paths,
+    progress::{EMULATOR, HOST, Slow},
+};
+use anyhow::Result;
+use std::process::Command;
+
+/// What is quick here is what runs: see the profile in `Cargo.toml`.
+pub const PROFILE: &str = "host";
+
+/// A program of the workspace.
+pub struct Program {
+    /// Its package.
+    pub package: &'static str,
+    /// Its name.
+    pub name: &'static str,
+    /// Whether it is built with its package's default features.
+    pub whole: bool,
+}
+
+/// The demonstration on the native core, with nothing that it does not need.
+pub const NATIVE_DEMO: Program = Program { package: "host-tests", name: "demo", whole: false };
+/// The emulated board without scenes and without the text of the log.
+pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
+/// The emulated board with all that it can.
+pub const SCENE_BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: true };
+
+impl Program {
+    /// One of the tools of `host-tests`.
+    pub const fn tool(name: &'static str) -> Self {
+        Self { package: "host-tests", name, whole: true }
+    }
+
+    /// One of the programs of `sim`.
+    pub const fn sim(name: &'static str) -> Self {
+        Self { package: "sim", name, whole: true }
+    }
+
+    /// Builds it, and returns the command that starts it.
+    ///
+    /// # Errors
+    /// It does not compile.
+    pub fn build(&self, console: &mut Console) -> Result<Command> {
+        let mut command = cargo("build", self.package);
+        command.args(["--bin", self.name]).args((!self.whole).then_some("--no-default-features"));
+        console.build(&mut command, self.name, slow(self.package))?;
+        Ok(Command::new(paths::target().join(PROFILE).join(self.name)))
+    }
+}
+
+fn slow(package: &str) -> Slow {
+    if package == BOARD.package { EMULATOR } else { HOST }
+}
+
+/// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.
+pub fn cargo(subcommand: &str, package: &str) -> Command {
+    let mut command = console::cargo(subcommand);
+    command.args(["--profile", PROFILE, "--package", package, "--ignore-rust-version"]);
+    command
+}
+
+/// Builds the tests of a command `cargo test ...`, then runs them.
+///
+/// # Errors
+/// They do not compile, or one fails.
+pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
+    let mut build = Command::new(command.get_program());
+    // What follows `--` is for the tests.
+    build.args(command.get_args().take_while(|word| *word != "--").filter(|word| *word != "--no-fail-fast"));
+    build.arg("--no-run");
+    let package = command.get_args().find(|word| *word == BOARD.package);
+    console.build(&mut build, "the tests", slow(package.and_then(|word| word.to_str()).unwrap_or_default()))?;
+    console.run(command)
+}

@@ -86,7 +86,7 @@ def main():
     arguments.add_argument("--id", type=int, default=1)
     arguments.add_argument("--newtons", type=float, default=1.0)
     arguments.add_argument("--readings", type=int, default=1000, help="how often to read the force while it is held")
-    arguments.add_argument("--patience-ms", type=int, default=2000, help="how much longer to wait for an answer")
+    arguments.add_argument("--patience-ms", type=int, default=10_000, help="how much longer to wait for an answer: a simulated board may be slow")
     arguments = arguments.parse_args()
 
     port = PatientPort(arguments.port)

@@ -29,6 +29,12 @@ pub fn run(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| console.run(console::cargo("fmt").args(["--all", "--check"])));
     stages.stage("lints, host", |console| console.run(&mut clippy(&["--workspace", "--all-targets"])));
+    stages.stage("lints, what the demonstration is built of", |console| {
+        for package in ["host-tests", "virtual-board"] {
+            console.run(&mut clippy(&["--package", package, "--no-default-features", "--lib", "--bins"]))?;
+        }
+        Ok(())
+    });
     stages.stage("lints, plugin", |console| {
         console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))
     });

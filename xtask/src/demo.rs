@@ -59,8 +59,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 fn native(args: &Args, console: &mut Console) -> Result<()> {
     let mut command = host::NATIVE_DEMO.build(console)?;
     console.say("First on the native core: the same script and plant, no microcontroller in between.");
-    let out = paths::target().join("demo").join("native");
-    console.run(command.arg("--out").arg(&out).args(args.quick.then_some("--quick")))?;
+    // As it is to be read: programs are started in the root.
+    let out = paths::shown(&paths::target().join("demo").join("native"));
+    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
     console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
     Ok(())
 }

@@ -14,8 +14,8 @@ pub const HOST: Slow = &[("fixed", 5.0), ("clap_builder", 5.0), ("fingertip", 4.
 /// The emulated board.
 pub const EMULATOR: Slow = &[
     ("cranelift-codegen", 90.0),
-    ("rigless", 60.0),
-    ("virtual-board", 25.0),
+    ("rigless", 100.0),
+    ("virtual-board", 45.0),
     ("host-tests", 10.0),
     ("cranelift-assembler-x64", 8.0),
     ("gimli", 4.0),

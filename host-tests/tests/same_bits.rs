@@ -21,7 +21,7 @@ fn public_functions(text: &str) -> impl Iterator<Item = &str> {
 
 #[test]
 fn no_public_function_of_the_model_is_forgotten() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../src");
+    let root = Path::new(env!("FINGERTIP_ROOT")).join("src");
     let mut files = vec![root.join("model.rs"), root.join("root.rs")];
     files.extend(fs::read_dir(root.join("model")).unwrap().map(|entry| entry.unwrap().path()));
     let compared: BTreeSet<&str> = names().map(|name| name.rsplit("::").next().unwrap_or(name)).collect();

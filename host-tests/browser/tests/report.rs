@@ -43,7 +43,7 @@ fn a_report_of_two_fingers_has_nothing_wrong() {
 
 fn nothing_is_wrong(name: &str) {
     let (folder, mut browser) = browser(name);
-    let scene = format!("{}/../sim/tests/left_behind/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+    let scene = format!("{}/host-tests/sim/tests/left_behind/{name}.toml", env!("FINGERTIP_ROOT"));
     let scene = cli::load(&scene, &[], None).unwrap();
     let board: Run = &|scene, watch| Ok(native::simulate(scene, watch)?);
     let mut trace = Trace::new(scene.duration_s);

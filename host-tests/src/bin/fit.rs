@@ -63,7 +63,7 @@ fn run() -> Result<(), String> {
     if live {
         eprint!("\r{:60}\r", "");
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/contact.md");
+    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/contact.md");
     let renew = || -> Result<(String, String), String> {
         let old = std::fs::read_to_string(&file).map_err(|error| format!("docs/contact.md: {error}"))?;
         let new = renewed(&old, &tables).ok_or("docs/contact.md lacks the markers of its tables")?;

@@ -144,7 +144,7 @@ fn renew(tables: &str, page: Page) -> Result<(), String> {
     if page == Page::Leave {
         return Ok(());
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/model.md");
+    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/model.md");
     let failed = |error| format!("docs/model.md: {error}");
     let old = std::fs::read_to_string(&file).map_err(failed)?;
     let new = tables::renewed(&old, tables).ok_or("docs/model.md lacks the markers of its tables")?;

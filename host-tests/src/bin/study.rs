@@ -50,7 +50,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     if let Some(file) = json {
         fs::write(&file, page::json_lines(&studied)).map_err(|error| format!("{}: {error}", file.display()))?;
     }
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let root = Path::new(env!("FINGERTIP_ROOT"));
     let mut files = Vec::new();
     for (name, tables) in [("docs/study.md", page::markdown(&studied)), ("README.md", page::readme(&studied))] {
         let old = fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
@@ -66,7 +66,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     if let Some(folder) = out {
         return write_all(&folder, &files);
     }
-    renew(&root, &files, check)
+    renew(root, &files, check)
 }
 
 fn verdicts(studied: &[Studied]) {

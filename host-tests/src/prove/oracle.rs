@@ -13,7 +13,7 @@ use super::tally::{Judged, Tally};
 
 /// Where the points are.
 pub fn path() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("oracle/park2003.csv")
+    Path::new(env!("FINGERTIP_ROOT")).join("host-tests/oracle/park2003.csv")
 }
 
 /// Every point of the oracle.

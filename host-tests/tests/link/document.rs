@@ -5,7 +5,7 @@ use host_tests::control_table::{COMMAND, markdown, step};
 
 #[test]
 fn the_page_is_fresh() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/control-table.md");
+    let path = concat!(env!("FINGERTIP_ROOT"), "/docs/control-table.md");
     let page = std::fs::read_to_string(path).expect("docs/control-table.md can be read");
     assert!(page == markdown(), "docs/control-table.md is stale: write it anew with `{COMMAND}`");
 }

@@ -54,7 +54,7 @@ fn the_python_example_touches_holds_and_lets_go() {
     let board = Board::serve(&["--pty", link.to_str().expect("a plain path")]);
     assert_eq!(Path::new(&board.name), link);
 
-    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/python/force.py");
+    let example = Path::new(env!("FINGERTIP_ROOT")).join("examples/python/force.py");
     let mut python = Command::new(named("FINGERTIP_PYTHON"));
     python.env("PYTHONDONTWRITEBYTECODE", "1").arg(example).arg("--port").arg(&link);
     // As patient as it takes on the slowest machine: two hours mean that the board hangs.

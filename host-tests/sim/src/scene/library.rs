@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Where the library lies.
 pub fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes")
+    Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/scenes")
 }
 
 /// The library's scenes by name, in order.

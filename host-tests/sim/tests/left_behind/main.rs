@@ -11,7 +11,7 @@ use sim::scene::Scene;
 use sim::watch::{Summary, Watch};
 
 /// A wall with one effect.
-const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/wall.toml");
+const SCENE: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/left_behind/wall.toml");
 
 fn wall() -> Scene {
     cli::load(SCENE, &[], None).unwrap()

@@ -39,7 +39,8 @@ fn a_recording_replays_to_the_bit() {
 
 #[test]
 fn two_fingers_are_measured_recorded_and_drawn_each() {
-    let scene = cli::load(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/left_behind/grasp.toml"), &[], None).unwrap();
+    let scene =
+        cli::load(concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/left_behind/grasp.toml"), &[], None).unwrap();
     let path = folder("grasp").join("grasp.mcap");
     let mut recorder = Recorder::new(&path, &scene, 1).unwrap();
     let mut trace = Trace::new(scene.duration_s);

@@ -54,11 +54,11 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
     let field = |name| release.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
     let codename = field("VERSION_CODENAME").filter(|_| field("ID") == Some("debian"));
     let Some(codename) = codename.filter(|_| paths::find_program("apt-get").is_some()) else {
-        bail!("{why} needs a newer version of `{list}`, and this is no Debian: install it by hand");
+        bail!("{why} needs a recent `{list}`, and this is no Debian: install it by hand");
     };
     let suite = format!("{codename}-backports");
     if !is_root() {
-        bail!("{why} needs a newer version of `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
+        bail!("{why} needs a recent `{list}`: run `sudo apt-get install -t {suite} {list}` and try again");
     }
     console.say(&format!(
         "Installing the newest `{list}`, from {suite} where {codename} has an older one: {why} needs it. \
@@ -108,8 +108,8 @@ impl Apt {
         // Downloads go to a folder that apt's own user may not see.
         command.args(["-o", "APT::Sandbox::User=root"]);
         if subcommand == "install" {
-            // Waits for another installation under way.
-            command.args(["-y", "--no-install-recommends", "-o", "DPkg::Lock::Timeout=600"]);
+            // Takes nothing away, and waits for another installation under way.
+            command.args(["-y", "--no-install-recommends", "--no-remove", "-o", "DPkg::Lock::Timeout=600"]);
         }
         command
     }

@@ -51,7 +51,8 @@ pub fn test(choice: Choice, console: &mut Console) -> Result<()> {
 pub fn ensure(console: &mut Console) -> Result<()> {
     match paths::find_program(PROGRAM) {
         Some(_) => Ok(()),
-        None => apt::ensure(&[PROGRAM], "running the core on an emulated Cortex-M4F", console),
+        // At once the version that the estimates of cycles need: none is installed to be replaced.
+        None => apt::newest(&[PROGRAM], "running the core on an emulated Cortex-M4F", console),
     }
 }
 

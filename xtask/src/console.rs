@@ -92,6 +92,7 @@ impl Console {
             }
         }
         let status = child.wait()?;
+        clear_line();
         progress.finish();
         self.built_s += cpu_s() - before_s;
         match &mut self.captured {

@@ -77,7 +77,6 @@ impl Progress {
 
     /// The build ended.
     pub fn finish(&self) {
-        self.clear();
         if self.compiled > 0.0 && self.total > 0 {
             let seconds = self.begun.elapsed().as_secs();
             println!("built    {}: {} crates in {} min {:02} s", self.what, self.total, seconds / 60, seconds % 60);
@@ -111,13 +110,6 @@ impl Progress {
         match ((waiting + quick) / pace / 60.0).ceil() {
             minutes if minutes <= 1.0 => ", less than a minute left".into(),
             minutes => format!(", about {minutes} minutes left"),
-        }
-    }
-
-    fn clear(&self) {
-        if self.terminal {
-            print!("\r\x1b[2K");
-            let _ = io::stdout().flush();
         }
     }
 }

@@ -20,7 +20,7 @@ pub struct Forces {
 /// Letting go.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Release {
-    /// Until the object is let go of for good.
+    /// From the goal of 0 until nothing is touched for good; none where something still is.
     pub clear_after_ms: Option<f64>,
     /// How far from the object the tip ends.
     pub clearance_mm: f64,

@@ -30,14 +30,6 @@ impl Rig {
         self.with(|stand| std::mem::take(&mut stand.bench.received))
     }
 
-    /// Bytes that have not gone out to the image yet.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn unsent(&mut self) -> Result<usize, Error> {
-        self.with(|stand| stand.session.board_mut().wire().pending())
-    }
-
     /// Sends a packet and runs until a whole status packet has come back, or nothing has for the wait's time after the
     /// last byte either way. What came back is not checked.
     ///

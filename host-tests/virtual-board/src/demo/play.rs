@@ -24,6 +24,7 @@ const POLLS_A_PICTURE: u64 = 5;
 const BYTE_NS: u64 = 10_000;
 /// Bytes of a Write of four.
 const GOAL_BYTES: u64 = 16;
+
 /// What came of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {

@@ -1,10 +1,11 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This is the only place with floating point: single precision, and only + - * /, so the host and the target agree to
+//! This and `control/gains.rs`, which it calls, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
 use crate::contact::Geometry;
 use crate::control::BRAKE_SHARE_Q8;
+use crate::control::gains::{self, Gains, PACES};
 use crate::frame::COLUMNS;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
@@ -12,14 +13,14 @@ use crate::scan::{ScanError, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I8F24, I16F16};
 
-/// Bandwidth of the speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the encoder was
-/// read and half a frame later on average through the hold; with a whole frame of reserve that is 1.5 T or 17 degrees at the crossover.
-const SPEED_GAIN_FRAMES: f32 = 5.0;
-/// The position's slope k is this much slower than the speed loop: k = k_v / 3. The feed-forward a_ref puts the poles of the
-/// linear zone at exactly -k_v and -k, so they need no further distance.
-const POSITION_TO_SPEED: f32 = 3.0;
-/// Poles of the observer, in frames: 1 / (2 T), 2.5 times faster than the speed loop that it serves.
-const OBSERVER_FRAMES: f32 = 2.0;
+/// The band of the way at rest: this, for the array's noise, mm,
+const CALM_MM: f32 = 0.008;
+/// and so many counts of the encoder;
+const CALM_COUNTS: f32 = 3.0;
+/// at most 4 mm, of which the pace's arithmetic holds 16 (Q24).
+const CALM_MAX: i32 = 4 << 24;
+/// Time constants of the quickest profile without a way to go before the loop is calmer.
+const CALM_TIME_CONSTANTS: f32 = 2.0;
 
 /// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i64 = 1_000_000 << 8;
@@ -86,20 +87,18 @@ pub struct Config {
     pub frame_s_q39: i32,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
+    /// The same: the encoder's resolution.
+    pub count: Millimetres,
     /// Error of the travel that is not motion but a jump of the encoder, Q24 mm.
     pub jump: u32,
     /// Encoder counts that the travel can hold.
     pub counts_max: i32,
-    /// l1 (Q31), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
-    pub observer_gains: [i32; 3],
-    /// k_v in 1/s, Q18.
-    pub speed_gain_q18_per_s: i32,
-    /// k in 1/s.
-    pub position_gain_per_s: i32,
-    /// 1 / (2 k) in s, Q32.
-    pub half_over_slope_q32: i32,
-    /// 1 / (2 k^2) in s^2, Q40.
-    pub half_over_slope2_q40: i32,
+    /// The loop's gains, quickest first.
+    pub paces: [Gains; PACES],
+    /// How far the way still to go may be off at rest.
+    pub calm_band: Millimetres,
+    /// Frames of calm at the quickest pace before the next.
+    pub calm_frames: u32,
     /// c in 1/s, Q17: at most 16,384, a motor that stops within less than a frame.
     pub damping_q17_per_s: i32,
     /// g V_max, Q8 mm/s^2.
@@ -159,13 +158,6 @@ impl Config {
         let g = torque_constant / (resistance * inertia * travel_rad_per_m) * 1e3;
         let c = torque_constant * torque_constant / (resistance * inertia);
 
-        let speed_gain = 1.0 / (SPEED_GAIN_FRAMES * frame_s);
-        let slope = speed_gain / POSITION_TO_SPEED;
-        // A pole at the rate w, by the bilinear transform.
-        let half_angle = 0.5 / OBSERVER_FRAMES;
-        let beta = (1.0 - half_angle) / (1.0 + half_angle);
-        let gap = 1.0 - beta;
-
         let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
         let codes_per_kpa = p.codes_per_kpa_milli as f32 * 1e-3;
@@ -173,6 +165,7 @@ impl Config {
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
+        let paces = gains::paces(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
         let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
         let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
@@ -193,18 +186,13 @@ impl Config {
             contact_off: newtons(p.contact_off_mn),
             frame_s_q39: narrow(frame_s * exp2(39)),
             mm_per_count_q40,
+            count: Millimetres(I8F24::from_bits(narrow(mm_per_count * exp2(24)))),
             jump: narrow((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24))
                 .cast_unsigned(),
             counts_max: ((i64::from(i32::MAX) << 16) / mm_per_count_q40.max(1)).min(i32::MAX.into()) as i32,
-            observer_gains: [
-                narrow((1.0 - beta * beta * beta) * exp2(31)),
-                narrow(1.5 * gap * gap * (1.0 + beta) / frame_s * exp2(16)),
-                narrow(gap * gap * gap / (frame_s * frame_s)),
-            ],
-            speed_gain_q18_per_s: narrow(speed_gain * exp2(18)),
-            position_gain_per_s: slope as i32,
-            half_over_slope_q32: narrow(0.5 / slope * exp2(32)),
-            half_over_slope2_q40: narrow(0.5 / (slope * slope) * exp2(40)),
+            paces,
+            calm_band: Millimetres(I8F24::from_bits(narrow((CALM_MM + CALM_COUNTS * mm_per_count) * exp2(24)).min(CALM_MAX))),
+            calm_frames: (CALM_TIME_CONSTANTS / (paces[0].slope_per_s as f32 * frame_s)) as u32,
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,
             current_limit,

@@ -10,8 +10,8 @@
 //! with the tip's travel x, the voltage V, g = k_t N / (R m), c = k_t^2 N^2 / (R m), m = J N^2 (N the motor's angle for a
 //! travel of the tip) and everything else, the contact force and friction among it, in the disturbance w.
 //!
-//! Three parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still stop there;
-//! [`observer`] estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits.
+//! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still stop there;
+//! [`pace`] says how quick the loop is, by the [`gains`] of the paces; [`observer`] estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits.
 //! The law that joins them is
 //!
 //! ```text
@@ -23,34 +23,39 @@
 
 mod arith;
 pub mod drive;
+pub mod gains;
 pub mod goal;
 pub mod observer;
+pub mod pace;
 pub mod profile;
 
 use crate::config::Config;
 use crate::safety::Limits;
-use crate::units::{Duty, Millimetres, MillimetresPerSecond2};
+use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 use arith::{held, high, product};
 use drive::Drive;
 use observer::Observer;
+use pace::Pace;
 use profile::Reference;
 
 /// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
 pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
 
 /// The state of the speed loop.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpeedLoop {
     /// Where the tip is, how fast it goes and what pushes it.
     pub observer: Observer,
     /// The limits between the law and the bridge.
     pub drive: Drive,
+    /// How quick the loop is.
+    pub pace: Pace,
 }
 
 impl SpeedLoop {
     /// At rest.
     pub const fn new() -> Self {
-        Self { observer: Observer::new(), drive: Drive::new() }
+        Self { observer: Observer::new(), drive: Drive::new(), pace: Pace::QUICK }
     }
 
     /// The duty that makes the tip follow a speed reference.
@@ -70,7 +75,7 @@ impl SpeedLoop {
         // c v, the acceleration that the back-EMF takes away.
         let back_emf = high(speed << 3, config.damping_q17_per_s);
         let wanted =
-            high(behind << 2, config.speed_gain_q18_per_s) + (reference.acceleration.to_bits() >> 4) + back_emf
+            high(behind << 2, self.pace.gains(config).speed_q18_per_s) + (reference.acceleration.to_bits() >> 4) + back_emf
                 - (self.observer.disturbance.to_bits() >> 4);
         let [wanted, back_emf] = [held(wanted, 28) << 4, held(back_emf, 28) << 4];
         self.drive.apply(wanted, back_emf, supply_mv, config, limits);
@@ -79,12 +84,32 @@ impl SpeedLoop {
     /// Takes the encoder's count of this frame into the observer, which then stands at this instant.
     #[inline(always)]
     pub fn observe(&mut self, encoder: i32, config: &Config) {
-        self.observer.update(encoder, self.drive.acceleration(), config);
+        self.observer.update(encoder, self.drive.acceleration(), self.pace.gains(config), config);
+    }
+
+    /// The speed to follow over a way still to go, at most `limit`; whether it was held to that.
+    ///
+    /// Once the loop is calm, a way within `slack` is none: a tip that sticks would else be driven from count to count for ever.
+    #[inline(always)]
+    pub fn towards(
+        &mut self,
+        way: Millimetres,
+        slack: Millimetres,
+        limit: MillimetresPerSecond,
+        config: &Config,
+    ) -> (Reference, bool) {
+        self.pace.note(way, config);
+        let way = if self.pace.calm() { Millimetres(way.0 - way.0.max(-slack.0).min(slack.0)) } else { way };
+        let brake = self.brake(way, config);
+        let reference = Reference::towards(way, self.observer.speed, brake, self.pace.gains(config));
+        let limited = reference.limited(limit);
+        (limited, limited != reference)
     }
 
     /// The bridge is off: no current flows, so neither voltage nor back-EMF acts.
     pub fn coast(&mut self) -> Duty {
         self.drive = Drive::new();
+        self.pace = Pace::QUICK;
         Duty::ZERO
     }
 

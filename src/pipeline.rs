@@ -177,9 +177,9 @@ impl Pipeline {
         let reference = match mode {
             Mode::Off | Mode::Tare | Mode::Fault => None,
             Mode::Approach | Mode::Force | Mode::Release => {
-                Some(self.goal.reference(mode, command.goal, &contact, &self.motion, &self.config, &mut limits))
+                Some(self.goal.reference(mode, command.goal, &contact, &mut self.motion, &self.config, &mut limits))
             }
-            Mode::Identify => Some(self.press.reference(&self.motion, &self.config, &mut limits)),
+            Mode::Identify => Some(self.press.reference(&mut self.motion, &self.config, &mut limits)),
         };
         let duty = match reference {
             Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
@@ -290,7 +290,10 @@ impl Pipeline {
                 Mode::Identify
             }
             Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => Mode::Force,
-            Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => Mode::Force,
+            Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => {
+                self.array.touched();
+                Mode::Force
+            }
             Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
                 self.follow_drift(contact, sound);
                 wanted
@@ -304,9 +307,10 @@ impl Pipeline {
 
     /// Lets the baseline follow drift where nothing is touched.
     fn follow_drift(&mut self, contact: &Contact, sound: bool) {
-        let untouched = sound && contact.force < self.config.contact_off;
+        let clear = self.goal.clear(self.motion.observer.travel, &self.config);
+        let untouched = sound && (clear || contact.force < self.config.contact_off);
         if self.tared && self.config.params.baseline_follows != 0 && untouched {
-            self.array.follow_drift();
+            self.array.follow_drift(clear);
         }
     }
 }

@@ -58,6 +58,8 @@ pub struct Array {
     tare_sums: [i32; 3],
     tare_frames: u32,
     baseline_row: usize,
+    /// Rounds of the baseline over all rows since a contact.
+    clear_rounds: i32,
 }
 
 impl Default for Array {
@@ -80,6 +82,7 @@ impl Array {
             tare_sums: [0; 3],
             tare_frames: 0,
             baseline_row: 0,
+            clear_rounds: 0,
         }
     }
 

@@ -1,4 +1,7 @@
 //! What each mode asks of the speed loop.
+//!
+//! Letting go goes by geometry first: where the surface was touched, less the clearance, is where the tip rests, whatever the
+//! array says on the way. Noise, creep, warmth and hysteresis can look like a contact in the air; none of them moves that place.
 
 use crate::config::Config;
 use crate::control::SpeedLoop;
@@ -8,16 +11,25 @@ use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
 
-/// Where a released tip is to stand.
+/// How much farther than twice the indentation a tip may have gone into what it touches and still go at full speed: 0.3 mm.
+const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
+
+/// How much the indentation may be off at rest, where the encoder is coarser than that: 1 um.
+const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 1_000);
+
+/// Where the surface is, and where a released tip is to stand.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Goal {
-    hold: Option<Millimetres>,
+    mode: Mode,
+    /// Travel at which the surface was last touched.
+    surface: Option<Millimetres>,
+    rest: Millimetres,
 }
 
 impl Goal {
-    /// Torque was just enabled: a release holds the tip where it is.
+    /// Torque was just enabled: nothing is known of what there is to touch.
     pub fn start(&mut self) {
-        self.hold = Some(Millimetres::ZERO);
+        *self = Self::default();
     }
 
     /// The speed to follow in a mode that drives the bridge.
@@ -29,38 +41,61 @@ impl Goal {
         mode: Mode,
         goal: Newtons,
         contact: &Contact,
-        motion: &SpeedLoop,
+        motion: &mut SpeedLoop,
         config: &Config,
         limits: &mut Limits,
     ) -> Reference {
-        let (way, speed_max) = match mode {
-            Mode::Release => (self.way_to_release(contact, motion, config), config.speed_max),
-            _ => {
-                self.hold = None;
-                let limit = if mode == Mode::Force { config.speed_max } else { config.approach };
-                let way = way_to_goal(goal, contact, motion, config, limits);
-                (within_travel(way, motion, config, limits), limit)
-            }
+        let travel = motion.observer.travel;
+        self.enter(mode, contact, travel, config);
+        let (way, quick, slack) = if mode == Mode::Release {
+            let way = Millimetres(self.rest.0.saturating_sub(travel.0));
+            (way, self.pressed(contact, travel, config), config.count)
+        } else {
+            let way = way_to_goal(goal, contact, motion, config, limits);
+            let quick = mode == Mode::Force && self.confirmed(contact, travel, config);
+            (within_travel(way, motion, config, limits), quick, config.count.min(FORCE_SLACK))
         };
-        let touching = contact.force >= config.contact_off;
-        let speed_max = if touching { speed_max } else { speed_max.min(config.approach) };
-        let reference = Reference::towards(way, motion.observer.speed, motion.brake(way, config), config);
-        let limited = reference.limited(speed_max);
-        if limited != reference {
+        let limit = if quick { config.speed_max } else { config.approach };
+        let (reference, limited) = motion.towards(way, slack, limit, config);
+        if limited {
             limits.set(Limits::SPEED);
         }
-        limited
+        reference
     }
 
-    /// Back off until nothing is touched, then to the clearance behind that point.
-    fn way_to_release(&mut self, contact: &Contact, motion: &SpeedLoop, config: &Config) -> Millimetres {
-        if contact.force >= config.contact_off {
-            self.hold = None;
-            return Millimetres((-contact.indentation.0).saturating_sub(config.clearance.0));
+    /// Notes where the surface is when a contact begins, and where to rest when letting go begins.
+    #[inline(always)]
+    fn enter(&mut self, mode: Mode, contact: &Contact, travel: Millimetres, config: &Config) {
+        if mode == self.mode {
+            return;
         }
-        let travel = motion.observer.travel.0;
-        let hold = self.hold.get_or_insert(Millimetres(travel.saturating_sub(config.clearance.0)));
-        Millimetres(hold.0.saturating_sub(travel))
+        let enabled = self.mode == Mode::Off;
+        self.mode = mode;
+        if mode == Mode::Force || enabled && contact.force >= config.contact_on {
+            self.surface = Some(Millimetres(travel.0.saturating_sub(contact.indentation.0)));
+        }
+        if mode == Mode::Release {
+            let clear = self.surface.map_or(travel, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
+            self.rest = clear.min(travel);
+        }
+    }
+
+    /// Whether a release still lets go of what was touched.
+    fn pressed(&self, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
+        contact.force >= config.contact_off && self.surface.is_some_and(|surface| travel > surface)
+    }
+
+    /// Whether the array bears out how far the tip went into what it touches.
+    fn confirmed(&self, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
+        let deep = contact.indentation.0.saturating_mul_int(2).saturating_add(YIELDING.0);
+        contact.force >= config.contact_off
+            && self.surface.is_some_and(|surface| travel.0.saturating_sub(surface.0) <= deep)
+    }
+
+    /// Whether the tip stands clear of what it touched: the array's readings are then its baseline, whatever they are.
+    pub fn clear(&self, travel: Millimetres, config: &Config) -> bool {
+        let half = self.rest.0.saturating_add(config.clearance.0 / 2);
+        self.mode == Mode::Release && self.surface.is_some() && config.clearance.0 > 0 && travel.0 < half
     }
 }
 
@@ -72,10 +107,11 @@ fn way_to_goal(
     config: &Config,
     limits: &mut Limits,
 ) -> Millimetres {
-    if goal > config.force_max {
+    let held = goal.max(config.contact_on).min(config.force_max);
+    if held != goal {
         limits.set(Limits::GOAL);
     }
-    let wanted = config.tip.indentation(goal.min(config.force_max));
+    let wanted = config.tip.indentation(held);
     let sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
     if contact.force >= config.contact_off { Millimetres(wanted.0.saturating_sub(sensed)) } else { wanted }
 }

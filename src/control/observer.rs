@@ -13,6 +13,7 @@
 //! rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
 
 use super::arith::{nearest_product, nearest_share};
+use super::gains::Gains;
 use crate::config::Config;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
@@ -52,7 +53,7 @@ impl Observer {
 
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
     #[inline(always)]
-    pub fn update(&mut self, encoder: i32, acceleration: i32, config: &Config) {
+    pub fn update(&mut self, encoder: i32, acceleration: i32, gains: &Gains, config: &Config) {
         // Q8 mm/s^2 times T (Q39) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
         let gained = nearest_share(acceleration.saturating_add(self.disturbance.to_bits()), config.frame_s_q39);
         let before = self.speed.to_bits();
@@ -66,7 +67,7 @@ impl Observer {
             *self = Self { travel: measured, origin: self.origin, ..Self::new() };
             return;
         }
-        let [l1_q31, l2_per_s_q16, l3_per_s2] = config.observer_gains;
+        let [l1_q31, l2_per_s_q16, l3_per_s2] = gains.observer;
         let disturbance = self.disturbance.to_bits().saturating_add(nearest_product(error, l3_per_s2, 16));
         self.travel = Millimetres::from_bits(travel.saturating_add(nearest_share(error, l1_q31)));
         self.speed = MillimetresPerSecond::from_bits(speed.saturating_add(nearest_product(error, l2_per_s_q16, 24)));

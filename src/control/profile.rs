@@ -11,7 +11,7 @@
 //! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
 
 use super::arith::product;
-use crate::config::Config;
+use super::gains::Gains;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// What the speed loop is to follow.
@@ -30,20 +30,20 @@ impl Reference {
         way: Millimetres,
         speed: MillimetresPerSecond,
         brake: MillimetresPerSecond2,
-        config: &Config,
+        gains: &Gains,
     ) -> Self {
         let (way_bits, speed_bits) = (way.to_bits(), speed.to_bits());
         let brake_bits = brake.to_bits().max(1);
-        let slope = config.position_gain_per_s;
+        let slope = gains.slope_per_s;
         // a / (2 k^2): Q8 to Q24 mm.
-        let linear = (i64::from(brake_bits) * i64::from(config.half_over_slope2_q40)) >> 24;
+        let linear = (i64::from(brake_bits) * i64::from(gains.half_over_slope2_q40)) >> 24;
         let (reference, acceleration) = if i64::from(way_bits.unsigned_abs()) <= linear {
             (product(way_bits, slope, 8), product(speed_bits, slope, 8))
         } else {
             // Q8 mm/s^2 times Q24 mm is Q32 mm^2/s^2; its root is Q16 mm/s, and good enough as the FPU gives it.
             let (root, _) = lanes::root_and_product(2 * brake_bits.cast_unsigned(), way_bits.unsigned_abs(), 0);
             let root = root.cast_signed();
-            let magnitude = root.wrapping_sub(product(brake_bits, config.half_over_slope_q32, 24));
+            let magnitude = root.wrapping_sub(product(brake_bits, gains.half_over_slope_q32, 24));
             let reference = if way_bits < 0 { magnitude.wrapping_neg() } else { magnitude };
             (reference, product(brake_bits, share_q12(speed_bits, root), 12))
         };

@@ -135,14 +135,14 @@ impl Press {
     }
 
     /// The speed to follow.
-    pub fn reference(&self, motion: &SpeedLoop, config: &Config, limits: &mut Limits) -> Reference {
+    pub fn reference(&self, motion: &mut SpeedLoop, config: &Config, limits: &mut Limits) -> Reference {
         let (way, speed) = match self.phase {
             Phase::Idle => (Millimetres::ZERO, config.approach),
             Phase::Retreat => (Millimetres(-FAR.0), config.approach),
             Phase::Seek => (within_travel(FAR, motion, config, limits), config.approach),
             Phase::Squeeze => (within_travel(FAR, motion, config, limits), config.approach.min(SPEED)),
         };
-        Reference::towards(way, motion.observer.speed, motion.brake(way, config), config).limited(speed)
+        motion.towards(way, Millimetres::ZERO, speed, config).0
     }
 
     fn stalled(&mut self, view: &View, config: &Config) -> bool {

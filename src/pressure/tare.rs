@@ -13,6 +13,9 @@ const TARE_STRIDE: u32 = ROWS as u32 / 2;
 /// Weight of a frame in the baseline, Q16; each row is visited every tenth frame, so the time constant is 10,240 frames.
 const BASELINE_WEIGHT: i32 = 64;
 
+/// The first frames after a contact are weighed as if so many had come before.
+const CLEAR_ROUNDS_FIRST: i32 = 4;
+
 impl Array {
     /// Forgets the tare and starts to measure it anew.
     pub fn start_tare(&mut self) {
@@ -50,10 +53,21 @@ impl Array {
         1 << self.baseline_row.min(ROWS - 1)
     }
 
-    /// Lets the baseline follow the picture, one row a frame, which must be developed; call it only where there is no contact.
-    pub fn follow_drift(&mut self) {
-        self.learn(self.baseline_row, BASELINE_WEIGHT);
+    /// Lets the baseline follow the picture, one row a frame, which must be developed; call it only where there is no contact. Where the
+    /// tip is surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as the
+    /// filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
+    pub fn follow_drift(&mut self, clear: bool) {
+        let weight = if clear { ((1 << 16) / (self.clear_rounds + CLEAR_ROUNDS_FIRST)).max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT };
+        self.learn(self.baseline_row, weight);
         self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
+        if clear && self.baseline_row == 0 {
+            self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
+        }
+    }
+
+    /// Something is touched: the baseline that it leaves is learnt anew.
+    pub fn touched(&mut self) {
+        self.clear_rounds = 0;
     }
 
     /// Moves each tare of a row by `weight` (Q16) of what the taxel now reads above it. It wraps only for codes that no

@@ -114,7 +114,7 @@ pub const FRAMES: [Step; 6] = [
     ("Array::develop", |m, s, mix| {
         m.array.develop(&m.frame, m.array.drift_row() | s.words[3] as u16);
         add_picture(mix, m.array.picture());
-        m.array.follow_drift();
+        m.array.follow_drift(s.share_q32 & 1 == 0);
         if s.words[2] == 0 {
             m.array.continue_tare();
         }
@@ -180,7 +180,7 @@ pub const STEPS: [Step; 20] = [
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
         let [encoder, acceleration, ..] = s.words;
-        m.observer.update(encoder >> 24, acceleration, &m.config);
+        m.observer.update(encoder >> 24, acceleration, &m.config.paces[(s.share_q32 & 3) as usize], &m.config);
         mix.add(m.observer.travel.to_bits());
         mix.add(m.observer.speed.to_bits());
         mix.add(m.observer.disturbance.to_bits());
@@ -213,7 +213,7 @@ pub const STEPS: [Step; 20] = [
         };
         let contact = Contact { force: s.force, indentation: s.d, ..Contact::default() };
         let (goal, mut limits) = (Newtons::from_bits(s.words[1]), Limits::default());
-        add_reference(mix, m.goal.reference(mode, goal, &contact, &m.motion, &m.config, &mut limits));
+        add_reference(mix, m.goal.reference(mode, goal, &contact, &mut m.motion, &m.config, &mut limits));
         mix.add(limits.0);
     }),
     ("SpeedLoop::follow", |m, s, mix| {
@@ -240,7 +240,7 @@ pub const STEPS: [Step; 20] = [
 fn towards(machines: &Machines, sample: &Sample) -> Reference {
     let [way, speed, brake, _] = sample.words;
     let brake = MillimetresPerSecond2::from_bits(brake.max(0).min(BRAKE_MAX));
-    Reference::towards(Millimetres::from_bits(way), MillimetresPerSecond::from_bits(speed), brake, &machines.config)
+    Reference::towards(Millimetres::from_bits(way), MillimetresPerSecond::from_bits(speed), brake, machines.motion.pace.gains(&machines.config))
 }
 
 fn add_reference(mix: &mut Mix, reference: Reference) {

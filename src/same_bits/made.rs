@@ -3,6 +3,7 @@
 use super::machines::Machines;
 use super::{Mix, Source, frames};
 use crate::config::{Config, ConfigError};
+use crate::control::gains::Gains;
 use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use crate::params::Params;
 use crate::pressure::CalibrationError;
@@ -93,13 +94,12 @@ fn add_config(mix: &mut Mix, config: &Config) {
         contact_off,
         frame_s_q39,
         mm_per_count_q40,
+        count,
         jump,
         counts_max,
-        observer_gains: [l1, l2, l3],
-        speed_gain_q18_per_s,
-        position_gain_per_s,
-        half_over_slope_q32,
-        half_over_slope2_q40,
+        paces,
+        calm_band,
+        calm_frames,
         damping_q17_per_s,
         voltage_limit,
         current_limit,
@@ -123,7 +123,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
         mix.add(force.to_bits());
     }
-    for length in [half_pitch, travel_max, clearance] {
+    for length in [half_pitch, count, calm_band, travel_max, clearance] {
         mix.add(length.to_bits());
     }
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
@@ -132,14 +132,23 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }
-    for number in [frame_s_q39, counts_max, l1, l2, l3, speed_gain_q18_per_s, position_gain_per_s] {
-        mix.add(*number);
+    for number in [*frame_s_q39, *counts_max, calm_frames.cast_signed()] {
+        mix.add(number);
+    }
+    for gains in paces {
+        let Gains { observer, speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } = gains;
+        for number in observer {
+            mix.add(*number);
+        }
+        for number in [speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40] {
+            mix.add(*number);
+        }
     }
     for speed in [speed_max, approach] {
         mix.add(speed.to_bits());
     }
     for number in
-        [half_over_slope_q32, half_over_slope2_q40, damping_q17_per_s, voltage_limit, current_limit, slew_limit]
+        [damping_q17_per_s, voltage_limit, current_limit, slew_limit]
     {
         mix.add(*number);
     }

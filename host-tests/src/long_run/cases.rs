@@ -4,8 +4,8 @@ use super::{Machine, Outcome};
 use fingertip::config::Config;
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
+use fingertip::control::gains::PACES;
 use fingertip::control::observer::Observer;
-use fingertip::control::profile::Reference;
 use fingertip::frame::{Frame, ROWS, SATURATED, SLOTS};
 use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
@@ -87,14 +87,15 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
         ("the encoder's ends in turns", [(i32::MIN, i32::MAX), (i32::MAX, i32::MIN)]),
         ("the ends of the acceleration's type in turns", [(0, i32::MAX), (1, i32::MIN)]),
     ];
-    let machine = |(input, pair): (&str, [(i32, i32); 2])| {
+    let machine = |((input, pair), pace): ((&str, [(i32, i32); 2]), usize)| {
         let config = config.clone();
         Machine {
-            name: format!("observer, {scan} scan, {input}"),
+            name: format!("observer, {scan} scan, pace {pace}, {input}"),
             start: Observer::new(),
             inputs: 2,
             step: Box::new(move |observer: &mut Observer| {
-                pair.iter().for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, &config));
+                let gains = &config.paces[pace];
+                pair.iter().for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
             outputs: vec![
                 ("travel", |observer| observer.travel.to_bits().into(), TRAVEL_SWING),
@@ -103,7 +104,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
             ],
         }
     };
-    inputs.map(machine).into()
+    inputs.into_iter().flat_map(|input| [(input, 0), (input, PACES - 1)]).map(machine).collect()
 }
 
 /// The wanted acceleration, held or in turns.
@@ -129,30 +130,27 @@ fn drives(scan: &str, config: &Config) -> Vec<Machine<Drive>> {
 }
 
 /// Observer and drive joined by the law, behind a motor that does not move, with the way still to go held or in turns.
-fn loops(scan: &str, config: &Config) -> Vec<Machine<(Observer, Drive)>> {
+fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
     let inputs =
         [("none", [0; 2]), ("1 um", [1 << 14; 2]), ("far", [i32::MAX; 2]), ("far in turns", [i32::MAX, i32::MIN])];
     let machine = |(input, pair): (&str, [i32; 2])| {
         let config = config.clone();
         Machine {
             name: format!("speed loop, {scan} scan, blocked motor, way {input}"),
-            start: (Observer::new(), Drive::new()),
+            start: SpeedLoop::new(),
             inputs: 2,
-            step: Box::new(move |state: &mut (Observer, Drive)| {
+            step: Box::new(move |motion: &mut SpeedLoop| {
                 for way in pair.map(Millimetres::from_bits) {
-                    let mut motion = SpeedLoop { observer: state.0, drive: state.1 };
                     motion.observe(0, &config);
-                    let (speed, brake) = (motion.observer.speed, motion.brake(way, &config));
-                    let reference = Reference::towards(way, speed, brake, &config).limited(config.speed_max);
+                    let (reference, _) = motion.towards(way, config.count, config.speed_max, &config);
                     motion.follow(reference, SUPPLY_MV, &config, &mut Limits::default());
-                    *state = (motion.observer, motion.drive);
                 }
             }),
             outputs: vec![
-                ("travel", |state| state.0.travel.to_bits().into(), TRAVEL_SWING),
-                ("speed", |state| state.0.speed.to_bits().into(), SPEED_SWING),
-                ("disturbance", |state| state.0.disturbance.to_bits().into(), DISTURBANCE_SWING),
-                ("acceleration", |state| state.1.acceleration().into(), DISTURBANCE_SWING),
+                ("travel", |motion| motion.observer.travel.to_bits().into(), TRAVEL_SWING),
+                ("speed", |motion| motion.observer.speed.to_bits().into(), SPEED_SWING),
+                ("disturbance", |motion| motion.observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
+                ("acceleration", |motion| motion.drive.acceleration().into(), DISTURBANCE_SWING),
             ],
         }
     };
@@ -197,7 +195,7 @@ fn baselines() -> Vec<Machine<Array>> {
                 // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
                 for frame in frames.iter().cycle().take(ROWS) {
                     array.read_all(frame, &config);
-                    array.follow_drift();
+                    array.follow_drift(false);
                 }
             }),
             outputs: vec![("sum of the tares", tare_sum, 0)],

@@ -60,6 +60,12 @@ enum Command {
         after_help = "Examples:\n  cargo xtask sweep wall --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
     )]
     Sweep(sim::Args),
+    /// Run fingers that are drawn as a usual build brings them about, and judge each by what it must never do
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask population ordinary --fingers 100\n  cargo xtask population --help    (all that it takes)"
+    )]
+    Population(sim::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -110,6 +116,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(args, toolchain, console),
         Command::Sim(args) => sim::sim(args, toolchain, console),
         Command::Sweep(args) => sim::sweep(args, console),
+        Command::Population(args) => sim::population(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),

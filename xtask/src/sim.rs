@@ -37,6 +37,14 @@ pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim("sweep").build(console)?.args(&args.arguments))
 }
 
+/// Runs a population of drawn fingers, on the board that is asked for.
+///
+/// # Errors
+/// As [`sim`].
+pub fn population(args: &Args, console: &mut Console) -> Result<()> {
+    start(host::Program::sim("population").build(console)?.args(&args.arguments))
+}
+
 /// Whether a board is asked for that runs the flash image.
 fn wants_image(arguments: &[String]) -> bool {
     let boards = ["virtual", "both"];

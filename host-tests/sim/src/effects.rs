@@ -6,7 +6,7 @@
 pub mod contact;
 pub mod drive;
 pub mod link;
-mod random;
+pub(crate) mod random;
 pub mod sensor;
 pub mod set;
 

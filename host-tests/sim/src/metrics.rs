@@ -3,16 +3,20 @@
 //! [`METRICS`] is the one table of them: the reader checks `[[expect]]` by it, the results are named by it, and the
 //! reference page shows it. All figures are of what is simulated; times before 0, when the finger is tared, do not count.
 
+mod at_goal;
+mod conduct;
 mod finger;
 mod slips;
 mod table;
 
+pub use at_goal::AtGoal;
+pub use conduct::Hold;
 pub use finger::Finger;
 pub(crate) use finger::newtons;
-pub use table::METRICS;
+pub use table::{BY_GOAL, METRICS};
 
 use crate::scene::Bound;
-use crate::watch::{Step, Watch};
+use crate::watch::{Controller, Step, Watch};
 use std::sync::LazyLock;
 
 /// Fingers that a scene has at most.
@@ -29,6 +33,15 @@ pub struct Metric {
     pub of_several: Worst,
     /// Its value for a finger; none where the run has none.
     pub value: fn(&Finger) -> Option<f64>,
+}
+
+/// A metric that has a value for each goal.
+#[derive(Clone, Copy)]
+pub struct ByGoal {
+    /// The metric's name.
+    pub name: &'static str,
+    /// Its values, in the metric's unit.
+    pub values: fn(&Finger) -> Vec<AtGoal>,
 }
 
 /// Which of several values counts.
@@ -67,6 +80,44 @@ impl Meter {
         Measured(scene.chain(fingers).collect())
     }
 
+    /// Whether each bound is held.
+    pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
+        let measured = self.measured();
+        bounds.iter().map(|bound| self.verdict(&measured, bound)).collect()
+    }
+
+    fn verdict(&self, measured: &Measured, bound: &Bound) -> Verdict {
+        let value = measured.get(&bound.metric);
+        let (mut value, mut max) = (value, bound.max);
+        if let (Some(base), Some(share)) = (bound.max, bound.max_per_goal_n) {
+            // That of the goal at which it is farthest beyond what it may be, as a share of that.
+            let allowed = |at: &AtGoal| base + share * at.goal_n;
+            let used = |at: &AtGoal| if allowed(at) > 0.0 { at.value / allowed(at) } else { at.value - allowed(at) };
+            let worst = self.by_goal(&bound.metric).into_iter().max_by(|a, b| used(a).total_cmp(&used(b)));
+            if let Some(worst) = worst {
+                (value, max) = (Some(worst.value), Some(allowed(&worst)));
+            }
+        }
+        let within = |value: f64| bound.min.is_none_or(|min| value >= min) && max.is_none_or(|max| value <= max);
+        Verdict { bound: bound.clone(), value, max, held: value.is_some_and(within) }
+    }
+
+    fn by_goal(&self, metric: &str) -> Vec<AtGoal> {
+        let numbered =
+            (0..FINGERS).find_map(|number| Some((number, metric.strip_prefix(&format!("finger{number}."))?)));
+        let (fingers, name) = match numbered {
+            Some((number, name)) => (self.0.get(number..=number).unwrap_or_default(), name),
+            None => (&self.0[..], metric),
+        };
+        let known = BY_GOAL.iter().find(|known| known.name == name);
+        known.map_or(Vec::new(), |known| fingers.iter().flat_map(known.values).collect())
+    }
+
+    /// The forces that were held.
+    pub fn holds(&self) -> Vec<Hold> {
+        self.0.iter().flat_map(|finger| finger.conduct.ended().holds).collect()
+    }
+
     /// None where a finger has none: a finger that never settles is not made up for by one that does.
     fn scene(&self, metric: &Metric) -> Option<f64> {
         let values: Option<Vec<f64>> = self.0.iter().map(metric.value).collect();
@@ -85,6 +136,10 @@ impl Meter {
 }
 
 impl Watch for Meter {
+    fn begin(&mut self, controllers: &[Controller]) {
+        self.0 = controllers.iter().map(Finger::of).collect();
+    }
+
     fn step(&mut self, step: &Step) {
         if self.0.len() <= step.finger {
             self.0.resize_with(step.finger + 1, Finger::default);
@@ -103,17 +158,6 @@ impl Measured {
         let of = |name: &str| self.0.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
         of(name).or_else(|| of(name.strip_prefix("finger0.")?)).flatten()
     }
-
-    /// Whether each bound is held.
-    pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
-        let verdict = |bound: &Bound| {
-            let value = self.get(&bound.metric);
-            let within =
-                |value: f64| bound.min.is_none_or(|min| value >= min) && bound.max.is_none_or(|max| value <= max);
-            Verdict { bound: bound.clone(), value, held: value.is_some_and(within) }
-        };
-        bounds.iter().map(verdict).collect()
-    }
 }
 
 /// What became of a bound.
@@ -123,6 +167,8 @@ pub struct Verdict {
     pub bound: Bound,
     /// What was measured; a metric that the run does not have holds no bound.
     pub value: Option<f64>,
+    /// The largest that was allowed, where what is allowed grows with the goal; else that of the bound.
+    pub max: Option<f64>,
     /// Whether it is held.
     pub held: bool,
 }

@@ -1,7 +1,7 @@
 //! A run with everything that watches it, and what it leaves behind.
 
 use crate::ledger::{self, Without};
-use crate::metrics::{Measured, Meter, Verdict, shown};
+use crate::metrics::{Hold, Measured, Meter, Verdict, shown};
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Summary, Watch};
 use serde_json::{Map, Value, json};
@@ -21,6 +21,8 @@ pub struct Outcome {
     pub measured: Measured,
     /// Whether it held what the scene asks for.
     pub verdicts: Vec<Verdict>,
+    /// The forces that were held.
+    pub holds: Vec<Hold>,
     /// Times, costs and digest.
     pub summary: Summary,
 }
@@ -33,7 +35,7 @@ pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result
     let mut meter = Meter::default();
     let summary = board(scene, &mut All { meter: &mut meter, others: watchers })?;
     let measured = meter.measured();
-    Ok(Outcome { verdicts: measured.verdicts(&scene.bounds), measured, summary })
+    Ok(Outcome { verdicts: meter.verdicts(&scene.bounds), holds: meter.holds(), measured, summary })
 }
 
 impl Outcome {
@@ -53,7 +55,7 @@ impl Outcome {
         let bound = |verdict: &Verdict| {
             let bound = &verdict.bound;
             json!({
-                "metric": bound.metric, "min": bound.min, "max": bound.max, "value": verdict.value, "held": verdict.held,
+                "metric": bound.metric, "min": bound.min, "max": verdict.max, "value": verdict.value, "held": verdict.held,
             })
         };
         json!({
@@ -109,7 +111,7 @@ impl Outcome {
 
 /// What a bound asks for.
 pub fn asked(verdict: &Verdict) -> String {
-    match (verdict.bound.min, verdict.bound.max) {
+    match (verdict.bound.min, verdict.max) {
         (Some(min), Some(max)) => format!("{min} to {max} asked"),
         (Some(min), None) => format!("{min} or more asked"),
         (None, Some(max)) => format!("{max} or less asked"),
@@ -125,6 +127,7 @@ struct All<'a, 'b> {
 
 impl Watch for All<'_, '_> {
     fn begin(&mut self, controllers: &[Controller]) {
+        self.meter.begin(controllers);
         self.others.iter_mut().for_each(|watch| watch.begin(controllers));
     }
 

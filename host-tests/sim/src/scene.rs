@@ -65,4 +65,6 @@ pub struct Bound {
     pub min: Option<f64>,
     /// The largest.
     pub max: Option<f64>,
+    /// How much larger for each N of the goal, of a metric that has a value for each goal.
+    pub max_per_goal_n: Option<f64>,
 }

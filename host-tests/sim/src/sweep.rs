@@ -3,12 +3,15 @@
 //! Runs are numbered point by point and, within a point, seed by seed. A shard takes every n-th of them; what is merged from
 //! shards is the same, byte for byte, as one whole sweep.
 
+pub mod cores;
 pub mod files;
 mod plots;
+mod shard;
 mod summary;
 mod vary;
 
 pub use files::{Table, merge};
+pub use shard::Shard;
 pub use vary::Vary;
 
 use crate::cli;
@@ -17,11 +20,7 @@ use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use files::Part;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::num::NonZero;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
-use std::thread;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -34,8 +33,8 @@ pub struct Plan {
     pub vary: Vec<Vary>,
     /// Seeds at each point, counted on from the scene's.
     pub seeds: u64,
-    /// This shard, from 1, of how many.
-    pub shard: [usize; 2],
+    /// Which of the runs.
+    pub shard: Shard,
     /// Where the results go.
     pub out: PathBuf,
 }
@@ -62,46 +61,25 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<Table, RunError> {
         let (values, scene) = &points[number / plan.seeds as usize];
         Task { number, values, scene, seed: scene.seed + (number % plan.seeds as usize) as u64 }
     };
-    let [shard, shards] = plan.shard;
-    let mine = (0..all).filter(|number| number % shards == shard - 1);
+    let mine = (0..all).filter(|number| plan.shard.has(*number));
     let tasks: Vec<Task> = mine.filter(|number| !part.has(number + 1)).map(task).collect();
-    let progress = ProgressBar::new((tasks.len() + part.rows()) as u64)
-        .with_style(ProgressStyle::with_template("{bar:40} {pos} of {len} runs, {eta} to go")?)
-        .with_position(part.rows() as u64);
-    each(&tasks, board, |task, row| {
+    let progress = progress(tasks.len() + part.rows(), "runs")?.with_position(part.rows() as u64);
+    let done = |task: &Task, row| {
         progress.inc(1);
         part.add(task.number + 1, row)
-    })?;
+    };
+    cores::each(&tasks, |task| row(task, board), done)?;
     progress.finish_and_clear();
     part.finish(plan)
 }
 
-/// Runs the tasks on all cores, and hands each row to `done` as it comes.
-fn each(
-    tasks: &[Task],
-    board: Run,
-    mut done: impl FnMut(&Task, Vec<String>) -> Result<(), RunError>,
-) -> Result<(), RunError> {
-    let next = AtomicUsize::new(0);
-    let stop = AtomicBool::new(false);
-    let (sender, rows) = mpsc::channel();
-    let cores = thread::available_parallelism().map_or(1, NonZero::get);
-    thread::scope(|scope| {
-        for _ in 0..cores {
-            let (sender, next, stop) = (sender.clone(), &next, &stop);
-            scope.spawn(move || {
-                while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    if stop.load(Ordering::Relaxed) || sender.send((task, row(task, board))).is_err() {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        let finished = rows.into_iter().try_for_each(|(task, row)| done(task, row?));
-        stop.store(finished.is_err(), Ordering::Relaxed);
-        finished
-    })
+/// A bar on the terminal.
+///
+/// # Errors
+/// None: the template is one.
+pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
+    let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
+    Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
 }
 
 /// What a run writes after its number: values, seed, verdict, digest and metrics.

@@ -70,7 +70,7 @@ const BREAKERS: &[Breakers] = &[
 /// stopped with a fault breaks only that it must not.
 fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     let sides = |verdict: &Verdict| {
-        let Verdict { bound: Bound { metric, min, max }, value, .. } = verdict;
+        let Verdict { bound: Bound { metric, min, .. }, value, max, .. } = verdict;
         let held = [
             (min.is_some(), "min", value.is_some_and(|value| min.is_some_and(|min| value < min))),
             (max.is_some(), "max", value.is_some_and(|value| max.is_some_and(|max| value > max))),

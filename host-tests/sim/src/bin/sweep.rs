@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use sim::cli::verdict;
 use sim::native;
-use sim::sweep::{Plan, Vary, merge, sweep};
+use sim::sweep::{Plan, Shard, Vary, merge, sweep};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -38,8 +38,8 @@ struct Args {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
     seeds: u64,
     /// Runs only the I-th of N shares, for merging
-    #[arg(long, value_name = "I/N", value_parser = shard)]
-    shard: Option<[usize; 2]>,
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
     /// Where the results go
     #[arg(long, value_name = "DIR", default_value = "target/sweep")]
     out: PathBuf,
@@ -58,23 +58,17 @@ enum Merge {
     },
 }
 
-fn shard(text: &str) -> Result<[usize; 2], String> {
-    let wrong = || format!("`{text}`: I/N is asked for, I from 1 to N");
-    let (shard, shards) = text.split_once('/').ok_or_else(wrong)?;
-    let [shard, shards]: [usize; 2] = [shard.parse().map_err(|_| wrong())?, shards.parse().map_err(|_| wrong())?];
-    if (1..=shards).contains(&shard) { Ok([shard, shards]) } else { Err(wrong()) }
-}
-
 fn main() -> ExitCode {
     let Args { merge: merged, scene, vary, set, seeds, shard, out } = Args::parse();
     let started = Instant::now();
     let (table, out, whole) = match merged {
         Some(Merge::Merge { files, out }) => (merge(&files, &out), out, true),
         None => {
-            let plan = Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or([1, 1]), out };
+            let plan =
+                Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or(Shard::WHOLE), out };
             let board =
                 |scene: &_, watch: &mut dyn sim::watch::Watch| native::simulate(scene, watch).map_err(Into::into);
-            (sweep(&plan, &board), plan.out.clone(), plan.shard[1] == 1)
+            (sweep(&plan, &board), plan.out.clone(), plan.shard.is_whole())
         }
     };
     verdict(table.map(|table| {

@@ -1,7 +1,8 @@
 //! What is gathered of one finger, step by step; no trace is kept, so an hour costs what a second does.
 
+use super::conduct::Conduct;
 use super::slips::Slips;
-use crate::watch::Step;
+use crate::watch::{Controller, Step};
 use fingertip::safety::{Fault, Limits};
 use fingertip::units::{Duty, Millimetres, Newtons};
 use host_tests::metrics::Response;
@@ -120,9 +121,15 @@ pub struct Finger {
     pub(super) energy_j: f64,
     pub(super) current_a: Squares,
     pub(super) winding_max_c: Option<f64>,
+    pub(super) conduct: Conduct,
 }
 
 impl Finger {
+    /// With what its controller is given.
+    pub(super) fn of(controller: &Controller) -> Self {
+        Self { conduct: Conduct::of(controller), ..Self::default() }
+    }
+
     pub(super) fn step(&mut self, step: &Step) {
         if step.time_s < 0.0 {
             self.missed_before = step.status.missed_frames;
@@ -136,6 +143,7 @@ impl Finger {
         self.sensing(step, dt_s);
         self.drive(step, dt_s);
         self.object(step, begins);
+        self.conduct.step(step);
     }
 
     /// All goals' answers, the one under way included.
@@ -154,7 +162,7 @@ impl Finger {
             self.touch(step);
         }
         if goal_n != self.goal_n {
-            let trimmed = self.response.is_some() && goal_n > 0.0 && (goal_n - self.goal_n).abs() < STEP_N;
+            let trimmed = self.response.is_some() && trimmed(self.goal_n, goal_n);
             self.goal_n = goal_n;
             if let Some(over) = if trimmed { None } else { self.response.take() } {
                 self.answers.add(&over);
@@ -236,8 +244,13 @@ impl Finger {
     }
 }
 
+/// Whether a goal that changes is no step to judge.
+pub(super) fn trimmed(from_n: f64, to_n: f64) -> bool {
+    from_n > 0.0 && to_n > 0.0 && (to_n - from_n).abs() < STEP_N
+}
+
 /// As a share of the supply.
-fn duty(duty: Duty) -> f64 {
+pub(super) fn duty(duty: Duty) -> f64 {
     f64::from(duty.0) / f64::from(Duty::FULL)
 }
 

@@ -1,7 +1,8 @@
 //! The one table of metrics.
 
+use super::at_goal::AtGoal;
 use super::finger::{DROPPED_MM, Finger, LIMITS};
-use super::{Metric, Worst};
+use super::{ByGoal, Metric, Worst};
 use Worst::{FirstFault, Largest, Least, Sum};
 
 const fn metric(
@@ -35,6 +36,7 @@ pub const METRICS: &[Metric] = &[
     metric("touch_ms", Largest, "from the start to the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
     metric("approach_mm_per_s", Largest, "mean speed of the tip over the last 10 ms before the first contact", |f| f.approach_mm_per_s),
     metric("travel_max_mm", Largest, "farthest way of the tip from its start", |f| Some(f.travel_max_mm)),
+    metric("travel_min_mm", Least, "farthest way of the tip behind its start, below 0", |f| Some(f.conduct.travel_min_mm)),
     metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
     metric("faults_count", Sum, "faults that stopped the motor", |f| Some(f64::from(f.faults))),
     metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
@@ -64,4 +66,35 @@ pub const METRICS: &[Metric] = &[
     metric("current_rms_a", Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
     metric("current_max_a", Largest, "largest current in the winding", |f| Some(f.current_a.max)),
     metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
+    metric("runaway_mm", Largest, "farthest way of the tip behind the first touch, beyond the largest indentation and the clearance (before a touch: behind the start, beyond the clearance), or beyond the travel's end", |f| Some(f.conduct.runaway_mm)),
+    metric("air_speed_percent", Largest, "largest speed of the tip without a contact, from 20 ms after one ended, of the approach speed", |f| Some(100.0 * f.conduct.air_share())),
+    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is taken back counts for 200 ms, and on behind a fault", |f| largest(&over_force(f)).or(Some(0.0))),
+    metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that was there for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm)),
+    metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that was there for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share)),
+    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that was there for 400 ms; the worst of all", |f| largest(&swings(f))),
+    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| if f.faults > 0 { largest(&errors(f)).or(Some(0.0)) } else { largest(&errors(f)) }),
+    metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
+
+/// Those that have a value for each goal.
+pub const BY_GOAL: &[ByGoal] = &[
+    ByGoal { name: "over_force_mn", values: over_force },
+    ByGoal { name: "hold_swing_mn", values: swings },
+    ByGoal { name: "hold_error_mn", values: errors },
+];
+
+fn over_force(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.over_force().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn swings(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.ended().swings().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn errors(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.ended().errors().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn largest(values: &[AtGoal]) -> Option<f64> {
+    values.iter().map(|at| at.value).reduce(f64::max)
+}

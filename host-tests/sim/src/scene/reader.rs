@@ -6,6 +6,7 @@ use super::error::{SceneError, SceneErrors, alike};
 use super::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
 use super::{Bound, Event, Scene, controller};
 use crate::key::Values;
+use crate::metrics;
 use crate::registry::{self, Named};
 use fingertip::config::Config;
 use std::ops::Range;
@@ -181,6 +182,7 @@ impl Reader<'_> {
                 metric: values.text("metric").to_owned(),
                 min: values.optional("min"),
                 max: values.optional("max"),
+                max_per_goal_n: values.optional("max_per_goal_n"),
             };
             let metric = || item_span(given, "metric");
             if !metrics.contains(&bound.metric.as_str()) {
@@ -191,6 +193,19 @@ impl Reader<'_> {
             if bounds.iter().any(|before| before.metric == bound.metric) {
                 let message = format!("bounds of `{}` for the second time", bound.metric);
                 self.error(metric(), message, "one [[expect]] a metric, with min, max or both".into());
+            }
+            let by_goal = metrics::BY_GOAL.iter().map(|metric| metric.name);
+            if bound.max_per_goal_n.is_some() {
+                let name = bound.metric.rsplit('.').next().unwrap_or_default();
+                let message = if by_goal.clone().all(|known| known != name) {
+                    Some(format!("`{}` has no value for each goal", bound.metric))
+                } else {
+                    bound.max.is_none().then(|| "`max_per_goal_n` without `max`".into())
+                };
+                if let Some(message) = message {
+                    let allowed = format!("with max, and of {}", by_goal.collect::<Vec<_>>().join(", "));
+                    self.error(item_span(given, "max_per_goal_n"), message, allowed);
+                }
             }
             match (bound.min, bound.max) {
                 (None, None) => {

@@ -71,6 +71,11 @@ pub const EXPECT: Table = Table {
         Key { name: "metric", about: "The metric's name.", kind: Kind::Text },
         Key { name: "min", about: "The least, in the metric's unit.", kind: ANY },
         Key { name: "max", about: "The largest, in the metric's unit.", kind: ANY },
+        Key {
+            name: "max_per_goal_n",
+            about: "How much larger for each N of the goal, of a metric that has a value for each goal: over_force_mn, hold_swing_mn, hold_error_mn.",
+            kind: Kind::Optional { min: 0.0, max: 1e6, whole: false },
+        },
     ],
 };
 const ANY: Kind = Kind::Optional { min: -1e12, max: 1e12, whole: false };

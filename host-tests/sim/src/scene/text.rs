@@ -62,7 +62,7 @@ pub fn write(scene: &Scene) -> String {
     }
     for bound in &scene.bounds {
         text += &format!("\n[[expect]]\nmetric = {}\n", Value::Text(bound.metric.clone()));
-        for (name, side) in [("min", bound.min), ("max", bound.max)] {
+        for (name, side) in [("min", bound.min), ("max", bound.max), ("max_per_goal_n", bound.max_per_goal_n)] {
             text += &side.map_or(String::new(), |side| format!("{name} = {}\n", Value::Number(side)));
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! A shard writes `runs-1-of-4.csv` alone; merging makes the rest. Each row says to which sweep it belongs and of how many runs.
 
-use super::{Plan, plots, summary};
+use super::{Plan, Shard, plots, summary};
 use crate::metrics::METRICS;
 use crate::run::RunError;
 use crate::scene::Scene;
@@ -110,10 +110,10 @@ impl Part {
     /// Writes the files.
     pub fn finish(self, plan: &Plan) -> Result<Table, RunError> {
         let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
-        if plan.shard[1] > 1 {
-            table.write_runs(&plan.out.join(runs_name(plan)))?;
-        } else {
+        if plan.shard.is_whole() {
             table.write(&plan.out)?;
+        } else {
+            table.write_runs(&plan.out.join(runs_name(plan)))?;
         }
         drop(self.out);
         fs::remove_file(&self.path)?;
@@ -122,10 +122,8 @@ impl Part {
 }
 
 fn runs_name(plan: &Plan) -> String {
-    match plan.shard {
-        [_, 1] => "runs.csv".into(),
-        [shard, shards] => format!("runs-{shard}-of-{shards}.csv"),
-    }
+    let Shard { number, of } = plan.shard;
+    if plan.shard.is_whole() { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") }
 }
 
 fn words(row: &StringRecord) -> Vec<String> {

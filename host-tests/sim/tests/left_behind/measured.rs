@@ -80,7 +80,7 @@ fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
 #[test]
 fn a_bound_breaks_on_either_side_and_without_a_value() {
     let mut scene = wall();
-    let bound = |metric: &str, min, max| Bound { metric: metric.into(), min, max };
+    let bound = |metric: &str, min, max| Bound { metric: metric.into(), min, max, max_per_goal_n: None };
     scene.bounds = vec![
         bound("peak_force_n", Some(1.2), None),
         bound("peak_force_n", None, Some(0.9)),

@@ -2,7 +2,7 @@
 
 use crate::{SCENE, native};
 use sim::cli;
-use sim::sweep::{Plan, Table, merge, sweep};
+use sim::sweep::{Plan, Shard, Table, merge, sweep};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 /// Two keys and two seeds, short.
-fn plan(out: &Path, shard: [usize; 2]) -> Plan {
+fn plan(out: &Path, shard: Shard) -> Plan {
     Plan {
         scene: SCENE.into(),
         set: vec!["duration_s=0.04".into(), "object.distance_mm=0.5".into()],
@@ -33,7 +33,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 fn whole(name: &str) -> (PathBuf, Table) {
     let out = folder(name);
-    let table = sweep(&plan(&out, [1, 1]), &native).unwrap();
+    let table = sweep(&plan(&out, Shard::WHOLE), &native).unwrap();
     (out, table)
 }
 
@@ -51,7 +51,7 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     let shards = folder("shards");
     // The last first: the order of the files does not count.
     for shard in (1..=4).rev() {
-        sweep(&plan(&shards, [shard, 4]), &native).unwrap();
+        sweep(&plan(&shards, Shard { number: shard, of: 4 }), &native).unwrap();
     }
     let parts: Vec<PathBuf> = (1..=4).rev().map(|shard| shards.join(format!("runs-{shard}-of-4.csv"))).collect();
     let merged = folder("merged");
@@ -63,7 +63,7 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     assert!(refused(&parts[1..]).contains("3 of 12 runs are missing, run 4 the first"), "{}", refused(&parts[1..]));
     assert!(refused(&[parts.clone(), vec![parts[0].clone()]].concat()).contains("there twice"));
     let other = folder("other");
-    sweep(&Plan { seeds: 1, ..plan(&other, [1, 2]) }, &native).unwrap();
+    sweep(&Plan { seeds: 1, ..plan(&other, Shard { number: 1, of: 2 }) }, &native).unwrap();
     assert!(refused(&[parts[0].clone(), other.join("runs-1-of-2.csv")]).contains("is of the sweep"));
     assert!(refused(&[whole.join("summary.csv")]).contains("is no shard"));
 }
@@ -101,10 +101,10 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
     let part = out.join("runs.csv.part");
     fs::write(&part, kept.clone() + &cut[..cut.len() / 2]).unwrap();
     // A try that gets no farther leaves the six.
-    sweep(&plan(&out, [1, 1]), &|_, _| Err("stopped".into())).unwrap_err();
+    sweep(&plan(&out, Shard::WHOLE), &|_, _| Err("stopped".into())).unwrap_err();
     assert_eq!(fs::read_to_string(&part).unwrap(), kept);
     let ran = AtomicUsize::new(0);
-    let again = sweep(&plan(&out, [1, 1]), &|scene, watch| {
+    let again = sweep(&plan(&out, Shard::WHOLE), &|scene, watch| {
         ran.fetch_add(1, Ordering::Relaxed);
         native(scene, watch)
     });
@@ -114,7 +114,7 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
     // What another sweep of the same columns left is not taken up.
     fs::write(&part, kept).unwrap();
     let ran = AtomicUsize::new(0);
-    let other = Plan { seeds: 1, ..plan(&out, [1, 1]) };
+    let other = Plan { seeds: 1, ..plan(&out, Shard::WHOLE) };
     let other = sweep(&other, &|scene, watch| {
         ran.fetch_add(1, Ordering::Relaxed);
         native(scene, watch)
@@ -125,8 +125,8 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
 #[test]
 fn what_cannot_be_run_is_told() {
     let out = folder("wrong");
-    let plan = Plan { vary: vec!["tip.radius_mm=10..1000:2".parse().unwrap()], ..plan(&out, [1, 1]) };
+    let plan = Plan { vary: vec!["tip.radius_mm=10..1000:2".parse().unwrap()], ..plan(&out, Shard::WHOLE) };
     assert!(sweep(&plan, &native).unwrap_err().to_string().contains("radius_mm"));
-    let failing = sweep(&self::plan(&out, [1, 1]), &|_, _| Err("the board burns".into()));
+    let failing = sweep(&self::plan(&out, Shard::WHOLE), &|_, _| Err("the board burns".into()));
     assert!(failing.unwrap_err().to_string().contains("the board burns"));
 }

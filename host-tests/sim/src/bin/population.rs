@@ -1,0 +1,15 @@
+//! `population`: many drawn fingers on the native board.
+
+use clap::Parser;
+use sim::native;
+use sim::population::cli::{self, Args, Board};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let args = Args::parse();
+    if args.board != Board::Native {
+        eprintln!("this program is the native board: `cargo xtask population --board virtual` runs the flash image");
+        return ExitCode::from(2);
+    }
+    cli::answer(&args, &|scene, watch| native::simulate(scene, watch).map_err(Into::into))
+}

@@ -1,0 +1,99 @@
+//! Populations: what the fingers are like that a usual build brings about, and how the controller does on them.
+//!
+//! A population's file is a scene whose values may be drawn, each finger anew. Its bounds are the envelope: what each finger promises.
+//! A finger is a scene like any other, so what is found can be run again by itself.
+
+pub mod cli;
+mod draw;
+mod expression;
+mod file;
+mod read;
+pub mod report;
+mod text;
+mod worst;
+
+pub use draw::Drawn;
+pub use file::{folder, load, read};
+pub use report::Report;
+
+use crate::effects::stream;
+use crate::metrics;
+use crate::scene::{self, Scene, SceneErrors};
+use draw::Draw;
+use fastrand::Rng;
+use file::{Place, written};
+
+/// A population.
+#[derive(Clone, Debug)]
+pub struct Population {
+    /// The file's name without its ending.
+    pub name: String,
+    /// As errors name it.
+    pub file: String,
+    /// What it is, in a line.
+    pub about: String,
+    /// The whole text, what it extends included.
+    pub text: String,
+    variables: Vec<(String, Draw)>,
+    places: Vec<Place>,
+    /// What is counted beside the envelope.
+    pub counted: Vec<Counted>,
+}
+
+/// Fingers whose metric is above something are counted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Counted {
+    /// The metric.
+    pub metric: String,
+    /// Above this.
+    pub above: f64,
+}
+
+/// A finger that was drawn.
+#[derive(Clone, Debug)]
+pub struct Finger {
+    /// Each variable and each drawn key, with its value.
+    pub drawn: Vec<(String, Drawn)>,
+    /// Its scene.
+    pub scene: Scene,
+}
+
+impl Population {
+    /// Draws a finger, from 0. Each value has a stream of random numbers of its own, so one more leaves the others as they are.
+    ///
+    /// # Errors
+    /// It is no scene.
+    pub fn finger(&self, seed: u64, number: usize) -> Result<Finger, SceneErrors> {
+        let mut drawn: Vec<(String, Drawn)> = Vec::new();
+        let draw = |name: &str, draw: &Draw, whole: bool, drawn: &[(String, Drawn)]| {
+            let variable = |name: &str| drawn.iter().find(|(known, _)| known == name).map(|(_, value)| value.clone());
+            let mut rng = Rng::with_seed(stream(seed, name, number));
+            // Every name was looked up when the file was read.
+            draw.draw(&mut rng, &variable).expect("a draw knows its variables").rounded(whole)
+        };
+        for (name, how) in &self.variables {
+            let value = draw(name, how, false, &drawn);
+            drawn.push((name.clone(), value));
+        }
+        let mut text = String::new();
+        let mut from = 0;
+        for Place { at, key, whole, draw: how } in &self.places {
+            text += &self.text[from..at.start];
+            match how {
+                Some(how) => {
+                    let value = draw(key, how, *whole, &drawn[..self.variables.len()]);
+                    text += &written(&value, *whole);
+                    drawn.push((key.clone(), value));
+                }
+                // Lines stay lines, so that errors name the right ones.
+                None => text.extend(self.text[at.clone()].chars().filter(|c| *c == '\n')),
+            }
+            from = at.end;
+        }
+        text += &self.text[from..];
+        let mut scene = scene::read(&self.file, &text, &metrics::names())?;
+        scene.seed = stream(seed, "seed", number) >> 1;
+        scene.name = format!("finger-{}", number + 1);
+        Ok(Finger { drawn, scene })
+    }
+}

@@ -1,0 +1,310 @@
+//! What became of a population: every finger's draws and verdicts, and what they come to.
+
+use super::{Drawn, Finger, Population};
+use crate::run::{Outcome, RunError};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// All fingers of a population or of a shard, in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// The population's name.
+    pub population: String,
+    /// What it is.
+    pub about: String,
+    /// Always true.
+    pub simulated: bool,
+    /// On which board.
+    pub board: String,
+    /// Of the draws.
+    pub seed: u64,
+    /// How many fingers the whole has.
+    pub of_fingers: usize,
+    /// Of the population's text, the seed and the number of fingers: shards of one whole have the same.
+    pub id: String,
+    /// What they come to, for scripts.
+    pub summary: Value,
+    /// Each finger.
+    pub fingers: Vec<Ran>,
+}
+
+/// A finger that was run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ran {
+    /// Its number, from 1.
+    pub finger: usize,
+    /// Of its scene.
+    pub seed: u64,
+    /// Whether it kept all promises.
+    pub inside: bool,
+    /// What was drawn.
+    pub drawn: Map<String, Value>,
+    /// What it promised, and what became of it.
+    pub promises: Vec<Promise>,
+    /// The forces that it held.
+    pub holds: Vec<Held>,
+    /// All metrics; null where the run has none.
+    pub metrics: Map<String, Value>,
+    /// Of its run.
+    pub digest: String,
+}
+
+/// A promise of the envelope.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Promise {
+    /// What it is about.
+    pub metric: String,
+    /// What was measured: of a metric that has a value for each goal, that which is worst against what is allowed.
+    pub value: Option<f64>,
+    /// The least that is allowed.
+    pub min: Option<f64>,
+    /// The largest that is allowed.
+    pub max: Option<f64>,
+    /// Whether it is kept.
+    pub held: bool,
+}
+
+/// A force that was held.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Held {
+    /// What was asked for.
+    pub goal_n: f64,
+    /// Mean of the true force at the end.
+    pub mean_n: f64,
+    /// Whether a fault had stopped the motor.
+    pub faulty: bool,
+}
+
+impl Promise {
+    /// How far beyond what is allowed it is, as a share of that; what is only counted is far beyond.
+    pub fn excess(&self) -> f64 {
+        let Some(value) = self.value else { return if self.held { 0.0 } else { f64::INFINITY } };
+        let over = self.max.map_or(0.0, |max| value - max).max(self.min.map_or(0.0, |min| min - value));
+        over / self.max.or(self.min).map(f64::abs).filter(|allowed| *allowed > 0.0).unwrap_or(1.0)
+    }
+}
+
+impl Ran {
+    /// What became of a finger.
+    pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
+        let drawn = finger.drawn.iter().map(|(name, value)| {
+            (
+                name.clone(),
+                match value {
+                    Drawn::Number(number) => json!(number),
+                    Drawn::Word(word) => json!(word),
+                },
+            )
+        });
+        let promises = outcome.verdicts.iter().map(|verdict| Promise {
+            metric: verdict.bound.metric.clone(),
+            value: verdict.value,
+            min: verdict.bound.min,
+            max: verdict.max,
+            held: verdict.held,
+        });
+        let holds = outcome.holds.iter();
+        let holds = holds.map(|hold| Held { goal_n: hold.goal_n, mean_n: hold.mean_n, faulty: hold.faulty });
+        Self {
+            finger: number + 1,
+            seed: finger.scene.seed,
+            inside: outcome.passed(),
+            drawn: drawn.collect(),
+            promises: promises.collect(),
+            holds: holds.collect(),
+            metrics: outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
+            digest: outcome.summary.digest.clone(),
+        }
+    }
+
+    /// The promises that it broke.
+    pub fn broken(&self) -> impl Iterator<Item = &Promise> {
+        self.promises.iter().filter(|promise| !promise.held)
+    }
+
+    /// How bad it is: the worst of its broken promises.
+    pub fn excess(&self) -> f64 {
+        self.broken().map(Promise::excess).fold(0.0, f64::max)
+    }
+
+    /// A metric; none where the run has none.
+    pub fn metric(&self, name: &str) -> Option<f64> {
+        self.metrics.get(name)?.as_f64()
+    }
+}
+
+impl Report {
+    /// Of these fingers, in any order.
+    pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
+        let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
+        let id =
+            format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()));
+        let counted = population.counted.iter().map(|counted| (counted.metric.clone(), json!(counted.above))).collect();
+        let mut report = Self {
+            population: population.name.clone(),
+            about: population.about.clone(),
+            simulated: true,
+            board: board.into(),
+            seed,
+            of_fingers,
+            id,
+            summary: Value::Null,
+            fingers,
+        };
+        report.finish(counted);
+        report
+    }
+
+    /// Shards put together: the same, byte for byte, as the whole.
+    ///
+    /// # Errors
+    /// They are not of one population, a finger is missing or there twice, or a file cannot be read.
+    pub fn merge(files: &[PathBuf]) -> Result<Self, RunError> {
+        let mut whole: Option<Self> = None;
+        let mut fingers = BTreeMap::new();
+        for file in files {
+            let name = file.display();
+            let text = fs::read_to_string(file).map_err(|error| format!("cannot read {name}: {error}"))?;
+            let shard: Self =
+                serde_json::from_str(&text).map_err(|error| format!("{name} is no population's JSON: {error}"))?;
+            for finger in &shard.fingers {
+                if fingers.insert(finger.finger, finger.clone()).is_some() {
+                    return Err(format!("finger {} is there twice: in {name} again", finger.finger).into());
+                }
+            }
+            let known = whole.get_or_insert(shard.clone());
+            if known.id != shard.id {
+                return Err(format!("{name} is of the population {} and not of {}", shard.id, known.id).into());
+            }
+        }
+        let mut whole = whole.ok_or("there are no files to put together")?;
+        let missing: Vec<usize> = (1..=whole.of_fingers).filter(|number| !fingers.contains_key(number)).collect();
+        if let Some(first) = missing.first() {
+            let (count, all) = (missing.len(), whole.of_fingers);
+            return Err(
+                format!("{count} of {all} fingers are missing, finger {first} the first: is a shard missing?").into()
+            );
+        }
+        whole.fingers = fingers.into_values().collect();
+        let counted = whole.counted().into_iter().map(|(metric, above, _)| (metric, json!(above))).collect();
+        whole.finish(counted);
+        Ok(whole)
+    }
+
+    fn finish(&mut self, counted: Map<String, Value>) {
+        self.fingers.sort_by_key(|ran| ran.finger);
+        let promises: Vec<Value> = self.promises().iter().map(Row::json).collect();
+        let [percent, mn] = self.errors().map(|spread| spread.json());
+        let counted = counted.into_iter().map(|(metric, above)| {
+            let over = |ran: &&Ran| ran.metric(&metric) > above.as_f64();
+            json!({ "metric": metric, "above": above, "fingers": self.fingers.iter().filter(over).count() })
+        });
+        self.summary = json!({
+            "fingers": self.fingers.len(),
+            "inside": self.inside(),
+            "promises": promises,
+            "hold_error_percent": percent,
+            "hold_error_mn": mn,
+            "counted": counted.collect::<Vec<_>>(),
+        });
+    }
+
+    /// How many kept all promises.
+    pub fn inside(&self) -> usize {
+        self.fingers.iter().filter(|ran| ran.inside).count()
+    }
+
+    /// What is counted beside the envelope: metric, above what, and how many fingers.
+    pub fn counted(&self) -> Vec<(String, f64, u64)> {
+        let counted = self.summary["counted"].as_array().into_iter().flatten();
+        let row =
+            |row: &Value| Some((row["metric"].as_str()?.to_owned(), row["above"].as_f64()?, row["fingers"].as_u64()?));
+        counted.filter_map(row).collect()
+    }
+
+    /// Each promise over all fingers.
+    pub fn promises(&self) -> Vec<Row> {
+        let of = |place: usize| self.fingers.iter().filter_map(move |ran| ran.promises.get(place));
+        let names =
+            self.fingers.first().map_or(Vec::new(), |ran| ran.promises.iter().map(|p| p.metric.clone()).collect());
+        let row = |(place, metric): (usize, String)| Row {
+            metric,
+            broken: of(place).filter(|promise| !promise.held).count(),
+            spread: Spread::of(of(place).filter_map(|promise| promise.value).collect()),
+        };
+        names.into_iter().enumerate().map(row).collect()
+    }
+
+    /// What the true force is off the goal in holds, in percent of it and in mN.
+    pub fn errors(&self) -> [Spread; 2] {
+        let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty);
+        let off_n = |hold: &Held| (hold.mean_n - hold.goal_n).abs();
+        let percent = holds().map(|hold| 100.0 * off_n(hold) / hold.goal_n).collect();
+        [Spread::of(percent), Spread::of(holds().map(|hold| 1e3 * off_n(hold)).collect())]
+    }
+
+    /// The worst first, of those that broke a promise.
+    pub fn worst(&self) -> Vec<&Ran> {
+        let mut outside: Vec<&Ran> = self.fingers.iter().filter(|ran| !ran.inside).collect();
+        outside.sort_by(|a, b| b.excess().total_cmp(&a.excess()).then(a.finger.cmp(&b.finger)));
+        outside
+    }
+
+    /// Writes it for scripts.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), RunError> {
+        let text = serde_json::to_string_pretty(self)? + "\n";
+        fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+    }
+}
+
+/// A promise over all fingers.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// What it is about.
+    pub metric: String,
+    /// Fingers that broke it.
+    pub broken: usize,
+    /// The values.
+    pub spread: Spread,
+}
+
+impl Row {
+    fn json(&self) -> Value {
+        let Value::Object(mut row) = self.spread.json() else { return Value::Null };
+        row.insert("metric".into(), json!(self.metric));
+        row.insert("broken".into(), json!(self.broken));
+        Value::Object(row)
+    }
+}
+
+/// How values are spread.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spread {
+    /// How many.
+    pub count: usize,
+    /// Half of them are below this.
+    pub median: Option<f64>,
+    /// 95 % of them are at or below this.
+    pub most: Option<f64>,
+    /// The largest.
+    pub worst: Option<f64>,
+}
+
+impl Spread {
+    /// Of values in any order.
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let rank = |share: f64| values.get(((values.len() as f64 * share).ceil() as usize).max(1) - 1).copied();
+        Self { count: values.len(), median: rank(0.5), most: rank(0.95), worst: values.last().copied() }
+    }
+
+    fn json(&self) -> Value {
+        json!({ "count": self.count, "median": self.median, "percentile_95": self.most, "worst": self.worst })
+    }
+}

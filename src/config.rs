@@ -6,7 +6,6 @@
 use crate::contact::Geometry;
 use crate::control::BRAKE_SHARE_Q8;
 use crate::control::gains::{self, Gains, PACES};
-use crate::frame::COLUMNS;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
@@ -66,8 +65,6 @@ pub struct Config {
 
     /// See [`Params::row_sag_ppb_per_code`], as a share in Q32.
     pub sag_q32: u16,
-    /// The same for as many codes as dead taxels of a whole row would show at most.
-    pub sag_of_dead_q32: i32,
     /// See [`Params::dead_codes`].
     pub dead_codes: u16,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
@@ -176,7 +173,6 @@ impl Config {
             timing,
             tip,
             sag_q32,
-            sag_of_dead_q32: COLUMNS as i32 * p.dead_codes * i32::from(sag_q32),
             dead_codes: p.dead_codes as u16,
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),

@@ -17,7 +17,7 @@ mod sums;
 mod view;
 
 pub use effort::Effort;
-pub use follow::{Fit, Rows};
+pub use follow::Fit;
 pub use geometry::Geometry;
 pub use sums::from_sums;
 

@@ -12,7 +12,7 @@ use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
 use crate::identify::{Press, PressView, Refusal};
-use crate::pressure::{ALL_ROWS, Array, Calibration};
+use crate::pressure::{Array, Calibration};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
@@ -93,13 +93,6 @@ impl Pipeline {
         self.status.duty = self.motion.coast();
     }
 
-    /// Works out every taxel of the frame last stepped with, for those who look at the whole picture: the step itself works out the
-    /// few that it needs. The peak is then that frame's, too.
-    pub fn develop(&mut self, frame: &Frame) {
-        self.array.develop(frame, ALL_ROWS);
-        self.status.contact.peak_pa = self.array.picture().peak_pa(&self.config);
-    }
-
     /// What the last step reported.
     pub fn status(&self) -> &Status {
         &self.status
@@ -140,10 +133,6 @@ impl Pipeline {
         // in a broken array.
         let sound = broken.is_none();
         let fits = sound && self.status.mode != Mode::Identify;
-        if sound {
-            self.array.develop(frame, self.rows_wanted());
-        }
-        let picture = self.array.picture();
         let contact =
             if fits { self.fit.read(picture, &self.config) } else { contact::from_sums(picture, &self.config) };
         self.budget.note(fits && self.fit.at_work());
@@ -209,17 +198,6 @@ impl Pipeline {
             self.stop(Fault::ArrayBroken);
         }
         broken
-    }
-
-    /// Rows of which somebody looks at single taxels in this frame, a bit each.
-    fn rows_wanted(&self) -> u16 {
-        match self.status.mode {
-            Mode::Tare => self.array.tare_rows(),
-            Mode::Identify => 0,
-            _ if self.array.picture().force(&self.config) >= self.config.contact_off => self.fit.wants().bits(),
-            // The baseline may follow.
-            _ => self.array.drift_row(),
-        }
     }
 
     /// Whether faults count: not while the bridge is off anyhow.

@@ -5,15 +5,14 @@
 //! tells the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
 //! taxel would show behind a perfect row driver, and m times the taxel's gain, less its tare, is its pressure.
 //!
-//! The sag is common to a row, so it is taken out of the row's sums: the pass over a frame ([`Array::read`]) makes sums and flags
-//! alone, two taxels an instruction. Single taxels are worked out row by row, where somebody looks at them ([`Array::develop`]).
+//! [`Array::read`] makes all of it in one pass over the frame ([`lanes::portable_pass`] is the arithmetic): every taxel's pressure,
+//! what they add up to, the highest of them, and whether any may be dead or saturated.
 
 mod calibration;
 mod picture;
 mod row;
 mod suspect;
 mod tare;
-mod taxels;
 
 pub use calibration::{Calibration, CalibrationError};
 pub use picture::Picture;
@@ -21,37 +20,27 @@ pub use tare::TARE_FRAMES;
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
-use lanes::{BOOST_BITS, Pairs, Row, Total};
+use lanes::{BOOST_BITS, GAIN_BITS, Pairs, Row, Total};
 use row::Sound;
 use suspect::Share;
 
 /// Fractional bits of a corrected code.
-pub const CODE_BITS: u32 = 4;
+pub const CODE_BITS: u32 = lanes::CODE_BITS;
 /// Fractional bits of the tare: the baseline's filter needs steps far below one code.
-const TARE_BITS: u32 = 16;
-/// Fractional bits of a gain.
-const GAIN_BITS: u32 = 14;
+pub const TARE_BITS: u32 = lanes::TARE_BITS;
 /// Per-taxel gain of one, Q14. Gains reach from 0 to just below 2.
 pub const GAIN_ONE: u16 = 1 << GAIN_BITS;
 /// Largest gain.
 pub const GAIN_MAX: u16 = (1 << 15) - 1;
-/// A bit for each row.
-pub const ALL_ROWS: u16 = (1 << ROWS) - 1;
 
 /// Per-taxel calibration and the last picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
     picture: Picture,
-    /// Gains, what the floors hold back of the rows' sums (see [`Sound`]), and the sag of the last frame.
+    /// Gains, the reading without contact, and the sag of the last frame.
     rows: [Row; ROWS],
-    /// The highest taxel of each row when that was last developed.
-    peaks: [i32; ROWS],
-    /// What is held back was worked out for so many.
-    dead_codes: u16,
     /// A bit for each column that is left out.
     mask: [u16; ROWS],
-    /// Reading without contact, codes in Q16.
-    tare: [[i32; COLUMNS]; ROWS],
     /// Sum of each row's tares and their moment, in sixteenths of a corrected code.
     tare_lines: [[i32; 2]; ROWS],
     /// Sum and moments of the tare, in sixteenths of a corrected code.
@@ -71,13 +60,11 @@ impl Default for Array {
 impl Array {
     /// Gains of one and no tare.
     pub const fn new() -> Self {
+        let [gains, moments] = Calibration::NONE.weights[0];
         Self {
             picture: Picture::EMPTY,
-            rows: [Row { weights: Calibration::NONE.weights[0], start: [0; 2], boost: 1 << BOOST_BITS }; ROWS],
-            peaks: [0; ROWS],
-            dead_codes: 0,
+            rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS }; ROWS],
             mask: [0; ROWS],
-            tare: [[0; COLUMNS]; ROWS],
             tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
             tare_frames: 0,
@@ -91,24 +78,22 @@ impl Array {
         &self.picture
     }
 
-    /// The tare of every taxel in sixteenths of a corrected code, row by row.
-    pub fn tare(&self) -> impl Iterator<Item = i32> + '_ {
-        self.tare.iter().flatten().map(|tare| tare >> (TARE_BITS - CODE_BITS))
+    /// The tare of every row's taxels: corrected codes with [`TARE_BITS`] fractional bits.
+    pub fn tare(&self) -> impl Iterator<Item = &[i32; COLUMNS]> {
+        self.rows.iter().map(|row| &row.tare)
     }
 
-    /// Reads a frame's sums and flags. Any codes are taken: what a sound array cannot show becomes a bad taxel. The picture's single
-    /// taxels and its peak stay as they are, see [`Array::develop`].
+    /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot show becomes
+    /// a bad taxel.
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
         let [rows @ .., undriven] = &frame.pairs;
-        if config.dead_codes != self.dead_codes {
-            self.hold_back(config.dead_codes);
-        }
         if self.picture.bad_count != 0 {
             (self.picture.bad, self.picture.bad_count) = (self.mask, 0);
         }
         let sound = Sound::new(undriven, config);
-        let mut total = lanes::pass(rows, &mut self.rows, &sound.common);
+        let mut total = lanes::pass(rows, &mut self.rows, &sound.common, &mut self.picture.taxels);
         let largest = row::larger_lane(total.largest);
+        self.picture.peak = total.peak;
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
         if sound.suspects(largest) {
@@ -122,22 +107,12 @@ impl Array {
         &self.picture
     }
 
-    /// Works out what floors of so many codes above the undriven levels hold back.
-    #[cold]
-    #[inline(never)]
-    fn hold_back(&mut self, dead_codes: u16) {
-        self.dead_codes = dead_codes;
-        let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
-        for row in &mut self.rows {
-            row.start = row.weights.map(|weights| weights.into_iter().fold(0, |sum, pair| lanes::dot(pair, dead, sum)));
-        }
-    }
-
-    /// Takes dead and saturated taxels out of a pass, and tells which they are.
+    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are.
     #[cold]
     #[inline(never)]
     fn leave_out(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
         let [rows @ .., undriven] = &frame.pairs;
+        let mut highest = 0;
         for (row, codes) in rows.iter().enumerate() {
             let bad = suspect::bad([codes, undriven], config.dead_codes);
             if bad == 0 {
@@ -150,39 +125,13 @@ impl Array {
             self.picture.bad_count += bad.count_ones() as u8;
             // An array that is broken anyhow must not take long.
             if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                let share = Share::new(bad, [codes, undriven], &self.rows[row], &self.tare[row]);
+                let share = Share::new(bad, [codes, undriven], &self.rows[row]);
                 row::leave_out(total, row, &share, self.rows[row].boost);
             }
+            highest = highest.max(suspect::clear(bad, &mut self.picture.taxels[row]));
         }
-    }
-
-    /// Works out the single taxels of some rows (a bit each) for the picture, from the frame last read.
-    pub fn develop(&mut self, frame: &Frame, rows: u16) {
-        let mut rows = rows & ALL_ROWS;
-        while rows != 0 {
-            self.develop_row(rows.trailing_zeros() as usize, frame);
-            rows &= rows - 1;
-        }
-        let [a, b, c, d, e, f, g, h, i, j] = self.peaks;
-        self.picture.peak = a.max(b).max(c).max(d).max(e).max(f).max(g).max(h).max(i).max(j);
-    }
-
-    /// Reads a frame with all of its taxels.
-    pub fn read_all(&mut self, frame: &Frame, config: &Config) -> &Picture {
-        self.read(frame, config);
-        self.develop(frame, ALL_ROWS);
-        &self.picture
-    }
-
-    /// Works out a row's taxels.
-    fn develop_row(&mut self, row: usize, frame: &Frame) {
-        let row = row.min(ROWS - 1);
-        let [rows @ .., undriven] = &frame.pairs;
-        let out = &mut self.picture.taxels[row];
-        self.peaks[row] = taxels::develop([&rows[row], undriven], &self.rows[row], &self.tare[row], out);
-        let bad = self.picture.bad[row] & !self.mask[row];
-        if bad != 0 {
-            self.peaks[row] = taxels::leave_out(bad, out);
+        if highest == self.picture.peak {
+            self.picture.peak = self.picture.taxels.as_flattened().iter().fold(0, |peak, taxel| peak.max(*taxel));
         }
     }
 
@@ -202,10 +151,9 @@ impl Array {
     /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
     pub fn calibrate(&mut self, calibration: &Calibration) {
         let Calibration { weights, mask } = calibration;
-        for (row, weights) in self.rows.iter_mut().zip(weights) {
-            row.weights = *weights;
+        for (row, [gains, moments]) in self.rows.iter_mut().zip(weights) {
+            (row.gains, row.moments) = (*gains, *moments);
         }
-        self.hold_back(self.dead_codes);
         self.mask = *mask;
         (self.picture.bad, self.picture.bad_count) = (*mask, 0);
         self.start_tare();

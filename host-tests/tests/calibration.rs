@@ -24,7 +24,7 @@ fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
     let mut array = Array::new();
     array.calibrate(calibration);
     for _ in 0..TARE_FRAMES {
-        array.read_all(blank, config);
+        array.read(blank, config);
         array.continue_tare();
     }
     array
@@ -34,12 +34,12 @@ fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
 fn a_gain_scales_its_taxel_and_no_other() {
     let [pressed, blank] = frames();
     let config = Config::new(&Params::DEFAULT).unwrap();
-    let plain = *tared(&Calibration::NONE, &blank, &config).read_all(&pressed, &config);
+    let plain = *tared(&Calibration::NONE, &blank, &config).read(&pressed, &config);
     let mut gains = GAINS;
     gains[4][6] = GAIN_ONE / 2;
     gains[5][3] = GAIN_ONE / 4 * 5;
     let calibration = Calibration::new(&gains, &[0; ROWS]).unwrap();
-    let scaled = *tared(&calibration, &blank, &config).read_all(&pressed, &config);
+    let scaled = *tared(&calibration, &blank, &config).read(&pressed, &config);
     for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
         let share = f64::from(gains[row][column]) / f64::from(GAIN_ONE);
         let expected = f64::from(plain.taxels[row][column]) * share;
@@ -58,7 +58,7 @@ fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
     mask[7] = 0x3ff;
     let array = |frame: &Frame| {
         let mut array = tared(&Calibration::new(&GAINS, &mask).unwrap(), &blank, &config);
-        (*array.read_all(frame, &config), array.bad_taxels(frame, &config))
+        (*array.read(frame, &config), array.bad_taxels(frame, &config))
     };
     let (sound, _) = array(&pressed);
     assert_eq!((sound.taxels[4][5], sound.taxels[7], sound.bad, sound.bad_count), (0, [0; COLUMNS], mask, 0));

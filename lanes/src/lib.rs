@@ -11,7 +11,7 @@ extern crate std;
 
 mod rows;
 
-pub use rows::{BOOST_BITS, Common, Row, Total, pass, portable_pass};
+pub use rows::{BOOST_BITS, CODE_BITS, Common, GAIN_BITS, Row, TARE_BITS, Total, pass, portable_pass};
 
 /// The sign bits of both lanes.
 pub const SIGNS: u32 = 0x8000_8000;

@@ -1,18 +1,35 @@
-//! One pass over the rows of a frame: sums of ten columns, two of them an instruction, the sag of each row taken out.
+//! One pass over the rows of a frame: from codes to taxels above their tare, their sums, and the highest of them.
+//!
+//! [`portable_pass`] is the pass to read; [`pass`] gives the same bits by the target's instructions.
 
-use super::{Pairs, portable};
+use super::{Pairs, high, low, portable};
 
+/// Fractional bits of a taxel.
+pub const CODE_BITS: u32 = 4;
+/// Fractional bits of a gain.
+pub const GAIN_BITS: u32 = 14;
+/// Fractional bits of a tare: what follows it slowly needs steps far below a taxel's.
+pub const TARE_BITS: u32 = 16;
 /// Fractional bits of a boost.
 pub const BOOST_BITS: u32 = 28;
+/// By so many bits the boost is shortened for single taxels, whose product is then an upper half.
+const BOOST_DROP: u32 = GAIN_BITS + BOOST_BITS - CODE_BITS - 32;
+
+/// Columns of a row: the two lanes of five pairs.
+pub const COLUMNS: usize = 2 * PLACES;
+/// Pairs of a row.
+const PLACES: usize = 5;
 
 /// What is known of a row before the pass, and the boost, which the pass finds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// The first and the second weight of each column.
-    pub weights: [Pairs; 2],
-    /// What the row's two weighted sums begin with.
-    pub start: [i32; 2],
+    /// The gain of each column.
+    pub gains: Pairs,
+    /// The weight of each column in the row's moment, its gain in it.
+    pub moments: Pairs,
+    /// What each column reads without contact.
+    pub tare: [i32; COLUMNS],
     /// 1 / (1 - x) in Q28, where x is the row's sag.
     pub boost: i32,
 }
@@ -22,24 +39,26 @@ pub struct Row {
 #[derive(Clone, Copy, Debug)]
 pub struct Common {
     /// What each column's codes are taken above.
-    pub floors: Pairs,
-    /// What the sag of each row begins with, Q32.
-    pub start: i32,
-    /// The sag for each code above the floor, Q32; in both lanes.
+    pub undriven: Pairs,
+    /// A column that shows less is dead; in both lanes.
+    pub dead: u32,
+    /// The sag for each code, Q32; in both lanes.
     pub sag: u32,
 }
 
 /// What the rows add up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
-    /// Sum of the rows' first sums, each times its boost; upper half of the product.
+    /// Sum of the rows' sums, each times its boost; upper half of the product.
     pub first: i32,
-    /// The same of the second sums.
+    /// The same of their moments.
     pub second: i32,
     /// A quarter of `first` after each row, added up.
     pub running: i32,
-    /// The largest code above its floor in each lane, unsigned: one below its floor is huge.
+    /// The largest code less what a dead one shows, in each lane, unsigned: that of a dead one is huge.
     pub largest: u32,
+    /// The highest taxel, at least 0.
+    pub peak: i32,
 }
 
 /// 1 / (1 - x) in Q28, for x in Q32 from -0.32 to 0.32.
@@ -54,24 +73,44 @@ fn boost(x: i32) -> i32 {
     portable::add_high(boost, boost, portable::add_high(x4, x4, x4))
 }
 
-/// [`pass`] without the instructions.
+/// A column's net code, gain and shortened boost to its taxel above the tare, rounded once.
 #[inline(always)]
-pub fn portable_pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; ROWS], common: &Common) -> Total {
+fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
+    let gained = i64::from(net) * i64::from(gain);
+    let boosted = (gained * i64::from(boost) + (1 << 31)) >> 32;
+    (boosted as i32).wrapping_sub(tare >> (TARE_BITS - CODE_BITS))
+}
+
+/// From codes to `taxels`, row by row: net codes, the row's sag by their sum, each column by its gain and the row's boost, less its
+/// tare; and the rows' sums by the same gains and boosts, which are not rounded taxel by taxel.
+#[inline(always)]
+pub fn portable_pass<const ROWS: usize>(
+    codes: &[Pairs; ROWS],
+    rows: &mut [Row; ROWS],
+    common: &Common,
+    taxels: &mut [[i32; COLUMNS]; ROWS],
+) -> Total {
     let mut total = Total::default();
-    for (codes, row) in codes.iter().zip(rows) {
-        let ([mut first, mut second], mut sag) = (row.start, common.start);
-        let [firsts, seconds] = &row.weights;
-        for (((code, floor), first_weight), second_weight) in codes.iter().zip(&common.floors).zip(firsts).zip(seconds)
-        {
-            let above = portable::sub(*code, *floor);
-            sag = portable::dot(above, common.sag, sag);
-            first = portable::dot(above, *first_weight, first);
-            second = portable::dot(above, *second_weight, second);
-            total.largest = super::larger(total.largest, above);
+    for ((codes, row), taxels) in codes.iter().zip(rows).zip(taxels) {
+        let mut nets = [0; PLACES];
+        let (mut sag, mut sum, mut moment) = (0, 0, 0);
+        for (place, net) in nets.iter_mut().enumerate() {
+            *net = portable::sub(codes[place], common.undriven[place]);
+            total.largest = super::larger(total.largest, portable::sub(*net, common.dead));
+            sag = portable::dot(*net, common.sag, sag);
+            sum = portable::dot(*net, row.gains[place], sum);
+            moment = portable::dot(*net, row.moments[place], moment);
         }
         row.boost = boost(sag);
-        total.first = portable::add_high(total.first, first, row.boost);
-        total.second = portable::add_high(total.second, second, row.boost);
+        let short = row.boost >> BOOST_DROP;
+        for (place, net) in nets.into_iter().enumerate() {
+            let (left, right) = (place, place + PLACES);
+            taxels[left] = taxel(low(net), low(row.gains[place]), short, row.tare[left]);
+            taxels[right] = taxel(high(net), high(row.gains[place]), short, row.tare[right]);
+            total.peak = total.peak.max(taxels[left]).max(taxels[right]);
+        }
+        total.first = portable::add_high(total.first, sum, row.boost);
+        total.second = portable::add_high(total.second, moment, row.boost);
         total.running = total.running.wrapping_add(total.first >> 2);
     }
     total
@@ -80,81 +119,165 @@ pub fn portable_pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; 
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
 pub use portable_pass as pass;
 
-/// Sums up the rows and finds their boosts (SSUB16, SMLAD, UQSUB16, SMMLA). ROWS is even.
+/// What a row's turn does for the two columns of a pair, whose net codes are in `$net`: sums, taxels, peak.
+#[cfg(all(target_arch = "arm", target_os = "none"))]
+macro_rules! columns {
+    ($net:literal, $place:literal, $sum:literal, $moment:literal) => {
+        concat!(
+            "ldr r8, [r1, #4 * ",
+            $place,
+            "]\n", // gains
+            "ldr r9, [r1, #4 * ",
+            $place,
+            " + {moments}]\n",
+            $sum,
+            "\n",
+            $moment,
+            "\n",
+            "smultt r9, ",
+            $net,
+            ", r8\n",
+            "smulbb r8, ",
+            $net,
+            ", r8\n",
+            "ldr ",
+            $net,
+            ", [r1, #4 * ",
+            $place,
+            " + {tare}]\n",
+            "ldr r10, [r1, #4 * ",
+            $place,
+            " + {tare} + {pairs}]\n",
+            "smmulr r8, r8, r0\n",
+            "smmulr r9, r9, r0\n",
+            "sub r8, r8, ",
+            $net,
+            ", asr #{tare_drop}\n",
+            "sub r9, r9, r10, asr #{tare_drop}\n",
+            "cmp r8, r12\n",
+            "it gt\n",
+            "movgt r12, r8\n",
+            "cmp r9, r12\n",
+            "it gt\n",
+            "movgt r12, r9\n",
+            "str r8, [r2, #4 * ",
+            $place,
+            "]\n",
+            "str r9, [r2, #4 * ",
+            $place,
+            " + {pairs}]\n",
+        )
+    };
+}
+
+/// [`portable_pass`] by instructions: SSUB16, SMLAD, UQSUB16, SMMLA, SMULxy, SMMULR.
 ///
 /// Written out, because the compiler has too few registers for any order of these instructions, and keeps loading and
-/// storing. It works through a row in about 73 cycles.
+/// storing. It works through a row in about 170 cycles.
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 #[inline(always)]
-pub fn pass<const ROWS: usize>(codes: &[Pairs; ROWS], rows: &mut [Row; ROWS], common: &Common) -> Total {
-    const { assert!(ROWS > 0 && ROWS.is_multiple_of(2)) };
-    let (first, second, running, largest);
-    // SAFETY: reads the codes, the rows and what is common, writes each row's boost; the types hold their lengths and places,
-    // and the codes' end ends the loop, which takes two rows a turn. The stack is as it was at the end, and so are r6 and r7,
-    // which an operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
+pub fn pass<const ROWS: usize>(
+    codes: &[Pairs; ROWS],
+    rows: &mut [Row; ROWS],
+    common: &Common,
+    taxels: &mut [[i32; COLUMNS]; ROWS],
+) -> Total {
+    const { assert!(ROWS > 0) };
+    let (first, second, running, largest, peak);
+    // SAFETY: reads the codes, the rows and what is common, writes each row's boost and the taxels; the types hold their
+    // lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
+    // operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
         core::arch::asm!(
+            // On the stack: what is common, the place among the codes, the totals, r6 and r7, the codes' end.
             "push {{r6, r7, r9}}",
-            "ldm r2, {{r3-r8, lr}}",
-            "push {{r3-r8}}",
-            "movs r2, #0", // the largest
-            "movs r3, #0", // first, second, running
             "movs r4, #0",
             "movs r5, #0",
+            "movs r6, #0",
+            "movs r7, #0",
+            "push {{r0, r4-r7}}",
+            "ldm r3, {{r4-r8, r10, r11}}",
+            "push {{r4-r8, r10, r11}}",
+            "mov r12, #0", // the peak
             "2:",
-            ".irp row, 0, 1",
-            "ldr r6, [sp, #20]", // the sag, then the row's two sums
-            "ldr r7, [r1, #\\row * {row} + {start}]",
-            "ldr r8, [r1, #\\row * {row} + {start} + 4]",
-            ".irp place, 0, 4, 8, 12, 16",
-            "ldr r9, [r0, #\\row * {pairs} + \\place]",
-            "ldr r10, [sp, #\\place]",
-            "ldr r11, [r1, #\\row * {row} + \\place]",
-            "ldr r12, [r1, #\\row * {row} + \\place + {pairs}]",
-            "ssub16 r9, r9, r10",
-            "smlad r6, r9, lr, r6",
-            "smlad r7, r9, r11, r7",
-            "smlad r8, r9, r12, r8",
-            "uqsub16 r10, r9, r2",
-            "add r2, r2, r10",
+            "ldm r0!, {{r3-r7}}", // codes, then net codes
+            "str r0, [sp, #28]",
+            "ldm sp, {{r0, r8-r11}}",
+            "ssub16 r3, r3, r0",
+            "ssub16 r4, r4, r8",
+            "ssub16 r5, r5, r9",
+            "ssub16 r6, r6, r10",
+            "ssub16 r7, r7, r11",
+            "ldr r8, [sp, #20]", // dead
+            "ldr r9, [sp, #24]", // sag
+            "ldr r10, [sp, #44]", // the largest
+            "smuad r11, r3, r9",
+            "smlad r11, r4, r9, r11",
+            "smlad r11, r5, r9, r11",
+            "smlad r11, r6, r9, r11",
+            "smlad r11, r7, r9, r11",
+            ".irp net, r3, r4, r5, r6, r7",
+            "ssub16 r0, \\net, r8",
+            "uqsub16 r0, r0, r10",
+            "add r10, r10, r0",
             ".endr",
-            "smmul r9, r6, r6", // the boost
-            "smmul r10, r9, r9",
-            "mov r12, #1 << 28",
-            "add r12, r12, r6, asr #4",
-            "smmla r10, r10, r10, r10",
-            "smmla r12, r12, r9, r12",
-            "smmla r12, r12, r10, r12",
-            "str r12, [r1, #\\row * {row} + {boost}]",
-            "smmla r3, r7, r12, r3",
-            "smmla r4, r8, r12, r4",
+            "str r10, [sp, #44]",
+            "smmul r8, r11, r11", // the boost
+            "smmul r9, r8, r8",
+            "mov r0, #1 << 28",
+            "add r0, r0, r11, asr #4",
+            "smmla r9, r9, r9, r9",
+            "smmla r0, r0, r8, r0",
+            "smmla r0, r0, r9, r0",
+            "str r0, [r1, #{boost}]",
+            "asr r0, r0, #{boost_drop}",
+            columns!("r3", "0", "smuad lr, r3, r8", "smuad r11, r3, r9"),
+            columns!("r4", "1", "smlad lr, r4, r8, lr", "smlad r11, r4, r9, r11"),
+            columns!("r5", "2", "smlad lr, r5, r8, lr", "smlad r11, r5, r9, r11"),
+            columns!("r6", "3", "smlad lr, r6, r8, lr", "smlad r11, r6, r9, r11"),
+            columns!("r7", "4", "smlad lr, r7, r8, lr", "smlad r11, r7, r9, r11"),
+            "ldr r0, [sp, #28]",
+            "ldr r3, [sp, #32]", // the totals
+            "ldr r4, [sp, #36]",
+            "ldr r5, [sp, #40]",
+            "ldr r6, [r1, #{boost}]",
+            "ldr r7, [sp, #56]", // the codes' end
+            "smmla r3, lr, r6, r3",
+            "smmla r4, r11, r6, r4",
             "add r5, r5, r3, asr #2",
-            ".endr",
-            "ldr r12, [sp, #32]", // the codes' end
-            "adds r0, #2 * {pairs}",
-            "adds r1, #2 * {row}",
-            "cmp r0, r12",
+            "str r3, [sp, #32]",
+            "str r4, [sp, #36]",
+            "str r5, [sp, #40]",
+            "adds r1, #{row}",
+            "adds r2, #2 * {pairs}",
+            "cmp r0, r7",
             "bne 2b",
-            "add sp, #24",
+            "ldr r0, [sp, #44]",
+            "add sp, #48",
             "pop {{r6, r7, r9}}",
             pairs = const size_of::<Pairs>(),
             row = const size_of::<Row>(),
-            start = const core::mem::offset_of!(Row, start),
+            moments = const core::mem::offset_of!(Row, moments),
+            tare = const core::mem::offset_of!(Row, tare),
             boost = const core::mem::offset_of!(Row, boost),
-            inout("r0") codes.as_ptr() => _,
+            tare_drop = const TARE_BITS - CODE_BITS,
+            boost_drop = const BOOST_DROP,
+            inout("r0") codes.as_ptr() => largest,
             inout("r1") rows.as_mut_ptr() => _,
-            inout("r2") common => largest,
-            out("r3") first, out("r4") second, out("r5") running,
+            inout("r2") taxels.as_mut_ptr() => _,
+            inout("r3") common => first,
+            out("r4") second, out("r5") running,
             out("r8") _, in("r9") codes.as_ptr_range().end,
-            out("r10") _, out("r11") _, out("r12") _, out("lr") _,
+            out("r10") _, out("r11") _, out("r12") peak, out("lr") _,
         );
     }
-    Total { first, second, running, largest }
+    Total { first, second, running, largest, peak }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BOOST_BITS, Common, Row, boost, pass};
+    use super::super::pair;
+    use super::{BOOST_BITS, Common, PLACES, Row, boost, pass};
 
     const ONE: f64 = (1_u64 << 32) as f64;
 
@@ -177,29 +300,40 @@ mod tests {
     #[test]
     fn a_pass_is_what_its_parts_say() {
         let codes = [[0x0102_0304, 5, 6 << 16, 0x0fff_0fff, 9], [0x0001_0002, 0, 0, 0, 0x0100_0001]];
-        let common = Common { floors: [1, 2, 1 << 16, 0x0ffe_0ffe, 3], start: 7_000, sag: 3 | 3 << 16 };
-        let weights = [[2 | 1 << 16; 5], [0xffff, 3, 0, 0, 5]];
-        let mut rows = [Row { weights, start: [1 << 20, 4], boost: 0 }; 2];
-        let total = pass(&codes, &mut rows, &common);
+        let common = Common { undriven: [1, 2, 1 << 16, 0x0ffe_0ffe, 3], dead: 2 | 2 << 16, sag: 3 | 3 << 16 };
+        let tare = [5 << 16, -(3 << 16), 0, 0, 7, 9 << 12, 0, 0, -1, 1 << 20];
+        let (gains, moments) = ([2 << 14 | 1 << 30; PLACES], [0xffff, 3, 0, 0, 5]);
+        let mut rows = [Row { gains, moments, tare, boost: 0 }; 2];
+        let mut taxels = [[0; 10]; 2];
+        let total = pass(&codes, &mut rows, &common, &mut taxels);
         let lanes = |pair: u32| [i64::from(pair as u16 as i16), i64::from((pair >> 16) as u16 as i16)];
-        let (mut first_total, mut second_total, mut running) = (0, 0, 0);
-        for (codes, row) in codes.iter().zip(&rows) {
-            let [mut sag, mut first, mut second] = [7_000, 1 << 20, 4];
-            for place in 0..5 {
-                for lane in 0..2 {
-                    let above = lanes(codes[place])[lane] - lanes(common.floors[place])[lane];
-                    sag += 3 * above;
-                    first += above * lanes(weights[0][place])[lane];
-                    second += above * lanes(weights[1][place])[lane];
-                }
+        let (mut first, mut second, mut running, mut peak, mut largest) = (0, 0, 0, 0, [0; 2]);
+        for ((codes, row), taxels) in codes.iter().zip(&rows).zip(taxels) {
+            let net = |column: usize| {
+                let [place, lane] = [column % PLACES, column / PLACES];
+                lanes(codes[place])[lane] - lanes(common.undriven[place])[lane]
+            };
+            let by = |weights: [u32; 5], column: usize| lanes(weights[column % PLACES])[column / PLACES];
+            assert_eq!(row.boost, boost((0..10).map(|column| 3 * net(column)).sum::<i64>() as i32));
+            for (column, taxel) in taxels.into_iter().enumerate() {
+                let exact = net(column) as f64 * by(gains, column) as f64 / 16_384.0 * f64::from(row.boost);
+                let exact = 16.0 * exact / f64::from(1 << BOOST_BITS) - f64::from(tare[column] >> 12);
+                assert!((f64::from(taxel) - exact).abs() <= 0.51, "{column}: {taxel}, not {exact}");
+                peak = peak.max(taxel);
+                let above = (net(column) - 2) as u16;
+                largest[column / PLACES] = above.max(largest[column / PLACES]);
             }
-            assert_eq!(row.boost, boost(sag as i32));
-            first_total += (first * i64::from(row.boost)) >> 32;
-            second_total += (second * i64::from(row.boost)) >> 32;
-            running += first_total >> 2;
+            let boosted =
+                |weights| ((0..10).map(|c| net(c) * by(weights, c)).sum::<i64>() * i64::from(row.boost)) >> 32;
+            first += boosted(gains);
+            second += boosted(moments);
+            running += first >> 2;
         }
-        assert_eq!([total.first, total.second, total.running].map(i64::from), [first_total, second_total, running]);
-        // The second row's codes below their floors are huge.
-        assert_eq!(total.largest, 0xffff_fffe, "{:x}", total.largest);
+        assert_eq!([total.first, total.second, total.running].map(i64::from), [first, second, running]);
+        assert_eq!(total.peak, peak);
+        assert!(peak > 1_000, "there is one");
+        // The second row's codes below their levels are huge.
+        assert_eq!(total.largest, pair(largest[0] as i16, largest[1] as i16), "{:x}", total.largest);
+        assert!(largest.into_iter().all(|largest| largest > 0xff00), "{largest:x?}");
     }
 }

@@ -18,7 +18,7 @@ use fingertip::control::profile::Reference;
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::{Contact, Pipeline};
-use fingertip::pressure::{ALL_ROWS, Array, Picture};
+use fingertip::pressure::{Array, Picture};
 use fingertip::record::{MAGIC, Record};
 use fingertip::safety::{Limits, Mode};
 use fingertip::units::{Duty, Millimetres};
@@ -59,11 +59,10 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 19] = [
+const KERNELS: [(&str, Kernel, When); 18] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
-    ("single taxels of two rows", two_rows, Always),
     ("indentation from force", indentation, Always),
     ("observer", observe, Driving),
     ("goal and profile", reference, Driving),
@@ -90,10 +89,6 @@ extern "C" fn step(bench: &mut Bench) {
 
 extern "C" fn frame_pass(bench: &mut Bench) {
     bench.array.read(&bench.record.frame, bench.config);
-}
-
-extern "C" fn two_rows(bench: &mut Bench) {
-    bench.array.develop(&bench.record.frame, 1 | 1 << 5);
 }
 
 extern "C" fn indentation(bench: &mut Bench) {
@@ -201,7 +196,6 @@ fn measure_frame(bench: &mut Bench) {
             continue;
         }
         bench.array = bench.pipeline.array().clone();
-        bench.array.develop(&bench.record.frame, ALL_ROWS);
         bench.picture = *bench.array.picture();
         bench.contact = status.contact;
         let now = match when {

@@ -16,7 +16,7 @@ use fingertip::units::Duty;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{COMMAND, DETAIL, DETAIL_READY, DETAIL_WANTED, PACKETS, PARAMS, REPORT, Report};
+use super::exchange::{COMMAND, PACKETS, PARAMS, PICTURE, REPORT, Report};
 use super::guard;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
@@ -191,24 +191,17 @@ impl State {
     }
 
     fn publish(&mut self) {
-        let wanted = DETAIL_WANTED.swap(false, Ordering::Relaxed);
-        if wanted {
-            self.parts.pipeline.develop(&self.frame);
-        }
-        REPORT.set(Report { status: *self.parts.pipeline.status(), ..self.report });
-        if wanted {
-            let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
-            let array = pipeline.array();
-            DETAIL.fill(|detail| {
-                detail.frame = *frame;
-                detail.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
-                detail.taxels = array.picture().taxels;
-                for (place, tare) in detail.tare.iter_mut().zip(array.tare()) {
-                    *place = tare;
-                }
-            });
-            DETAIL_READY.signal(());
-        }
+        let report = Report { status: *self.parts.pipeline.status(), ..self.report };
+        REPORT.set(report);
+        let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
+        // Where the link is just answering, it has the next one.
+        PICTURE.visit(|picture| {
+            picture.report = Some(report);
+            picture.frame = *frame;
+            picture.taxels = pipeline.array().picture().taxels;
+            picture.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
+            picture.tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
+        });
     }
 
     /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and the scan

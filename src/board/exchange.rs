@@ -1,12 +1,11 @@
 //! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the other.
 
 use core::cell::{Cell, UnsafeCell};
-use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::signal::Signal;
-use fingertip::frame::{COLUMNS, Frame, ROWS, TAXELS};
+use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::{Command, Status};
 
@@ -23,16 +22,18 @@ pub struct Report {
     pub loop_ticks_max: u32,
 }
 
-/// What control copies out on request: too much for every frame.
-pub struct Detail {
-    /// The frame that the newest report was made from.
+/// All that the bus may read of a frame, with the report made of it.
+pub struct Picture {
+    /// The report; none before the first.
+    pub report: Option<Report>,
+    /// The frame.
     pub frame: Frame,
-    /// Pressure in Pa for a sixteenth of a corrected code, Q32.
-    pub pascals_per_sum_q32: i64,
-    /// Sixteenths of a corrected code above tare.
+    /// Its taxels, sixteenths of a corrected code above tare.
     pub taxels: [[i32; COLUMNS]; ROWS],
-    /// Sixteenths of a corrected code.
-    pub tare: [i32; TAXELS],
+    /// Pressure in Pa for such a sixteenth, Q32.
+    pub pascals_per_sum_q32: i64,
+    /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
+    pub tare: [[i32; COLUMNS]; ROWS],
 }
 
 /// The newest report.
@@ -43,16 +44,13 @@ pub static COMMAND: Shared<Command> = Shared::new();
 pub static PACKETS: AtomicU32 = AtomicU32::new(0);
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
-/// Set by the link for control to fill [`DETAIL`].
-pub static DETAIL_WANTED: AtomicBool = AtomicBool::new(false);
-/// Raised when [`DETAIL`] is filled.
-pub static DETAIL_READY: Signal<CriticalSectionRawMutex, ()> = Signal::new();
-/// The last detail asked for.
-pub static DETAIL: Mailbox<Detail> = Mailbox::new(Detail {
+/// The newest picture; control leaves it as it is while the link answers from it.
+pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
+    report: None,
     frame: Frame::EMPTY,
-    pascals_per_sum_q32: 0,
     taxels: [[0; COLUMNS]; ROWS],
-    tare: [0; TAXELS],
+    pascals_per_sum_q32: 0,
+    tare: [[0; COLUMNS]; ROWS],
 });
 
 /// A small value that is read and replaced as a whole.
@@ -94,6 +92,10 @@ impl<T> Mailbox<T> {
         Self { state: AtomicU8::new(EMPTY), value: UnsafeCell::new(value) }
     }
 
+    const fn full(value: T) -> Self {
+        Self { state: AtomicU8::new(FULL), value: UnsafeCell::new(value) }
+    }
+
     /// Fills the value where the box is empty; false where it is not.
     pub fn fill(&self, write: impl FnOnce(&mut T)) -> bool {
         self.turn(EMPTY, FULL, write).is_some()
@@ -102,6 +104,11 @@ impl<T> Mailbox<T> {
     /// Empties the box where it is full.
     pub fn take<R>(&self, read: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.turn(FULL, EMPTY, read)
+    }
+
+    /// Looks at the value, or replaces it, where the box is full, and leaves it there.
+    pub fn visit<R>(&self, act: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.turn(FULL, FULL, act)
     }
 
     fn turn<R>(&self, from: u8, to: u8, act: impl FnOnce(&mut T) -> R) -> Option<R> {

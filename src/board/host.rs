@@ -3,28 +3,23 @@
 use core::sync::atomic::Ordering;
 
 use defmt::{error, info, warn};
-use embassy_time::{Duration, Instant, Timer, with_timeout};
-use fingertip::frame::{Frame, TAXELS};
+use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply, Server, Snapshot};
 use fingertip::safety::Mode;
 use fingertip::store::Record;
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{COMMAND, DETAIL, DETAIL_READY, DETAIL_WANTED, Detail, PACKETS, PARAMS, REPORT};
+use super::exchange::{COMMAND, PACKETS, PARAMS, PICTURE, Picture, REPORT};
 use super::flash::Store;
 use super::guard;
 
-/// Control answers within two frames, even while frames are lost: at most this for the slowest scan.
-const DETAIL_TIMEOUT: Duration = Duration::from_millis(3);
 const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
-/// Fractional bits of a corrected code.
-const CODE_BITS: u32 = fingertip::pressure::CODE_BITS;
 
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(bus: Bus, store: Store, record: Record, boot: Boot) {
-    let mut host = Host { bus, store, boot, server: Server::new(record), pictures: Pictures::new(), line_good: true };
+    let mut host = Host { bus, store, boot, server: Server::new(record), line_good: true };
     host.run().await;
 }
 
@@ -33,7 +28,6 @@ struct Host {
     store: Store,
     boot: Boot,
     server: Server,
-    pictures: Pictures,
     line_good: bool,
 }
 
@@ -61,12 +55,10 @@ impl Host {
 
     async fn answer(&mut self, mut bytes: &[u8], reply: &mut Reply) {
         let received = Instant::now();
-        if Server::may_ask_for_taxels(bytes) {
-            self.pictures.renew().await;
-        }
         while !bytes.is_empty() {
-            let snapshot = self.pictures.snapshot(self.boot);
-            let taken = self.server.feed(bytes, &snapshot, reply);
+            // Control, which fills the picture, interrupts this task: here it is never under way.
+            let taken = PICTURE.visit(|picture| self.server.feed(bytes, &snapshot(picture, self.boot), reply));
+            let Some(taken) = taken else { return };
             bytes = bytes.get(taken..).unwrap_or_default();
             COMMAND.set(self.server.command());
             PACKETS.store(self.server.good_packets(), Ordering::Relaxed);
@@ -122,60 +114,26 @@ impl Host {
     }
 }
 
-/// The array's details in the units of the bus.
-struct Pictures {
-    pressures_10pa: [u16; TAXELS],
-    tare_codes: [u16; TAXELS],
-    frame: Frame,
-}
-
-impl Pictures {
-    const fn new() -> Self {
-        Self { pressures_10pa: [0; TAXELS], tare_codes: [0; TAXELS], frame: Frame::EMPTY }
-    }
-
-    /// Asks control for the newest frame's details; keeps the old ones where it does not answer.
-    async fn renew(&mut self) {
-        DETAIL_READY.reset();
-        DETAIL_WANTED.store(true, Ordering::Relaxed);
-        if with_timeout(DETAIL_TIMEOUT, DETAIL_READY.wait()).await.is_ok() {
-            DETAIL.take(|detail| self.convert(detail));
-        }
-    }
-
-    fn convert(&mut self, detail: &Detail) {
-        self.frame = detail.frame;
-        for (place, taxel) in self.pressures_10pa.iter_mut().zip(detail.taxels.as_flattened()) {
-            let pascals = (i64::from(*taxel) * detail.pascals_per_sum_q32) >> 32;
-            *place = saturate(((pascals + 5) / 10) as i32);
-        }
-        for (place, tare) in self.tare_codes.iter_mut().zip(detail.tare) {
-            *place = saturate((tare + (1 << (CODE_BITS - 1))) >> CODE_BITS);
-        }
-    }
-
-    fn snapshot(&self, boot: Boot) -> Snapshot<'_> {
-        let report = REPORT.get();
-        Snapshot {
-            status: report.status,
-            supply_mv: report.supply_mv,
-            tick_ms: Instant::now().as_millis() as u32,
-            loop_time_us: microseconds(report.loop_ticks),
-            loop_time_max_us: microseconds(report.loop_ticks_max),
-            reset_cause: boot.reset,
-            crash: boot.crash,
-            pressures_10pa: &self.pressures_10pa,
-            frame: &self.frame,
-            tare_codes: &self.tare_codes,
-        }
+/// What the bus may read, of the newest picture.
+fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
+    let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
+    let report = report.unwrap_or_default();
+    Snapshot {
+        status: report.status,
+        supply_mv: report.supply_mv,
+        tick_ms: Instant::now().as_millis() as u32,
+        loop_time_us: microseconds(report.loop_ticks),
+        loop_time_max_us: microseconds(report.loop_ticks_max),
+        reset_cause: boot.reset,
+        crash: boot.crash,
+        frame,
+        taxels,
+        pascals_per_sum_q32: *pascals_per_sum_q32,
+        tare,
     }
 }
 
 /// Rounded up: a high-water mark must not look better than it is.
 fn microseconds(ticks: u32) -> u16 {
     u16::try_from(ticks.div_ceil(TICKS_PER_US)).unwrap_or(u16::MAX)
-}
-
-fn saturate(value: i32) -> u16 {
-    value.clamp(0, i32::from(u16::MAX)) as u16
 }

@@ -33,28 +33,6 @@ const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
-/// Rows of the array: this one and every so many-th after it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Rows {
-    /// The first; [`ROWS`] where there is none.
-    pub first: usize,
-    /// From row to row.
-    pub stride: usize,
-}
-
-impl Rows {
-    /// A bit for each.
-    pub fn bits(self) -> u16 {
-        let mut bits = 0;
-        let mut row = self.first;
-        while row < ROWS {
-            bits |= 1 << row;
-            row += self.stride.max(1);
-        }
-        bits
-    }
-}
-
 /// Fractional bits of what the indentation follows the force by.
 const FOLLOWS_BITS: u32 = 12;
 /// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
@@ -138,18 +116,6 @@ impl Fit {
         }
     }
 
-    /// The rows whose taxels the next [`Fit::read`] looks at. Of the others it takes only what they add up to.
-    pub fn wants(&self) -> Rows {
-        let rows = self.effort.rows();
-        let frame = match (self.begun, rows) {
-            (true, 1..) => usize::from(self.frames),
-            (false, ROWS) => 0,
-            _ => return Rows { first: ROWS, stride: ROWS },
-        };
-        let stride = ROWS / rows;
-        Rows { first: if rows == 1 { frame * ROW_STEP % ROWS } else { frame }, stride }
-    }
-
     /// Whether the last frame took the model.
     pub fn at_work(&self) -> bool {
         self.at_work
@@ -174,18 +140,19 @@ impl Fit {
                 _ => from_sums(picture, config),
             };
         }
-        let rows = self.wants();
         // At the beginning, and while the sums are all there is.
-        let sums = (!self.begun || self.fitted.is_none()).then(|| from_sums(picture, config));
-        if let (false, Some(sums)) = (self.begun, &sums)
+        let begins = !self.begun;
+        let sums = (begins || self.fitted.is_none()).then(|| from_sums(picture, config));
+        if let (true, Some(sums)) = (begins, &sums)
             && !self.start(sums, picture, config)
         {
             self.lose();
             return *sums;
         }
         self.at_work = true;
-        if rows.first < ROWS {
-            self.take(rows, force, picture, config);
+        // The start has a frame of its own, where a refinement is spread over frames.
+        if !begins || self.effort.rows() == ROWS {
+            self.take(force, picture, config);
             if usize::from(self.frames) * self.effort.rows() >= ROWS {
                 self.refine(force, config);
             }
@@ -225,19 +192,20 @@ impl Fit {
         true
     }
 
-    /// Takes in a frame.
-    fn take(&mut self, rows: Rows, force: Newtons, picture: &Picture, config: &Config) {
+    /// Takes in the frame's share of the rows.
+    fn take(&mut self, force: Newtons, picture: &Picture, config: &Config) {
         let view = View { picture, scale: self.scale };
         self.pressed.rest = self.followed(&self.guess, force);
         let bench = Bench { pressed: &self.pressed, view: &view, geometry: &config.geometry };
-        let mut row = rows.first;
+        let (rows, frame) = (self.effort.rows(), usize::from(self.frames));
+        let mut row = if rows == 1 { frame * ROW_STEP % ROWS } else { frame };
         while row < ROWS {
             if self.covered {
                 self.equations.misfit.compare_row(bench, row);
             } else {
                 self.equations.take_row(bench, row);
             }
-            row += rows.stride;
+            row += ROWS / rows.max(1);
         }
         self.forces += i64::from(force.to_bits());
         self.frames += 1;

@@ -10,13 +10,11 @@ use crate::safety::Fault;
 use crate::store::Record;
 use crate::units::Newtons;
 
-use super::packet::instruction::{ACTION, BULK_WRITE, FACTORY_RESET, PING, READ, REBOOT, REG_WRITE, SYNC_WRITE, WRITE};
-use super::packet::{HEADER, StatusError};
+use super::packet::StatusError;
 use super::receiver::{Event, Receiver};
 use super::sender::Reply;
 use super::settings::{Actions, Saved, Settings};
 use super::snapshot::Snapshot;
-use super::table::address::{PEAK_PRESSURE_PA, PRESSURES};
 use super::turn::Turn;
 
 /// The longest Reg Write: all parameters at once.
@@ -70,13 +68,13 @@ pub(super) struct State {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{frame::{Frame, TAXELS}, link::{Reply, Server, Snapshot}, pipeline::Status, store::Record};
+/// # use fingertip::{frame::{COLUMNS, Frame, ROWS}, link::{Reply, Server, Snapshot}, pipeline::Status, store::Record};
 /// let mut server = Server::new(Record::DEFAULT);
-/// let zeros = [0; TAXELS];
+/// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
 ///     status: Status::default(), supply_mv: 6000, tick_ms: 0, loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(),
-///     pressures_10pa: &zeros, frame: &Frame::EMPTY, tare_codes: &zeros,
+///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros,
 /// };
 /// let mut reply = Reply::new();
 /// let mut received: &[u8] = &[0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4E];
@@ -132,24 +130,6 @@ impl Server {
             }
         }
         bytes.len()
-    }
-
-    /// Whether an answer to these bytes may tell of single taxels: their pictures and the peak, which take a while to work out. Not where
-    /// they are one packet that only writes, or that reads other registers; that it is damaged does no harm.
-    pub fn may_ask_for_taxels(bytes: &[u8]) -> bool {
-        let [_, _, _, _, _, low, high, instruction, params @ ..] = bytes else { return true };
-        if !bytes.starts_with(&HEADER) || bytes.len() != usize::from(u16::from_le_bytes([*low, *high])) + 7 {
-            return true;
-        }
-        match (*instruction, params) {
-            (PING | WRITE | REG_WRITE | ACTION | FACTORY_RESET | REBOOT | SYNC_WRITE | BULK_WRITE, _) => false,
-            (READ, [first_low, first_high, count_low, count_high, ..]) => {
-                let first = u16::from_le_bytes([*first_low, *first_high]);
-                let end = first.saturating_add(u16::from_le_bytes([*count_low, *count_high]));
-                end > PRESSURES || first < PEAK_PRESSURE_PA + 4 && end > PEAK_PRESSURE_PA
-            }
-            _ => true,
-        }
     }
 
     /// How long to wait between the packet's last byte and the reply's first.

@@ -1,7 +1,8 @@
 //! What the bus may read of the running controller, gathered by the firmware.
 
-use crate::frame::{Frame, TAXELS};
+use crate::frame::{COLUMNS, Frame, ROWS};
 use crate::pipeline::Status;
+use crate::pressure::TARE_BITS;
 use crate::safety::Fault;
 
 /// A picture of the controller at one moment.
@@ -21,12 +22,35 @@ pub struct Snapshot<'a> {
     pub reset_cause: ResetCause,
     /// The last crash on record.
     pub crash: Crash,
-    /// Pressure on each taxel in units of 10 Pa, row by row.
-    pub pressures_10pa: &'a [u16; TAXELS],
     /// The frame that the status was made from.
     pub frame: &'a Frame,
-    /// The zero of each taxel in converter codes, row by row.
-    pub tare_codes: &'a [u16; TAXELS],
+    /// What its taxels read above tare, sixteenths of a corrected code.
+    pub taxels: &'a [[i32; COLUMNS]; ROWS],
+    /// Pressure in Pa for such a sixteenth, Q32.
+    pub pascals_per_sum_q32: i64,
+    /// What they read without contact, corrected codes with [`TARE_BITS`] fractional bits.
+    pub tare: &'a [[i32; COLUMNS]; ROWS],
+}
+
+impl Snapshot<'_> {
+    /// Pressure on a taxel, row by row, in units of 10 Pa.
+    pub fn pressure_10pa(&self, place: usize) -> u16 {
+        let pascals = (i64::from(of(self.taxels, place)) * self.pascals_per_sum_q32) >> 32;
+        saturate(((pascals + 5) / 10) as i32)
+    }
+
+    /// The zero of a taxel, row by row, in converter codes.
+    pub fn tare_codes(&self, place: usize) -> u16 {
+        saturate(of(self.tare, place).saturating_add(1 << (TARE_BITS - 1)) >> TARE_BITS)
+    }
+}
+
+fn of(taxels: &[[i32; COLUMNS]; ROWS], place: usize) -> i32 {
+    taxels.as_flattened().get(place).copied().unwrap_or(0)
+}
+
+fn saturate(value: i32) -> u16 {
+    value.max(0).min(i32::from(u16::MAX)) as u16
 }
 
 /// Why the microcontroller started. The numbers are stable.

@@ -37,7 +37,7 @@ pub struct Contact {
     pub centre_y: Millimetres,
     /// Contact radius, by the model.
     pub radius: Millimetres,
-    /// Highest pressure of the taxels as they were last worked out, Pa.
+    /// Highest pressure on a taxel, Pa.
     pub peak_pa: u32,
     /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
     pub confidence: u8,

@@ -1,4 +1,4 @@
-//! What a frame shows: sums, flags and single taxels.
+//! What a frame shows: taxels, sums and flags.
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, ROWS};
@@ -8,8 +8,7 @@ use fixed::types::I16F16;
 /// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated. Each row is that of the frame in which it was
-    /// last developed.
+    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated.
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows, the array is broken,
     /// and bad ones may be in it.
@@ -18,7 +17,7 @@ pub struct Picture {
     pub moment_x: i32,
     /// Sum weighted by twice the row's distance from the middle, in pitches.
     pub moment_y: i32,
-    /// Largest of the taxels as they were last developed, at least 0.
+    /// The highest taxel, at least 0.
     pub peak: i32,
     /// The highest code of a taxel above its column's undriven level: how near the array is to saturation. 0 where a taxel is dead or
     /// saturated, masked ones too.

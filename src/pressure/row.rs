@@ -1,4 +1,4 @@
-//! The rows' sums: ten codes as five pairs, two taxels an instruction where the target has such.
+//! What goes into the pass over a frame, and what is made of its totals.
 
 use super::suspect::Share;
 use super::{CODE_BITS, GAIN_BITS, each};
@@ -13,7 +13,7 @@ const COARSER: u32 = 32 - BOOST_BITS;
 
 /// A frame's sound codes, between dead and saturated.
 pub(super) struct Sound {
-    /// For a pass. The floors are the columns' lowest sound codes: the undriven level, and what a dead taxel falls short of.
+    /// For the pass.
     pub common: Common,
     /// The highest undriven level.
     pub undriven_max: u16,
@@ -24,28 +24,27 @@ impl Sound {
     /// From the slot with nothing driven.
     #[inline(always)]
     pub fn new(undriven: &Pairs, config: &Config) -> Self {
-        let Config { dead_codes, sag_q32, sag_of_dead_q32, .. } = *config;
-        let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
+        let Config { dead_codes, sag_q32, .. } = *config;
         let common = Common {
-            // No lane carries for codes of 12 bits.
-            floors: each(|place| undriven[place].wrapping_add(dead)),
-            start: sag_of_dead_q32,
+            undriven: *undriven,
+            dead: lanes::pair(dead_codes as i16, dead_codes as i16),
             sag: lanes::pair(sag_q32 as i16, sag_q32 as i16),
         };
         Self { common, undriven_max: highest(*undriven), dead_codes }
     }
 
-    /// Whether a taxel may be dead or saturated where this is the largest code above its floor: one below its floor is huge as
-    /// an unsigned number.
+    /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a dead one is
+    /// huge as an unsigned number.
     #[inline(always)]
     pub fn suspects(&self, largest: u16) -> bool {
         u32::from(largest) + u32::from(self.undriven_max) + u32::from(self.dead_codes) >= u32::from(SATURATED)
     }
 
-    /// The largest code of a row above its floor.
+    /// That of a row.
     #[inline(always)]
     pub fn largest(&self, codes: &Pairs) -> u16 {
-        highest(each(|place| lanes::sub(codes[place], self.common.floors[place])))
+        let Common { undriven, dead, .. } = &self.common;
+        highest(each(|place| lanes::sub(lanes::sub(codes[place], undriven[place]), *dead)))
     }
 }
 

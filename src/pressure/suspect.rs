@@ -23,6 +23,18 @@ pub(super) fn bad([codes, undriven]: [&Pairs; 2], dead_codes: u16) -> u16 {
     (first | second << BANK_COLUMNS) as u16
 }
 
+/// Makes taxels of a row, a bit each, zero; the highest of them, at least 0.
+pub(super) fn clear(columns: u16, taxels: &mut [i32; COLUMNS]) -> i32 {
+    let mut highest = 0;
+    let mut left = u32::from(columns);
+    while left != 0 {
+        let taxel = &mut taxels[(left.trailing_zeros() as usize).min(COLUMNS - 1)];
+        highest = highest.max(core::mem::take(taxel));
+        left &= left - 1;
+    }
+    highest
+}
+
 /// What some taxels of a row have in its sums.
 #[derive(Default)]
 pub(super) struct Share {
@@ -34,7 +46,7 @@ pub(super) struct Share {
 
 impl Share {
     /// Of some columns, a bit each.
-    pub fn new(columns: u16, [codes, undriven]: [&Pairs; 2], row: &Row, tares: &[i32; COLUMNS]) -> Self {
+    pub fn new(columns: u16, [codes, undriven]: [&Pairs; 2], row: &Row) -> Self {
         let mut share = Self::default();
         let [sum, moment] = &mut share.sums;
         let [tare_sum, tare_moment] = &mut share.tares;
@@ -45,9 +57,9 @@ impl Share {
             let place = column % BANK_COLUMNS;
             let lane = if column < BANK_COLUMNS { 0xffff } else { 0xffff_0000 };
             let net = lanes::sub(codes[place], undriven[place]) & lane;
-            *sum = lanes::dot(net, row.weights[0][place], *sum);
-            *moment = lanes::dot(net, row.weights[1][place], *moment);
-            let tare = tares[column] >> (TARE_BITS - CODE_BITS);
+            *sum = lanes::dot(net, row.gains[place], *sum);
+            *moment = lanes::dot(net, row.moments[place], *moment);
+            let tare = row.tare[column] >> (TARE_BITS - CODE_BITS);
             *tare_sum += tare;
             *tare_moment += tare * weight(column);
         }

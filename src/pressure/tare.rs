@@ -3,13 +3,8 @@
 use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
 use crate::frame::{COLUMNS, ROWS};
 
-/// Frames of a tare, 16 ms at 10 kHz.
-///
-/// Each looks at two rows, so that it takes no longer than a frame in contact, and each row is looked at 32 times: that leaves 0.18 of
-/// a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08.
-pub const TARE_FRAMES: u32 = 32 * TARE_STRIDE;
-/// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
-const TARE_STRIDE: u32 = ROWS as u32 / 2;
+/// Frames of a tare, 16 ms at 10 kHz. They leave 0.08 of a reading's white noise in a taxel's tare.
+pub const TARE_FRAMES: u32 = 160;
 /// Weight of a frame in the baseline, Q16; each row is visited every tenth frame, so the time constant is 10,240 frames.
 const BASELINE_WEIGHT: i32 = 64;
 
@@ -19,46 +14,33 @@ const CLEAR_ROUNDS_FIRST: i32 = 4;
 impl Array {
     /// Forgets the tare and starts to measure it anew.
     pub fn start_tare(&mut self) {
-        self.tare = [[0; COLUMNS]; ROWS];
+        self.rows.iter_mut().for_each(|row| row.tare = [0; COLUMNS]);
         self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
     }
 
-    /// The two rows, a bit each, that [`Array::continue_tare`] looks at next.
-    pub fn tare_rows(&self) -> u16 {
-        (1 | 1 << TARE_STRIDE) << (self.tare_frames % TARE_STRIDE)
-    }
-
-    /// Takes the picture last read into the tare's running means, of which two rows must be developed; true when the tare is complete.
+    /// Takes the picture last read into the tare's running means; true when the tare is complete.
     pub fn continue_tare(&mut self) -> bool {
-        let (visits, first) = (self.tare_frames / TARE_STRIDE, self.tare_frames % TARE_STRIDE);
         self.tare_frames = (self.tare_frames + 1).min(TARE_FRAMES);
+        let weight = ((1 << 16) / self.tare_frames) as i32;
         // The sums are not rounded taxel by taxel, so they have a mean of their own.
-        let weight = i64::from((1 << 16) / self.tare_frames.max(1));
         let Picture { sum, moment_x, moment_y, .. } = self.picture;
         let mut tare_sums = self.tare_sums;
         for (tare, value) in tare_sums.iter_mut().zip([sum, moment_x, moment_y]) {
-            *tare = tare.wrapping_add(((i64::from(value) * weight + (1 << 15)) >> 16) as i32);
+            *tare = tare.wrapping_add(((i64::from(value) * i64::from(weight) + (1 << 15)) >> 16) as i32);
         }
-        for row in [first, first + TARE_STRIDE] {
-            self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
-        }
+        (0..ROWS).for_each(|row| self.learn(row, weight));
         self.tare_sums = tare_sums;
         self.tare_frames >= TARE_FRAMES
     }
 
-    /// The row, as a bit, that [`Array::follow_drift`] looks at next.
-    pub fn drift_row(&self) -> u16 {
-        1 << self.baseline_row.min(ROWS - 1)
-    }
-
-    /// Lets the baseline follow the picture, one row a frame, which must be developed; call it only where there is no contact. Where the
+    /// Lets the baseline follow the picture, one row a frame; call it only where there is no contact. Where the
     /// tip is surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as the
     /// filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
     pub fn follow_drift(&mut self, clear: bool) {
-        let weight = if clear { ((1 << 16) / (self.clear_rounds + CLEAR_ROUNDS_FIRST)).max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT };
-        self.learn(self.baseline_row, weight);
+        let quick = (1 << 16) / (self.clear_rounds + CLEAR_ROUNDS_FIRST);
+        self.learn(self.baseline_row, if clear { quick.max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT });
         self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
         if clear && self.baseline_row == 0 {
             self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
@@ -75,7 +57,7 @@ impl Array {
     fn learn(&mut self, row: usize, weight: i32) {
         let row = row.min(ROWS - 1);
         let (mut sum, mut moment) = (0, 0);
-        for (column, (tare, value)) in self.tare[row].iter_mut().zip(&self.picture.taxels[row]).enumerate() {
+        for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(&self.picture.taxels[row]).enumerate() {
             *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;

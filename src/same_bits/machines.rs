@@ -5,13 +5,13 @@ use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
 use crate::config::Config;
-use crate::contact::{self, Effort, Fit, Refined, Rows};
+use crate::contact::{self, Effort, Fit, Refined};
 use crate::control::SpeedLoop;
 use crate::control::drive::Drive;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::control::profile::Reference;
-use crate::frame::Frame;
+use crate::frame::{COLUMNS, Frame};
 use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use crate::model::{Relaxation, RelaxationState, Tip};
 use crate::pipeline::Contact;
@@ -111,13 +111,12 @@ pub const FRAMES: [Step; 6] = [
         frames::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));
     }),
-    ("Array::develop", |m, s, mix| {
-        m.array.develop(&m.frame, m.array.drift_row() | s.words[3] as u16);
-        add_picture(mix, m.array.picture());
+    ("Array::follow_drift", |m, s, mix| {
         m.array.follow_drift(s.share_q32 & 1 == 0);
         if s.words[2] == 0 {
             m.array.continue_tare();
         }
+        m.array.tare().flatten().for_each(|tare| mix.add(*tare));
     }),
     ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, &m.config))),
     ("contact::read", |m, s, mix| {
@@ -136,8 +135,6 @@ pub const FRAMES: [Step; 6] = [
         if s.share_q32 >> 27 == 4 {
             m.fit.set_effort(Effort::from_number((s.share_q32 >> 24 & 7) as u8));
         }
-        let Rows { first, stride } = m.fit.wants();
-        mix.add((first << 8 | stride) as u32);
         add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config));
     }),
 ];
@@ -156,11 +153,16 @@ pub const STEPS: [Step; 20] = [
     ("lanes::pass", |_, s, mix| {
         let [first, second, third, fourth] = s.words.map(i32::cast_unsigned);
         let pairs = [first, second, third, fourth, s.share_q32];
-        let weights = [[s.share_q32, third, first, fourth, second], [fourth, first, s.share_q32, second, third]];
-        let mut rows = [Row { weights, start: [s.words[0], s.words[3]], boost: 0 }; 2];
-        let common = Common { floors: weights[0], start: s.words[2], sag: second & 0x7fff_7fff };
-        let Total { first, second, running, largest } = lanes::pass(&[pairs, weights[1]], &mut rows, &common);
-        [first, second, running, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+        let gains = [s.share_q32, third, first, fourth, second];
+        let moments = [fourth, first, s.share_q32, second, third];
+        let tare = core::array::from_fn(|column| s.words[column % 4].wrapping_mul(column as i32));
+        let mut rows = [Row { gains, moments, tare, boost: 0 }; 2];
+        let common = Common { undriven: gains, dead: fourth, sag: second & 0x7fff_7fff };
+        let mut taxels = [[0; COLUMNS]; 2];
+        let total = lanes::pass(&[pairs, moments], &mut rows, &common, &mut taxels);
+        let Total { first, second, running, largest, peak } = total;
+        [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
+        taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
         mix.add(largest);
     }),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),

@@ -85,7 +85,6 @@ fn add_config(mix: &mut Mix, config: &Config) {
         timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles },
         tip,
         sag_q32,
-        sag_of_dead_q32,
         dead_codes,
         newtons_per_sum_q48,
         pascals_per_sum_q32,
@@ -119,7 +118,6 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(*ticks);
     }
     mix.add(u32::from(*sag_q32));
-    mix.add(*sag_of_dead_q32);
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
         mix.add(force.to_bits());
     }

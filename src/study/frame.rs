@@ -75,7 +75,7 @@ enum Format {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel, Format); 10] = [
+const VARIANTS: [(&str, Kernel, Format); 9] = [
     ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
     ("packed, gains", packed::gains, Format::Fixed(4)),
     ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
@@ -85,7 +85,6 @@ const VARIANTS: [(&str, Kernel, Format); 10] = [
     ("f64", double, Format::Double),
     ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
     ("**Array::read**", firmware, Format::Picture),
-    ("**Array::read_all**", all_taxels, Format::Picture),
 ];
 
 /// Measures all variants over the next section of inputs: gains, the frame without contact, frames.
@@ -166,7 +165,7 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
     let mut array = Array::new();
     array.calibrate(&calibration);
     for _ in 0..TARE_FRAMES {
-        array.read_all(&quiet, config);
+        array.read(&quiet, config);
         array.continue_tare();
     }
     let sag = f64::from(config.sag_q32) / 4_294_967_296.0;
@@ -222,10 +221,6 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
 
 extern "C" fn firmware(bench: &mut Bench) {
     bench.array.read(&bench.frame, &bench.config);
-}
-
-extern "C" fn all_taxels(bench: &mut Bench) {
-    bench.array.read_all(&bench.frame, &bench.config);
 }
 
 /// Taxel by taxel, in 32 and 64 bits.

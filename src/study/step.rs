@@ -44,14 +44,13 @@ const STEPS: [(&str, Effort); 6] = [
 ];
 
 /// The place of the first part that works on what those before it left.
-const OBSERVER: usize = 3;
+const OBSERVER: usize = 2;
 /// Records that the parts see at most; the step sees all.
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 8] = [
+const PARTS: [(&str, Kernel, bool); 7] = [
     ("**Array::read**", read, false),
-    ("**Array::develop, two rows**", develop, false),
     ("**contact::from_sums**", sums, false),
     ("**observer**", observe, true),
     ("**goal and profile**", reference, true),
@@ -67,10 +66,6 @@ extern "C" fn step(bench: &mut Bench) {
 
 extern "C" fn read(bench: &mut Bench) {
     bench.array.read(&bench.record.frame, bench.config);
-}
-
-extern "C" fn develop(bench: &mut Bench) {
-    bench.array.develop(&bench.record.frame, 1 | 1 << 5);
 }
 
 extern "C" fn sums(bench: &mut Bench) {

@@ -65,7 +65,6 @@ fn sample(board: &Native, status: &Status, goal_n: f64) -> Sample {
 
 /// The taxels as the controller has them.
 fn picture(board: &mut Native, goal_n: f64) -> Picture {
-    board.pipeline.develop(&board.frame);
     let contact = board.pipeline.status().contact;
     let taxels = &board.pipeline.array().picture().taxels;
     let kpa_per_sum = board.pipeline.config().pascals_per_sum_q32 as f64 * 1e-3 / 2f64.powi(32);

@@ -166,9 +166,9 @@ fn frame(codes: u16) -> Frame {
     frame
 }
 
-/// Sum of the tares, sixteenths of a code.
+/// Sum of the tares, codes in Q16.
 fn tare_sum(array: &Array) -> i64 {
-    array.tare().map(i64::from).sum()
+    array.tare().flatten().map(|tare| i64::from(*tare)).sum()
 }
 
 /// Frames held or in turns, from a tare at 40 codes.
@@ -194,7 +194,7 @@ fn baselines() -> Vec<Machine<Array>> {
             step: Box::new(move |array: &mut Array| {
                 // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
                 for frame in frames.iter().cycle().take(ROWS) {
-                    array.read_all(frame, &config);
+                    array.read(frame, &config);
                     array.follow_drift(false);
                 }
             }),
@@ -207,7 +207,7 @@ fn baselines() -> Vec<Machine<Array>> {
 fn tare(array: &mut Array, frame: &Frame, config: &Config) {
     array.start_tare();
     for _ in 0..TARE_FRAMES {
-        array.read_all(frame, config);
+        array.read(frame, config);
         array.continue_tare();
     }
 }

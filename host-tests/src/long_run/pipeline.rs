@@ -7,8 +7,9 @@ use fingertip::params::Params;
 use fingertip::pipeline::{Command, Pipeline, Status};
 use fingertip::pressure::TARE_FRAMES;
 
-/// The baseline visits a row a frame, and the fit takes six: the pipeline can repeat itself no sooner than after this many steps.
-const PERIOD: u64 = 30;
+/// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat itself no sooner
+/// than after this many steps.
+const PERIOD: u64 = 110;
 
 /// The frame of a tip that presses, or not, in the middle of the array.
 fn frame(codes: u16) -> Frame {

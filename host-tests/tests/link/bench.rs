@@ -1,11 +1,12 @@
 //! A server with a made-up loop behind it, and a host's side of the talk.
 
-use fingertip::frame::{COLUMNS, Frame, SLOTS, TAXELS};
+use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Reply, ResetCause, Server, Snapshot};
 use fingertip::pipeline::Status;
+use fingertip::pressure::TARE_BITS;
 use fingertip::safety::{Fault, Mode};
 use fingertip::store::Record;
 
@@ -31,8 +32,8 @@ pub struct Bench {
     pub server: Server,
     pub status: Status,
     frame: Frame,
-    pressures: [u16; TAXELS],
-    tare: [u16; TAXELS],
+    taxels: [[i32; COLUMNS]; ROWS],
+    tare: [[i32; COLUMNS]; ROWS],
 }
 
 impl Bench {
@@ -49,8 +50,8 @@ impl Bench {
             server: Server::new(record),
             status: Status::default(),
             frame,
-            pressures: std::array::from_fn(|place| 20_000 + place as u16),
-            tare: std::array::from_fn(|place| 300 + place as u16),
+            taxels: by_place(|place| 20_000 + place),
+            tare: by_place(|place| (300 + place) << TARE_BITS),
         }
     }
 
@@ -70,9 +71,10 @@ impl Bench {
             loop_time_max_us: 47,
             reset_cause: ResetCause::Watchdog,
             crash: Crash { cause: CrashCause::Panic, line: 321, count: 7, pc: 0x0800_1234 },
-            pressures_10pa: &self.pressures,
             frame: &self.frame,
-            tare_codes: &self.tare,
+            taxels: &self.taxels,
+            pascals_per_sum_q32: 10 << 32,
+            tare: &self.tare,
         };
         let mut reply = Reply::new();
         let mut replies = Vec::new();
@@ -123,6 +125,11 @@ impl Bench {
     pub fn refused(&self, error: StatusError) -> u16 {
         self.server.counters().refused(error)
     }
+}
+
+/// A number for each taxel.
+fn by_place(number: impl Fn(i32) -> i32) -> [[i32; COLUMNS]; ROWS] {
+    std::array::from_fn(|row| std::array::from_fn(|column| number((COLUMNS * row + column) as i32)))
 }
 
 /// An instruction or status packet as it goes over the wire.

@@ -189,26 +189,3 @@ fn a_save_is_told_about() {
     bench.server.note_saved(true);
     assert_eq!(bench.number(address::SAVED_STATE, 1), 0);
 }
-
-#[test]
-fn only_what_may_tell_of_taxels_asks_for_them() {
-    use fingertip::link::Server;
-    use fingertip::link::packet::instruction::{PING, READ, SYNC_READ, WRITE};
-    use fingertip::link::table::address::{PEAK_PRESSURE_PA, PRESSURES};
-
-    let read = |first: u16, count: u16| packet(1, READ, &[first.to_le_bytes(), count.to_le_bytes()].concat());
-    let peak = PEAK_PRESSURE_PA;
-    let quick = [read(peak - 32, 32), read(peak + 4, 64), read(PRESSURES - 8, 8), packet(1, PING, &[])];
-    for bytes in quick.into_iter().chain([packet(1, WRITE, &[0x10, 1, 1])]) {
-        assert!(!Server::may_ask_for_taxels(&bytes), "{bytes:x?}");
-        // More or less than a packet: anything may be asked for.
-        assert!(Server::may_ask_for_taxels(&bytes[..bytes.len() - 1]) && Server::may_ask_for_taxels(&bytes[1..]));
-        assert!(Server::may_ask_for_taxels(&[bytes.clone(), bytes].concat()));
-    }
-    for bytes in
-        [read(peak - 32, 33), read(peak + 3, 1), read(PRESSURES - 1, 2), read(PRESSURES, 200), read(0, u16::MAX)]
-    {
-        assert!(Server::may_ask_for_taxels(&bytes), "{bytes:x?}");
-    }
-    assert!(Server::may_ask_for_taxels(&packet(1, SYNC_READ, &[0, 1, 4, 0, 1])));
-}

@@ -13,7 +13,7 @@ use crate::link::snapshot::hardware_error;
 use crate::params::Params;
 use crate::store::Record;
 
-use super::values::{bump, element, permille, set_goal, set_identify, set_torque, set_watchdog, watchdog};
+use super::values::{bump, permille, set_goal, set_identify, set_torque, set_watchdog, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
@@ -225,13 +225,13 @@ control_table! {
         |view, _| view.snapshot.status.effort as u32;
     /// Pressure on each taxel, row by row.
     768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
-        |view, place| element(view.snapshot.pressures_10pa, place);
+        |view, place| view.snapshot.pressure_10pa(place).into();
     /// Converter codes of the last frame, row by row; the last ten are the columns with no row driven.
     1024 RAW_CODES: U16[SLOTS * COLUMNS] ReadOnly, "" * 1, 0 to 4095,
         |view, place| u32::from(view.snapshot.frame.code(place / COLUMNS, place % COLUMNS));
     /// Zero of each taxel in converter codes, row by row.
     1280 TARE_CODES: U16[TAXELS] ReadOnly, "" * 1, 0 to 4095,
-        |view, place| element(view.snapshot.tare_codes, place);
+        |view, place| view.snapshot.tare_codes(place).into();
 }
 
 /// Every register, in the order of the addresses.

@@ -61,11 +61,6 @@ pub(super) fn bump(request: &mut u8, value: i64) {
     *request = request.wrapping_add(u8::from(value != 0));
 }
 
-/// One element of a picture of the array.
-pub(super) fn element(values: &[u16], place: usize) -> u32 {
-    values.get(place).map_or(0, |&value| u32::from(value))
-}
-
 /// Thousandths of the whole supply, rounded.
 pub(super) fn permille(duty: Duty) -> i32 {
     let full = i32::from(Duty::FULL);

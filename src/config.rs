@@ -21,6 +21,9 @@ const CALM_MAX: i32 = 4 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 2.0;
 
+/// Time over which the guard compares motor and encoder, s.
+const GUARD_S: f32 = 0.005;
+
 /// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i64 = 1_000_000 << 8;
 /// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,
@@ -120,6 +123,20 @@ pub struct Config {
     pub travel_max: Millimetres,
     /// See [`Params::clearance_um`].
     pub clearance: Millimetres,
+    /// How far behind where torque was enabled the tip may go: from the largest force to the clearance, and 1 mm.
+    pub travel_back: Millimetres,
+    /// For the guard: 1.5 times the approach speed, and 1.5 times the largest.
+    pub speed_loose: MillimetresPerSecond,
+    /// See [`Config::speed_loose`].
+    pub speed_any: MillimetresPerSecond,
+    /// Frames in a second.
+    pub frames_per_s: i32,
+    /// A frame's share of the guard's 5 ms, Q16: at most a half.
+    pub guard_leak: i32,
+    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over the guard's 5 ms, Q24 mm.
+    pub acceleration_per_n: i32,
+    /// See [`Config::acceleration_per_n`].
+    pub way_per_n: i32,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
@@ -127,6 +144,12 @@ pub struct Config {
 }
 
 impl Config {
+    /// The travel that so many encoder counts mean, held to the type's range but for a count.
+    pub fn travel(&self, counts: i32) -> Millimetres {
+        let counts = counts.max(-self.counts_max).min(self.counts_max);
+        Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
+    }
+
     /// Checks the parameters and derives the loop's constants.
     ///
     /// # Errors
@@ -154,6 +177,9 @@ impl Config {
         // g = k_t N / (R m) with m = J N^2, in mm/s^2 for a V; c = k_t^2 N^2 / (R m).
         let g = torque_constant / (resistance * inertia * travel_rad_per_m) * 1e3;
         let c = torque_constant * torque_constant / (resistance * inertia);
+        let mass = inertia * travel_rad_per_m * travel_rad_per_m;
+        let deepest = tip.indentation(newtons(p.force_max_mn));
+        let travel_back = Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0));
 
         let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
@@ -201,6 +227,13 @@ impl Config {
             approach: speed(p.approach_um_per_s),
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
+            travel_back,
+            speed_loose: speed(p.approach_um_per_s + p.approach_um_per_s / 2),
+            speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
+            frames_per_s: (1.0 / frame_s) as i32,
+            guard_leak: narrow((frame_s / GUARD_S).min(0.5) * exp2(16)),
+            acceleration_per_n: narrow(1e3 / mass * exp2(8)),
+            way_per_n: narrow(1e3 / mass * GUARD_S * GUARD_S * exp2(24)),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
         })

@@ -13,6 +13,7 @@ use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense};
 use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
+use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
@@ -28,6 +29,7 @@ pub struct Pipeline {
     fit: Fit,
     motion: SpeedLoop,
     monitor: Monitor,
+    guard: Guard,
     goal: Goal,
     press: Press,
     status: Status,
@@ -55,6 +57,7 @@ impl Pipeline {
             fit: Fit::default(),
             motion: SpeedLoop::new(),
             monitor: Monitor::default(),
+            guard: Guard::default(),
             goal: Goal::default(),
             press: Press::new(),
             status: Status::default(),
@@ -136,7 +139,6 @@ impl Pipeline {
         let contact =
             if fits { self.fit.read(picture, &self.config) } else { contact::from_sums(picture, &self.config) };
         self.budget.note(fits && self.fit.at_work());
-        let modelled = fits && self.fit.found();
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
         }
@@ -145,8 +147,18 @@ impl Pipeline {
         self.motion.observe(sense.encoder, &self.config);
 
         // Whether that is sound.
-        let view = View { picture, contact: &contact, modelled, sense, motion: &self.motion, command };
-        if watched && let Some(fault) = self.monitor.check(&view, self.status.mode != Mode::Tare, &self.config) {
+        let driven = watched && self.status.mode != Mode::Tare;
+        let seen = Seen {
+            encoder: sense.encoder,
+            force: contact.force.max(picture.force(&self.config)),
+            pressing: self.status.mode != Mode::Release,
+            voltage: self.motion.drive.voltage(),
+        };
+        let unsafe_motion = if driven { self.guard.check(&seen, &self.config) } else { None };
+        let pressed = self.guard.pressed(&self.config);
+        let view = View { picture, contact: &contact, pressed, sense, motion: &self.motion, command };
+        let unsound = if watched { self.monitor.check(&view, driven, &self.config) } else { None };
+        if let Some(fault) = unsound.or(unsafe_motion) {
             self.status.mode = Mode::Fault;
             self.status.fault = Some(fault);
         }
@@ -174,6 +186,11 @@ impl Pipeline {
             Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
             None => self.motion.coast(),
         };
+        let allowed = self.guard.allow(duty, &mut limits);
+        if allowed != duty {
+            self.motion.drive.cut();
+        }
+        let duty = allowed;
         if !self.tared {
             limits.set(Limits::NOT_TARED);
         }
@@ -252,8 +269,9 @@ impl Pipeline {
             Mode::Off if command.torque && self.tared => {
                 self.motion.observer = Observer::zeroed_at(sense.encoder);
                 self.goal.start();
-                let (picture, modelled) = (self.array.picture(), self.fit.found());
-                let view = View { picture, contact, modelled, sense, motion: &self.motion, command };
+                self.guard = Guard::start(sense.encoder, &self.config);
+                let picture = self.array.picture();
+                let view = View { picture, contact, pressed: false, sense, motion: &self.motion, command };
                 self.monitor.restart(&view);
                 wanted
             }

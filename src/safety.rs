@@ -15,6 +15,7 @@
 //! Torque off leads to off from every mode but fault. A fault (stop) is latched until it is cleared; a limit (what holds the loop
 //! back just now) comes and goes by itself. The numbers are stable: hosts may store them.
 
+pub mod guard;
 pub mod monitor;
 
 /// What the controller is doing.
@@ -50,7 +51,7 @@ pub enum Fault {
     RowStuck = 3,
     /// The array does not follow the motion that the encoder reports.
     ArrayFrozen = 4,
-    /// The encoder does not follow the motion that the array or the duty implies.
+    /// The encoder does not follow what the motor is driven to: it stands, or the motor is blocked.
     EncoderFrozen = 5,
     /// The contact force passed its limit.
     OverForce = 6,
@@ -68,6 +69,10 @@ pub enum Fault {
     MissedDeadline = 12,
     /// The firmware was reset by its watchdog, a panic or a hard fault; see the crash record.
     Crash = 13,
+    /// The tip left its envelope: an end of the travel, a retreat without end, or speed where nothing is touched.
+    Runaway = 14,
+    /// The encoder runs against what the motor is driven to: its channels or the motor's leads are swapped.
+    Reversed = 15,
 }
 
 /// What holds the loop back just now: a set of flags, stable by bit.
@@ -95,6 +100,10 @@ impl Limits {
     pub const SLEW: u16 = 1 << 8;
     /// There is no time for the effort that was asked for; see [`crate::pipeline::budget`].
     pub const EFFORT: u16 = 1 << 9;
+    /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds it from above.
+    pub const FROM_BELOW: u16 = 1 << 11;
+    /// The guard holds the duty back, see [`guard`].
+    pub const GUARD: u16 = 1 << 12;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

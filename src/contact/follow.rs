@@ -33,6 +33,13 @@ const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
+/// The ratio follows a refinement by a quarter of the way: what one of them gets wrong must not push the finger.
+const RATIO_FOLLOWS_BITS: u32 = 2;
+/// A ratio this near to 1 is 1: 1/64.
+const RATIO_SAME: i32 = 1 << (RATIO_BITS - 6);
+/// From this ratio on a third of the force is hidden: only a good likeness says how much. Below, any fit does.
+const RATIO_PLAIN: i32 = (3 << RATIO_BITS) / 2;
+
 /// Fractional bits of what the indentation follows the force by.
 const FOLLOWS_BITS: u32 = 12;
 /// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
@@ -79,6 +86,15 @@ struct Fitted {
     centre: [Millimetres; 2],
 }
 
+impl Fitted {
+    /// The contact, where the sum makes this force.
+    fn contact(self, force: Newtons, picture: &Picture, config: &Config) -> Contact {
+        let wide = (i64::from(force.to_bits()) * i64::from(self.ratio)) >> RATIO_BITS;
+        let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
+        sums::of_force(force, self.centre, picture, config)
+    }
+}
+
 impl Default for Fit {
     fn default() -> Self {
         Self::new(Effort::default())
@@ -121,11 +137,6 @@ impl Fit {
         self.at_work
     }
 
-    /// Whether the last force was the model's, not the sum's.
-    pub fn found(&self) -> bool {
-        self.fitted.is_some()
-    }
-
     /// Reads the next frame's contact. Any picture is taken.
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
@@ -135,10 +146,11 @@ impl Fit {
         self.at_work = false;
         if self.effort.rows() == 0 || force < config.contact_off {
             self.lose();
-            return match self.effort {
-                Effort::Sum => sums::of_force(force, [Millimetres::ZERO; 2], picture, config),
-                _ => from_sums(picture, config),
-            };
+            let sums = from_sums(picture, config);
+            let from_below = force >= config.contact_off && !covers(&sums, picture, config);
+            let centre = [sums.centre_x, sums.centre_y];
+            let [centre_x, centre_y] = if self.effort == Effort::Sum { [Millimetres::ZERO; 2] } else { centre };
+            return Contact { from_below, centre_x, centre_y, ..sums };
         }
         // At the beginning, and while the sums are all there is.
         let begins = !self.begun;
@@ -158,16 +170,12 @@ impl Fit {
             }
         }
         let contact = match (self.fitted, sums) {
-            (Some(Fitted { ratio, centre }), _) => {
-                let wide = (i64::from(force.to_bits()) * i64::from(ratio)) >> RATIO_BITS;
-                let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
-                sums::of_force(force, centre, picture, config)
-            }
+            (Some(fitted), _) => fitted.contact(force, picture, config),
             (None, Some(sums)) => sums,
             // A fit given up in this frame.
             (None, None) => from_sums(picture, config),
         };
-        Contact { confidence: self.confidence, ..contact }
+        Contact { confidence: self.confidence, from_below: self.from_below(), ..contact }
     }
 
     /// Begins a refinement. False where the peak is too low for the model.
@@ -175,10 +183,11 @@ impl Fit {
         let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
             return false;
         };
-        self.covered = covers(sums, picture, config);
-        if self.covered {
-            self.forget();
-        }
+        // Where a contact is cut off, the sums' centre lies too far in, and their radius is too small: the fit knows better.
+        self.covered = match self.fitted {
+            Some(fitted) => covers(&fitted.contact(sums.force, picture, config), picture, config),
+            None => covers(sums, picture, config),
+        };
         self.guess = self
             .next
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
@@ -223,25 +232,53 @@ impl Fit {
         self.begun = false;
         self.confidence = confidence(&self.equations.misfit, &self.scale);
         if self.covered {
+            self.settle(1 << RATIO_BITS, None);
             return;
         }
         self.astray = if self.confidence > 0 { 0 } else { self.astray + 1 };
-        if self.equations.misfit.taxels < TAXELS_MIN || self.astray > ASTRAY_MAX {
+        if self.equations.misfit.taxels < TAXELS_MIN {
             return self.forget();
+        }
+        if self.astray > ASTRAY_MAX {
+            // Another start may find it.
+            (self.next, self.astray) = (None, 0);
+            return;
         }
         let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);
         self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
         let taxels = self.equations.misfit.taxels;
-        let sure = self.confidence >= CONFIDENCE_LEAST || taxels >= TAXELS_SURE;
-        if self.confidence > 0 && taxels >= TAXELS_LEAST && (sure || self.fitted.is_some()) {
+        let likely = self.confidence >= CONFIDENCE_LEAST || taxels >= TAXELS_SURE;
+        if taxels >= TAXELS_LEAST && (likely || self.fitted.is_some() && self.confidence > 0) {
             // At the mean of the frames, where noise counts least.
             let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
             let rest = self.followed(&guess, Newtons::from_bits(mean));
             let mean_guess = Guess::new(rest, guess.x, guess.y, &config.geometry);
             let fitted = i64::from(config.tip.force(mean_guess.indentation(&config.tip)).to_bits());
             let ratio = Divisor::new(mean.unsigned_abs().into()).divide(fitted, RATIO_BITS);
-            self.fitted = Some(Fitted { ratio: ratio.max(1).min(RATIO_MAX), centre: guess.centre(&config.tip) });
+            self.settle(ratio.max(1).min(RATIO_MAX), Some(guess.centre(&config.tip)));
         }
+    }
+
+    /// Takes a refinement's ratio, and its centre where it has one.
+    fn settle(&mut self, ratio: i32, centre: Option<[Millimetres; 2]>) {
+        match (&mut self.fitted, centre) {
+            (Some(fitted), centre) => {
+                let way = ratio - fitted.ratio;
+                fitted.ratio += way >> RATIO_FOLLOWS_BITS;
+                fitted.centre = centre.unwrap_or(fitted.centre);
+                if self.covered && way.abs() < RATIO_SAME {
+                    self.forget();
+                }
+            }
+            (None, Some(centre)) => self.fitted = Some(Fitted { ratio, centre }),
+            (None, None) => {}
+        }
+    }
+
+    /// Whether the force is known only from below: a part of the contact is hidden, and no fit says how large it is.
+    fn from_below(&self) -> bool {
+        let hidden = |fitted: Fitted| fitted.ratio > RATIO_PLAIN && self.confidence < CONFIDENCE_LEAST;
+        !self.covered && self.fitted.is_none_or(hidden)
     }
 
     /// No contact, or none that the model can say anything of.

@@ -25,6 +25,16 @@ impl Drive {
         self.net
     }
 
+    /// g V that the bridge was told (Q8 mm/s^2).
+    pub fn voltage(&self) -> i32 {
+        self.voltage
+    }
+
+    /// Nothing is let through: the bridge holds the motor at no voltage.
+    pub fn cut(&mut self) {
+        *self = Self { voltage: 0, net: self.net.saturating_sub(self.voltage) };
+    }
+
     /// Cuts the wanted g V to what slew, current and voltage allow.
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.

@@ -51,7 +51,7 @@ impl Goal {
             let way = Millimetres(self.rest.0.saturating_sub(travel.0));
             (way, self.pressed(contact, travel, config), config.count)
         } else {
-            let way = way_to_goal(goal, contact, motion, config, limits);
+            let way = self.way_to_goal(goal, contact, motion, config, limits);
             let quick = mode == Mode::Force && self.confirmed(contact, travel, config);
             (within_travel(way, motion, config, limits), quick, config.count.min(FORCE_SLACK))
         };
@@ -80,6 +80,34 @@ impl Goal {
         }
     }
 
+    /// d_goal - d, with d brought forward from the middle of the scan to now.
+    ///
+    /// A force that is known only from below is no reason to press harder: the tip is then at most as deep as it went since the touch,
+    /// and as deep it is taken to be.
+    fn way_to_goal(
+        &self,
+        goal: Newtons,
+        contact: &Contact,
+        motion: &SpeedLoop,
+        config: &Config,
+        limits: &mut Limits,
+    ) -> Millimetres {
+        let held = goal.max(config.contact_on).min(config.force_max);
+        if held != goal {
+            limits.set(Limits::GOAL);
+        }
+        let wanted = config.tip.indentation(held);
+        if contact.force < config.contact_off {
+            return wanted;
+        }
+        let mut sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
+        if contact.from_below && let Some(surface) = self.surface {
+            limits.set(Limits::FROM_BELOW);
+            sensed = sensed.max(motion.observer.travel.0.saturating_sub(surface.0));
+        }
+        Millimetres(wanted.0.saturating_sub(sensed))
+    }
+
     /// Whether a release still lets go of what was touched.
     fn pressed(&self, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
         contact.force >= config.contact_off && self.surface.is_some_and(|surface| travel > surface)
@@ -97,23 +125,6 @@ impl Goal {
         let half = self.rest.0.saturating_add(config.clearance.0 / 2);
         self.mode == Mode::Release && self.surface.is_some() && config.clearance.0 > 0 && travel.0 < half
     }
-}
-
-/// d_goal - d, with d brought forward from the middle of the scan to now.
-fn way_to_goal(
-    goal: Newtons,
-    contact: &Contact,
-    motion: &SpeedLoop,
-    config: &Config,
-    limits: &mut Limits,
-) -> Millimetres {
-    let held = goal.max(config.contact_on).min(config.force_max);
-    if held != goal {
-        limits.set(Limits::GOAL);
-    }
-    let wanted = config.tip.indentation(held);
-    let sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
-    if contact.force >= config.contact_off { Millimetres(wanted.0.saturating_sub(sensed)) } else { wanted }
 }
 
 /// No further than to the end of the travel.

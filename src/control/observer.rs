@@ -47,8 +47,7 @@ impl Observer {
 
     /// Travel that an encoder count means, held to the type's range but for a count.
     pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
-        let counts = encoder.wrapping_sub(self.origin).max(-config.counts_max).min(config.counts_max);
-        Millimetres::from_bits(((i64::from(counts) * config.mm_per_count_q40) >> 16) as i32)
+        config.travel(encoder.wrapping_sub(self.origin))
     }
 
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).

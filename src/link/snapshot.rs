@@ -107,12 +107,17 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
     match fault {
         None => 0,
         Some(Fault::SupplyLow | Fault::SupplyHigh) => 1 << 0,
-        Some(Fault::EncoderFrozen) => 1 << 3,
+        Some(Fault::EncoderFrozen | Fault::Reversed) => 1 << 3,
         Some(Fault::Bridge) => 1 << 4,
         Some(Fault::OverForce) => 1 << 5,
         Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen) => 1 << 6,
-        Some(Fault::LostFrames | Fault::BusSilent | Fault::BrokenParameters | Fault::MissedDeadline | Fault::Crash) => {
-            1 << 7
-        }
+        Some(
+            Fault::LostFrames
+            | Fault::BusSilent
+            | Fault::BrokenParameters
+            | Fault::MissedDeadline
+            | Fault::Crash
+            | Fault::Runaway,
+        ) => 1 << 7,
     }
 }

@@ -41,6 +41,8 @@ pub struct Contact {
     pub peak_pa: u32,
     /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
     pub confidence: u8,
+    /// The force is known only from below: a part of the contact is hidden, and no fit says how large it is.
+    pub from_below: bool,
     /// Taxels left out because they are dead or saturated.
     pub bad_taxels: u8,
 }

@@ -8,14 +8,8 @@ use crate::pressure::Picture;
 use crate::safety::Fault;
 use crate::units::Millimetres;
 
-/// Indentation that must not change without a single encoder count (0.15 mm).
-const BLIND_INDENTATION: Millimetres = Millimetres::from_bits((1 << 24) * 15 / 100);
 /// Travel that must not leave the picture of a contact unchanged to the last bit (0.2 mm).
 const BLIND_TRAVEL: Millimetres = Millimetres::from_bits((1 << 24) / 5);
-/// So many frames in a row: near no force the indentation is steep, and noise alone can make that of one frame or two.
-const BLIND_FRAMES: u8 = 5;
-/// The motor must turn within this time when it is driven hard and nothing is touched, ns.
-const STALL_NS: u32 = 3_000_000;
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
 const SUPPLY_FRAMES: u8 = 5;
 
@@ -25,8 +19,8 @@ pub struct View<'a> {
     pub picture: &'a Picture,
     /// The contact read off it.
     pub contact: &'a Contact,
-    /// Whether its force is the model's, not the sum's.
-    pub modelled: bool,
+    /// Whether the tip surely presses on something, by the guard.
+    pub pressed: bool,
     /// Encoder, supply, bus and bridge.
     pub sense: &'a Sense,
     /// The motion estimated.
@@ -38,11 +32,6 @@ pub struct View<'a> {
 /// Where things stood when they last changed.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Monitor {
-    encoder: i32,
-    indentation: Millimetres,
-    modelled: bool,
-    blind_frames: u8,
-    stalled_ns: u32,
     sums: [i32; 3],
     travel: Millimetres,
     supply_frames: u8,
@@ -51,14 +40,7 @@ pub struct Monitor {
 impl Monitor {
     /// Starts anew from this frame.
     pub fn restart(&mut self, view: &View) {
-        *self = Self {
-            encoder: view.sense.encoder,
-            indentation: view.contact.indentation,
-            modelled: view.modelled,
-            sums: sums(view.picture),
-            travel: view.motion.observer.travel,
-            ..Self::default()
-        };
+        *self = Self { sums: sums(view.picture), travel: view.motion.observer.travel, ..Self::default() };
     }
 
     /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off for a tare,
@@ -73,7 +55,7 @@ impl Monitor {
         if !driven {
             return None;
         }
-        self.supply(view, config).or_else(|| self.motion(view, config))
+        self.supply(view, config).or_else(|| self.array(view))
     }
 
     fn supply(&mut self, view: &View, config: &Config) -> Option<Fault> {
@@ -87,38 +69,11 @@ impl Monitor {
         (self.supply_frames >= SUPPLY_FRAMES).then_some(if low { Fault::SupplyLow } else { Fault::SupplyHigh })
     }
 
-    /// The encoder must see what the array feels, and the array what the encoder sees.
-    fn motion(&mut self, view: &View, config: &Config) -> Option<Fault> {
-        let touching = view.contact.force >= config.contact_off;
-        // A contact that is read in another way has not moved.
-        if view.modelled != self.modelled {
-            self.modelled = view.modelled;
-            self.indentation = view.contact.indentation;
-        }
-        let moved = view.sense.encoder != self.encoder;
-        if moved {
-            self.encoder = view.sense.encoder;
-            self.indentation = view.contact.indentation;
-            self.stalled_ns = 0;
-        }
-        if touching && distance(view.contact.indentation, self.indentation) > BLIND_INDENTATION {
-            self.blind_frames = self.blind_frames.saturating_add(1);
-            if self.blind_frames >= BLIND_FRAMES {
-                return Some(Fault::EncoderFrozen);
-            }
-        } else {
-            self.blind_frames = 0;
-        }
-        if !moved && !touching && view.motion.drive.acceleration().saturating_abs() > config.current_limit / 8 {
-            self.stalled_ns += config.timing.frame_ns();
-            if self.stalled_ns > STALL_NS {
-                return Some(Fault::EncoderFrozen);
-            }
-        }
-
+    /// The array must see what the encoder sees.
+    fn array(&mut self, view: &View) -> Option<Fault> {
         let sums = sums(view.picture);
         let travel = view.motion.observer.travel;
-        if sums != self.sums || !touching {
+        if sums != self.sums || !view.pressed {
             self.sums = sums;
             self.travel = travel;
         }

@@ -111,6 +111,13 @@ fn add_config(mix: &mut Mix, config: &Config) {
         approach,
         travel_max,
         clearance,
+        travel_back,
+        speed_loose,
+        speed_any,
+        frames_per_s,
+        guard_leak,
+        acceleration_per_n,
+        way_per_n,
         force_fault,
         force_max,
     } = config;
@@ -121,7 +128,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
         mix.add(force.to_bits());
     }
-    for length in [half_pitch, count, calm_band, travel_max, clearance] {
+    for length in [half_pitch, count, calm_band, travel_max, clearance, travel_back] {
         mix.add(length.to_bits());
     }
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
@@ -142,11 +149,11 @@ fn add_config(mix: &mut Mix, config: &Config) {
             mix.add(*number);
         }
     }
-    for speed in [speed_max, approach] {
+    for speed in [speed_max, approach, speed_loose, speed_any] {
         mix.add(speed.to_bits());
     }
     for number in
-        [damping_q17_per_s, voltage_limit, current_limit, slew_limit]
+        [damping_q17_per_s, voltage_limit, current_limit, slew_limit, frames_per_s, guard_leak, acceleration_per_n, way_per_n]
     {
         mix.add(*number);
     }

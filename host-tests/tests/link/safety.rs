@@ -57,6 +57,8 @@ fn every_fault_has_a_bit() {
         (Fault::Bridge, 4),
         (Fault::MissedDeadline, 7),
         (Fault::Crash, 7),
+        (Fault::Runaway, 7),
+        (Fault::Reversed, 3),
     ];
     for (fault, bit) in faults {
         bench.set_fault(Some(fault));

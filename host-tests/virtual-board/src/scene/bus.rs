@@ -119,6 +119,8 @@ fn fault(number: u8) -> Option<Fault> {
         Fault::Bridge,
         Fault::MissedDeadline,
         Fault::Crash,
+        Fault::Runaway,
+        Fault::Reversed,
     ]
     .into_iter()
     .find(|fault| *fault as u8 == number)

@@ -1,0 +1,200 @@
+//! The last word on the duty: an envelope that holds whatever the loop, the fit or the host believe.
+//!
+//! The guard owes nothing to the loop. It counts the encoder by itself, keeps a model of the motor of its own, and takes of the array the
+//! larger of the plain sum and the force in use. `docs/safety.md` states its promises, by number:
+//!
+//! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
+//! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm on, the motor stops.
+//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; 20 ms on, the
+//!    motor stops.
+//! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
+//!
+//! For the fourth the guard compares two ways over the last 5 ms: the one that the encoder tells and the one that its model expects,
+//!
+//! ```text
+//! v' = g V - c v - F / m       h' = v - h / 5 ms
+//! ```
+
+use crate::config::Config;
+use crate::safety::{Fault, Limits};
+use crate::units::{Duty, Millimetres, Newtons};
+
+/// The model must expect at least this way of the motor before it counts: 0.15 mm, Q24.
+const EXPECTED: i32 = (1 << 24) * 15 / 100;
+/// A way of this in the other direction is the wrong one: 0.05 mm, Q24.
+const WRONG: i32 = (1 << 24) / 20;
+/// A way that is less than this part of what is expected is none: 1/16.
+const NONE_BITS: u32 = 4;
+/// How far an end may be overrun: 1 mm.
+const BEYOND: i32 = 1 << 24;
+/// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
+const LOOSE_NS: u32 = 20_000_000;
+/// How much farther than twice the indentation a tip may have gone and still count as pressed: 0.5 mm, Q24.
+const YIELDING: i32 = 1 << 23;
+/// The force's mean follows it by 1/16 in each frame.
+const FORCE_BITS: u32 = 4;
+
+/// What the guard knows of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The encoder's count.
+    pub encoder: i32,
+    /// The force on the array: the larger of the sum and what the loop goes by.
+    pub force: Newtons,
+    /// Whether the host asks for a force.
+    pub pressing: bool,
+    /// g V that the bridge was given in the last frame, Q8 mm/s^2.
+    pub voltage: i32,
+}
+
+/// Ends of the travel, the last touch, and the motion over the last milliseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Guard {
+    origin: i32,
+    /// All lengths Q24 mm.
+    travel: i32,
+    /// No farther back than here.
+    floor: i32,
+    /// Where a touch began, less its indentation.
+    surface: Option<i32>,
+    touching: bool,
+    /// Mean force, Q16 N.
+    force: i32,
+    /// Speeds in Q16 mm/s: by the encoder, by the model.
+    speed: i32,
+    expected_speed: i32,
+    /// Ways over the last 5 ms.
+    way: i32,
+    expected_way: i32,
+    /// Since the tip was last surely pressed.
+    loose_ns: u32,
+    may: May,
+}
+
+/// Which duties are let through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct May {
+    forward: bool,
+    back: bool,
+}
+
+impl Guard {
+    /// Torque is enabled with the encoder at this count.
+    pub fn start(encoder: i32, config: &Config) -> Self {
+        let floor = config.travel_back.to_bits().saturating_neg();
+        Self { origin: encoder, floor, may: May { forward: true, back: true }, ..Self::default() }
+    }
+
+    /// Takes a frame: what is to stop the motor.
+    pub fn check(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
+        self.measure(seen, config);
+        self.touch(seen.pressing, config);
+        let loose = !self.pressed(config);
+        self.loose_ns = if loose { self.loose_ns.saturating_add(config.timing.frame_ns()) } else { 0 };
+        let limit = if self.loose_ns > LOOSE_NS { config.speed_loose } else { config.speed_any }.to_bits();
+        let [fast_forward, fast_back] = [self.speed > limit, self.speed < -limit];
+        let end = config.travel_max.to_bits();
+        self.may = May {
+            forward: self.travel <= end && !fast_forward,
+            back: self.travel >= self.floor && !fast_back,
+        };
+        let outside = self.travel > end.saturating_add(BEYOND) || self.travel < self.floor.saturating_sub(BEYOND);
+        let runs = (fast_forward || fast_back) && self.loose_ns > 2 * LOOSE_NS;
+        if outside || runs {
+            return Some(Fault::Runaway);
+        }
+        self.disagreement(config)
+    }
+
+    /// The duty that is let through; sets [`Limits::GUARD`] where that is not what was asked for.
+    pub fn allow(&self, duty: Duty, limits: &mut Limits) -> Duty {
+        let allowed = (duty.0 == 0) || if duty.0 > 0 { self.may.forward } else { self.may.back };
+        if allowed {
+            return duty;
+        }
+        limits.set(Limits::GUARD);
+        Duty::ZERO
+    }
+
+    /// Whether the array and the travel agree that something is pressed.
+    pub fn pressed(&self, config: &Config) -> bool {
+        let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
+        self.touching
+            && self.surface.is_some_and(|surface| {
+                let deep = self.travel.saturating_sub(surface);
+                deep >= -YIELDING && deep <= (2 * depth).saturating_add(YIELDING)
+            })
+    }
+
+    /// Travel, force, and the two ways.
+    fn measure(&mut self, seen: &Seen, config: &Config) {
+        let before = self.travel;
+        self.travel = config.travel(seen.encoder.wrapping_sub(self.origin)).to_bits();
+        let moved = self.travel.saturating_sub(before);
+        self.force += (seen.force.to_bits().max(0) - self.force) >> FORCE_BITS;
+        // Q24 mm in a frame to Q16 mm/s.
+        let speed = saturated((i64::from(moved) * i64::from(config.frames_per_s)) >> 8);
+        self.speed = towards(self.speed, speed, config.guard_leak);
+
+        let pushed = saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.acceleration_per_n)) >> 16);
+        let back_emf = saturated((i64::from(self.expected_speed) * i64::from(config.damping_q17_per_s)) >> 25);
+        let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
+        let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31);
+        self.expected_speed = towards(self.expected_speed.saturating_add(gained), self.speed, config.guard_leak >> 2);
+        let expected = saturated((i64::from(self.expected_speed) * i64::from(config.frame_s_q39)) >> 31);
+        self.way = towards(self.way.saturating_add(moved), 0, config.guard_leak);
+        self.expected_way = towards(self.expected_way.saturating_add(expected), 0, config.guard_leak);
+    }
+
+    /// Where a touch begins and how far back it lets the tip go.
+    fn touch(&mut self, pressing: bool, config: &Config) {
+        if self.force < config.contact_off.to_bits() {
+            self.touching = false;
+        } else if !self.touching && self.force >= config.contact_on.to_bits() {
+            self.touching = true;
+            if pressing {
+                let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
+                let surface = self.travel.saturating_sub(depth);
+                self.surface = Some(surface);
+                let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
+                self.floor = back.max(config.travel_back.to_bits().saturating_neg());
+            }
+        }
+    }
+
+    /// What the encoder tells against what the model expects.
+    fn disagreement(&self, config: &Config) -> Option<Fault> {
+        // A quarter of what the force makes is left to its errors.
+        let by_force = (i64::from(self.force) * i64::from(config.way_per_n)) >> 16;
+        let least = EXPECTED.saturating_add(2 * config.count.to_bits()).saturating_add(saturated(by_force / 4));
+        let expected = self.expected_way.saturating_abs();
+        if expected < least {
+            return None;
+        }
+        let along = if self.expected_way < 0 { self.way.saturating_neg() } else { self.way };
+        if along < -WRONG.max(2 * config.count.to_bits()) {
+            Some(Fault::Reversed)
+        } else if along < expected >> NONE_BITS {
+            Some(Fault::EncoderFrozen)
+        } else {
+            None
+        }
+    }
+}
+
+/// `value` moved by a share (Q16) of the way to `goal`.
+fn towards(value: i32, goal: i32, share: i32) -> i32 {
+    value.saturating_add(saturated((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16))
+}
+
+fn saturated(value: i64) -> i32 {
+    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+}
+
+/// The travel as a length.
+impl Guard {
+    /// Travel since torque was enabled, by the encoder alone.
+    pub fn travel(&self) -> Millimetres {
+        Millimetres::from_bits(self.travel)
+    }
+}

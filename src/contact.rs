@@ -118,17 +118,26 @@ fn misfit(guess: &Guess, which: Taxels, view: &View, geometry: &Geometry) -> Mis
     misfit
 }
 
-/// Whether the whole contact that the sums tell of lies on good taxels of the array.
-fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
-    // 24 bits hold 128 mm: half a unit of these is 8 nm, and nothing overflows.
+/// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a unit of these is
+/// 8 nm, and nothing overflows.
+fn overhang(contact: &Contact, config: &Config) -> i32 {
     let [x, y, radius, half_pitch] =
-        [sums.centre_x, sums.centre_y, sums.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
-    if x.abs().max(y.abs()) + radius > COLUMNS as i32 * half_pitch {
+        [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
+    x.abs().max(y.abs()) + radius - COLUMNS as i32 * half_pitch
+}
+
+/// Whether the whole contact lies on good taxels of the array.
+fn covers(contact: &Contact, picture: &Picture, config: &Config) -> bool {
+    overhang(contact, config) <= 0 && !hides(contact, picture, config)
+}
+
+/// Whether a bad taxel hides a part of a contact.
+fn hides(contact: &Contact, picture: &Picture, config: &Config) -> bool {
+    if picture.bad.iter().all(|bad| *bad == 0) {
         return false;
     }
-    if picture.bad.iter().all(|bad| *bad == 0) {
-        return true;
-    }
+    let [x, y, radius, half_pitch] =
+        [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
     // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.
     let reach = radius + half_pitch + (half_pitch >> 1);
     for (row, bad) in picture.bad.iter().enumerate() {
@@ -137,12 +146,12 @@ fn covers(sums: &Contact, picture: &Picture, config: &Config) -> bool {
         while left != 0 {
             let dx = (2 * left.trailing_zeros() as i32 + 1 - COLUMNS as i32) * half_pitch - x;
             if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
-                return false;
+                return true;
             }
             left &= left - 1;
         }
     }
-    true
+    false
 }
 
 /// Refines a guess as often as asked for.

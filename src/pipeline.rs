@@ -3,7 +3,7 @@
 pub mod budget;
 mod exchange;
 
-pub use exchange::{Command, Contact, Status};
+pub use exchange::{Bridge, Command, Contact, Status};
 
 use crate::config::Config;
 use crate::contact::{self, Fit};

@@ -119,7 +119,7 @@ impl Digest {
             duty: applied,
             identification,
         } = *status;
-        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, from_below, bad_taxels } = contact;
+        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
         for word in [sequence, missed_frames, peak_pa] {
             self.0.update(&word.to_le_bytes());
         }
@@ -136,7 +136,7 @@ impl Digest {
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());
         self.0.update(&applied.0.to_le_bytes());
-        self.0.update(&[effort as u8, mode as u8, fault.map_or(0, |fault| fault as u8), confidence, from_below.into(), bad_taxels]);
+        self.0.update(&[effort as u8, mode as u8, fault.map_or(0, |fault| fault as u8), confidence, doubt, bad_taxels]);
     }
 
     /// The digest of what was added.

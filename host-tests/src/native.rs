@@ -3,8 +3,7 @@
 use crate::plant::{Bridge, Setup, World};
 use fingertip::config::Config;
 use fingertip::frame::{Frame, SLOTS, Sense};
-use fingertip::pipeline::{Command, Pipeline, Status};
-use fingertip::safety::Mode;
+use fingertip::pipeline::{self, Command, Pipeline, Status};
 use fingertip::units::Duty;
 
 /// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
@@ -63,8 +62,8 @@ impl Native {
         self.frames += 1;
         self.frame.sequence = self.frames as u32;
         self.sense = self.world.sense(0);
-        let (duty, status) = self.pipeline.step(&self.frame, &self.sense, &self.command);
-        self.next = bridge(duty, status.mode);
+        let (_, status) = self.pipeline.step(&self.frame, &self.sense, &self.command);
+        self.next = bridge(status);
         *status
     }
 
@@ -78,12 +77,11 @@ impl Native {
     }
 }
 
-/// What a duty means at the bridge: a mode that does not drive leaves it open.
-pub fn bridge(duty: Duty, mode: Mode) -> Bridge {
-    match mode {
-        Mode::Off | Mode::Tare | Mode::Fault => Bridge::Coast,
-        Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
-            Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) }
-        }
+/// What a step means at the bridge.
+pub fn bridge(status: &Status) -> Bridge {
+    match status.bridge() {
+        pipeline::Bridge::Asleep | pipeline::Bridge::Open => Bridge::Coast,
+        pipeline::Bridge::Brakes => Bridge::Driven { duty: 0.0 },
+        pipeline::Bridge::Driven(duty) => Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) },
     }
 }

@@ -47,6 +47,12 @@ pub struct Faults {
     pub array: ArrayFaults,
     /// The encoder's count stands still.
     pub encoder_frozen: bool,
+    /// The encoder's channels are swapped: it counts down as the tip presses in.
+    pub encoder_reversed: bool,
+    /// The motor's leads are swapped: a positive duty draws the tip back.
+    pub leads_swapped: bool,
+    /// Travels at which the finger meets an end stop, rear and front.
+    pub end_stops_mm: Option<[f64; 2]>,
     /// Taken from the source's voltage.
     pub supply_drop_v: f64,
 }
@@ -89,11 +95,27 @@ impl World {
 
     /// One integrator step with the bridge held; 10 us is the step that the tests vouch for.
     pub fn advance(&mut self, dt_s: f64, bridge: Bridge) {
-        self.bridge = bridge;
+        self.bridge = match bridge {
+            Bridge::Driven { duty } if self.faults.leads_swapped => Bridge::Driven { duty: -duty },
+            sound => sound,
+        };
         self.shaft = Dynamics::new(&self.setup).advance(self.shaft, dt_s, &self.source());
+        if let Some(ends_mm) = self.faults.end_stops_mm {
+            self.stop_at(ends_mm);
+        }
         if !self.faults.encoder_frozen {
             let turns = self.shaft.angle_rad / TAU;
-            self.counts = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+            let counts = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+            self.counts = if self.faults.encoder_reversed { -counts } else { counts };
+        }
+    }
+
+    /// Holds the tip where it meets an end.
+    fn stop_at(&mut self, [rear_mm, front_mm]: [f64; 2]) {
+        let travel_mm = self.travel_mm();
+        let held_mm = travel_mm.clamp(rear_mm, front_mm);
+        if held_mm != travel_mm {
+            self.shaft = Shaft { angle_rad: Dynamics::new(&self.setup).angle_rad(held_mm), speed_rad_per_s: 0.0 };
         }
     }
 

@@ -45,11 +45,11 @@ fn the_observer_recovers_from_anything() {
             let mut observer = Observer::new();
             let (reach, frames) = (1 << rng.u32(1..31), rng.u32(1..200));
             for _ in 0..frames {
-                observer.update(rng.i32(-reach..reach), rng.i32(..), &config);
+                observer.update(rng.i32(-reach..reach), rng.i32(..), &config.paces[0], &config);
             }
             let encoder = rng.i32(-50_000..50_000);
             let (_, rest) =
-                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config)).expect("a cycle");
+                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config.paces[0], &config)).expect("a cycle");
             let measured = rest.measured(encoder, &config).to_bits();
             assert!((rest.travel.to_bits() - measured).abs() <= 1, "{rest:?} at {measured}");
             assert!(rest.speed.to_bits().abs() <= 131 && rest.disturbance.to_bits().abs() <= 1_024, "{rest:?}");

@@ -5,13 +5,14 @@
 //! | safe | low | off | low, low: coast |
 //! | ready | high | off | low, low: coast |
 //! | driving | high | on | slow decay: one input high, the other low for the share of the duty |
+//! | braking | high | on | high, high: the motor is shorted |
 
 use embassy_stm32::gpio::{Pull, Speed};
 use embassy_stm32::pac::timer::regs::SrAdv;
 use embassy_stm32::pac::timer::vals::{Bkp, Ocm, Ossi, Ossr};
 use embassy_stm32::peripherals::{PA8, PA9, PB12, PC9, TIM1};
 use embassy_stm32::{Peri, pac, rcc};
-use fingertip::safety::Mode;
+use fingertip::pipeline::Bridge as Wanted;
 use fingertip::units::Duty;
 
 use super::{guard, pins};
@@ -82,15 +83,17 @@ impl Bridge {
         Self { woken: None, ready: false, driving: false }
     }
 
-    /// Follows the mode: asleep in fault, awake in off and tare, driven by `duty` in the others.
-    pub fn apply(&mut self, mode: Mode, duty: Duty) {
-        match mode {
-            Mode::Fault => self.sleep(),
-            Mode::Off | Mode::Tare => {
+    /// Does what the pipeline says; a driver that sleeps is not woken to brake.
+    pub fn apply(&mut self, wanted: Wanted) {
+        match wanted {
+            Wanted::Asleep => self.sleep(),
+            Wanted::Open => {
                 self.coast();
                 self.wake();
             }
-            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
+            Wanted::Brakes if self.ready => self.drive(Duty::ZERO),
+            Wanted::Brakes => self.sleep(),
+            Wanted::Driven(duty) => {
                 self.wake();
                 if self.ready {
                     self.drive(duty);

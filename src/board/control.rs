@@ -9,10 +9,9 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::config::Config;
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline};
-use fingertip::safety::{Fault, Mode};
+use fingertip::pipeline::{Bridge as Wanted, Command, Pipeline};
+use fingertip::safety::Fault;
 use fingertip::scan::answer_ticks;
-use fingertip::units::Duty;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
@@ -126,7 +125,7 @@ impl State {
         }
         self.parts.scan.copy_so_far(&mut self.frame);
         if self.parts.pipeline.glance(&self.frame) {
-            self.parts.bridge.sleep();
+            self.parts.bridge.apply(self.parts.pipeline.status().bridge());
             self.publish();
         }
     }
@@ -142,8 +141,8 @@ impl State {
             // Before the first frame nothing is known: not 0, which would let any effort in.
             answer_ticks: self.report.loop_ticks.saturating_mul(guard::TICKS).max(1),
         };
-        let (duty, status) = parts.pipeline.step(&self.frame, &sense, &command);
-        parts.bridge.apply(status.mode, duty);
+        let (_, status) = parts.pipeline.step(&self.frame, &sense, &command);
+        parts.bridge.apply(status.bridge());
 
         let frame_ticks = guard::frame_ticks(parts.pipeline.config().timing);
         let loop_ticks = guard::now().wrapping_sub(completed.stamp);
@@ -208,7 +207,7 @@ impl State {
     /// starts anew.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
-        self.parts.bridge.apply(Mode::Off, Duty::ZERO);
+        self.parts.bridge.apply(Wanted::Open);
         self.parts.scan.stop();
         guard::rest();
         if !set_config(self.parts.pipeline, &params) {

@@ -12,7 +12,7 @@ use super::guess::{Guess, Pressed};
 use super::step::{Bench, Equations};
 use super::sums::{self, from_sums};
 use super::view::{Scale, View};
-use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers};
+use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, hides, overhang};
 use crate::config::Config;
 use crate::frame::ROWS;
 use crate::pipeline::Contact;
@@ -37,9 +37,6 @@ const RATIO_MAX: i32 = 64 << RATIO_BITS;
 const RATIO_FOLLOWS_BITS: u32 = 2;
 /// A ratio this near to 1 is 1: 1/64.
 const RATIO_SAME: i32 = 1 << (RATIO_BITS - 6);
-/// From this ratio on a third of the force is hidden: only a good likeness says how much. Below, any fit does.
-const RATIO_PLAIN: i32 = (3 << RATIO_BITS) / 2;
-
 /// Fractional bits of what the indentation follows the force by.
 const FOLLOWS_BITS: u32 = 12;
 /// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
@@ -70,6 +67,8 @@ pub struct Fit {
     follows: i32,
     equations: Equations,
     confidence: u8,
+    /// See [`Contact::doubt`], Q8.
+    doubt: u32,
     /// Refinements without any confidence since the last that had some.
     astray: u8,
     /// What the last refinement made of the guess.
@@ -118,6 +117,7 @@ impl Fit {
             follows: 0,
             equations: Equations::NONE,
             confidence: 255,
+            doubt: 0,
             astray: 0,
             next: None,
             fitted: None,
@@ -147,10 +147,10 @@ impl Fit {
         if self.effort.rows() == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);
-            let from_below = force >= config.contact_off && !covers(&sums, picture, config);
+            let doubt = if force < config.contact_off { 0 } else { unseen(&sums, picture, config) };
             let centre = [sums.centre_x, sums.centre_y];
             let [centre_x, centre_y] = if self.effort == Effort::Sum { [Millimetres::ZERO; 2] } else { centre };
-            return Contact { from_below, centre_x, centre_y, ..sums };
+            return Contact { doubt, centre_x, centre_y, ..sums };
         }
         // At the beginning, and while the sums are all there is.
         let begins = !self.begun;
@@ -175,7 +175,8 @@ impl Fit {
             // A fit given up in this frame.
             (None, None) => from_sums(picture, config),
         };
-        Contact { confidence: self.confidence, from_below: self.from_below(), ..contact }
+        self.doubt = follow_doubt(self.doubt, self.target_doubt(&contact, picture, config));
+        Contact { confidence: self.confidence, doubt: (self.doubt >> 8) as u8, ..contact }
     }
 
     /// Begins a refinement. False where the peak is too low for the model.
@@ -275,22 +276,51 @@ impl Fit {
         }
     }
 
-    /// Whether the force is known only from below: a part of the contact is hidden, and no fit says how large it is.
-    fn from_below(&self) -> bool {
-        let hidden = |fitted: Fitted| fitted.ratio > RATIO_PLAIN && self.confidence < CONFIDENCE_LEAST;
-        !self.covered && self.fitted.is_none_or(hidden)
+    /// How far the force is known only from below in this frame.
+    fn target_doubt(&self, contact: &Contact, picture: &Picture, config: &Config) -> u8 {
+        match self.fitted {
+            _ if self.covered => 0,
+            // A third of the force is hidden: only a good likeness says how much. Where less is, any fit does.
+            Some(fitted) => {
+                let hidden = ramp(fitted.ratio - (5 << RATIO_BITS) / 4, 1 << (RATIO_BITS - 1));
+                let unlike = ramp(160 - i32::from(self.confidence), 64);
+                ((u32::from(hidden) * u32::from(unlike)) >> 8) as u8
+            }
+            None => unseen(contact, picture, config),
+        }
     }
 
     /// No contact, or none that the model can say anything of.
     fn lose(&mut self) {
         self.forget();
-        (self.begun, self.confidence) = (false, 255);
+        (self.begun, self.confidence, self.doubt) = (false, 255, 0);
     }
 
     /// Back to the sums.
     fn forget(&mut self) {
         (self.next, self.fitted, self.astray) = (None, None, 0);
     }
+}
+
+/// 0 below 0, 255 from `whole` on, and a line between.
+fn ramp(value: i32, whole: i32) -> u8 {
+    (i64::from(value.max(0).min(whole)) * 255 / i64::from(whole.max(1))) as u8
+}
+
+/// How far the sums tell a force from below: not while the rim is within half a pitch of the edge, wholly from a pitch and a half on or
+/// where a bad taxel hides a part.
+fn unseen(sums: &Contact, picture: &Picture, config: &Config) -> u8 {
+    if hides(sums, picture, config) {
+        return u8::MAX;
+    }
+    let half_pitch = config.half_pitch.to_bits() >> 4;
+    ramp(overhang(sums, config) - half_pitch, 2 * half_pitch)
+}
+
+/// Doubt comes within 8 frames and goes within 64: what comes and goes must not push the finger about. Q8.
+fn follow_doubt(doubt: u32, target: u8) -> u32 {
+    let target = u32::from(target) << 8;
+    if target > doubt { doubt + (target - doubt).div_ceil(8) } else { doubt - (doubt - target).div_ceil(64) }
 }
 
 const _: () = assert!(ROWS == 10, "rows divide by 2, 5 and 10, and a step of 3 rows comes to each of them once");

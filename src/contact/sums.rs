@@ -31,7 +31,7 @@ pub(super) fn of_force(force: Newtons, centre: [Millimetres; 2], picture: &Pictu
         radius: config.tip.contact_radius(indentation),
         peak_pa: picture.peak_pa(config),
         confidence: 255,
-        from_below: false,
+        doubt: 0,
         bad_taxels: picture.bad_count,
     }
 }

@@ -49,7 +49,7 @@ impl Goal {
         self.enter(mode, contact, travel, config);
         let (way, quick, slack) = if mode == Mode::Release {
             let way = Millimetres(self.rest.0.saturating_sub(travel.0));
-            (way, self.pressed(contact, travel, config), config.count)
+            (way, travel.0 > self.rest.0 + config.clearance.0 && self.confirmed(contact, travel, config), config.count)
         } else {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
             let quick = mode == Mode::Force && self.confirmed(contact, travel, config);
@@ -83,7 +83,7 @@ impl Goal {
     /// d_goal - d, with d brought forward from the middle of the scan to now.
     ///
     /// A force that is known only from below is no reason to press harder: the tip is then at most as deep as it went since the touch,
-    /// and as deep it is taken to be.
+    /// and the more doubt there is, the nearer to that it is taken to be.
     fn way_to_goal(
         &self,
         goal: Newtons,
@@ -101,16 +101,15 @@ impl Goal {
             return wanted;
         }
         let mut sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
-        if contact.from_below && let Some(surface) = self.surface {
-            limits.set(Limits::FROM_BELOW);
-            sensed = sensed.max(motion.observer.travel.0.saturating_sub(surface.0));
+        if contact.doubt > 0 && let Some(surface) = self.surface {
+            let deeper = motion.observer.travel.0.saturating_sub(surface.0).saturating_sub(sensed).max(I8F24::ZERO);
+            if contact.doubt > u8::MAX / 2 {
+                limits.set(Limits::FROM_BELOW);
+            }
+            let doubtful = (i64::from(deeper.to_bits()) * i64::from(contact.doubt)) / i64::from(u8::MAX);
+            sensed = sensed.saturating_add(I8F24::from_bits(doubtful as i32));
         }
         Millimetres(wanted.0.saturating_sub(sensed))
-    }
-
-    /// Whether a release still lets go of what was touched.
-    fn pressed(&self, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
-        contact.force >= config.contact_off && self.surface.is_some_and(|surface| travel > surface)
     }
 
     /// Whether the array bears out how far the tip went into what it touches.

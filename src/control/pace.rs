@@ -1,8 +1,9 @@
 //! The pace of the loop: quick while there is a way to go, calmer the longer there is none.
 //!
-//! Rest and speed want different bandwidths. While the way still to go stays within a band that counts and noise explain, the
-//! loop falls to the next calmer pace every few of its own time constants; where the way's mean leaves twice that band, it
-//! is quick again at once. Only gains change, never what the observer and the drive hold, so a change of pace moves nothing.
+//! Rest and speed want different bandwidths. The calmest pace is for ways within twice a band that counts and noise explain, each
+//! quicker one for ways twice as long. Where the way's mean is longer, the loop is quicker at once; where it was half as long for
+//! two of the loop's own time constants, it is calmer. A loop that swings therefore slows down, however it came to
+//! swing. Only gains change, never what the observer and the drive hold, so a change of pace moves nothing.
 
 use super::gains::{Gains, PACES};
 use crate::config::Config;
@@ -44,16 +45,21 @@ impl Pace {
         let held = way.to_bits().max(-16 * band).min(16 * band);
         self.mean += (held - self.mean) >> MEAN_BITS;
         let mean = self.mean.saturating_abs();
-        if mean > 2 * band {
-            (self.number, self.calm_frames) = (0, 0);
-        } else if mean > band {
-            self.calm_frames = 0;
-        } else {
+        while self.number > 0 && mean > reach(band, self.number) {
+            (self.number, self.calm_frames) = (self.number - 1, 0);
+        }
+        if self.number + 1 < PACES && mean <= reach(band, self.number + 1) / 2 {
             self.calm_frames += 1;
             if self.calm_frames > config.calm_frames << self.number {
-                self.number = (self.number + 1).min(PACES - 1);
-                self.calm_frames = 0;
+                (self.number, self.calm_frames) = (self.number + 1, 0);
             }
+        } else {
+            self.calm_frames = 0;
         }
     }
+}
+
+/// The longest way for which a pace is quick enough: two bands at the calmest, twice that at each quicker one.
+const fn reach(band: i32, number: usize) -> i32 {
+    band << (PACES - number)
 }

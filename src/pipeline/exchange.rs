@@ -41,8 +41,8 @@ pub struct Contact {
     pub peak_pa: u32,
     /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
     pub confidence: u8,
-    /// The force is known only from below: a part of the contact is hidden, and no fit says how large it is.
-    pub from_below: bool,
+    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit says how much.
+    pub doubt: u8,
     /// Taxels left out because they are dead or saturated.
     pub bad_taxels: u8,
 }
@@ -72,4 +72,32 @@ pub struct Status {
     pub duty: Duty,
     /// The measurement of Young's modulus.
     pub identification: Identification,
+}
+
+/// What the bridge is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Bridge {
+    /// Its driver sleeps: it reported a fault.
+    Asleep,
+    /// Both outputs low: the motor coasts.
+    Open,
+    /// The motor is shorted: it resists what turns it.
+    Brakes,
+    /// Slow decay with this duty.
+    Driven(Duty),
+}
+
+impl Status {
+    /// What the bridge is to do.
+    ///
+    /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many millimetres if the motor
+    /// coasted. Shorted, the motor lets go slowly, by itself.
+    pub fn bridge(&self) -> Bridge {
+        match self.mode {
+            Mode::Fault if self.fault == Some(Fault::Bridge) => Bridge::Asleep,
+            Mode::Fault => Bridge::Brakes,
+            Mode::Off | Mode::Tare => Bridge::Open,
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => Bridge::Driven(self.duty),
+        }
+    }
 }

@@ -5,8 +5,8 @@
 //!
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
 //! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm on, the motor stops.
-//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; 20 ms on, the
-//!    motor stops.
+//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a tip that stays
+//!    so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
 //!
 //! For the fourth the guard compares two ways over the last 5 ms: the one that the encoder tells and the one that its model expects,
@@ -29,6 +29,8 @@ const NONE_BITS: u32 = 4;
 const BEYOND: i32 = 1 << 24;
 /// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
 const LOOSE_NS: u32 = 20_000_000;
+/// How far ahead the guard looks to an end: 5 ms, from Q16 mm/s to Q24 mm.
+const AHEAD_Q8: i32 = 256 * 5 / 1_000;
 /// How much farther than twice the indentation a tip may have gone and still count as pressed: 0.5 mm, Q24.
 const YIELDING: i32 = 1 << 23;
 /// The force's mean follows it by 1/16 in each frame.
@@ -68,6 +70,8 @@ pub struct Guard {
     expected_way: i32,
     /// Since the tip was last surely pressed.
     loose_ns: u32,
+    /// For how long it has been too fast.
+    fast_ns: u32,
     may: May,
 }
 
@@ -89,21 +93,22 @@ impl Guard {
     pub fn check(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         self.measure(seen, config);
         self.touch(seen.pressing, config);
-        let loose = !self.pressed(config);
-        self.loose_ns = if loose { self.loose_ns.saturating_add(config.timing.frame_ns()) } else { 0 };
+        let frame_ns = config.timing.frame_ns();
+        self.loose_ns = if self.pressed(config) { 0 } else { self.loose_ns.saturating_add(frame_ns) };
         let limit = if self.loose_ns > LOOSE_NS { config.speed_loose } else { config.speed_any }.to_bits();
         let [fast_forward, fast_back] = [self.speed > limit, self.speed < -limit];
+        self.fast_ns = if fast_forward || fast_back { self.fast_ns.saturating_add(frame_ns) } else { 0 };
         let end = config.travel_max.to_bits();
+        let soon = self.travel.saturating_add(saturated(i64::from(self.speed) * i64::from(AHEAD_Q8)));
         self.may = May {
-            forward: self.travel <= end && !fast_forward,
-            back: self.travel >= self.floor && !fast_back,
+            forward: self.travel.max(soon) <= end && !fast_forward,
+            back: self.travel.min(soon) >= self.floor && !fast_back,
         };
         let outside = self.travel > end.saturating_add(BEYOND) || self.travel < self.floor.saturating_sub(BEYOND);
-        let runs = (fast_forward || fast_back) && self.loose_ns > 2 * LOOSE_NS;
-        if outside || runs {
+        if outside || self.fast_ns > LOOSE_NS {
             return Some(Fault::Runaway);
         }
-        self.disagreement(config)
+        self.disagreement(seen, config)
     }
 
     /// The duty that is let through; sets [`Limits::GUARD`] where that is not what was asked for.
@@ -116,7 +121,7 @@ impl Guard {
         Duty::ZERO
     }
 
-    /// Whether the array and the travel agree that something is pressed.
+    /// Whether the array and the travel agree that something is pressed: the deeper the tip went, the more force.
     pub fn pressed(&self, config: &Config) -> bool {
         let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
         self.touching
@@ -163,9 +168,10 @@ impl Guard {
     }
 
     /// What the encoder tells against what the model expects.
-    fn disagreement(&self, config: &Config) -> Option<Fault> {
+    fn disagreement(&self, seen: &Seen, config: &Config) -> Option<Fault> {
         // A quarter of what the force makes is left to its errors.
-        let by_force = (i64::from(self.force) * i64::from(config.way_per_n)) >> 16;
+        let force = self.force.max(seen.force.to_bits());
+        let by_force = (i64::from(force) * i64::from(config.way_per_n)) >> 16;
         let least = EXPECTED.saturating_add(2 * config.count.to_bits()).saturating_add(saturated(by_force / 4));
         let expected = self.expected_way.saturating_abs();
         if expected < least {

@@ -258,14 +258,14 @@ fn add_picture(mix: &mut Mix, picture: &Picture) {
 }
 
 fn add_contact(mix: &mut Mix, contact: &Contact) {
-    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, from_below, bad_taxels } = *contact;
+    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = *contact;
     mix.add(force.to_bits());
     for length in [indentation, centre_x, centre_y, radius] {
         mix.add(length.to_bits());
     }
     mix.add(peak_pa);
     mix.add(confidence);
-    mix.add(u8::from(from_below));
+    mix.add(doubt);
     mix.add(bad_taxels);
 }
 

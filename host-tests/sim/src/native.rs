@@ -254,7 +254,7 @@ impl<E: Set> Board<E> {
         }
         let sense = self.world.sense(finger, silent_ms);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        unit.next = bridge(duty, status.mode);
+        unit.next = bridge(status);
         if unit.command.torque {
             unit.host.read(time_s, || Reading::of(status), &mut unit.link);
         }

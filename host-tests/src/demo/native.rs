@@ -47,7 +47,7 @@ fn play_phase(phase: &Phase, board: &mut Native, run: &mut Run) -> Result<(), De
 }
 
 fn sample(board: &Native, status: &Status, goal_n: f64) -> Sample {
-    let duty = match crate::native::bridge(status.duty, status.mode) {
+    let duty = match crate::native::bridge(status) {
         Bridge::Coast => 0.0,
         Bridge::Driven { duty } => duty,
     };

@@ -1,6 +1,7 @@
 //! Parameters at and between the ends of their ranges, and the configurations they make.
 
 use fingertip::config::Config;
+use fingertip::control::gains::Gains;
 use fingertip::params::Params;
 use proptest::prelude::*;
 
@@ -64,14 +65,17 @@ pub fn any_params() -> impl Strategy<Value = Params> {
 /// The configuration, with what the loop's arithmetic relies on.
 pub fn config(params: &Params) -> Config {
     let config = Config::new(params).expect("allowed");
-    assert!(config.speed_gain_q18_per_s >= 1 && config.position_gain_per_s >= 1, "{params:?}");
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.
     assert!((1..u32::MAX - 65_535).contains(&config.duty_gain) || config.voltage_limit == 0, "{config:?}");
-    let positive = [config.frame_s_q39, config.half_over_slope_q32, config.half_over_slope2_q40, config.counts_max];
+    let positive = [config.frame_s_q39, config.counts_max, config.calm_band.to_bits(), config.guard_leak];
+    let gains = config.paces.iter().flat_map(|gains| {
+        let Gains { observer: [l1, l2, l3], speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } = *gains;
+        [l1, l2, l3, speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40]
+    });
     // Below what their type holds: they were not cut to fit.
-    assert!(positive.iter().chain(&config.observer_gains).all(|value| (1..i32::MAX).contains(value)), "{config:?}");
+    assert!(positive.into_iter().chain(gains).all(|value| (1..i32::MAX).contains(&value)), "{config:?}");
     // 0 where the motor is too weak for the acceleration's resolution: then it is not driven.
     let limits = [config.voltage_limit, config.current_limit, config.slew_limit, config.damping_q17_per_s];
     assert!(limits.iter().all(|value| *value >= 0), "{config:?}");

@@ -115,7 +115,8 @@ impl Bench {
             return;
         }
         self.advance_world(at_ns);
-        let on = |bridge| matches!(bridge, Bridge::Driven { .. });
+        // A bridge that brakes drives nothing.
+        let on = |bridge| matches!(bridge, Bridge::Driven { duty } if duty != 0.0);
         if on(bridge) != on(self.bridge) {
             self.bridge_edges.push(BridgeEdge { at_ns, on: on(bridge) });
             self.trace.add(at_ns, Record::Bridge(on(bridge)));

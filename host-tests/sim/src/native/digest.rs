@@ -69,7 +69,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         duty: applied,
         identification,
     } = *status;
-    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, from_below, bad_taxels } = contact;
+    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
     let Modulus { modulus, sigma, contact, points } = identification.result();
     [
         sequence,
@@ -85,7 +85,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         radius.to_bits() as u32,
         peak_pa,
         u32::from(confidence),
-        u32::from(from_below),
+        u32::from(doubt),
         u32::from(bad_taxels),
         travel.to_bits() as u32,
         speed.to_bits() as u32,

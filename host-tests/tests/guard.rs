@@ -1,0 +1,195 @@
+//! The guard alone, against any frames, senses and duties: what it promises holds whatever the loop, the array and the host do.
+
+use fastrand::Rng;
+use fingertip::config::{Config, newtons};
+use fingertip::params::Params;
+use fingertip::safety::guard::{Guard, Seen};
+use fingertip::safety::{Fault, Limits};
+use fingertip::units::{Duty, Newtons};
+
+/// Steps over all cases of a test.
+const STEPS: u32 = 10_000_000;
+
+fn config(rng: &mut Rng) -> Config {
+    let params = Params {
+        approach_um_per_s: rng.i32(5_000..100_000),
+        travel_max_um: rng.i32(5_000..60_000),
+        clearance_um: rng.i32(0..3_000),
+        encoder_counts_per_turn: 1 << rng.u32(6..13),
+        settle_ns: [500, 2_400, 20_000][rng.usize(0..3)],
+        inertia_ug_m2: rng.i32(40..120),
+        ..Params::DEFAULT
+    };
+    Config::new(&params).expect("allowed")
+}
+
+fn count_mm(config: &Config) -> f64 {
+    config.count.0.to_num()
+}
+
+fn time_s(frames: u32, config: &Config) -> f64 {
+    f64::from(frames) / f64::from(config.frames_per_s)
+}
+
+fn travel_mm(guard: &Guard) -> f64 {
+    guard.travel().0.to_num()
+}
+
+/// Which of full duty forward and back are let through.
+fn lets_through(guard: &Guard) -> [bool; 2] {
+    [Duty::FULL, -Duty::FULL].map(|duty| {
+        let mut limits = Limits::default();
+        let allowed = guard.allow(Duty(duty), &mut limits);
+        assert_eq!(allowed.0 != duty, limits.has(Limits::GUARD));
+        assert!(allowed.0 == duty || allowed.0 == 0);
+        allowed.0 == duty
+    })
+}
+
+/// Beyond an end of the travel, or behind the floor, no duty drives the tip farther out, and 1 mm beyond it is stopped: for any
+/// counts, forces and voltages, jumps included.
+#[test]
+fn no_input_opens_an_end() {
+    let mut rng = Rng::with_seed(1);
+    for _ in 0..1_000 {
+        let config = config(&mut rng);
+        let (end, back): (f64, f64) = (config.travel_max.0.to_num(), config.travel_back.0.to_num());
+        let origin = rng.i32(..);
+        let mut guard = Guard::start(origin, &config);
+        let (mut counts, mut pace) = (0_i32, 1);
+        for _ in 0..STEPS / 1_000 {
+            if rng.u8(..) == 0 {
+                pace = 1 << rng.u32(0..10);
+            }
+            counts = if rng.u16(..) == 0 { rng.i32(..) } else { counts.saturating_add(rng.i32(-pace..=pace)) };
+            let seen = Seen {
+                encoder: origin.wrapping_add(counts),
+                force: Newtons::from_bits(if rng.u8(..) < 8 { rng.i32(..) } else { rng.i32(-9_000..90_000) }),
+                pressing: rng.bool(),
+                voltage: rng.i32(..) >> rng.u32(0..8),
+            };
+            let fault = guard.check(&seen, &config);
+            let [forward, backward] = lets_through(&guard);
+            let travel = travel_mm(&guard);
+            assert!(travel <= end || !forward, "{travel} mm of {end}");
+            assert!(travel >= -back || !backward, "{travel} mm of -{back}");
+            if travel > end + 1.001 || travel < -back - 1.001 {
+                assert!(fault.is_some(), "{travel} mm");
+            }
+        }
+    }
+}
+
+/// A motor, pushed about by somebody who wants to break the envelope: full duty this way and that, for as long as it pleases.
+struct Adversary {
+    travel_mm: f64,
+    speed_mm_per_s: f64,
+    duty: i16,
+    left: u32,
+}
+
+impl Adversary {
+    fn frame(&mut self, guard: &Guard, config: &Config, strength: f64, push_mm_per_s2: f64, rng: &mut Rng) -> i32 {
+        if self.left == 0 {
+            self.duty = [Duty::FULL, -Duty::FULL, 0, rng.i16(..)][rng.usize(0..4)];
+            self.left = rng.u32(1..600);
+        }
+        self.left -= 1;
+        let duty = guard.allow(Duty(self.duty), &mut Limits::default());
+        let voltage = i64::from(duty.0) * i64::from(config.voltage_limit) / i64::from(Duty::FULL);
+        let frame_s = 1.0 / f64::from(config.frames_per_s);
+        let damping = f64::from(config.damping_q17_per_s) / 131_072.0;
+        let push = strength * voltage as f64 / 256.0 - push_mm_per_s2;
+        self.speed_mm_per_s += (push - strength * damping * self.speed_mm_per_s) * frame_s;
+        self.travel_mm += self.speed_mm_per_s * frame_s;
+        voltage as i32
+    }
+}
+
+/// Where nothing is pressed, a tip that is fast 40 ms after the last contact is stopped within 15 ms more, whatever duty is asked for,
+/// and whatever the array reads in the air: noise, a wrong baseline, anything.
+#[test]
+fn no_duty_makes_it_fast_in_the_air() {
+    let mut rng = Rng::with_seed(2);
+    let (mut fast, mut stopped) = (0_u32, 0);
+    for _ in 0..1_000 {
+        let config = config(&mut rng);
+        let (strength, offset_mn) = (rng.f64() * 0.6 + 0.7, [0, 10, 200, 2_000][rng.usize(0..4)]);
+        let mut guard = Guard::start(0, &config);
+        let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty: 0, left: 0 };
+        let limit = 1.5 * f64::from(config.params.approach_um_per_s) * 1e-3;
+        let (mut voltage, mut since, mut forward) = (0, 0, false);
+        for frame in 0..STEPS / 1_000 {
+            let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
+            let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
+            let seen = Seen { encoder, force, pressing: rng.bool(), voltage };
+            if guard.check(&seen, &config).is_some() {
+                stopped += 1;
+                break;
+            }
+            let loose = time_s(frame, &config) > 0.04 && !guard.pressed(&config);
+            // The counts of 5 ms tell the speed no better than this.
+            let unsure = 2.0 * count_mm(&config) / 0.005;
+            let speed = finger.speed_mm_per_s;
+            since = if loose && speed.abs() > limit + unsure && (speed > 0.0) == forward { since + 1 } else { 0 };
+            forward = speed > 0.0;
+            fast = fast.max(since);
+            assert!(time_s(since, &config) <= 0.015, "{speed} mm/s, {limit} asked");
+            voltage = finger.frame(&guard, &config, strength, 0.0, &mut rng);
+        }
+    }
+    assert!(fast > 0 && stopped > 100, "the adversary never tried");
+}
+
+/// A finger that is as strong as its parameters say, give or take 30 %, with friction and contacts, is never taken for a broken one.
+#[test]
+fn a_sound_finger_is_never_stopped_for_its_direction() {
+    let mut rng = Rng::with_seed(3);
+    for _ in 0..1_000 {
+        let config = config(&mut rng);
+        let strength = rng.f64() * 0.6 + 0.7;
+        let wall_mm = rng.f64() * 8.0;
+        let per_n = f64::from(config.acceleration_per_n) / 256.0;
+        let mut guard = Guard::start(0, &config);
+        let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty: 0, left: 0 };
+        let mut voltage = 0;
+        for _ in 0..STEPS / 1_000 {
+            let depth = (finger.travel_mm - wall_mm).max(0.0);
+            let force_n = 0.785 * depth * depth;
+            let sensed = force_n * (0.8 + 0.4 * strength / 1.3) + rng.f64() * 0.01;
+            let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
+            let seen = Seen { encoder, force: newtons((1e3 * sensed.min(100.0)) as i32), pressing: true, voltage };
+            match guard.check(&seen, &config) {
+                Some(Fault::Runaway) => break,
+                None => {}
+                fault => panic!("{fault:?} at {} mm, {} mm/s, {sensed} N {force_n} {guard:?} {voltage} {:?} strength {strength} {}", finger.travel_mm, finger.speed_mm_per_s, config.params, config.way_per_n),
+            }
+            let friction = 500.0 * finger.speed_mm_per_s.signum();
+            voltage = finger.frame(&guard, &config, strength, force_n * per_n + friction, &mut rng);
+        }
+    }
+}
+
+/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a dead encoder too.
+#[test]
+fn the_wrong_way_ends_within_half_a_millimetre() {
+    let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+    for (turns, expected) in [(-1.0, Fault::Reversed), (0.0, Fault::EncoderFrozen)] {
+        for duty in [Duty::FULL, -Duty::FULL] {
+            let mut guard = Guard::start(0, &config);
+            let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty, left: u32::MAX };
+            let mut rng = Rng::with_seed(4);
+            let mut voltage = 0;
+            let frames = (1..200).find(|_| {
+                let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
+                let fault = guard.check(&Seen { encoder, force: Newtons::ZERO, pressing: true, voltage }, &config);
+                voltage = finger.frame(&guard, &config, 1.0, 0.0, &mut rng);
+                assert!(fault.is_none_or(|fault| fault == expected), "{fault:?}");
+                fault.is_some()
+            });
+            let frames = frames.expect("a fault");
+            assert!(time_s(frames, &config) <= 0.005, "{frames} frames");
+            assert!(finger.travel_mm.abs() <= 0.5, "{} mm", finger.travel_mm);
+        }
+    }
+}

@@ -15,7 +15,8 @@
 //! | read | any bytes, as long as each belongs to a register: access error otherwise; 1 to 256 bytes: length error otherwise |
 //! | stored registers | written with torque off only; kept over a reset only once `save_parameters` was written |
 //! | value beyond another register's limit, parameters that contradict each other | limit error |
-//! | fault | torque enable and goal force go to 0; torque enable is refused (result error) until the fault is cleared |
+//! | fault | torque enable and goal force go to 0; torque enable and goals above 0 are refused (result error) until the fault is cleared |
+//! | request that cannot be carried out as the loop stands | result error: a tare in a fault that is not cleared by then, a measurement of the modulus without torque or tare, a save or Factory Reset while the loop drives or tares. What comes in between shows in `tare_state`, `identify_state` and `saved_state`, also for those whom nothing is answered |
 //! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and goal force and torque enable are refused (access error) until 0 is written to it |
 //! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
@@ -30,6 +31,7 @@ pub mod sender;
 pub mod server;
 pub mod settings;
 pub mod snapshot;
+mod stand;
 pub mod table;
 mod turn;
 

@@ -2,8 +2,9 @@
 
 pub mod budget;
 mod exchange;
+mod requests;
 
-pub use exchange::{Bridge, Command, Contact, Status};
+pub use exchange::{Bridge, Command, Contact, Status, Taken, Taring};
 
 use crate::config::Config;
 use crate::contact::{self, Fit};
@@ -19,6 +20,7 @@ use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
 use crate::units::{Duty, Newtons};
 use budget::Budget;
+use requests::Asked;
 
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
@@ -34,17 +36,6 @@ pub struct Pipeline {
     press: Press,
     status: Status,
     tared: bool,
-    tare_request: u8,
-    clear_request: u8,
-    identify_request: u8,
-}
-
-/// Requests that a command brings.
-#[derive(Clone, Copy)]
-struct Asked {
-    tare: bool,
-    clear: bool,
-    identify: bool,
 }
 
 impl Pipeline {
@@ -62,27 +53,21 @@ impl Pipeline {
             press: Press::new(),
             status: Status::default(),
             tared: false,
-            tare_request: 0,
-            clear_request: 0,
-            identify_request: 0,
         }
     }
 
-    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays.
+    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins anew.
     pub fn configure(&mut self, config: &Config) {
         self.config = config.clone();
-        if self.status.mode != Mode::Fault {
-            self.status.mode = Mode::Off;
-        }
+        self.leave();
     }
 
-    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed.
+    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one under way
+    /// begins anew.
     pub fn calibrate(&mut self, calibration: &Calibration) {
         self.array.calibrate(calibration);
         self.tared = false;
-        if self.status.mode != Mode::Fault {
-            self.status.mode = Mode::Off;
-        }
+        self.leave();
     }
 
     /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
@@ -92,6 +77,9 @@ impl Pipeline {
         if self.press.running() {
             self.press.refuse(Refusal::Interrupted);
             self.status.identification = self.press.outcome();
+        }
+        if self.status.tare == Taring::Running {
+            self.status.tare = Taring::Refused;
         }
         self.status.duty = self.motion.coast();
     }
@@ -123,13 +111,16 @@ impl Pipeline {
             limits.set(Limits::EFFORT);
         }
 
-        // What the array feels, where it can be trusted: the bridge does not wait for the rest.
-        let watched = self.watched();
+        // What the array feels, where it can be trusted: the bridge does not wait for the rest. The frame that turns torque on drives
+        // already, so it is judged like all after it.
+        let starting = self.status.mode == Mode::Off && command.torque && self.tared && !asked.tare;
+        let watched = self.watched() || starting;
         let picture = self.array.read(frame, &self.config);
         let broken = monitor::array_broken(picture, &self.config);
         let fault = if sense.bridge_fault { Some(Fault::Bridge) } else { broken };
         if let Some(fault) = fault.filter(|_| watched) {
             self.stop(fault);
+            self.refuse(asked, command);
             return (Duty::ZERO, &self.status);
         }
         // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything to fit to
@@ -145,6 +136,10 @@ impl Pipeline {
 
         // What the finger does.
         self.motion.observe(sense.encoder, &self.config);
+        if starting {
+            self.motion.observer = Observer::zeroed_at(sense.encoder);
+            self.goal.start();
+        }
 
         // Whether that is sound.
         let driven = watched && self.status.mode != Mode::Tare;
@@ -154,9 +149,15 @@ impl Pipeline {
             pressing: self.status.mode != Mode::Release,
             voltage: self.motion.drive.voltage(),
         };
+        if starting {
+            self.guard = Guard::start(sense.encoder, &self.config);
+        }
         let unsafe_motion = if driven { self.guard.check(&seen, &self.config) } else { None };
         let pressed = self.guard.pressed(&self.config);
         let view = View { picture, contact: &contact, pressed, sense, motion: &self.motion, command };
+        if starting {
+            self.monitor.restart(&view);
+        }
         let unsound = if watched { self.monitor.check(&view, driven, &self.config) } else { None };
         if let Some(fault) = unsound.or(unsafe_motion) {
             self.status.mode = Mode::Fault;
@@ -170,7 +171,7 @@ impl Pipeline {
         }
 
         // What to do about it.
-        let mode = self.next_mode(asked, command, &contact, sense, sound);
+        let mode = self.next_mode(asked, command, &contact, sound);
         self.status.mode = mode;
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
@@ -222,20 +223,6 @@ impl Pipeline {
         !matches!(self.status.mode, Mode::Off | Mode::Fault)
     }
 
-    /// What is newly asked for. A request counts in the frame in which it comes, whatever else that brings.
-    fn take_requests(&mut self, command: &Command) -> Asked {
-        let identifying = self.status.mode == Mode::Identify;
-        let asked = Asked {
-            tare: command.tare_request != self.tare_request,
-            clear: command.clear_request != self.clear_request,
-            identify: command.identify_request != self.identify_request && !identifying,
-        };
-        self.tare_request = command.tare_request;
-        self.clear_request = command.clear_request;
-        self.identify_request = command.identify_request;
-        asked
-    }
-
     /// Counts missed frames from the gap in the sequence.
     fn count_frames(&mut self, sequence: u32) -> Limits {
         let mut limits = Limits::default();
@@ -249,32 +236,27 @@ impl Pipeline {
     }
 
     /// The mode table of [`crate::safety`], with what each change of mode prepares.
-    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sense: &Sense, sound: bool) -> Mode {
+    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
-        let mode = match self.status.mode {
-            Mode::Fault if asked.clear && !command.torque => {
-                self.status.fault = None;
-                Mode::Off
-            }
-            Mode::Fault => Mode::Fault,
-            Mode::Tare => {
-                self.tared = self.array.continue_tare();
-                if self.tared { Mode::Off } else { Mode::Tare }
-            }
-            Mode::Off if asked.tare => {
+        let before = self.status.mode;
+        let cleared = before == Mode::Fault && asked.clear && !command.torque;
+        if cleared {
+            self.status.fault = None;
+        }
+        let mode = match before {
+            Mode::Fault if !cleared => Mode::Fault,
+            // The bus lets it through with torque off alone, which may be on again by now.
+            _ if asked.tare => {
                 self.array.start_tare();
                 self.tared = false;
                 Mode::Tare
             }
-            Mode::Off if command.torque && self.tared => {
-                self.motion.observer = Observer::zeroed_at(sense.encoder);
-                self.goal.start();
-                self.guard = Guard::start(sense.encoder, &self.config);
-                let picture = self.array.picture();
-                let view = View { picture, contact, pressed: false, sense, motion: &self.motion, command };
-                self.monitor.restart(&view);
-                wanted
+            Mode::Fault => Mode::Off,
+            Mode::Tare => {
+                self.tared = self.array.continue_tare();
+                if self.tared { Mode::Off } else { Mode::Tare }
             }
+            Mode::Off if command.torque && self.tared => wanted,
             _ if !command.torque => {
                 self.follow_drift(contact, sound);
                 Mode::Off
@@ -295,9 +277,7 @@ impl Pipeline {
                 wanted
             }
         };
-        if asked.identify && mode != Mode::Identify {
-            self.press.refuse(Refusal::NotReady);
-        }
+        self.note_requests(asked, before, mode, command);
         mode
     }
 

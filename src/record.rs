@@ -5,7 +5,7 @@
 use crate::contact::Effort;
 use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
 use crate::identify::Modulus;
-use crate::pipeline::{Command, Contact, Status};
+use crate::pipeline::{Command, Contact, Status, Taken};
 use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 
@@ -118,6 +118,8 @@ impl Digest {
             speed,
             duty: applied,
             identification,
+            tare,
+            taken,
         } = *status;
         let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
         for word in [sequence, missed_frames, peak_pa] {
@@ -132,7 +134,8 @@ impl Digest {
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
             self.0.update(&bits.to_le_bytes());
         }
-        self.0.update(&[identification.number(), identification.refusal()]);
+        let Taken { tare: tares, clear: clears, identify: identifies } = taken;
+        self.0.update(&[identification.number(), identification.refusal(), tare as u8, tares, clears, identifies]);
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());
         self.0.update(&applied.0.to_le_bytes());
@@ -155,6 +158,7 @@ impl Default for Digest {
 mod tests {
     use super::*;
     use crate::identify::{Identification, Refusal};
+    use crate::pipeline::Taring;
     use crate::safety::{Fault, Limits, Mode};
     use crate::units::{Millimetres, MillimetresPerSecond};
 
@@ -205,6 +209,10 @@ mod tests {
             with(|status| status.contact.peak_pa = 1),
             with(|status| status.contact.confidence = 1),
             with(|status| status.contact.bad_taxels = 1),
+            with(|status| status.tare = Taring::Running),
+            with(|status| status.taken.tare = 1),
+            with(|status| status.taken.clear = 1),
+            with(|status| status.taken.identify = 1),
             with(|status| status.identification = Identification::Running),
             with(|status| status.identification = Identification::Refused(Refusal::Span)),
             with(|status| status.identification = Identification::Done(Modulus { points: 1, ..Modulus::default() })),

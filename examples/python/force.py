@@ -15,7 +15,7 @@ import registers as reg
 
 BAUD = 1_000_000
 MODES = ["off", "tare", "approach", "force", "release", "fault", "identify"]
-NOT_TARED = 1 << 6  # in the register LIMITS
+TARING, TARED = 1, 2  # of the register TARE_STATE
 
 
 class PatientPort(PortHandler):
@@ -64,9 +64,10 @@ class Fingertip:
         """Measures every taxel's zero; nothing may touch the tip."""
         self.write(reg.TORQUE_ENABLE, 0)
         self.write(reg.TARE, 1)
-        while MODES[self.read(reg.PRESENT_MODE)] == "tare" or self.read(reg.LIMITS) & NOT_TARED:
-            if self.read(reg.FAULT):
-                sys.exit(f"tare: fault {self.read(reg.FAULT)}")
+        while (state := self.read(reg.TARE_STATE)) == TARING:
+            pass
+        if state != TARED:
+            sys.exit(f"tare: fault {self.read(reg.FAULT)}")
 
 
 def sync_read(port, ids, register):

@@ -15,7 +15,7 @@ use fingertip::scan::answer_ticks;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{COMMAND, PACKETS, PARAMS, PICTURE, REPORT, Report};
+use super::exchange::{HEARD, Heard, PARAMS, PICTURE, REPORT, Report};
 use super::guard;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
@@ -96,7 +96,7 @@ impl State {
 
     /// Starts the scan anew when its fault is to be cleared, with torque off. The next frame clears it.
     fn find_frames(&mut self) {
-        let Command { torque, clear_request, .. } = COMMAND.get();
+        let Command { torque, clear_request, .. } = HEARD.get().command;
         if self.lost && clear_request != self.clear_seen && !torque {
             self.clear_seen = clear_request;
             self.restart_scan();
@@ -132,11 +132,11 @@ impl State {
 
     fn step(&mut self, completed: Completed) {
         let parts = &mut self.parts;
-        let command = COMMAND.get();
+        let Heard { command, packets } = HEARD.get();
         let sense = Sense {
             encoder: parts.encoder.read(),
             supply_mv: parts.supply.read_mv(),
-            bus_silent_ms: self.bus.silent_ms(),
+            bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
             // Before the first frame nothing is known: not 0, which would let any effort in.
             answer_ticks: self.report.loop_ticks.saturating_mul(guard::TICKS).max(1),
@@ -168,7 +168,7 @@ impl State {
         self.lost = true;
         // Both keep track of counters that wrap.
         self.parts.encoder.read();
-        self.bus.silent_ms();
+        self.bus.silent_ms(HEARD.get().packets);
         self.publish();
         if bridge::is_safe() {
             self.parts.watchdog.pet();
@@ -239,11 +239,10 @@ impl BusClock {
         Self { packets: 0, last: 0, part_ticks: 0, silent_ms: 0 }
     }
 
-    fn silent_ms(&mut self) -> u16 {
+    fn silent_ms(&mut self, packets: u32) -> u16 {
         let now = guard::now();
         self.part_ticks += now.wrapping_sub(self.last);
         self.last = now;
-        let packets = PACKETS.load(Ordering::Relaxed);
         if packets != self.packets {
             self.packets = packets;
             self.part_ticks = 0;

@@ -1,7 +1,7 @@
 //! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the other.
 
 use core::cell::{Cell, UnsafeCell};
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -22,6 +22,15 @@ pub struct Report {
     pub loop_ticks_max: u32,
 }
 
+/// What the link heard from the host: as a whole, so that a bus watchdog never comes without the packet that set it.
+#[derive(Clone, Copy, Default)]
+pub struct Heard {
+    /// What the host asks of the loop.
+    pub command: Command,
+    /// Valid packets; only its changes count.
+    pub packets: u32,
+}
+
 /// All that the bus may read of a frame, with the report made of it.
 pub struct Picture {
     /// The report; none before the first.
@@ -39,9 +48,7 @@ pub struct Picture {
 /// The newest report.
 pub static REPORT: Shared<Report> = Shared::new();
 /// What the host wants.
-pub static COMMAND: Shared<Command> = Shared::new();
-/// Valid packets heard; only its changes count.
-pub static PACKETS: AtomicU32 = AtomicU32::new(0);
+pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
 /// The newest picture; control leaves it as it is while the link answers from it.

@@ -10,7 +10,7 @@ use fingertip::store::Record;
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{COMMAND, PACKETS, PARAMS, PICTURE, Picture, REPORT};
+use super::exchange::{HEARD, Heard, PARAMS, PICTURE, Picture, REPORT};
 use super::flash::Store;
 use super::guard;
 
@@ -36,7 +36,7 @@ impl Host {
         let mut received = [0; 256];
         let mut reply = Reply::new();
         // What is stored of it counts before anybody asks.
-        COMMAND.set(self.server.command());
+        self.pass_on();
         loop {
             match self.bus.receive(&mut received).await {
                 Ok(count) => {
@@ -60,8 +60,7 @@ impl Host {
             let taken = PICTURE.visit(|picture| self.server.feed(bytes, &snapshot(picture, self.boot), reply));
             let Some(taken) = taken else { return };
             bytes = bytes.get(taken..).unwrap_or_default();
-            COMMAND.set(self.server.command());
-            PACKETS.store(self.server.good_packets(), Ordering::Relaxed);
+            self.pass_on();
             if !reply.is_empty() {
                 Timer::at(received + Duration::from_micros(self.server.reply_delay_us().into())).await;
                 if let Err(cause) = self.bus.send(reply).await {
@@ -71,6 +70,10 @@ impl Host {
             let actions = self.server.take_actions();
             self.carry_out(actions);
         }
+    }
+
+    fn pass_on(&self) {
+        HEARD.set(Heard { command: self.server.command(), packets: self.server.good_packets() });
     }
 
     fn carry_out(&mut self, actions: Actions) {

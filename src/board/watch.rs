@@ -5,7 +5,7 @@ use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
 use fingertip::safety::Mode;
 
-use super::exchange::{COMMAND, REPORT};
+use super::exchange::{HEARD, REPORT};
 
 const PERIOD_MS: u64 = 20;
 /// 5 Hz.
@@ -30,7 +30,7 @@ pub async fn run(mut led: Output<'static>) {
             warn!("{=u32} frames missed", missed_frames);
         }
         let blink = (period / BLINK_PERIODS).is_multiple_of(2);
-        let on = if status.mode == Mode::Fault { blink } else { COMMAND.get().torque };
+        let on = if status.mode == Mode::Fault { blink } else { HEARD.get().command.torque };
         led.set_level(on.into());
         Timer::after_millis(PERIOD_MS).await;
     }

@@ -5,8 +5,7 @@ mod execute;
 
 use heapless::Vec;
 
-use crate::pipeline::Command;
-use crate::safety::Fault;
+use crate::pipeline::{Command, Status};
 use crate::store::Record;
 use crate::units::Newtons;
 
@@ -15,6 +14,7 @@ use super::receiver::{Event, Receiver};
 use super::sender::Reply;
 use super::settings::{Actions, Saved, Settings};
 use super::snapshot::Snapshot;
+use super::stand::Stand;
 use super::turn::Turn;
 
 /// The longest Reg Write: all parameters at once.
@@ -60,8 +60,8 @@ pub(super) struct State {
     registered: Option<Registered>,
     actions: Actions,
     turn: Turn,
-    /// The fault that the last snapshot told of.
-    fault: Option<Fault>,
+    /// How the loop stood at the last snapshot.
+    stand: Stand,
     reply_delay_us: u32,
 }
 
@@ -103,7 +103,7 @@ impl Server {
             registered: None,
             actions: Actions::default(),
             turn: Turn::None,
-            fault: None,
+            stand: Stand::default(),
             reply_delay_us: 0,
         };
         Self { receiver: Receiver::new(), state }
@@ -116,7 +116,7 @@ impl Server {
     /// Do not feed what this device itself sends.
     pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) -> usize {
         reply.clear();
-        self.observe(snapshot.status.fault);
+        self.observe(&snapshot.status);
         for (place, &byte) in bytes.iter().enumerate() {
             self.state.listen(byte, snapshot, reply);
             match self.receiver.push(byte) {
@@ -168,19 +168,18 @@ impl Server {
     }
 
     /// A fault turns torque off and lets go; a silent bus also trips the watchdog's register.
-    ///
-    /// [`Server::feed`] does this with its snapshot; the firmware may do it earlier.
-    pub fn observe(&mut self, fault: Option<Fault>) {
+    fn observe(&mut self, status: &Status) {
         let settings = &mut self.state.settings;
-        if fault.is_some() {
+        let stand = Stand::of(status);
+        if stand.faulted {
             settings.command.torque = false;
             settings.command.goal = Newtons::ZERO;
         }
-        if fault != self.state.fault && fault == Some(Fault::BusSilent) {
+        if stand.bus_silent && !self.state.stand.bus_silent {
             settings.watchdog_tripped = true;
             settings.command.bus_watchdog_ms = 0;
         }
-        self.state.fault = fault;
+        self.state.stand = stand;
     }
 }
 

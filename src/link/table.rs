@@ -9,14 +9,15 @@ mod define;
 mod registers;
 mod values;
 
-use crate::identify::Modulus;
+use crate::identify::{Identification, Modulus};
 use crate::params::Params;
-use crate::pipeline::Contact;
+use crate::pipeline::{Contact, Taring};
 
 use super::packet::StatusError;
 use super::server::{Counters, State};
 use super::settings::{Actions, Settings};
 use super::snapshot::Snapshot;
+use super::stand::Stand;
 
 pub use registers::{REGISTERS, address};
 
@@ -157,6 +158,23 @@ impl<'a> View<'a> {
         self.snapshot.status.identification.result()
     }
 
+    /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
+    fn tare_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.tare_request != status.taken.tare {
+            return Taring::Running as u32;
+        }
+        status.tare as u32
+    }
+
+    fn identify_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.identify_request != status.taken.identify {
+            return Identification::Running.number().into();
+        }
+        status.identification.number().into()
+    }
+
     fn refused(&self, error: StatusError) -> u32 {
         u32::from(self.state.counters.refused(error))
     }
@@ -170,8 +188,8 @@ impl<'a> View<'a> {
 pub(super) struct Staged {
     pub settings: Settings,
     pub actions: Actions,
-    /// The loop is stopped by a fault.
-    pub faulted: bool,
+    /// How the loop stands.
+    pub stand: Stand,
 }
 
 /// Refuses a read that is too long, or that touches a byte without a register.
@@ -225,7 +243,8 @@ pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<()
     if data.is_empty() {
         return Err(StatusError::Length);
     }
-    let torque = staged.settings.command.torque;
+    let before = staged.settings.command;
+    let torque = before.torque;
     let params = staged.settings.record.params;
     let mut at = address;
     let mut rest = data;
@@ -247,7 +266,8 @@ pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<()
         rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
         at = at.saturating_add(cell.bytes());
     }
-    staged.settings.check(staged.settings.record.params != params)
+    staged.settings.check(staged.settings.record.params != params)?;
+    staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 
 /// Which parameter a byte belongs to.

@@ -47,6 +47,32 @@ pub struct Contact {
     pub bad_taxels: u8,
 }
 
+/// The numbers of the requests last taken up: a command's number that differs still waits, for a frame or for torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Taken {
+    /// See [`Command::tare_request`].
+    pub tare: u8,
+    /// See [`Command::clear_request`].
+    pub clear: u8,
+    /// See [`Command::identify_request`].
+    pub identify: u8,
+}
+
+/// How the tare that was last asked for stands. The numbers are stable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Taring {
+    /// None was asked for since reset.
+    #[default]
+    None = 0,
+    /// It is under way.
+    Running = 1,
+    /// It is done.
+    Done = 2,
+    /// A fault stood, or ended it: ask again once that is cleared.
+    Refused = 3,
+}
+
 /// What a step reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
@@ -72,6 +98,10 @@ pub struct Status {
     pub duty: Duty,
     /// The measurement of Young's modulus.
     pub identification: Identification,
+    /// The tare.
+    pub tare: Taring,
+    /// The requests taken up.
+    pub taken: Taken,
 }
 
 /// What the bridge is to do.

@@ -5,7 +5,7 @@ use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Reply, ResetCause, Server, Snapshot};
-use fingertip::pipeline::Status;
+use fingertip::pipeline::{Command, Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::safety::{Fault, Mode};
 use fingertip::store::Record;
@@ -59,6 +59,19 @@ impl Bench {
     pub fn set_fault(&mut self, fault: Option<Fault>) {
         self.status.fault = fault;
         self.status.mode = if fault.is_some() { Mode::Fault } else { Mode::Off };
+    }
+
+    /// The made-up loop takes up what it is asked, and carries out a tare and a clear at once.
+    pub fn take_up(&mut self) {
+        let Command { tare_request: tare, clear_request: clear, identify_request: identify, torque, .. } =
+            self.server.command();
+        if clear != self.status.taken.clear && !torque {
+            self.set_fault(None);
+        }
+        if tare != self.status.taken.tare {
+            self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
+        }
+        self.status.taken = Taken { tare, clear, identify };
     }
 
     /// What the bus sends in return, packet by packet.

@@ -6,6 +6,7 @@ mod document;
 mod instructions;
 mod noise;
 mod packets;
+mod requests;
 mod safety;
 mod several;
 mod store;

@@ -174,9 +174,11 @@ fn one_bad_value_spoils_the_whole_write() {
     params[last] = 0x7F;
     refuses(&mut bench, address::PARAMS, &params, StatusError::Range, "parameters");
 
-    assert_eq!(bench.write(address::GOAL_FORCE_MN, &[&goal[..], &[1, 1, 1]].concat()), Ok(()));
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &[&goal[..], &[1, 1, 0]].concat()), Ok(()));
     let command = bench.server.command();
     assert_eq!((command.goal.to_bits(), command.tare_request, command.clear_request), (65_536, 1, 1));
+    bench.take_up();
+    assert_eq!(bench.write(address::GOAL_FORCE_MN, &[&goal[..], &[0, 1, 1]].concat()), Ok(()));
     assert_eq!(bench.server.take_actions(), Actions { save: true, ..Actions::default() });
     assert_eq!(bench.server.take_actions(), Actions::default());
 }

@@ -150,7 +150,8 @@ fn turn() -> impl Strategy<Value = Turn> {
 
 fn requests() -> impl Strategy<Value = [u8; 3]> {
     [
-        prop_oneof![20 => Just(0), 1 => any::<u8>()],
+        // Each takes the motor away for many frames.
+        prop_oneof![400 => Just(0), 1 => any::<u8>()],
         prop_oneof![5 => Just(0), 1 => any::<u8>()],
         prop_oneof![
             10 => Just(0),

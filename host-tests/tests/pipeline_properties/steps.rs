@@ -3,7 +3,7 @@
 use crate::inputs::{Arguments, Input, any_inputs};
 use crate::params::{any_params, config};
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
+use fingertip::pipeline::{Pipeline, Status, Taring};
 use fingertip::pressure::TARE_FRAMES;
 use fingertip::record::Digest;
 use fingertip::safety::{Fault, Mode};
@@ -61,6 +61,8 @@ impl Run {
     /// A step, with everything that must hold after it.
     fn step(&mut self) -> Status {
         let clear_before = core::mem::replace(&mut self.clear_seen, self.arguments.command.clear_request);
+        let tares = self.arguments.command.tare_request != self.before.taken.tare;
+        let identifies = self.arguments.command.identify_request != self.before.taken.identify;
         let Arguments { frame, sense, command } = &self.arguments;
         let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
@@ -76,8 +78,23 @@ impl Run {
         assert_eq!(status.mode == Mode::Fault, status.fault.is_some());
         if self.before.mode == Mode::Fault {
             let cleared = command.clear_request != clear_before && !command.torque;
-            let expected = if cleared { (Mode::Off, None) } else { (Mode::Fault, self.before.fault) };
+            let mode = if tares { Mode::Tare } else { Mode::Off };
+            let expected = if cleared { (mode, None) } else { (Mode::Fault, self.before.fault) };
             assert_eq!((status.mode, status.fault), expected);
+        }
+        // A tare begins or is refused, and a measurement that was asked for runs, waits or is refused: nothing is lost.
+        assert_eq!((status.taken.tare, status.taken.clear), (command.tare_request, command.clear_request));
+        if tares {
+            let faulted = status.mode == Mode::Fault;
+            let expected = if faulted { (Mode::Fault, Taring::Refused) } else { (Mode::Tare, Taring::Running) };
+            assert_eq!((status.mode, status.tare), expected);
+        }
+        assert_eq!(status.tare == Taring::Running, status.mode == Mode::Tare);
+        if identifies && status.taken.identify != command.identify_request {
+            assert!(command.torque && status.mode != Mode::Fault, "waits in {:?}", status.mode);
+        } else if identifies {
+            let number = status.identification.number();
+            assert!(if status.mode == Mode::Identify { number == 1 } else { number == 3 }, "{status:?}");
         }
         // Enabling torque begins with an approach or a release, whatever was asked before.
         if drives(status.mode) && !drives(self.before.mode) {

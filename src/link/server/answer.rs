@@ -18,7 +18,7 @@ impl State {
     pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
         if level >= 2 {
             self.reply_delay_us = self.settings.return_delay_us();
-            Sender::status(reply, id, result.err(), self.fault.is_some()).finish();
+            Sender::status(reply, id, result.err(), self.stand.faulted).finish();
         }
     }
 
@@ -34,7 +34,7 @@ impl State {
             return;
         }
         self.reply_delay_us = self.settings.return_delay_us();
-        let mut sender = Sender::status(reply, self.settings.record.id, request.err(), self.fault.is_some());
+        let mut sender = Sender::status(reply, self.settings.record.id, request.err(), self.stand.faulted);
         if let Ok(Request { address, length }) = request {
             table::read(View { state: self, snapshot }, address, length, |byte| sender.push(byte));
         }
@@ -59,7 +59,7 @@ impl State {
             reply.push(byte).ok();
         };
         shared.opening().for_each(&mut put);
-        put(error_byte(readable.err(), self.fault.is_some()));
+        put(error_byte(readable.err(), self.stand.faulted));
         put(self.settings.record.id);
         match readable {
             Ok(_) => table::read(View { state: self, snapshot }, request.address, request.length, &mut put),

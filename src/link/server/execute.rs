@@ -87,7 +87,7 @@ impl State {
         if to == BROADCAST {
             self.reply_delay_us += u32::from(id) * (PING_SLOT_BITS * 1_000_000).div_ceil(self.settings.baud());
         }
-        let mut sender = Sender::status(reply, id, None, self.fault.is_some());
+        let mut sender = Sender::status(reply, id, None, self.stand.faulted);
         for (address, length) in [(address::MODEL_NUMBER, 2), (address::FIRMWARE_VERSION, 1)] {
             table::read(View { state: self, snapshot }, address, length, |byte| sender.push(byte));
         }
@@ -103,7 +103,7 @@ impl State {
     }
 
     fn staged(&self) -> Staged {
-        Staged { settings: self.settings, actions: self.actions, faulted: self.fault.is_some() }
+        Staged { settings: self.settings, actions: self.actions, stand: self.stand }
     }
 
     fn commit(&mut self, mut staged: Staged) {
@@ -144,6 +144,7 @@ impl State {
         staged.settings.record = record;
         staged.settings.check(true)?;
         staged.actions.save = true;
+        staged.stand.check(&staged.settings.command, &staged.settings.command, staged.actions)?;
         self.commit(staged);
         Ok(())
     }

@@ -13,7 +13,7 @@ use crate::link::snapshot::hardware_error;
 use crate::params::Params;
 use crate::store::Record;
 
-use super::values::{bump, permille, set_goal, set_identify, set_torque, set_watchdog, watchdog};
+use super::values::{bump, permille, set_goal, set_torque, set_watchdog, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
@@ -68,12 +68,13 @@ control_table! {
     /// Milliseconds since reset; wraps after 32767.
     120 REALTIME_TICK: U16 ReadOnly, "ms" * 1, 0 to 0x7FFF,
         |view, _| view.snapshot.tick_ms & 0x7FFF;
-    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error. Goes to 0
-    /// on a fault.
+    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error; one below contact_on_mn is held as
+    /// contact_on_mn, with limit 3. Goes to 0 on a fault; while that stands, other goals are refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
-    /// 1 measures the zero of every taxel; nothing may touch the tip. Reads 0.
+    /// 1 measures the zero of every taxel; nothing may touch the tip. Refused with a result error in fault, but for one that is cleared
+    /// in the same write or was just before. Reads 0.
     260 TARE: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { bump(&mut staged.settings.command.tare_request, value); Ok(()) };
@@ -81,7 +82,7 @@ control_table! {
     261 CLEAR_FAULT: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { bump(&mut staged.settings.command.clear_request, value); Ok(()) };
-    /// 1 writes the stored registers to flash. Reads 0.
+    /// 1 writes the stored registers to flash. Refused with a result error before the loop is off, and while a tare is under way. Reads 0.
     262 SAVE_PARAMETERS: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { staged.actions.save |= value != 0; Ok(()) };
@@ -192,13 +193,14 @@ control_table! {
     /// Good instruction packets for this device, broadcasts included; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.counters().good_packets;
-    /// 1 measures Young's modulus: backs off, presses slowly, lets go; refused without torque. Reads 0.
+    /// 1 measures Young's modulus: backs off, presses slowly, lets go. Refused with a result error without torque and before a tare.
+    /// Reads 0.
     350 IDENTIFY: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
-        set_identify;
-    /// The measurement of Young's modulus: 0 none since reset, 1 running, 2 done, 3 refused.
+        |staged, value| { bump(&mut staged.settings.command.identify_request, value); Ok(()) };
+    /// The measurement of Young's modulus that was last asked for: 0 none since reset, 1 running, 2 done, 3 refused.
     351 IDENTIFY_STATE: U8 ReadOnly, "" * 1, 0 to 3,
-        |view, _| u32::from(view.snapshot.status.identification.number());
+        |view, _| view.identify_state();
     /// Young's modulus as measured; 0 where there is no result. The parameter modulus_pa stays as it is.
     352 IDENTIFIED_MODULUS_PA: U32 ReadOnly, "Pa" * 1, 0 to 2_000_000,
         |view, _| thousandths(view.identified().modulus.to_bits(), 16) as u32;
@@ -223,6 +225,10 @@ control_table! {
     /// The effort in use: less than asked for where the deadline leaves no time for that.
     368 EFFORT_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.status.effort as u32;
+    /// The tare that was last asked for: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault: ask again once that is
+    /// cleared.
+    369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
+        |view, _| view.tare_state();
     /// Pressure on each taxel, row by row.
     768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
         |view, place| view.snapshot.pressure_10pa(place).into();

@@ -16,7 +16,7 @@ pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusEr
     if on && staged.settings.watchdog_tripped {
         return Err(StatusError::Access);
     }
-    if on && staged.faulted {
+    if on && staged.stand.faulted {
         return Err(StatusError::Result);
     }
     staged.settings.command.torque = on;
@@ -29,15 +29,6 @@ pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusErro
         return Err(StatusError::Access);
     }
     staged.settings.command.goal = newtons(value as i32);
-    Ok(())
-}
-
-/// Asks for a measurement of the modulus: refused without torque.
-pub(super) fn set_identify(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
-    if value != 0 && !staged.settings.command.torque {
-        return Err(StatusError::Result);
-    }
-    bump(&mut staged.settings.command.identify_request, value);
     Ok(())
 }
 

@@ -12,7 +12,7 @@ pub struct Digest(Hasher);
 
 /// Words of what a step takes beside the codes, and of what it gives.
 const TAKEN: usize = 13;
-const GIVEN: usize = 25;
+const GIVEN: usize = 29;
 
 impl Digest {
     /// Of nothing.
@@ -68,6 +68,8 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         speed,
         duty: applied,
         identification,
+        tare,
+        taken,
     } = *status;
     let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
     let Modulus { modulus, sigma, contact, points } = identification.result();
@@ -95,6 +97,10 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         points.into(),
         u32::from(identification.number()),
         u32::from(identification.refusal()),
+        tare as u32,
+        taken.tare.into(),
+        taken.clear.into(),
+        taken.identify.into(),
         duty.0 as u32,
         applied.0 as u32,
     ]
@@ -132,6 +138,8 @@ mod tests {
             of(|step| step.4.sequence = 1),
             of(|step| step.4.contact.bad_taxels = 1),
             of(|step| step.4.duty = Duty(1)),
+            of(|step| step.4.tare = fingertip::pipeline::Taring::Running),
+            of(|step| step.4.taken.clear = 1),
         ];
         let steps = all.len();
         all.sort();

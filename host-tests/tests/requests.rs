@@ -1,0 +1,291 @@
+//! Requests in the loop: what comes in one frame is done, and what cannot be done leaves a word. The first frame with torque.
+
+use fingertip::config::{Config, newtons};
+use fingertip::identify::{Identification, Refusal};
+use fingertip::params::Params;
+use fingertip::pipeline::Taring;
+use fingertip::pressure::TARE_FRAMES;
+use fingertip::safety::{Fault, Mode};
+use host_tests::native::Native;
+use host_tests::plant::{Setup, Taxel};
+
+const NOT_READY: Identification = Identification::Refused(Refusal::NotReady);
+
+fn new() -> Native {
+    at(Setup::default().wall.distance_mm)
+}
+
+/// With the object so far away.
+fn at(distance_mm: f64) -> Native {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = distance_mm;
+    Native::new(&setup, &Config::new(&Params::DEFAULT).unwrap())
+}
+
+fn ready() -> Native {
+    let mut board = new();
+    board.tare_and_enable();
+    board.step();
+    board
+}
+
+/// Stopped by an overload of the bridge that is over.
+fn faulted() -> Native {
+    let mut board = ready();
+    let mut sense = board.sense;
+    sense.bridge_fault = true;
+    let mut frame = board.frame;
+    frame.sequence += 1;
+    assert_eq!(board.pipeline.step(&frame, &sense, &board.command).1.fault, Some(Fault::Bridge));
+    board.command.torque = false;
+    board
+}
+
+fn break_array(board: &mut Native) {
+    board.world.faults.array.taxels = [[Taxel::Dead; 10]; 10];
+}
+
+fn tares(board: &mut Native) {
+    for _ in 1..=TARE_FRAMES {
+        let status = board.step();
+        assert_eq!((status.mode, status.tare), (Mode::Tare, Taring::Running));
+    }
+    assert_eq!(board.step().tare, Taring::Done);
+}
+
+#[test]
+fn a_tare_that_comes_with_torque_off_is_done() {
+    let mut board = ready();
+    assert_eq!(board.step().mode, Mode::Release);
+    board.command.torque = false;
+    board.command.tare_request += 1;
+    tares(&mut board);
+    assert_eq!(board.step().mode, Mode::Off);
+}
+
+/// Off, the tare and on again before the loop looks.
+#[test]
+fn a_tare_between_torque_off_and_on_is_done() {
+    let mut board = ready();
+    board.command.tare_request += 1;
+    assert_eq!(board.step().duty.0, 0);
+    for _ in 1..TARE_FRAMES {
+        assert_eq!(board.step().mode, Mode::Tare);
+    }
+    assert_eq!(board.step().mode, Mode::Off);
+    assert_eq!(board.step().mode, Mode::Release);
+}
+
+#[test]
+fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
+    let mut board = faulted();
+    board.command.clear_request += 1;
+    board.command.tare_request += 1;
+    tares(&mut board);
+    assert_eq!(board.step().fault, None);
+}
+
+#[test]
+fn a_tare_in_a_fault_is_refused_for_all_to_see() {
+    let mut board = faulted();
+    assert_eq!(board.step().tare, Taring::Done, "that before");
+    board.command.tare_request += 1;
+    let status = board.step();
+    assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
+    board.command.clear_request += 1;
+    let status = board.step();
+    assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused), "it does not come back by itself");
+}
+
+#[test]
+fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
+    let mut board = ready();
+    break_array(&mut board);
+    board.command.torque = false;
+    board.command.tare_request += 1;
+    let status = board.step();
+    assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
+}
+
+#[test]
+fn a_fault_ends_a_tare_for_all_to_see() {
+    for late in [false, true] {
+        let mut board = new();
+        board.command.tare_request += 1;
+        board.step();
+        if late {
+            board.command.bus_watchdog_ms = 20;
+            let (mut sense, mut frame) = (board.sense, board.frame);
+            sense.bus_silent_ms = 20;
+            frame.sequence += 1;
+            let status = *board.pipeline.step(&frame, &sense, &board.command).1;
+            assert_eq!((status.fault, status.tare), (Some(Fault::BusSilent), Taring::Refused));
+        } else {
+            break_array(&mut board);
+            let status = board.step();
+            assert_eq!((status.fault, status.tare), (Some(Fault::ArrayBroken), Taring::Refused));
+        }
+    }
+    let mut board = new();
+    board.command.tare_request += 1;
+    board.step();
+    board.pipeline.stop(Fault::LostFrames);
+    assert_eq!(board.pipeline.status().tare, Taring::Refused);
+}
+
+#[test]
+fn a_second_tare_during_a_tare_begins_anew() {
+    let mut board = new();
+    board.command.tare_request += 1;
+    for _ in 0..100 {
+        board.step();
+    }
+    board.command.tare_request += 1;
+    tares(&mut board);
+}
+
+#[test]
+fn new_parameters_during_a_tare_begin_it_anew() {
+    let mut board = new();
+    board.command.tare_request += 1;
+    for _ in 0..100 {
+        board.step();
+    }
+    board.pipeline.configure(&Config::new(&Params::DEFAULT).unwrap());
+    for _ in 1..TARE_FRAMES {
+        assert_eq!(board.step().mode, Mode::Tare);
+    }
+    assert_eq!(board.step().tare, Taring::Done);
+}
+
+#[test]
+fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
+    for late in [false, true] {
+        let mut board = ready();
+        board.command.identify_request += 1;
+        if late {
+            board.command.bus_watchdog_ms = 20;
+        } else {
+            break_array(&mut board);
+        }
+        let mut command = board.command;
+        command.torque = true;
+        if late {
+            let (mut sense, mut frame) = (board.sense, board.frame);
+            sense.bus_silent_ms = 20;
+            frame.sequence += 1;
+            assert_eq!(board.pipeline.step(&frame, &sense, &command).1.identification, NOT_READY);
+        } else {
+            let status = board.step();
+            assert_eq!((status.mode, status.identification), (Mode::Fault, NOT_READY));
+        }
+    }
+}
+
+#[test]
+fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
+    let mut board = new();
+    board.command.tare_request += 1;
+    board.step();
+    board.command.torque = true;
+    board.command.identify_request += 1;
+    let mut frames = 0;
+    while board.step().mode != Mode::Identify {
+        frames += 1;
+        assert!(frames < TARE_FRAMES + 5);
+        assert_eq!(board.pipeline.status().identification, Identification::None);
+    }
+    assert_eq!(board.step().identification, Identification::Running);
+
+    let mut board = ready();
+    board.command.torque = false;
+    board.step();
+    board.command.torque = true;
+    board.command.identify_request += 1;
+    assert_eq!(board.step().mode, Mode::Release);
+    assert_eq!(board.step().mode, Mode::Identify);
+}
+
+#[test]
+fn identify_that_waits_is_refused_once_torque_is_off() {
+    let mut board = new();
+    board.command.tare_request += 1;
+    board.command.torque = true;
+    board.command.identify_request += 1;
+    board.step();
+    assert_eq!(board.step().identification, Identification::None);
+    board.command.torque = false;
+    let status = board.step();
+    assert_eq!((status.mode, status.identification), (Mode::Tare, NOT_READY));
+}
+
+#[test]
+fn identify_without_a_tare_is_refused() {
+    let mut board = new();
+    board.command.torque = true;
+    board.step();
+    board.command.identify_request += 1;
+    assert_eq!(board.step().identification, NOT_READY);
+}
+
+/// A host that asks for another measurement in the frame in which one ends gets another, and the first one's end is not spoilt.
+#[test]
+fn identify_in_the_frame_in_which_another_ends_begins_anew() {
+    let refused_at = {
+        let mut board = measuring();
+        (1..20_000).find(|_| board.step().identification != Identification::Running).expect("an end")
+    };
+    let mut board = measuring();
+    for _ in 1..refused_at {
+        assert_eq!(board.step().identification, Identification::Running);
+    }
+    board.command.identify_request += 1;
+    assert_eq!(board.step().identification, Identification::Refused(Refusal::NoContact));
+    assert_eq!(board.step().identification, Identification::Running);
+}
+
+/// With nothing to touch.
+fn measuring() -> Native {
+    let mut board = at(40.0);
+    board.tare_and_enable();
+    board.step();
+    board.command.identify_request += 1;
+    assert_eq!(board.step().identification, Identification::Running);
+    board
+}
+
+/// Like every later frame: not driven at all where it shows a fault.
+#[test]
+fn the_first_frame_with_torque_is_judged_before_it_drives() {
+    type Break = fn(&mut Native);
+    let cases: [(Break, Fault); 4] = [
+        (break_array, Fault::ArrayBroken),
+        (|board| board.sense.bridge_fault = true, Fault::Bridge),
+        (|board| (board.command.bus_watchdog_ms, board.sense.bus_silent_ms) = (20, 20), Fault::BusSilent),
+        (|board| board.frame = pressed(), Fault::OverForce),
+    ];
+    for (spoil, fault) in cases {
+        let mut board = new();
+        board.tare_and_enable();
+        board.command.torque = false;
+        board.command.goal = newtons(7_000);
+        board.step();
+        spoil(&mut board);
+        board.command.torque = true;
+        if fault == Fault::ArrayBroken {
+            board.step();
+        } else {
+            board.frame.sequence += 1;
+            board.pipeline.step(&board.frame, &board.sense, &board.command);
+        }
+        let status = board.pipeline.status();
+        assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
+    }
+}
+
+/// A frame of about 14 N.
+fn pressed() -> fingertip::frame::Frame {
+    let mut board = at(-4.2);
+    board.step();
+    fingertip::frame::Frame { sequence: 1_000, ..board.frame }
+}

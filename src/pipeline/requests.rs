@@ -1,0 +1,78 @@
+//! Requests: taken up once, and never lost without a word.
+//!
+//! | asked for | taken up | otherwise |
+//! | --- | --- | --- |
+//! | tare | in every mode but fault, also in the frame that clears one | refused: [`Taring::Refused`] |
+//! | clear | in fault, with torque off | the fault stands, or there is none |
+//! | identify | in approach, force and release; with torque on it waits for these while torque is taken up, a tare is under way or another measurement ends | refused: [`Refusal::NotReady`] |
+
+use super::{Command, Pipeline, Taring};
+use crate::identify::Refusal;
+use crate::safety::Mode;
+
+/// Requests that a command brings.
+#[derive(Clone, Copy)]
+pub(super) struct Asked {
+    pub tare: bool,
+    pub clear: bool,
+    pub identify: bool,
+}
+
+impl Pipeline {
+    /// What is newly asked for. A tare and a clear count in the frame in which they come, whatever else that brings; a measurement of the
+    /// modulus counts until [`Pipeline::note_requests`] has an answer to it.
+    pub(super) fn take_requests(&mut self, command: &Command) -> Asked {
+        let taken = &mut self.status.taken;
+        let asked = Asked {
+            tare: command.tare_request != taken.tare,
+            clear: command.clear_request != taken.clear,
+            identify: command.identify_request != taken.identify,
+        };
+        (taken.tare, taken.clear) = (command.tare_request, command.clear_request);
+        asked
+    }
+
+    /// Answers what was asked for in a frame that a fault ended.
+    pub(super) fn refuse(&mut self, asked: Asked, command: &Command) {
+        if asked.tare {
+            self.status.tare = Taring::Refused;
+        }
+        if asked.identify {
+            self.status.taken.identify = command.identify_request;
+            self.press.refuse(Refusal::NotReady);
+            self.status.identification = self.press.outcome();
+        }
+    }
+
+    /// Answers what was asked for, by what became of the mode.
+    pub(super) fn note_requests(&mut self, asked: Asked, before: Mode, mode: Mode, command: &Command) {
+        if mode == Mode::Fault {
+            if self.status.tare == Taring::Running {
+                self.status.tare = Taring::Refused;
+            }
+            return self.refuse(asked, command);
+        }
+        if mode == Mode::Tare {
+            self.status.tare = Taring::Running;
+        } else if before == Mode::Tare {
+            self.status.tare = Taring::Done;
+        }
+        let about_to_drive =
+            mode == Mode::Tare || self.tared && matches!(before, Mode::Off | Mode::Tare | Mode::Identify);
+        if asked.identify && (mode == Mode::Identify || !command.torque || !about_to_drive) {
+            self.status.taken.identify = command.identify_request;
+            if mode != Mode::Identify {
+                self.press.refuse(Refusal::NotReady);
+            }
+        }
+    }
+
+    /// Leaves what was going on for what a new configuration or calibration asks: off, where there is no fault. A tare begins anew.
+    pub(super) fn leave(&mut self) {
+        match self.status.mode {
+            Mode::Fault => {}
+            Mode::Tare => self.array.start_tare(),
+            _ => self.status.mode = Mode::Off,
+        }
+    }
+}

@@ -6,6 +6,7 @@
 use crate::contact::Geometry;
 use crate::control::BRAKE_SHARE_Q8;
 use crate::control::gains::{self, Gains, PACES};
+use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{ScanError, ScanTiming};
@@ -16,14 +17,18 @@ use fixed::types::{I8F24, I16F16};
 const CALM_MM: f32 = 0.008;
 /// and so many counts of the encoder;
 const CALM_COUNTS: f32 = 3.0;
-/// at most 4 mm, of which the pace's arithmetic holds 16 (Q24).
-const CALM_MAX: i32 = 4 << 24;
+/// at most 2 mm, of which the pace's arithmetic holds 32 (Q24).
+const CALM_MAX: i32 = 2 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 2.0;
 
 /// Time over which the guard compares motor and encoder, s.
 const GUARD_S: f32 = 0.005;
 
+/// Share of the converter's range up to saturation that a peak may use,
+const SEEN: f32 = 0.95;
+/// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not as more than this.
+const LEVEL_MAX: i32 = 1_024;
 /// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i64 = 1_000_000 << 8;
 /// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,
@@ -38,7 +43,7 @@ pub enum ConfigError {
     Param(ParamError),
     /// The scan cannot be timed so.
     Scan(ScanError),
-    /// Two contradict each other, by name and value: the first must be below the second.
+    /// Two contradict each other, by name and value: the first must be below the second; the speeds may be equal.
     Order([(&'static str, i32); 2]),
 }
 
@@ -141,6 +146,9 @@ pub struct Config {
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
     pub force_max: Newtons,
+    /// The largest force of a centred contact that the converter still sees whole: by the tip's model its peak stays a
+    /// twentieth below saturation. It may be less than [`Config::force_max`].
+    pub force_seen: Newtons,
 }
 
 impl Config {
@@ -157,12 +165,15 @@ impl Config {
     pub fn new(params: &Params) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
-        for (low, high, names) in [
-            (p.contact_off_mn, p.contact_on_mn, ("contact_off_mn", "contact_on_mn")),
-            (p.force_max_mn, p.force_fault_mn, ("force_max_mn", "force_fault_mn")),
-            (p.supply_min_mv, p.supply_max_mv, ("supply_min_mv", "supply_max_mv")),
+        // By how much the one must be below the other, the two, and their names.
+        for (apart, low, high, names) in [
+            (1, p.contact_off_mn, p.contact_on_mn, ("contact_off_mn", "contact_on_mn")),
+            (1, p.contact_on_mn, p.force_max_mn, ("contact_on_mn", "force_max_mn")),
+            (1, p.force_max_mn, p.force_fault_mn, ("force_max_mn", "force_fault_mn")),
+            (1, p.supply_min_mv, p.supply_max_mv, ("supply_min_mv", "supply_max_mv")),
+            (0, p.approach_um_per_s, p.speed_max_um_per_s, ("approach_um_per_s", "speed_max_um_per_s")),
         ] {
-            if low >= high {
+            if low + apart > high {
                 return Err(ConfigError::Order([(names.0, low), (names.1, high)]));
             }
         }
@@ -236,8 +247,16 @@ impl Config {
             way_per_n: narrow(1e3 / mass * GUARD_S * GUARD_S * exp2(24)),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
+            force_seen: force_seen(p, &tip),
         })
     }
+}
+
+/// See [`Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.
+fn force_seen(p: &Params, tip: &Tip) -> Newtons {
+    let codes = SEEN * f32::from(SATURATED) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
+    let peak_kpa = codes / (p.codes_per_kpa_milli as f32 * 1e-3);
+    tip.force(tip.indentation_from_peak(Kilopascals::from_bits(narrow(peak_kpa * exp2(16)))))
 }
 
 fn tip(p: &Params) -> Result<Tip, ConfigError> {

@@ -90,9 +90,9 @@ params! {
     undriven_max_codes = 700 in 0..=4_000;
     /// More dead or saturated taxels than this are a fault.
     bad_taxels_max = 5 in 0..=100;
-    /// Contact begins above this force.
+    /// Contact begins above this force; goals below it are held as this. Must be above contact_off_mn and below force_max_mn.
     contact_on_mn = 40 in 5..=2_000;
-    /// Contact ends below this force.
+    /// Contact ends below this force. Must be below contact_on_mn.
     contact_off_mn = 15 in 1..=2_000;
     /// Whether the baseline follows drift while there is no contact: 1 yes, 0 no.
     baseline_follows = 1 in 0..=1;
@@ -114,21 +114,21 @@ params! {
     current_max_ma = 2_000 in 20..=20_000;
     /// Largest change of the motor's voltage in a millisecond.
     voltage_slew_mv_per_ms = 60_000 in 100..=1_000_000;
-    /// Largest speed of the tip.
+    /// Largest speed of the tip. Must not be below approach_um_per_s.
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
-    /// Speed of the approach and of the release.
+    /// Speed of the approach and of the release. Must not be above speed_max_um_per_s.
     approach_um_per_s = 30_000 in 500..=200_000;
     /// How far the tip may travel from where torque was enabled.
     travel_max_um = 20_000 in 100..=100_000;
     /// How far the tip backs off after contact is lost on release.
     clearance_um = 1_000 in 0..=20_000;
-    /// Over-force: above this the motor is stopped.
+    /// Over-force: above this the motor is stopped. Must be above force_max_mn.
     force_fault_mn = 9_000 in 100..=200_000;
-    /// Goals are cut to this.
+    /// Goals are cut to this. Must be above contact_on_mn and below force_fault_mn.
     force_max_mn = 7_000 in 50..=150_000;
-    /// Below this supply the motor is stopped.
+    /// Below this supply the motor is stopped. Must be below supply_max_mv.
     supply_min_mv = 5_000 in 1_000..=48_000;
-    /// Above this supply the motor is stopped.
+    /// Above this supply the motor is stopped. Must be above supply_min_mv.
     supply_max_mv = 8_500 in 2_000..=60_000;
 }
 

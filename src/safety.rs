@@ -86,7 +86,7 @@ impl Limits {
     pub const CURRENT: u16 = 1 << 1;
     /// The speed limit is reached.
     pub const SPEED: u16 = 1 << 2;
-    /// The goal is above the largest force allowed and was cut to it.
+    /// The goal is above the largest force allowed or below the least that is a contact, and was moved to it.
     pub const GOAL: u16 = 1 << 3;
     /// The travel's end is reached without contact.
     pub const TRAVEL: u16 = 1 << 4;

@@ -38,7 +38,8 @@ fn errors(page: &mut String) {
         (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
         (
             StatusError::Limit,
-            "a value beyond what other registers allow: a goal above force_max_mn, parameters that contradict each other",
+            "a value beyond what other registers allow: a goal above force_max_mn, parameters that contradict each other: each says \
+            which it must be above or below; to change both, write both in one packet, or first the one that makes room",
         ),
         (StatusError::Access, "no such register, or one that cannot be written, or not while torque is on"),
     ];

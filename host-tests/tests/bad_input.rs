@@ -29,12 +29,27 @@ fn two_parameters_that_contradict_each_other() {
     let cases = [
         (Params { contact_on_mn: 15, ..default }, ["contact_off_mn of 15", "contact_on_mn, which is 15"]),
         (Params { force_fault_mn: 6_999, ..default }, ["force_max_mn of 7000", "force_fault_mn, which is 6999"]),
+        (
+            Params { contact_on_mn: 2_000, force_max_mn: 500, ..default },
+            ["contact_on_mn of 2000", "force_max_mn, which is 500"],
+        ),
+        (
+            Params { contact_on_mn: 500, force_max_mn: 500, ..default },
+            ["contact_on_mn of 500", "force_max_mn, which is 500"],
+        ),
+        (
+            Params { speed_max_um_per_s: 29_999, ..default },
+            ["approach_um_per_s of 30000", "speed_max_um_per_s, which is 29999"],
+        ),
         (Params { supply_min_mv: 8_500, ..default }, ["supply_min_mv of 8500", "supply_max_mv, which is 8500"]),
     ];
     for (params, [low, high]) in cases {
         assert_eq!(refused(&params).to_string(), format!("{low}: below {high}, is allowed"));
     }
-    assert!(Config::new(&Params { contact_on_mn: 16, force_fault_mn: 7_001, supply_min_mv: 8_499, ..default }).is_ok());
+    let least = Params { contact_on_mn: 16, force_fault_mn: 7_001, supply_min_mv: 8_499, ..default };
+    assert!(Config::new(&least).is_ok());
+    let nearest = Params { contact_on_mn: 499, force_max_mn: 500, speed_max_um_per_s: 30_000, ..default };
+    assert!(Config::new(&nearest).is_ok());
 }
 
 #[test]

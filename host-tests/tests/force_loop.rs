@@ -131,3 +131,23 @@ fn the_same_run_twice_gives_the_same_bits() {
     };
     assert_eq!(trace(), trace());
 }
+
+#[test]
+fn a_goal_below_the_least_contact_is_held_as_that() {
+    for goal_mn in [1, 5, 14, 15, 39] {
+        let mut board = board();
+        let (_, status) = run(&mut board, goal_mn, 0.5);
+        assert!(status.mode == Mode::Force && status.limits.has(Limits::GOAL), "{goal_mn} mN: {:?}", status.mode);
+        let mut lost = 0;
+        for _ in 0..3_000 {
+            let status = board.step();
+            lost += u32::from(status.mode != Mode::Force);
+            let force_n = board.world.force_n();
+            assert!((0.030..=0.050).contains(&force_n), "{goal_mn} mN: {force_n} N");
+        }
+        assert_eq!(lost, 0, "{goal_mn} mN");
+    }
+    let mut board = board();
+    let (_, status) = run(&mut board, 40, 0.5);
+    assert!(!status.limits.has(Limits::GOAL), "the least is none that is moved");
+}

@@ -38,7 +38,8 @@ fn the_observer_recovers_from_anything() {
     for (settle_ns, sample_cycles, speed_max_um_per_s) in
         [(500, 3, 2_000_000), (2_400, 15, 250_000), (100_000, 480, 1_000)]
     {
-        let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, ..Params::DEFAULT };
+        let approach_um_per_s = speed_max_um_per_s.min(Params::DEFAULT.approach_um_per_s);
+        let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, approach_um_per_s, ..Params::DEFAULT };
         let config = Config::new(&params).unwrap();
         let mut rng = Rng::with_seed(11);
         for _ in 0..300 {

@@ -162,3 +162,47 @@ fn any_frame_is_taken() {
         }
     }
 }
+
+/// The highest code of a centred contact, as the plant's electrical model has it, stays where it is said to.
+#[test]
+fn the_force_that_is_seen_whole_leaves_the_converter_room() {
+    for (radius_mm, modulus_kpa) in [(10.0, 250.0), (4.0, 250.0), (10.0, 2_000.0), (16.0, 700.0), (4.0, 2_000.0)] {
+        let mut setup = Setup::default();
+        (setup.tip.radius_mm, setup.tip.modulus_kpa) = (radius_mm, modulus_kpa);
+        // The middle of a taxel.
+        (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.75, 0.75);
+        // Without the sag, which lets the converter see more.
+        setup.array.row_ohm = 0.0;
+        let params = Params {
+            tip_radius_um: (radius_mm * 1e3) as i32,
+            modulus_pa: (modulus_kpa * 1e3) as i32,
+            ..Params::DEFAULT
+        };
+        let seen_n: f64 = Config::new(&params).unwrap().force_seen.0.to_num();
+        let mut world = World::new(&setup);
+        let indentation_mm = setup.tip.indentation_mm(seen_n);
+        world.place(setup.wall.distance_mm + indentation_mm);
+        let mut frame = Frame::EMPTY;
+        world.fill_frame(&mut frame);
+        let highest = (0..ROWS).flat_map(|row| (0..10).map(move |column| (row, column)));
+        let highest = highest.map(|(row, column)| frame.code(row, column)).max().unwrap();
+        println!("{radius_mm} mm, {modulus_kpa} kPa: {seen_n} N at {indentation_mm} mm, code {highest}");
+        assert!(highest <= 3_890, "{highest}");
+        // A taxel averages over a peak that may be small.
+        assert!(highest >= 3_000, "{highest}: more could be seen");
+    }
+}
+
+/// What a set of parameters may hold: never beyond the model, never below zero.
+#[test]
+fn the_force_that_is_seen_whole_is_one_of_the_tips() {
+    for undriven_max_codes in [0, 700, 4_000] {
+        for codes_per_kpa_milli in [1_000, 24_000, 200_000] {
+            for modulus_pa in [20_000, 2_000_000] {
+                let params = Params { undriven_max_codes, codes_per_kpa_milli, modulus_pa, ..Params::DEFAULT };
+                let config = Config::new(&params).unwrap();
+                assert!(config.force_seen.0 > 0 && config.force_seen <= config.tip.force_max(), "{params:?}");
+            }
+        }
+    }
+}

@@ -49,7 +49,8 @@ impl Goal {
         self.enter(mode, contact, travel, config);
         let (way, quick, slack) = if mode == Mode::Release {
             let way = Millimetres(self.rest.0.saturating_sub(travel.0));
-            (way, travel.0 > self.rest.0 + config.clearance.0 && self.confirmed(contact, travel, config), config.count)
+            let pressed = travel.0 > self.rest.0.saturating_add(config.clearance.0);
+            (way, pressed && self.confirmed(contact, travel, config), config.count)
         } else {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
             let quick = mode == Mode::Force && self.confirmed(contact, travel, config);
@@ -92,7 +93,8 @@ impl Goal {
         config: &Config,
         limits: &mut Limits,
     ) -> Millimetres {
-        let held = goal.max(config.contact_on).min(config.force_max);
+        // What is less than a contact would be lost and sought again for ever; what the converter cannot see would be pressed for ever.
+        let held = goal.max(config.contact_on).min(config.force_max.min(config.force_seen));
         if held != goal {
             limits.set(Limits::GOAL);
         }

@@ -66,13 +66,12 @@ pub const MADE: [Make; 3] = [
 fn params(source: &mut Source) -> Params {
     let mut params = Params::from_array(&Params::RANGES.map(|(_, _, min, max)| source.within(min, max)));
     params.sample_cycles = SAMPLE_CYCLES.get((source.word() & 7) as usize).map_or(0, |cycles| *cycles);
-    for (low, high) in [
-        (&mut params.contact_off_mn, &mut params.contact_on_mn),
-        (&mut params.force_max_mn, &mut params.force_fault_mn),
-        (&mut params.supply_min_mv, &mut params.supply_max_mv),
-    ] {
-        (*low, *high) = ((*low).min(*high), (*low).max(*high));
-    }
+    let order = |low: &mut i32, high: &mut i32| (*low, *high) = ((*low).min(*high), (*low).max(*high));
+    order(&mut params.contact_off_mn, &mut params.contact_on_mn);
+    order(&mut params.contact_on_mn, &mut params.force_max_mn);
+    order(&mut params.force_max_mn, &mut params.force_fault_mn);
+    order(&mut params.supply_min_mv, &mut params.supply_max_mv);
+    order(&mut params.approach_um_per_s, &mut params.speed_max_um_per_s);
     params
 }
 
@@ -120,12 +119,13 @@ fn add_config(mix: &mut Mix, config: &Config) {
         way_per_n,
         force_fault,
         force_max,
+        force_seen,
     } = config;
     for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
         mix.add(*ticks);
     }
     mix.add(u32::from(*sag_q32));
-    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max] {
+    for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max, *force_seen] {
         mix.add(force.to_bits());
     }
     for length in [half_pitch, count, calm_band, travel_max, clearance, travel_back] {

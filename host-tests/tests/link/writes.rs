@@ -219,11 +219,20 @@ fn a_goal_beyond_the_largest_force_is_a_limit_error() {
 #[test]
 fn parameters_that_contradict_each_other_are_a_limit_error() {
     let mut bench = Bench::new();
-    for (name, value) in
-        [("contact_off_mn", 40), ("force_max_mn", 9_000), ("supply_min_mv", 8_500), ("sample_cycles", 16)]
-    {
+    for (name, value) in [
+        ("contact_off_mn", 40),
+        ("force_max_mn", 9_000),
+        ("supply_min_mv", 8_500),
+        ("speed_max_um_per_s", 29_999),
+        ("sample_cycles", 16),
+    ] {
         refuses(&mut bench, param(name), &i32::to_le_bytes(value), StatusError::Limit, name);
     }
+    let contact_on = param("contact_on_mn");
+    assert_eq!(bench.write(contact_on, &2_000i32.to_le_bytes()), Ok(()));
+    refuses(&mut bench, param("force_max_mn"), &500i32.to_le_bytes(), StatusError::Limit, "no goal could be held");
+    assert_eq!(bench.write(contact_on, &40i32.to_le_bytes()), Ok(()));
+    bench.server.take_actions();
     assert_eq!(bench.write(param("sample_cycles"), &28i32.to_le_bytes()), Ok(()));
     assert_eq!(bench.server.take_actions(), Actions { configure: true, ..Actions::default() });
     assert_eq!(bench.number(address::SAVED_STATE, 1), 1);

@@ -36,7 +36,9 @@ pub fn placed(places: impl IntoIterator<Item = Place>) -> Params {
     let nearest = SAMPLE_CYCLES.into_iter().min_by_key(|cycles| cycles.abs_diff(params.sample_cycles));
     params.sample_cycles = nearest.expect("there are some");
     apart(&mut params.contact_off_mn, &mut params.contact_on_mn, 2_000);
+    apart(&mut params.contact_on_mn, &mut params.force_max_mn, 150_000);
     apart(&mut params.force_max_mn, &mut params.force_fault_mn, 200_000);
+    params.approach_um_per_s = params.approach_um_per_s.min(params.speed_max_um_per_s);
     apart(&mut params.supply_min_mv, &mut params.supply_max_mv, 60_000);
     params
 }

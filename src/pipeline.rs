@@ -195,6 +195,9 @@ impl Pipeline {
         if !self.tared {
             limits.set(Limits::NOT_TARED);
         }
+        if self.array.tared_touching() {
+            limits.set(Limits::TARED_TOUCHING);
+        }
 
         self.status.identification = self.press.outcome();
         self.status.limits = limits;
@@ -254,6 +257,9 @@ impl Pipeline {
             Mode::Fault => Mode::Off,
             Mode::Tare => {
                 self.tared = self.array.continue_tare();
+                if self.tared {
+                    self.array.judge_tare(&self.config);
+                }
                 if self.tared { Mode::Off } else { Mode::Tare }
             }
             Mode::Off if command.torque && self.tared => wanted,

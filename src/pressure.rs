@@ -13,6 +13,7 @@ mod picture;
 mod row;
 mod suspect;
 mod tare;
+mod touched;
 
 pub use calibration::{Calibration, CalibrationError};
 pub use picture::Picture;
@@ -23,6 +24,7 @@ use crate::frame::{COLUMNS, Frame, ROWS};
 use lanes::{BOOST_BITS, GAIN_BITS, Pairs, Row, Total};
 use row::Sound;
 use suspect::Share;
+use touched::Touched;
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = lanes::CODE_BITS;
@@ -46,6 +48,7 @@ pub struct Array {
     /// Sum and moments of the tare, in sixteenths of a corrected code.
     tare_sums: [i32; 3],
     tare_frames: u32,
+    touched: Touched,
     baseline_row: usize,
     /// Rounds of the baseline over all rows since a contact.
     clear_rounds: i32,
@@ -68,6 +71,7 @@ impl Array {
             tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
             tare_frames: 0,
+            touched: Touched::NONE,
             baseline_row: 0,
             clear_rounds: 0,
         }
@@ -156,6 +160,7 @@ impl Array {
         }
         self.mask = *mask;
         (self.picture.bad, self.picture.bad_count) = (*mask, 0);
+        self.touched = Touched::NONE;
         self.start_tare();
     }
 }

@@ -105,6 +105,9 @@ impl Limits {
     /// The guard holds the duty back, see [`guard`].
     pub const GUARD: u16 = 1 << 12;
 
+    /// Something touched the tip during the last tare: what the array shows is less by that.
+    pub const TARED_TOUCHING: u16 = 1 << 10;
+
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {
         self.0 |= flag;

@@ -46,13 +46,19 @@ impl Picture {
 
     /// The sum as a force: the taxels' area times their pressure, never below zero.
     pub fn force(&self, config: &Config) -> Newtons {
-        // The product is positive: its upper half is below 2^31.
-        let force_bits = ((i64::from(self.sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
-        Newtons(I16F16::from_bits(force_bits.max(0)))
+        force(self.sum, config)
     }
 
     /// The peak as a pressure in Pa.
     pub fn peak_pa(&self, config: &Config) -> u32 {
         ((i64::from(self.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32
     }
+}
+
+/// What taxels carry together, from the sum of their readings; never below zero.
+#[inline(always)]
+pub(super) fn force(sum: i32, config: &Config) -> Newtons {
+    // The product is positive: its upper half is below 2^31.
+    let force_bits = ((i64::from(sum.max(0)) * config.newtons_per_sum_q48) >> 32) as i32;
+    Newtons(I16F16::from_bits(force_bits.max(0)))
 }

@@ -230,6 +230,7 @@ fn parameters_that_contradict_each_other_are_a_limit_error() {
     }
     let contact_on = param("contact_on_mn");
     assert_eq!(bench.write(contact_on, &2_000i32.to_le_bytes()), Ok(()));
+    bench.server.take_actions();
     refuses(&mut bench, param("force_max_mn"), &500i32.to_le_bytes(), StatusError::Limit, "no goal could be held");
     assert_eq!(bench.write(contact_on, &40i32.to_le_bytes()), Ok(()));
     bench.server.take_actions();

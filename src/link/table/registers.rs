@@ -73,7 +73,7 @@ control_table! {
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
-    /// 1 measures the zero of every taxel; nothing may touch the tip. Refused with a result error in fault, but for one that is cleared
+    /// 1 measures the zero of every taxel; nothing may touch the tip: where something seems to, limit 10 says so until the next tare. Refused with a result error in fault, but for one that is cleared
     /// in the same write or was just before. Reads 0.
     260 TARE: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
@@ -98,8 +98,8 @@ control_table! {
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 13,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
-    /// frame missed, 8 slew, 9 effort held back by time.
-    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x3FF,
+    /// frame missed, 8 slew, 9 effort held back by time, 10 something touched during the last tare.
+    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x7FF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force.
     268 PRESENT_FORCE_MN: I32 ReadOnly, "mN" * 1, -32_768_000 to 32_768_000,

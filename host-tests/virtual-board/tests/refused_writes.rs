@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, read_u8, write_u8};
+use common::{WAIT_NS, holding_on_a_bus, read_u8, write_u8};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, Kind, REGISTERS, Register, address};
@@ -80,7 +80,8 @@ fn write_all(rig: &mut Rig, torque: bool) -> usize {
 #[test]
 fn no_register_takes_a_value_out_of_its_range() {
     for torque in [true, false] {
-        let mut rig = holding();
+        // 1 Mbaud, and answers after 50 us.
+        let mut rig = holding_on_a_bus(3, 25);
         if !torque {
             write_u8(&mut rig, address::TORQUE_ENABLE, 0);
             // The contact pushes the coasting tip back, and friction takes its time to stop it.

@@ -2,9 +2,11 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::link::table::address;
+use fingertip::store::{self, Record};
 use host_tests::plant::{Setup, World};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use virtual_board::flash::SECTOR;
 use virtual_board::{Options, Rig};
 
 /// Virtual time that an answer may take.
@@ -49,24 +51,36 @@ pub fn scratch(name: &str) -> PathBuf {
     folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
 }
 
-/// A board that holds 1 N against a wall 0.5 mm away, from a snapshot that is made once.
+/// Starts a board, which then holds 1 N against a wall 0.5 mm away.
+fn hold(options: &Options) -> Rig {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.5;
+    let mut rig = Rig::new(&image(), World::new(&setup), options).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    write_goal(&mut rig, 1_000);
+    rig.run_ms(150).expect("it runs");
+    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    assert!((0.99..1.01).contains(&force_n), "{force_n} N");
+    rig
+}
+
+/// A board that holds 1 N against a wall 0.5 mm away: the first one that was started, and after it what its snapshot kept.
 pub fn holding() -> Rig {
     static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
+    let mut started = None;
     let snapshot = SNAPSHOT.get_or_init(|| {
-        let mut setup = Setup::default();
-        setup.wall.distance_mm = 0.5;
-        let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
-        rig.run_until_ns(20_000_000).expect("it runs");
-        write_u8(&mut rig, address::TARE, 1);
-        rig.run_ms(20).expect("it runs");
-        write_u8(&mut rig, address::TORQUE_ENABLE, 1);
-        write_goal(&mut rig, 1_000);
-        rig.run_ms(150).expect("it runs");
-        let force_n = rig.world(|world| world.force_n()).expect("it runs");
-        assert!((0.99..1.01).contains(&force_n), "{force_n} N");
         let path = scratch("holding.snapshot");
-        rig.snapshot(&path).expect("a snapshot is taken");
+        started.insert(hold(&Options::default())).snapshot(&path).expect("a snapshot is taken");
         path
     });
-    Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored")
+    started.unwrap_or_else(|| Rig::restore(&image(), snapshot, &Options::default()).expect("the snapshot is restored"))
+}
+
+/// The same on a bus of another speed, by its code, or with another pause before an answer: for what has much to say.
+pub fn holding_on_a_bus(baud_code: u8, return_delay_2us: u8) -> Rig {
+    let record = Record { baud_code, return_delay_2us, ..Record::DEFAULT };
+    hold(&Options { presets: vec![(SECTOR.start, store::encode(&record).to_vec())], ..Options::default() })
 }

@@ -159,7 +159,7 @@ proptest! {
         let mut array = Array::new();
         array.calibrate(&calibration);
         array.read(&frame, &config);
-        array.follow_drift();
+        array.follow_drift(false);
         array.continue_tare();
         array.read(&frame, &config);
         array.continue_tare();

@@ -138,7 +138,7 @@ fn the_baseline_follows_drift_only_when_told() {
     // One time constant of the baseline, 1024 visits to each row.
     for _ in 0..10_240 {
         bench.array.read(&bench.frame, &bench.config);
-        bench.array.follow_drift();
+        bench.array.follow_drift(false);
     }
     let left = f64::from(bench.array.read(&bench.frame, &bench.config).sum) / f64::from(drifted);
     assert!((0.33..0.42).contains(&left), "1/e is left, not {left}");
@@ -158,7 +158,7 @@ fn any_frame_is_taken() {
             let contact = from_sums(bench.array.read(&frame, &bench.config), &bench.config);
             assert!(contact.force.to_bits() >= 0);
             bench.array.continue_tare();
-            bench.array.follow_drift();
+            bench.array.follow_drift(false);
         }
     }
 }

@@ -22,8 +22,13 @@ const CALM_MAX: i32 = 2 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 2.0;
 
-/// Time over which the guard compares motor and encoder, s.
+/// Time over which the guard compares motor and encoder, s,
 const GUARD_S: f32 = 0.005;
+/// for an encoder whose counts are no farther apart than this, mm; the others need longer, up to so many times.
+const GUARD_COUNT_MM: f32 = 0.008;
+const GUARD_LONGER: f32 = 8.0;
+/// It must expect a quarter of what the largest voltage does in that time, or this, mm/s; and what four counts may be wrong by.
+const GUARD_CHANGE: f32 = 40.0;
 
 /// Share of the converter's range up to saturation that a peak may use,
 const SEEN: f32 = 0.95;
@@ -110,6 +115,8 @@ pub struct Config {
     pub voltage_limit: i32,
     /// g R i_max, Q8 mm/s^2.
     pub current_limit: i32,
+    /// Below this the supply is about to go under: 4 % above where the motor is stopped.
+    pub supply_weak_mv: i32,
     /// Largest change of g V in a frame, Q8 mm/s^2.
     pub slew_limit: i32,
     /// Least, usual and largest deceleration that the profile counts on, Q8 mm/s^2.
@@ -136,12 +143,14 @@ pub struct Config {
     pub speed_any: MillimetresPerSecond,
     /// Frames in a second.
     pub frames_per_s: i32,
-    /// A frame's share of the guard's 5 ms, Q16: at most a half.
+    /// A frame's share of the guard's tau, Q16: at most an eighth.
     pub guard_leak: i32,
-    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over the guard's 5 ms, Q24 mm.
+    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over the guard's tau, Q16 mm/s.
     pub acceleration_per_n: i32,
     /// See [`Config::acceleration_per_n`].
-    pub way_per_n: i32,
+    pub change_per_n: i32,
+    /// The change of speed that the guard must expect before it counts, Q16 mm/s.
+    pub change_least: i32,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
@@ -189,6 +198,11 @@ impl Config {
         let g = torque_constant / (resistance * inertia * travel_rad_per_m) * 1e3;
         let c = torque_constant * torque_constant / (resistance * inertia);
         let mass = inertia * travel_rad_per_m * travel_rad_per_m;
+        let turn_rad = 2.0 * core::f32::consts::PI;
+        let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
+        let guard_s = GUARD_S * (mm_per_count / GUARD_COUNT_MM).max(1.0).min(GUARD_LONGER);
+        let driven = 0.25 * g * p.voltage_max_mv as f32 * 1e-3 * guard_s;
+        let change_least = driven.min(GUARD_CHANGE) + 16.0 * mm_per_count / guard_s;
         let deepest = tip.indentation(newtons(p.force_max_mn));
         let travel_back = Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0));
 
@@ -196,8 +210,6 @@ impl Config {
         let pitch_mm = p.pitch_um as f32 * 1e-3;
         let codes_per_kpa = p.codes_per_kpa_milli as f32 * 1e-3;
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
-        let turn_rad = 2.0 * core::f32::consts::PI;
-        let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
         let paces = gains::paces(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
         let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
@@ -229,6 +241,7 @@ impl Config {
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,
             current_limit,
+            supply_weak_mv: p.supply_min_mv + p.supply_min_mv / 25,
             slew_limit: narrow(g * p.voltage_slew_mv_per_ms as f32 * frame_s * exp2(8)),
             brake: brake(current_limit.min(voltage_limit)),
             share_per_mv_q32: u32::MAX / p.voltage_max_mv.unsigned_abs().max(1),
@@ -242,9 +255,10 @@ impl Config {
             speed_loose: speed(p.approach_um_per_s + p.approach_um_per_s / 2),
             speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
             frames_per_s: (1.0 / frame_s) as i32,
-            guard_leak: narrow((frame_s / GUARD_S).min(0.5) * exp2(16)),
+            guard_leak: narrow((frame_s / guard_s).min(0.125) * exp2(16)),
             acceleration_per_n: narrow(1e3 / mass * exp2(8)),
-            way_per_n: narrow(1e3 / mass * GUARD_S * GUARD_S * exp2(24)),
+            change_per_n: narrow(1e3 / mass * guard_s * exp2(16)),
+            change_least: narrow(change_least * exp2(16)),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen: force_seen(p, &tip),

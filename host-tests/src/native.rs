@@ -4,6 +4,7 @@ use crate::plant::{Bridge, Setup, World};
 use fingertip::config::Config;
 use fingertip::frame::{Frame, SLOTS, Sense};
 use fingertip::pipeline::{self, Command, Pipeline, Status};
+use fingertip::record::Record;
 use fingertip::units::Duty;
 
 /// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
@@ -50,6 +51,11 @@ impl Native {
 
     /// Scans one frame, row by row while the world moves on, and takes one control step.
     pub fn step(&mut self) -> Status {
+        self.step_with(|_| {})
+    }
+
+    /// The same, where somebody changes what the core is given.
+    pub fn step_with(&mut self, change: impl FnOnce(&mut Record)) -> Status {
         for slot in 0..SLOTS {
             if slot == DUTY_DELAY_SLOTS {
                 self.bridge = self.next;
@@ -62,7 +68,9 @@ impl Native {
         self.frames += 1;
         self.frame.sequence = self.frames as u32;
         self.sense = self.world.sense(0);
-        let (_, status) = self.pipeline.step(&self.frame, &self.sense, &self.command);
+        let mut record = Record { frame: self.frame, sense: self.sense, command: self.command };
+        change(&mut record);
+        let (_, status) = self.pipeline.step(&record.frame, &record.sense, &record.command);
         self.next = bridge(status);
         *status
     }

@@ -43,26 +43,30 @@ pub fn records() -> Vec<Record> {
             if let Some((_, goal_mn)) = GOALS_MN.iter().find(|(from, _)| *from == index) {
                 board.command.goal = newtons(*goal_mn);
             }
-            board.step();
-            let mut record = Record { frame: board.frame, sense: board.sense, command: board.command };
-            if let Some(since) = index.checked_sub(BROKEN_FROM) {
-                let (burst, phase) = (since / BURST_EVERY, since % BURST_EVERY);
-                match phase {
-                    0..BURST => {
-                        if phase == 0 {
-                            held = record.sense;
+            let mut given = None;
+            // What breaks comes before the core, so that the finger does what the core makes of it.
+            board.step_with(|record| {
+                if let Some(since) = index.checked_sub(BROKEN_FROM) {
+                    let (burst, phase) = (since / BURST_EVERY, since % BURST_EVERY);
+                    match phase {
+                        0..BURST => {
+                            if phase == 0 {
+                                held = record.sense;
+                            }
+                            spoil(record, burst, &held, &mut random);
                         }
-                        spoil(&mut record, burst, &held, &mut random);
+                        BURST => clears += 1,
+                        _ => {}
                     }
-                    BURST => clears += 1,
-                    _ => {}
+                    record.command.torque &= !(BURST..BURST + CLEAR).contains(&phase);
+                    record.command.clear_request = clears;
                 }
-                record.command.torque &= !(BURST..BURST + CLEAR).contains(&phase);
-                record.command.clear_request = clears;
-            }
-            record
+                given = Some(*record);
+            });
+            given
         })
-        .collect()
+        .collect::<Option<_>>()
+        .unwrap_or_default()
 }
 
 /// What a recording's file holds.

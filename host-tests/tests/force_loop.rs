@@ -71,7 +71,7 @@ fn a_zero_goal_lets_go_and_stands_clear() {
     let mut board = board();
     run(&mut board, 2_000, 0.5);
     let (trace, status) = run(&mut board, 0, 0.5);
-    assert_eq!(status.mode, Mode::Release);
+    assert_eq!((status.mode, status.fault), (Mode::Release, None));
     assert_eq!(trace.last().unwrap().1, 0.0);
     let clear_mm = board.world.setup().wall.distance_mm - board.world.travel_mm();
     assert!((0.8..=1.3).contains(&clear_mm), "stands {clear_mm} mm clear");

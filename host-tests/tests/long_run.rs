@@ -4,7 +4,7 @@ use fastrand::Rng;
 use fingertip::config::Config;
 use fingertip::control::observer::Observer;
 use fingertip::params::Params;
-use fingertip::safety::Mode;
+use fingertip::safety::{Fault, Mode};
 use host_tests::long_run::{Cycle, Machine, all, cycle, hold};
 
 #[test]
@@ -18,17 +18,18 @@ fn nothing_in_the_loop_drifts_or_swings() {
 #[test]
 fn the_pipeline_comes_to_rest_under_what_does_not_change() {
     let cases = [
-        ("off", false, 0, 0, Mode::Off),
-        ("off, with a drifted array", false, 0, 1, Mode::Off),
-        ("released", true, 0, 0, Mode::Release),
-        ("released, with a drifted array", true, 0, 1, Mode::Release),
-        ("pressing with less than the goal", true, 7_000, 60, Mode::Force),
-        ("pressing with more than the goal", true, 50, 1_500, Mode::Force),
+        ("off", false, 0, 0, Mode::Off, None),
+        ("off, with a drifted array", false, 0, 1, Mode::Off, None),
+        ("released", true, 0, 0, Mode::Release, None),
+        ("released, with a drifted array", true, 0, 1, Mode::Release, None),
+        // A motor that is driven ever harder and does not turn is not driven for ever.
+        ("pressing with less than the goal", true, 7_000, 60, Mode::Fault, Some(Fault::EncoderFrozen)),
+        ("pressing with more than the goal", true, 50, 1_500, Mode::Fault, Some(Fault::EncoderFrozen)),
     ];
-    for (name, torque, goal_mn, codes, mode) in cases {
+    for (name, torque, goal_mn, codes, mode, fault) in cases {
         let (outcome, status) = hold(name, torque, goal_mn, codes, 20_000_000);
         println!("{outcome}");
-        assert_eq!((status.mode, status.fault), (mode, None), "{name}");
+        assert_eq!((status.mode, status.fault), (mode, fault), "{name}");
     }
 }
 

@@ -33,7 +33,7 @@ const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
-/// The ratio follows a refinement by a quarter of the way: what one of them gets wrong must not push the finger.
+/// The ratio follows a good likeness at once, another by a quarter of the way: what one of them gets wrong must not push the finger.
 const RATIO_FOLLOWS_BITS: u32 = 2;
 /// A ratio this near to 1 is 1: 1/64.
 const RATIO_SAME: i32 = 1 << (RATIO_BITS - 6);
@@ -265,7 +265,7 @@ impl Fit {
         match (&mut self.fitted, centre) {
             (Some(fitted), centre) => {
                 let way = ratio - fitted.ratio;
-                fitted.ratio += way >> RATIO_FOLLOWS_BITS;
+                fitted.ratio += if self.confidence >= CONFIDENCE_LEAST { way } else { way >> RATIO_FOLLOWS_BITS };
                 fitted.centre = centre.unwrap_or(fitted.centre);
                 if self.covered && way.abs() < RATIO_SAME {
                     self.forget();

@@ -6,18 +6,26 @@ use crate::safety::Limits;
 use crate::units::Duty;
 
 /// What the bridge was last told, as accelerations (Q8 mm/s^2): the observer's input.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Drive {
     /// g V.
     voltage: i32,
     /// g V - c v, what it gave at the tip.
     net: i32,
+    /// Share of the current limit that the supply bears, Q8.
+    share: i32,
 }
+
+/// All of the current limit, and the least that is left of it, Q8.
+const WHOLE: i32 = 1 << 8;
+const LEAST: i32 = 1 << 4;
+/// What comes back in a frame, Q8.
+const RECOVERS: i32 = 2;
 
 impl Drive {
     /// Nothing at the motor.
     pub const fn new() -> Self {
-        Self { voltage: 0, net: 0 }
+        Self { voltage: 0, net: 0, share: WHOLE }
     }
 
     /// g V - c v since the last frame (Q8 mm/s^2).
@@ -32,7 +40,7 @@ impl Drive {
 
     /// Nothing is let through: the bridge holds the motor at no voltage.
     pub fn cut(&mut self) {
-        *self = Self { voltage: 0, net: self.net.saturating_sub(self.voltage) };
+        (self.voltage, self.net) = (0, self.net.saturating_sub(self.voltage));
     }
 
     /// Cuts the wanted g V to what slew, current and voltage allow.
@@ -41,7 +49,8 @@ impl Drive {
     #[inline(always)]
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
         let slewed = near(wanted, self.voltage, config.slew_limit);
-        let within_current = near(slewed, back_emf, config.current_limit);
+        self.spare(supply_mv, config);
+        let within_current = near(slewed, back_emf, (config.current_limit >> 8) * self.share);
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != wanted {
@@ -54,6 +63,13 @@ impl Drive {
         }
         self.voltage = applied;
         self.net = applied.saturating_sub(back_emf);
+    }
+
+    /// A source that goes under with the current is given less of it, at once; what it bears comes back slowly.
+    #[inline(always)]
+    fn spare(&mut self, supply_mv: u16, config: &Config) {
+        let weak = i32::from(supply_mv) < config.supply_weak_mv;
+        self.share = if weak { (self.share >> 1).max(LEAST) } else { (self.share + RECOVERS).min(WHOLE) };
     }
 
     /// V / V_supply by one 32-bit division: the duty that makes the voltage from this supply.

@@ -94,7 +94,7 @@ impl Goal {
         limits: &mut Limits,
     ) -> Millimetres {
         // What is less than a contact would be lost and sought again for ever; what the converter cannot see would be pressed for ever.
-        let held = goal.max(config.contact_on).min(config.force_max.min(config.force_seen));
+        let held = goal.min(config.force_max.min(config.force_seen)).max(config.contact_on);
         if held != goal {
             limits.set(Limits::GOAL);
         }

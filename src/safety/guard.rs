@@ -9,22 +9,23 @@
 //!    so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
 //!
-//! For the fourth the guard compares two ways over the last 5 ms: the one that the encoder tells and the one that its model expects,
+//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells, and the one that its
+//! model of the motor expects. Both pass the same two filters, so a sound finger shows the same sign whatever it is asked for:
 //!
 //! ```text
-//! v' = g V - c v - F / m       h' = v - h / 5 ms
+//! a = g V - c v - F / m       h' = a - h / tau       p' = 4 (h - p) / tau       tau = 5 ms
 //! ```
+//!
+//! An encoder whose counts are farther apart than 8 um makes tau longer, up to eight times.
 
 use crate::config::Config;
 use crate::safety::{Fault, Limits};
 use crate::units::{Duty, Millimetres, Newtons};
 
-/// The model must expect at least this way of the motor before it counts: 0.15 mm, Q24.
-const EXPECTED: i32 = (1 << 24) * 15 / 100;
-/// A way of this in the other direction is the wrong one: 0.05 mm, Q24.
-const WRONG: i32 = (1 << 24) / 20;
-/// A way that is less than this part of what is expected is none: 1/16.
-const NONE_BITS: u32 = 4;
+/// A change of speed that is less than this part of what is expected is none: 1/8.
+const NONE_BITS: u32 = 3;
+/// The two changes must tell another story for so long, ns.
+const OTHER_NS: u32 = 500_000;
 /// How far an end may be overrun: 1 mm.
 const BEYOND: i32 = 1 << 24;
 /// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
@@ -62,16 +63,18 @@ pub struct Guard {
     touching: bool,
     /// Mean force, Q16 N.
     force: i32,
-    /// Speeds in Q16 mm/s: by the encoder, by the model.
+    /// Speeds by the encoder, quick and slow, Q16 mm/s.
     speed: i32,
-    expected_speed: i32,
-    /// Ways over the last 5 ms.
-    way: i32,
-    expected_way: i32,
+    slow_speed: i32,
+    /// What the model expects the speed to have changed by, and that as late as the encoder tells it.
+    change: i32,
+    late_change: i32,
     /// Since the tip was last surely pressed.
     loose_ns: u32,
     /// For how long it has been too fast.
     fast_ns: u32,
+    /// For how long the two ways have told another story.
+    other_ns: u32,
     may: May,
 }
 
@@ -139,16 +142,16 @@ impl Guard {
         self.force += (seen.force.to_bits().max(0) - self.force) >> FORCE_BITS;
         // Q24 mm in a frame to Q16 mm/s.
         let speed = saturated((i64::from(moved) * i64::from(config.frames_per_s)) >> 8);
-        self.speed = towards(self.speed, speed, config.guard_leak);
+        self.speed = towards(self.speed, speed, 4 * config.guard_leak);
+        self.slow_speed = towards(self.slow_speed, self.speed, config.guard_leak);
 
         let pushed = saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.acceleration_per_n)) >> 16);
-        let back_emf = saturated((i64::from(self.expected_speed) * i64::from(config.damping_q17_per_s)) >> 25);
+        // By the way itself: what a filtered speed is late by would add up.
+        let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
         let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31);
-        self.expected_speed = towards(self.expected_speed.saturating_add(gained), self.speed, config.guard_leak >> 2);
-        let expected = saturated((i64::from(self.expected_speed) * i64::from(config.frame_s_q39)) >> 31);
-        self.way = towards(self.way.saturating_add(moved), 0, config.guard_leak);
-        self.expected_way = towards(self.expected_way.saturating_add(expected), 0, config.guard_leak);
+        self.change = towards(self.change.saturating_add(gained), 0, config.guard_leak);
+        self.late_change = towards(self.late_change, self.change, 4 * config.guard_leak);
     }
 
     /// Where a touch begins and how far back it lets the tip go.
@@ -167,24 +170,23 @@ impl Guard {
         }
     }
 
-    /// What the encoder tells against what the model expects.
-    fn disagreement(&self, seen: &Seen, config: &Config) -> Option<Fault> {
+    /// What the encoder tells against what the model expects, where that has been another for a while.
+    fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         // A quarter of what the force makes is left to its errors.
         let force = self.force.max(seen.force.to_bits());
-        let by_force = (i64::from(force) * i64::from(config.way_per_n)) >> 16;
-        let least = EXPECTED.saturating_add(2 * config.count.to_bits()).saturating_add(saturated(by_force / 4));
-        let expected = self.expected_way.saturating_abs();
-        if expected < least {
+        let by_force = saturated((i64::from(force) * i64::from(config.change_per_n)) >> 18);
+        let expected = self.late_change.saturating_abs();
+        let told = self.speed.saturating_sub(self.slow_speed);
+        let along = if self.late_change < 0 { told.saturating_neg() } else { told };
+        if expected < config.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
+            self.other_ns = 0;
             return None;
         }
-        let along = if self.expected_way < 0 { self.way.saturating_neg() } else { self.way };
-        if along < -WRONG.max(2 * config.count.to_bits()) {
-            Some(Fault::Reversed)
-        } else if along < expected >> NONE_BITS {
-            Some(Fault::EncoderFrozen)
-        } else {
-            None
-        }
+        self.other_ns = self.other_ns.saturating_add(config.timing.frame_ns());
+        // At an end stop the speed changes against the drive, too, but only to none.
+        let speed_along = if self.late_change < 0 { self.speed.saturating_neg() } else { self.speed };
+        let wrong = along.max(speed_along) < -(expected >> NONE_BITS);
+        (self.other_ns > OTHER_NS).then_some(if wrong { Fault::Reversed } else { Fault::EncoderFrozen })
     }
 }
 

@@ -55,7 +55,7 @@ impl Monitor {
         if !driven {
             return None;
         }
-        self.supply(view, config).or_else(|| self.array(view))
+        self.supply(view, config).or_else(|| self.array(view, config))
     }
 
     fn supply(&mut self, view: &View, config: &Config) -> Option<Fault> {
@@ -70,10 +70,11 @@ impl Monitor {
     }
 
     /// The array must see what the encoder sees.
-    fn array(&mut self, view: &View) -> Option<Fault> {
+    fn array(&mut self, view: &View, config: &Config) -> Option<Fault> {
         let sums = sums(view.picture);
         let travel = view.motion.observer.travel;
-        if sums != self.sums || !view.pressed {
+        // In the air the array may well show the same for ever.
+        if sums != self.sums || !view.pressed || view.contact.force < config.contact_off {
             self.sums = sums;
             self.travel = travel;
         }

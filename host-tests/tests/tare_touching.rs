@@ -79,16 +79,12 @@ impl Finger {
         self.command.tare_request += 1;
         let mut limits = Limits::default();
         for _ in 0..TARE_FRAMES + 2 {
-            for slot in 0..SLOTS {
-                for column in 0..COLUMNS {
-                    let net = if slot < ROWS {
-                        self.gain[slot][column] * 24.0 * kpa[slot][column] + self.preload[slot][column]
-                    } else {
-                        0.0
-                    };
-                    let code = self.undriven[column] + net + self.noise_codes * normal(&mut self.rng);
-                    self.frame.set_code(slot, column, code.clamp(0.0, 4_095.0) as u16);
-                }
+            for (slot, column) in (0..SLOTS).flat_map(|slot| (0..COLUMNS).map(move |column| (slot, column))) {
+                let pressed = kpa
+                    .get(slot)
+                    .map_or(0.0, |row| self.gain[slot][column] * 24.0 * row[column] + self.preload[slot][column]);
+                let code = self.undriven[column] + pressed + self.noise_codes * normal(&mut self.rng);
+                self.frame.set_code(slot, column, code.clamp(0.0, 4_095.0) as u16);
             }
             self.frame.sequence += 1;
             let sense = Sense { supply_mv: 6_000, ..Sense::default() };

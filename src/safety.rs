@@ -2,7 +2,7 @@
 //!
 //! | mode | bridge | leaves when |
 //! | --- | --- | --- |
-//! | 0 off | outputs low, motor coasts | torque is enabled on a tared array: approach (goal > 0), release (goal = 0); a tare is asked for: tare |
+//! | 0 off | outputs low, motor coasts | torque is enabled on a tared array: approach (goal > 0), release (goal = 0) |
 //! | 1 tare | outputs low | enough frames are averaged: off |
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
@@ -12,8 +12,9 @@
 //!
 //! Identify, which measures Young's modulus, is asked for in approach, force or release.
 //!
-//! Torque off leads to off from every mode but fault. A fault (stop) is latched until it is cleared; a limit (what holds the loop
-//! back just now) comes and goes by itself. The numbers are stable: hosts may store them.
+//! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault, and from a fault
+//! that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what holds the loop back just now)
+//! comes and goes by itself. The numbers are stable: hosts may store them.
 
 pub mod guard;
 pub mod monitor;

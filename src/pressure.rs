@@ -21,9 +21,8 @@ pub use tare::TARE_FRAMES;
 
 use crate::config::Config;
 use crate::frame::{COLUMNS, Frame, ROWS};
-use lanes::{BOOST_BITS, GAIN_BITS, Pairs, Row, Total};
+use lanes::{BOOST_BITS, GAIN_BITS, Pairs, Row};
 use row::Sound;
-use suspect::Share;
 use touched::Touched;
 
 /// Fractional bits of a corrected code.
@@ -66,7 +65,7 @@ impl Array {
         let [gains, moments] = Calibration::NONE.weights[0];
         Self {
             picture: Picture::EMPTY,
-            rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS }; ROWS],
+            rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }; ROWS],
             mask: [0; ROWS],
             tare_lines: [[0; 2]; ROWS],
             tare_sums: [0; 3],
@@ -95,47 +94,50 @@ impl Array {
             (self.picture.bad, self.picture.bad_count) = (self.mask, 0);
         }
         let sound = Sound::new(undriven, config);
-        let mut total = lanes::pass(rows, &mut self.rows, &sound.common, &mut self.picture.taxels);
+        let total = lanes::pass(rows, &mut self.rows, &sound.common, &mut self.picture.taxels);
         let largest = row::larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
-        if sound.suspects(largest) {
-            self.leave_out(frame, config, &mut total);
-        }
         let [sum, moment_x, moment_y] = self.tare_sums;
         let [total_sum, total_x, total_y] = row::sixteenths(&total);
         self.picture.sum = total_sum.wrapping_sub(sum);
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
+        if sound.suspects(largest) {
+            self.leave_out(frame, &sound, config);
+        }
         &self.picture
     }
 
-    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are.
+    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are. An array that is broken anyhow must
+    /// not take long: its taxels are all zero, and its sums mean nothing.
     #[cold]
     #[inline(never)]
-    fn leave_out(&mut self, frame: &Frame, config: &Config, total: &mut Total) {
+    fn leave_out(&mut self, frame: &Frame, sound: &Sound, config: &Config) {
         let [rows @ .., undriven] = &frame.pairs;
         let mut highest = 0;
-        for (row, codes) in rows.iter().enumerate() {
-            let bad = suspect::bad([codes, undriven], config.dead_codes);
-            if bad == 0 {
+        for (number, ((codes, row), mask)) in rows.iter().zip(&self.rows).zip(&self.mask).enumerate() {
+            if !sound.suspects(row::larger_lane(row.largest)) {
                 continue;
             }
-            self.picture.peak_codes = 0;
-            // Masked taxels have neither gain nor tare.
-            let bad = bad & !self.mask[row];
-            self.picture.bad[row] |= bad;
-            self.picture.bad_count += bad.count_ones() as u8;
-            // An array that is broken anyhow must not take long.
-            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                let share = Share::new(bad, [codes, undriven], &self.rows[row]);
-                row::leave_out(total, row, &share, self.rows[row].boost);
+            let bad = suspect::bad([codes, undriven], config.dead_codes);
+            if bad != 0 {
+                self.picture.peak_codes = 0;
             }
-            highest = highest.max(suspect::clear(bad, &mut self.picture.taxels[row]));
+            // A masked taxel is no fault.
+            let bad = bad & !mask;
+            self.picture.bad[number] |= bad;
+            self.picture.bad_count += bad.count_ones() as u8;
+            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
+                highest = self.picture.leave_out(number, bad).max(highest);
+            }
         }
-        if highest == self.picture.peak {
-            self.picture.peak = self.picture.taxels.as_flattened().iter().fold(0, |peak, taxel| peak.max(*taxel));
+        if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {
+            self.picture.taxels.as_flattened_mut().fill(0);
+            self.picture.peak = 0;
+        } else if highest > 0 && highest == self.picture.peak {
+            self.picture.find_peak();
         }
     }
 

@@ -20,7 +20,7 @@ pub const COLUMNS: usize = 2 * PLACES;
 /// Pairs of a row.
 const PLACES: usize = 5;
 
-/// What is known of a row before the pass, and the boost, which the pass finds.
+/// What is known of a row before the pass, and what the pass finds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
@@ -30,8 +30,10 @@ pub struct Row {
     pub moments: Pairs,
     /// What each column reads without contact.
     pub tare: [i32; COLUMNS],
-    /// 1 / (1 - x) in Q28, where x is the row's sag.
+    /// Found: 1 / (1 - x) in Q28, where x is the row's sag.
     pub boost: i32,
+    /// Found: the largest code less what a dead one shows, in each lane, unsigned: that of a dead one is huge.
+    pub largest: u32,
 }
 
 /// What is common to the rows of a pass.
@@ -55,7 +57,7 @@ pub struct Total {
     pub second: i32,
     /// A quarter of `first` after each row, added up.
     pub running: i32,
-    /// The largest code less what a dead one shows, in each lane, unsigned: that of a dead one is huge.
+    /// The largest of the rows, in each lane.
     pub largest: u32,
     /// The highest taxel, at least 0.
     pub peak: i32,
@@ -94,13 +96,15 @@ pub fn portable_pass<const ROWS: usize>(
     for ((codes, row), taxels) in codes.iter().zip(rows).zip(taxels) {
         let mut nets = [0; PLACES];
         let (mut sag, mut sum, mut moment) = (0, 0, 0);
+        row.largest = 0;
         for (place, net) in nets.iter_mut().enumerate() {
             *net = portable::sub(codes[place], common.undriven[place]);
-            total.largest = super::larger(total.largest, portable::sub(*net, common.dead));
+            row.largest = super::larger(row.largest, portable::sub(*net, common.dead));
             sag = portable::dot(*net, common.sag, sag);
             sum = portable::dot(*net, row.gains[place], sum);
             moment = portable::dot(*net, row.moments[place], moment);
         }
+        total.largest = super::larger(total.largest, row.largest);
         row.boost = boost(sag);
         let short = row.boost >> BOOST_DROP;
         for (place, net) in nets.into_iter().enumerate() {
@@ -119,10 +123,11 @@ pub fn portable_pass<const ROWS: usize>(
 #[cfg(not(all(target_arch = "arm", target_os = "none")))]
 pub use portable_pass as pass;
 
-/// What a row's turn does for the two columns of a pair, whose net codes are in `$net`: sums, taxels, peak.
+/// What a row's turn does for the two columns of a pair, whose net codes are in `$net`: sums, taxels, peak. `$left` and r10 get
+/// their tares, `$early` and `$late` load the left one: early, where there is a register left.
 #[cfg(all(target_arch = "arm", target_os = "none"))]
 macro_rules! columns {
-    ($net:literal, $place:literal, $sum:literal, $moment:literal) => {
+    ($place:literal, $net:literal, $left:literal, $early:expr, $late:expr, $add:literal, $sum:literal, $moment:literal) => {
         concat!(
             "ldr r8, [r1, #4 * ",
             $place,
@@ -130,8 +135,20 @@ macro_rules! columns {
             "ldr r9, [r1, #4 * ",
             $place,
             " + {moments}]\n",
+            "ldr r10, [r1, #4 * ",
+            $place,
+            " + {tare} + {pairs}]\n",
+            $early,
+            $add,
+            " lr, ",
+            $net,
+            ", r8",
             $sum,
             "\n",
+            $add,
+            " r11, ",
+            $net,
+            ", r9",
             $moment,
             "\n",
             "smultt r9, ",
@@ -140,18 +157,11 @@ macro_rules! columns {
             "smulbb r8, ",
             $net,
             ", r8\n",
-            "ldr ",
-            $net,
-            ", [r1, #4 * ",
-            $place,
-            " + {tare}]\n",
-            "ldr r10, [r1, #4 * ",
-            $place,
-            " + {tare} + {pairs}]\n",
+            $late,
             "smmulr r8, r8, r0\n",
             "smmulr r9, r9, r0\n",
             "sub r8, r8, ",
-            $net,
+            $left,
             ", asr #{tare_drop}\n",
             "sub r9, r9, r10, asr #{tare_drop}\n",
             "cmp r8, r12\n",
@@ -166,6 +176,22 @@ macro_rules! columns {
             "str r9, [r2, #4 * ",
             $place,
             " + {pairs}]\n",
+        )
+    };
+    // The first pair begins the sums, and has no register left beside its own.
+    ($place:literal, $net:literal) => {
+        columns!($place, $net, $net, "", concat!("ldr ", $net, ", [r1, #4 * ", $place, " + {tare}]\n"), "smuad", "", "")
+    };
+    ($place:literal, $net:literal, $left:literal) => {
+        columns!(
+            $place,
+            $net,
+            $left,
+            concat!("ldr ", $left, ", [r1, #4 * ", $place, " + {tare}]\n"),
+            "",
+            "smlad",
+            ", lr",
+            ", r11"
         )
     };
 }
@@ -210,17 +236,21 @@ pub fn pass<const ROWS: usize>(
             "ssub16 r7, r7, r11",
             "ldr r8, [sp, #20]", // dead
             "ldr r9, [sp, #24]", // sag
-            "ldr r10, [sp, #44]", // the largest
             "smuad r11, r3, r9",
             "smlad r11, r4, r9, r11",
             "smlad r11, r5, r9, r11",
             "smlad r11, r6, r9, r11",
             "smlad r11, r7, r9, r11",
-            ".irp net, r3, r4, r5, r6, r7",
+            "ssub16 r10, r3, r8", // the row's largest
+            ".irp net, r4, r5, r6, r7",
             "ssub16 r0, \\net, r8",
             "uqsub16 r0, r0, r10",
             "add r10, r10, r0",
             ".endr",
+            "ldr r0, [sp, #44]", // that of all
+            "str r10, [r1, #{largest}]",
+            "uqsub16 r10, r10, r0",
+            "add r10, r10, r0",
             "str r10, [sp, #44]",
             "smmul r8, r11, r11", // the boost
             "smmul r9, r8, r8",
@@ -231,11 +261,11 @@ pub fn pass<const ROWS: usize>(
             "smmla r0, r0, r9, r0",
             "str r0, [r1, #{boost}]",
             "asr r0, r0, #{boost_drop}",
-            columns!("r3", "0", "smuad lr, r3, r8", "smuad r11, r3, r9"),
-            columns!("r4", "1", "smlad lr, r4, r8, lr", "smlad r11, r4, r9, r11"),
-            columns!("r5", "2", "smlad lr, r5, r8, lr", "smlad r11, r5, r9, r11"),
-            columns!("r6", "3", "smlad lr, r6, r8, lr", "smlad r11, r6, r9, r11"),
-            columns!("r7", "4", "smlad lr, r7, r8, lr", "smlad r11, r7, r9, r11"),
+            columns!("0", "r3"),
+            columns!("1", "r4", "r3"),
+            columns!("2", "r5", "r4"),
+            columns!("3", "r6", "r5"),
+            columns!("4", "r7", "r6"),
             "ldr r0, [sp, #28]",
             "ldr r3, [sp, #32]", // the totals
             "ldr r4, [sp, #36]",
@@ -260,6 +290,7 @@ pub fn pass<const ROWS: usize>(
             moments = const core::mem::offset_of!(Row, moments),
             tare = const core::mem::offset_of!(Row, tare),
             boost = const core::mem::offset_of!(Row, boost),
+            largest = const core::mem::offset_of!(Row, largest),
             tare_drop = const TARE_BITS - CODE_BITS,
             boost_drop = const BOOST_DROP,
             inout("r0") codes.as_ptr() => largest,
@@ -303,11 +334,11 @@ mod tests {
         let common = Common { undriven: [1, 2, 1 << 16, 0x0ffe_0ffe, 3], dead: 2 | 2 << 16, sag: 3 | 3 << 16 };
         let tare = [5 << 16, -(3 << 16), 0, 0, 7, 9 << 12, 0, 0, -1, 1 << 20];
         let (gains, moments) = ([2 << 14 | 1 << 30; PLACES], [0xffff, 3, 0, 0, 5]);
-        let mut rows = [Row { gains, moments, tare, boost: 0 }; 2];
+        let mut rows = [Row { gains, moments, tare, boost: 0, largest: 7 }; 2];
         let mut taxels = [[0; 10]; 2];
         let total = pass(&codes, &mut rows, &common, &mut taxels);
         let lanes = |pair: u32| [i64::from(pair as u16 as i16), i64::from((pair >> 16) as u16 as i16)];
-        let (mut first, mut second, mut running, mut peak, mut largest) = (0, 0, 0, 0, [0; 2]);
+        let (mut first, mut second, mut running, mut peak, mut all) = (0, 0, 0, 0, [0; 2]);
         for ((codes, row), taxels) in codes.iter().zip(&rows).zip(taxels) {
             let net = |column: usize| {
                 let [place, lane] = [column % PLACES, column / PLACES];
@@ -315,6 +346,7 @@ mod tests {
             };
             let by = |weights: [u32; 5], column: usize| lanes(weights[column % PLACES])[column / PLACES];
             assert_eq!(row.boost, boost((0..10).map(|column| 3 * net(column)).sum::<i64>() as i32));
+            let mut largest = [0; 2];
             for (column, taxel) in taxels.into_iter().enumerate() {
                 let exact = net(column) as f64 * by(gains, column) as f64 / 16_384.0 * f64::from(row.boost);
                 let exact = 16.0 * exact / f64::from(1 << BOOST_BITS) - f64::from(tare[column] >> 12);
@@ -323,6 +355,8 @@ mod tests {
                 let above = (net(column) - 2) as u16;
                 largest[column / PLACES] = above.max(largest[column / PLACES]);
             }
+            assert_eq!(row.largest, pair(largest[0] as i16, largest[1] as i16), "{:x}", row.largest);
+            all = [0, 1].map(|lane| largest[lane].max(all[lane]));
             let boosted =
                 |weights| ((0..10).map(|c| net(c) * by(weights, c)).sum::<i64>() * i64::from(row.boost)) >> 32;
             first += boosted(gains);
@@ -333,7 +367,7 @@ mod tests {
         assert_eq!(total.peak, peak);
         assert!(peak > 1_000, "there is one");
         // The second row's codes below their levels are huge.
-        assert_eq!(total.largest, pair(largest[0] as i16, largest[1] as i16), "{:x}", total.largest);
-        assert!(largest.into_iter().all(|largest| largest > 0xff00), "{largest:x?}");
+        assert_eq!(total.largest, pair(all[0] as i16, all[1] as i16), "{:x}", total.largest);
+        assert!(all.into_iter().all(|largest| largest > 0xff00), "{all:x?}");
     }
 }

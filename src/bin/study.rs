@@ -30,6 +30,8 @@ mod rings;
 mod root;
 #[path = "../study/scalar.rs"]
 mod scalar;
+#[path = "../study/sparse.rs"]
+mod sparse;
 #[path = "../study/step.rs"]
 mod step;
 

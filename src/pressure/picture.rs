@@ -1,5 +1,6 @@
 //! What a frame shows: taxels, sums and flags.
 
+use super::row::weight;
 use crate::config::Config;
 use crate::frame::{COLUMNS, ROWS};
 use crate::units::Newtons;
@@ -8,7 +9,7 @@ use fixed::types::I16F16;
 /// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated.
+    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated, and all zero where the array is broken.
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows, the array is broken,
     /// and bad ones may be in it.
@@ -43,6 +44,31 @@ impl Picture {
         bad_count: 0,
         undriven_max: 0,
     };
+
+    /// Takes bad taxels of a row, a bit each, out; the highest of them, at least 0.
+    pub(super) fn leave_out(&mut self, row: usize, bad: u16) -> i32 {
+        let Some(taxels) = self.taxels.get_mut(row) else { return 0 };
+        let (mut highest, mut left) = (0, u32::from(bad));
+        while left != 0 {
+            let column = (left.trailing_zeros() as usize).min(COLUMNS - 1);
+            left &= left - 1;
+            let taxel = core::mem::take(&mut taxels[column]);
+            self.sum = self.sum.wrapping_sub(taxel);
+            self.moment_x = self.moment_x.wrapping_sub(taxel.wrapping_mul(weight(column)));
+            self.moment_y = self.moment_y.wrapping_sub(taxel.wrapping_mul(weight(row)));
+            highest = highest.max(taxel);
+        }
+        highest
+    }
+
+    /// The highest taxel anew, where some were left out.
+    pub(super) fn find_peak(&mut self) {
+        let mut peak = 0;
+        for [a, b, c, d, e, f, g, h, i, j] in &self.taxels {
+            peak = peak.max(*a).max(*b).max(*c).max(*d).max(*e).max(*f).max(*g).max(*h).max(*i).max(*j);
+        }
+        self.peak = peak;
+    }
 
     /// The sum as a force: the taxels' area times their pressure, never below zero.
     pub fn force(&self, config: &Config) -> Newtons {

@@ -1,9 +1,8 @@
 //! What goes into the pass over a frame, and what is made of its totals.
 
-use super::suspect::Share;
 use super::{CODE_BITS, GAIN_BITS, each};
 use crate::config::Config;
-use crate::frame::{COLUMNS, ROWS, SATURATED};
+use crate::frame::{COLUMNS, SATURATED};
 use lanes::{BOOST_BITS, Common, Pairs, Total};
 
 /// Fractional bits of a row's moment.
@@ -72,16 +71,6 @@ pub(super) fn sixteenths(total: &Total) -> [i32; 3] {
         rounded(total.second, MOMENT_BITS - COARSER),
         rounded(moment_y, GAIN_BITS - COARSER - 2),
     ]
-}
-
-/// Takes taxels of a row, and their tares, out of a pass.
-pub(super) fn leave_out(total: &mut Total, row: usize, share: &Share, boost: i32) {
-    let Share { sums, tares } = share;
-    let first = (tares[0] << (GAIN_BITS - COARSER - CODE_BITS)).wrapping_sub(lanes::add_high(0, sums[0], boost));
-    let second = (tares[1] << (MOMENT_BITS - COARSER - CODE_BITS)).wrapping_sub(lanes::add_high(0, sums[1], boost));
-    total.first = total.first.wrapping_add(first);
-    total.second = total.second.wrapping_add(second);
-    total.running = total.running.wrapping_add((first >> 2).wrapping_mul((ROWS - row) as i32));
 }
 
 /// Twice a place's distance from the middle in pitches.

@@ -156,14 +156,14 @@ pub const STEPS: [Step; 20] = [
         let gains = [s.share_q32, third, first, fourth, second];
         let moments = [fourth, first, s.share_q32, second, third];
         let tare = core::array::from_fn(|column| s.words[column % 4].wrapping_mul(column as i32));
-        let mut rows = [Row { gains, moments, tare, boost: 0 }; 2];
+        let mut rows = [Row { gains, moments, tare, boost: 0, largest: 0 }; 2];
         let common = Common { undriven: gains, dead: fourth, sag: second & 0x7fff_7fff };
         let mut taxels = [[0; COLUMNS]; 2];
         let total = lanes::pass(&[pairs, moments], &mut rows, &common, &mut taxels);
         let Total { first, second, running, largest, peak } = total;
         [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
         taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
-        mix.add(largest);
+        [largest, rows[0].largest, rows[1].largest].into_iter().for_each(|number| mix.add(number));
     }),
     ("lanes::near_root", |_, s, mix| mix.add(lanes::near_root(s.share_q32 | 1 << 30))),
     ("lanes::root_and_product", |_, s, mix| {

@@ -3,6 +3,7 @@
 use super::call::pass_on;
 use super::inputs::Inputs;
 use super::packed;
+use super::sparse::{self, Sparse};
 use crate::host::{fail, say};
 use fingertip::config::Config;
 use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
@@ -52,6 +53,8 @@ pub struct Bench {
     pub out_single: Sums<f32>,
     /// In codes.
     pub out_double: Sums<f64>,
+    /// What the firmware had before.
+    pub sparse: Sparse,
     /// Whether a taxel is dead or saturated.
     pub suspect: bool,
 }
@@ -75,7 +78,7 @@ enum Format {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-const VARIANTS: [(&str, Kernel, Format); 9] = [
+const VARIANTS: [(&str, Kernel, Format); 12] = [
     ("packed, no gains, no sag", packed::plain, Format::Fixed(4)),
     ("packed, gains", packed::gains, Format::Fixed(4)),
     ("packed, gains, sag to first order", packed::first_order, Format::Fixed(4)),
@@ -84,6 +87,9 @@ const VARIANTS: [(&str, Kernel, Format); 9] = [
     ("f32", single, Format::Single),
     ("f64", double, Format::Double),
     ("I16F16 saturating, `fixed`", saturating, Format::Fixed(11)),
+    ("sums alone", sparse::sums, Format::Fixed(4)),
+    ("sums, taxels of two rows", sparse::two_rows, Format::Fixed(4)),
+    ("sums, taxels of all rows", sparse::all_rows, Format::Fixed(4)),
     ("**Array::read**", firmware, Format::Picture),
 ];
 
@@ -192,11 +198,14 @@ fn bench(config: &Config, inputs: &mut Inputs) -> Bench {
         }
         sums
     };
+    let gain = pairs(&|row, column| gains[row][column].into());
+    let weighted = pairs(&|row, column| (i32::from(gains[row][column]) * weight(column) + 4) >> 3);
     Bench {
         config: config.clone(),
         frame: quiet,
-        gain: pairs(&|row, column| gains[row][column].into()),
-        weighted: pairs(&|row, column| (i32::from(gains[row][column]) * weight(column) + 4) >> 3),
+        sparse: Sparse::new(&gain, &weighted, config),
+        gain,
+        weighted,
         tare_sums: sums(&|row, column| rounded(tare[row][column], 4_096.0)),
         plain_tare: sums(&|row, column| 16 * net(row, column)),
         single: Float {

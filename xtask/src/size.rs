@@ -10,9 +10,9 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, elf::SHF_ALLOC};
 use std::{collections::BTreeMap, fmt::Write as _, fs};
 
 /// Flash that the image may take.
-pub const FLASH_MAX_BYTES: u64 = 64 << 10;
+pub const FLASH_MAX_BYTES: u64 = 128 << 10;
 /// RAM that statics may take; the stack comes on top.
-pub const RAM_MAX_BYTES: u64 = 16 << 10;
+pub const RAM_MAX_BYTES: u64 = 32 << 10;
 /// Where the microcontroller's RAM begins.
 const RAM_BASE: u64 = 0x2000_0000;
 /// Lines of the table of crates.
@@ -149,7 +149,7 @@ mod tests {
         let sizes = |flash, ram| Sizes { flash, ram, stack: 0, sections: Vec::new(), crates: BTreeMap::new() };
         assert!(sizes(FLASH_MAX_BYTES, RAM_MAX_BYTES).check().is_ok());
         assert!(
-            sizes(FLASH_MAX_BYTES + 1, 0).check().unwrap_err().to_string().contains("flash: 65537 bytes are 1 more")
+            sizes(FLASH_MAX_BYTES + 1, 0).check().unwrap_err().to_string().contains("flash: 131073 bytes are 1 more")
         );
         assert!(sizes(0, RAM_MAX_BYTES + 1).check().unwrap_err().to_string().contains("static RAM"));
     }

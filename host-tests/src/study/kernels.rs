@@ -132,12 +132,14 @@ pub const KERNELS: &[Kernel] = &[
         text: "100 taxels: offset, gain, the driven row's sag, tare, then sum, moments, and whether a taxel is dead or saturated; \
             256 frames of a simulated array with gains of 0.8 to 1.2, indentations of 0.1 to 5 mm. The error is that of the arithmetic: force and \
             centre by the sums, against those by exact sums of the same codes and gains, less those of the frame without contact. All find \
-            a peak as well: `Array::read_all` and those that work taxel by taxel the largest taxel, `Array::read` and the packed ones the largest code.",
+            a peak as well: `Array::read` and those that work taxel by taxel the largest taxel, the packed ones and the sums alone the largest code. \
+            *Sums alone* is the pass that the firmware had before, which left single taxels to those frames that looked at them, *two rows* \
+            what most frames took, *all rows* every taxel by that way. What a frame pays for all taxels, always fresh, is the difference to `Array::read`.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Frames,
-        why: "`Array::read_all` works out every taxel as well: for the bus when it asks. The loop takes `Array::read` in each \
-            frame, and single taxels of one or two rows.",
+        why: "`Array::read` works out every taxel as well. A picture of which some rows are older than others cost less, but a contact \
+            whose rows nobody had looked at was never fitted: its force stayed the sum's.",
     },
     Kernel {
         name: "fit-clean",

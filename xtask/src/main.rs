@@ -116,7 +116,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Demo(args) => demo::run(args, toolchain, console),
         Command::Sim(args) => sim::sim(args, toolchain, console),
         Command::Sweep(args) => sim::sweep(args, console),
-        Command::Population(args) => sim::population(args, console),
+        Command::Population(args) => sim::population(args, toolchain, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
@@ -144,6 +144,8 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     browser::ensure(console)?;
     lint::ensure_deny(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
-    console.say("All set up: demo, sim, sweep, test, build, qemu, timing, size, lint and docs work offline now.");
+    console.say(
+        "All set up: demo, sim, sweep, population, test, build, qemu, timing, size, lint and docs work offline now.",
+    );
     Ok(())
 }

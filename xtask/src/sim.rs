@@ -21,12 +21,7 @@ pub struct Args {
 /// # Errors
 /// The board does not build. Where a scene breaks its bounds, this process ends as the board's does.
 pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    if !wants_image(&args.arguments) {
-        return start(host::Program::sim("sim").build(console)?.args(&args.arguments));
-    }
-    let image = image::firmware(choice, console)?;
-    let mut command = host::SCENE_BOARD.build(console)?;
-    start(command.arg("sim").arg("--image").arg(std::path::absolute(&image.elf)?).args(&args.arguments))
+    on_board("sim", args, choice, console)
 }
 
 /// Runs a sweep, on the native board.
@@ -41,8 +36,18 @@ pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
 ///
 /// # Errors
 /// As [`sim`].
-pub fn population(args: &Args, console: &mut Console) -> Result<()> {
-    start(host::Program::sim("population").build(console)?.args(&args.arguments))
+pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    on_board("population", args, choice, console)
+}
+
+/// Runs a program on this machine, or the same command of the board that runs the flash image.
+fn on_board(program: &'static str, args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    if !wants_image(&args.arguments) {
+        return start(host::Program::sim(program).build(console)?.args(&args.arguments));
+    }
+    let image = image::firmware(choice, console)?;
+    let mut command = host::SCENE_BOARD.build(console)?;
+    start(command.arg(program).arg("--image").arg(std::path::absolute(&image.elf)?).args(&args.arguments))
 }
 
 /// Whether a board is asked for that runs the flash image.

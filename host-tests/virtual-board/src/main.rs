@@ -25,6 +25,9 @@ enum Command {
     /// Runs a scene with the image.
     #[cfg(feature = "scenes")]
     Sim(commands::sim::Arguments),
+    /// Runs drawn fingers with the image.
+    #[cfg(feature = "scenes")]
+    Population(commands::population::Arguments),
 }
 
 fn main() -> ExitCode {
@@ -35,6 +38,8 @@ fn main() -> ExitCode {
         Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),
         #[cfg(feature = "scenes")]
         Command::Sim(arguments) => return commands::sim::run(&arguments),
+        #[cfg(feature = "scenes")]
+        Command::Population(arguments) => return commands::population::run(&arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,6 +1,8 @@
 //! The commands, one module each.
 
 pub mod demo;
+#[cfg(feature = "scenes")]
+pub mod population;
 #[cfg(feature = "log")]
 pub mod run;
 pub mod serve;

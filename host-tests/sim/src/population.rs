@@ -7,13 +7,17 @@ pub mod cli;
 mod draw;
 mod expression;
 mod file;
+mod parts;
 mod read;
 pub mod report;
+pub mod run;
+mod spread;
 mod text;
-mod worst;
+pub mod worst;
 
 pub use draw::Drawn;
-pub use file::{folder, load, read};
+pub use file::{folder, load};
+pub use parts::read;
 pub use report::Report;
 
 use crate::effects::stream;
@@ -21,7 +25,7 @@ use crate::metrics;
 use crate::scene::{self, Scene, SceneErrors};
 use draw::Draw;
 use fastrand::Rng;
-use file::{Place, written};
+use std::ops::Range;
 
 /// A population.
 #[derive(Clone, Debug)]
@@ -38,6 +42,19 @@ pub struct Population {
     places: Vec<Place>,
     /// What is counted beside the envelope.
     pub counted: Vec<Counted>,
+}
+
+/// A place in the text, and what stands there in a finger's scene: a drawn value, or nothing.
+#[derive(Clone, Debug)]
+struct Place {
+    /// In the population's text.
+    at: Range<usize>,
+    /// `table.key`.
+    key: String,
+    /// Whether it takes whole numbers only.
+    whole: bool,
+    /// How it is drawn; none where the scene has nothing.
+    draw: Option<Draw>,
 }
 
 /// Fingers whose metric is above something are counted.
@@ -95,5 +112,14 @@ impl Population {
         scene.seed = stream(seed, "seed", number) >> 1;
         scene.name = format!("finger-{}", number + 1);
         Ok(Finger { drawn, scene })
+    }
+}
+
+/// A value as a scene's text has it.
+fn written(value: &Drawn, whole: bool) -> String {
+    match value {
+        Drawn::Number(number) if whole => format!("{number:.0}"),
+        Drawn::Number(number) => format!("{number:?}"),
+        Drawn::Word(word) => toml_edit::Value::from(word.as_str()).to_string(),
     }
 }

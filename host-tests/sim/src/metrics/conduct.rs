@@ -153,14 +153,23 @@ impl Conduct {
 
     /// Judges the goal that is over.
     fn end(&mut self) {
-        self.ended = self.ended();
+        let mut ended = core::mem::take(&mut self.ended);
+        self.judge(&mut ended);
+        self.ended = ended;
     }
 
     /// All goals, the one under way included.
     pub(super) fn ended(&self) -> Ended {
         let mut ended = self.ended.clone();
-        let Some(last) = self.last.back().filter(|last| last.time_s >= self.since_s + JUDGED_S) else { return ended };
-        debug_assert!(last.time_s - self.last[0].time_s <= LAST_S + 1e-9);
+        self.judge(&mut ended);
+        ended
+    }
+
+    /// Adds the goal under way, where it had its time.
+    fn judge(&self, ended: &mut Ended) {
+        if self.last.back().is_none_or(|last| last.time_s < self.since_s + JUDGED_S) {
+            return;
+        }
         let worse = |known: Option<f64>, value: f64| Some(known.map_or(value, |known| known.max(value)));
         let [force_n, travel_mm, duty] = [|s: &Sample| s.force_n, |s: &Sample| s.travel_mm, |s: &Sample| s.duty]
             .map(|of| Spread::of(self.last.iter().map(of)));
@@ -176,7 +185,6 @@ impl Conduct {
         } else {
             ended.rest_mm = worse(ended.rest_mm, travel_mm.width);
         }
-        ended
     }
 
     /// Largest true force beyond each goal, where no lesser goal has a larger one.

@@ -1,11 +1,11 @@
 //! The command line of `population`, the same for both boards.
 
-use super::report::Ran;
+use super::run;
 use super::text::text;
-use super::{Population, Report, load, worst};
+use super::{Report, load, worst};
 use crate::cli::verdict;
-use crate::run::{Run, RunError, run};
-use crate::sweep::{Shard, cores, progress};
+use crate::run::{Run, RunError};
+use crate::sweep::Shard;
 use clap::{Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,8 +31,8 @@ pub struct Args {
     #[arg(required = true)]
     population: Option<String>,
     /// How many fingers the whole has
-    #[arg(long, value_name = "N", default_value_t = 100)]
-    fingers: usize,
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    fingers: u32,
     /// Of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
@@ -95,8 +95,8 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
         Board::Native => "native",
         Board::Virtual => "virtual",
     };
-    let fingers = draw_and_run(&population, args, shard, board)?;
-    let report = Report::new(&population, board_name, args.seed, args.fingers, fingers);
+    let fingers = run::fingers(&population, args.seed, args.fingers as usize, shard, board)?;
+    let report = Report::new(&population, board_name, args.seed, args.fingers as usize, fingers);
     print!("{}", text(&report));
     if let Some(path) = &args.json {
         report.write(path)?;
@@ -108,24 +108,4 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     }
     println!("{} fingers in {:.1} s", report.fingers.len(), started.elapsed().as_secs_f64());
     Ok(report.inside() == report.fingers.len())
-}
-
-fn draw_and_run(population: &Population, args: &Args, shard: Shard, board: Run) -> Result<Vec<Ran>, RunError> {
-    let numbers: Vec<usize> = (0..args.fingers).filter(|number| shard.has(*number)).collect();
-    let progress = progress(numbers.len(), "fingers")?;
-    let work = |number: &usize| {
-        let told =
-            |error: RunError| format!("{}: finger {} of seed {}: {error}", population.file, number + 1, args.seed);
-        let finger = population.finger(args.seed, *number).map_err(|errors| told(errors.into()))?;
-        let outcome = run(&finger.scene, board, &mut []).map_err(told)?;
-        Ok(Ran::new(*number, &finger, &outcome))
-    };
-    let mut fingers = Vec::new();
-    cores::each(&numbers, work, |_, ran| {
-        progress.inc(1);
-        fingers.push(ran);
-        Ok(())
-    })?;
-    progress.finish_and_clear();
-    Ok(fingers)
 }

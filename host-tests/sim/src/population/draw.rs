@@ -76,11 +76,34 @@ impl Draw {
         }
     }
 
+    /// What it may come to in the end: the values that are always the same, and the ways that draw a number.
+    pub fn ends(&self) -> Vec<&Self> {
+        match self {
+            Self::Choice(choices) => choices.iter().flat_map(|(_, draw)| draw.ends()).collect(),
+            Self::By(_, cases, otherwise) => {
+                cases.iter().map(|(_, draw)| draw).chain(otherwise.as_deref()).flat_map(Self::ends).collect()
+            }
+            Self::Times(_, draw) => draw.ends(),
+            end => vec![end],
+        }
+    }
+
     /// The words that it may draw.
     pub fn words(&self) -> Vec<&str> {
+        let word = |end| if let &Self::Always(Drawn::Word(ref word)) = end { Some(word.as_str()) } else { None };
+        self.ends().into_iter().filter_map(word).collect()
+    }
+
+    /// The variables that it asks for.
+    pub fn uses(&self) -> Vec<&str> {
         match self {
-            Self::Always(Drawn::Word(word)) => vec![word],
-            Self::Choice(choices) => choices.iter().flat_map(|(_, draw)| draw.words()).collect(),
+            Self::Choice(choices) => choices.iter().flat_map(|(_, draw)| draw.uses()).collect(),
+            Self::By(name, cases, otherwise) => {
+                let draws = cases.iter().map(|(_, draw)| draw).chain(otherwise.as_deref());
+                core::iter::once(name.as_str()).chain(draws.flat_map(Self::uses)).collect()
+            }
+            Self::Times(_, draw) => draw.uses(),
+            Self::Is(expression) => expression.variables(),
             _ => Vec::new(),
         }
     }

@@ -58,8 +58,13 @@ impl DrawReader<'_> {
         if let Some((name, value)) = table.iter().find(|(name, _)| !known(name)) {
             return Err(wrong(value, &format!("`{name}` does not go with `{way}`"), EXAMPLES));
         }
+        let words = draw.words().len();
+        if words > 0 && words < draw.ends().len() {
+            return Err(wrong(value, "a draw is of words or of numbers", "all of them words, or none"));
+        }
         Ok(match table.get("follows").map(|value| (value, value.as_str())) {
             None => draw,
+            Some((value, _)) if words > 0 => return Err(wrong(value, "words follow nothing", "no `follows`")),
             Some((_, Some("magnitude"))) => Draw::Times(self.magnitude, Box::new(draw)),
             Some((_, Some("1 / magnitude"))) => Draw::Times(1.0 / self.magnitude, Box::new(draw)),
             Some((value, _)) => {
@@ -125,13 +130,20 @@ impl DrawReader<'_> {
         let allowed = "+ - * / and ( ) with numbers and variables of [draw], such as \"1000 * modulus_kpa\"";
         let text = value.as_str().ok_or_else(|| wrong(value, "an expression is a text", allowed))?;
         let expression = Expression::read(text).map_err(|error| wrong(value, &error, allowed))?;
-        expression.variables().into_iter().try_for_each(|name| self.known(name, value).map(|_| ()))?;
+        for name in expression.variables() {
+            if !self.known(name, value)?.words().is_empty() {
+                return Err(wrong(value, &format!("`{name}` is a word, and cannot be reckoned with"), allowed));
+            }
+        }
         Ok(expression)
     }
 
     fn by(&self, table: &InlineTable, value: &Value) -> Result<Draw, Wrong> {
         let name = value.as_str().ok_or_else(|| wrong(value, "`by` names a variable", EXAMPLES))?;
         let words = self.known(name, value)?.words();
+        if words.is_empty() {
+            return Err(wrong(value, &format!("`{name}` is a number"), "a variable that is a choice of words"));
+        }
         let (mut cases, mut otherwise) = (Vec::new(), None);
         for (case, value) in table.iter().filter(|(case, _)| !["by", "follows"].contains(case)) {
             let draw = self.draw(value)?;

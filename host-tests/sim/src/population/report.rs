@@ -1,5 +1,6 @@
 //! What became of a population: every finger's draws and verdicts, and what they come to.
 
+use super::spread::Spread;
 use super::{Drawn, Finger, Population};
 use crate::run::{Outcome, RunError};
 use serde::{Deserialize, Serialize};
@@ -74,6 +75,8 @@ pub struct Held {
     pub goal_n: f64,
     /// Mean of the true force at the end.
     pub mean_n: f64,
+    /// Whether nothing was touched.
+    pub missed: bool,
     /// Whether a fault had stopped the motor.
     pub faulty: bool,
 }
@@ -107,7 +110,12 @@ impl Ran {
             held: verdict.held,
         });
         let holds = outcome.holds.iter();
-        let holds = holds.map(|hold| Held { goal_n: hold.goal_n, mean_n: hold.mean_n, faulty: hold.faulty });
+        let holds = holds.map(|hold| Held {
+            goal_n: hold.goal_n,
+            mean_n: hold.mean_n,
+            missed: hold.missed,
+            faulty: hold.faulty,
+        });
         Self {
             finger: number + 1,
             seed: finger.scene.seed,
@@ -170,14 +178,15 @@ impl Report {
             let text = fs::read_to_string(file).map_err(|error| format!("cannot read {name}: {error}"))?;
             let shard: Self =
                 serde_json::from_str(&text).map_err(|error| format!("{name} is no population's JSON: {error}"))?;
-            for finger in &shard.fingers {
-                if fingers.insert(finger.finger, finger.clone()).is_some() {
-                    return Err(format!("finger {} is there twice: in {name} again", finger.finger).into());
-                }
-            }
-            let known = whole.get_or_insert(shard.clone());
+            let known = whole.get_or_insert_with(|| shard.clone());
             if known.id != shard.id {
                 return Err(format!("{name} is of the population {} and not of {}", shard.id, known.id).into());
+            }
+            for finger in shard.fingers {
+                let number = finger.finger;
+                if fingers.insert(number, finger).is_some() {
+                    return Err(format!("finger {number} is there twice: in {name} again").into());
+                }
             }
         }
         let mut whole = whole.ok_or("there are no files to put together")?;
@@ -238,9 +247,9 @@ impl Report {
         names.into_iter().enumerate().map(row).collect()
     }
 
-    /// What the true force is off the goal in holds, in percent of it and in mN.
+    /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no fault came before.
     pub fn errors(&self) -> [Spread; 2] {
-        let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty);
+        let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty && !hold.missed);
         let off_n = |hold: &Held| (hold.mean_n - hold.goal_n).abs();
         let percent = holds().map(|hold| 100.0 * off_n(hold) / hold.goal_n).collect();
         [Spread::of(percent), Spread::of(holds().map(|hold| 1e3 * off_n(hold)).collect())]
@@ -280,31 +289,5 @@ impl Row {
         row.insert("metric".into(), json!(self.metric));
         row.insert("broken".into(), json!(self.broken));
         Value::Object(row)
-    }
-}
-
-/// How values are spread.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// How many.
-    pub count: usize,
-    /// Half of them are below this.
-    pub median: Option<f64>,
-    /// 95 % of them are at or below this.
-    pub most: Option<f64>,
-    /// The largest.
-    pub worst: Option<f64>,
-}
-
-impl Spread {
-    /// Of values in any order.
-    pub fn of(mut values: Vec<f64>) -> Self {
-        values.sort_by(f64::total_cmp);
-        let rank = |share: f64| values.get(((values.len() as f64 * share).ceil() as usize).max(1) - 1).copied();
-        Self { count: values.len(), median: rank(0.5), most: rank(0.95), worst: values.last().copied() }
-    }
-
-    fn json(&self) -> Value {
-        json!({ "count": self.count, "median": self.median, "percentile_95": self.most, "worst": self.worst })
     }
 }

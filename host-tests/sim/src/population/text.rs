@@ -1,6 +1,7 @@
 //! A population's report for people.
 
-use super::report::{Promise, Ran, Report, Spread};
+use super::report::{Promise, Ran, Report};
+use super::spread::Spread;
 use crate::metrics::shown;
 use std::fmt::Write as _;
 
@@ -31,7 +32,7 @@ pub fn text(report: &Report) -> String {
         let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers as usize));
     }
     let [of_goal, mn] = report.errors();
-    let _ = writeln!(text, "\n  true force off the goal, {} holds: median, 95 %, worst", of_goal.count);
+    let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);
     for (spread, unit) in [(of_goal, "% of the goal"), (mn, "mN")] {
         let _ = writeln!(text, "  {} {unit}", values(&spread).join(", "));
     }

@@ -13,7 +13,8 @@ use std::collections::BTreeSet;
 
 #[test]
 fn every_metric_has_a_name_with_a_unit_and_stands_once() {
-    let units = ["n", "mn", "ms", "mm", "mm_per_s", "percent", "count", "number", "j", "a", "c", "dropped", "broken"];
+    let units =
+        ["n", "mn", "ms", "mm", "mm_per_s", "percent", "count", "um", "number", "j", "a", "c", "dropped", "broken"];
     let names = metrics::names();
     assert_eq!(names.len(), 3 * METRICS.len());
     assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());

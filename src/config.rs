@@ -20,7 +20,7 @@ const CALM_COUNTS: f32 = 3.0;
 /// at most 2 mm, of which the pace's arithmetic holds 32 (Q24).
 const CALM_MAX: i32 = 2 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
-const CALM_TIME_CONSTANTS: f32 = 2.0;
+const CALM_TIME_CONSTANTS: f32 = 4.0;
 
 /// Time over which the guard compares motor and encoder, s,
 const GUARD_S: f32 = 0.005;

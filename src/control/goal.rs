@@ -14,8 +14,8 @@ use fixed::types::I8F24;
 /// How much farther than twice the indentation a tip may have gone into what it touches and still go at full speed: 0.3 mm.
 const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
 
-/// How much the indentation may be off at rest, where the encoder is coarser than that: 1 um.
-const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 1_000);
+/// How much the indentation may be off at rest, where the encoder is coarser than that: 0.4 um.
+const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
 
 /// Where the surface is, and where a released tip is to stand.
 #[derive(Clone, Copy, Debug, Default)]

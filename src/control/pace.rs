@@ -2,7 +2,7 @@
 //!
 //! Rest and speed want different bandwidths. The calmest pace is for ways within twice a band that counts and noise explain, each
 //! quicker one for ways twice as long. Where the way's mean is longer, the loop is quicker at once; where it was half as long for
-//! two of the loop's own time constants, it is calmer. A loop that swings therefore slows down, however it came to
+//! four of the loop's own time constants, it is calmer. A loop that swings therefore slows down, however it came to
 //! swing. Only gains change, never what the observer and the drive hold, so a change of pace moves nothing.
 
 use super::gains::{Gains, PACES};

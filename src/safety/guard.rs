@@ -30,8 +30,6 @@ const OTHER_NS: u32 = 500_000;
 const BEYOND: i32 = 1 << 24;
 /// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
 const LOOSE_NS: u32 = 20_000_000;
-/// How far ahead the guard looks to an end: 5 ms, from Q16 mm/s to Q24 mm.
-const AHEAD_Q8: i32 = 256 * 5 / 1_000;
 /// How much farther than twice the indentation a tip may have gone and still count as pressed: 0.5 mm, Q24.
 const YIELDING: i32 = 1 << 23;
 /// The force's mean follows it by 1/16 in each frame.
@@ -102,7 +100,8 @@ impl Guard {
         let [fast_forward, fast_back] = [self.speed > limit, self.speed < -limit];
         self.fast_ns = if fast_forward || fast_back { self.fast_ns.saturating_add(frame_ns) } else { 0 };
         let end = config.travel_max.to_bits();
-        let soon = self.travel.saturating_add(saturated(i64::from(self.speed) * i64::from(AHEAD_Q8)));
+        // In 1/256 s: Q16 mm/s are as many Q24 mm.
+        let soon = self.travel.saturating_add(self.speed);
         self.may = May {
             forward: self.travel.max(soon) <= end && !fast_forward,
             back: self.travel.min(soon) >= self.floor && !fast_back,

@@ -236,7 +236,9 @@ impl Config {
                 .cast_unsigned(),
             counts_max: ((i64::from(i32::MAX) << 16) / mm_per_count_q40.max(1)).min(i32::MAX.into()) as i32,
             paces,
-            calm_band: Millimetres(I8F24::from_bits(narrow((CALM_MM + CALM_COUNTS * mm_per_count) * exp2(24)).min(CALM_MAX))),
+            calm_band: Millimetres(I8F24::from_bits(
+                narrow((CALM_MM + CALM_COUNTS * mm_per_count) * exp2(24)).min(CALM_MAX),
+            )),
             calm_frames: (CALM_TIME_CONSTANTS / (paces[0].slope_per_s as f32 * frame_s)) as u32,
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,

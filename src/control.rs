@@ -74,9 +74,10 @@ impl SpeedLoop {
         let behind = held(reference.speed.to_bits().saturating_sub(speed), 30);
         // c v, the acceleration that the back-EMF takes away.
         let back_emf = high(speed << 3, config.damping_q17_per_s);
-        let wanted =
-            high(behind << 2, self.pace.gains(config).speed_q18_per_s) + (reference.acceleration.to_bits() >> 4) + back_emf
-                - (self.observer.disturbance.to_bits() >> 4);
+        let wanted = high(behind << 2, self.pace.gains(config).speed_q18_per_s)
+            + (reference.acceleration.to_bits() >> 4)
+            + back_emf
+            - (self.observer.disturbance.to_bits() >> 4);
         let [wanted, back_emf] = [held(wanted, 28) << 4, held(back_emf, 28) << 4];
         self.drive.apply(wanted, back_emf, supply_mv, config, limits);
     }

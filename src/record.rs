@@ -121,7 +121,8 @@ impl Digest {
             tare,
             taken,
         } = *status;
-        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
+        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } =
+            contact;
         for word in [sequence, missed_frames, peak_pa] {
             self.0.update(&word.to_le_bytes());
         }

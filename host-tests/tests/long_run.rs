@@ -51,7 +51,8 @@ fn the_observer_recovers_from_anything() {
             }
             let encoder = rng.i32(-50_000..50_000);
             let (_, rest) =
-                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config.paces[0], &config)).expect("a cycle");
+                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config.paces[0], &config))
+                    .expect("a cycle");
             let measured = rest.measured(encoder, &config).to_bits();
             assert!((rest.travel.to_bits() - measured).abs() <= 1, "{rest:?} at {measured}");
             assert!(rest.speed.to_bits().abs() <= 131 && rest.disturbance.to_bits().abs() <= 1_024, "{rest:?}");

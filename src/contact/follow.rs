@@ -236,13 +236,15 @@ impl Fit {
             self.settle(1 << RATIO_BITS, None);
             return;
         }
-        self.astray = if self.confidence > 0 { 0 } else { self.astray + 1 };
-        if self.equations.misfit.taxels < TAXELS_MIN {
-            return self.forget();
-        }
-        if self.astray > ASTRAY_MAX {
-            // Another start may find it.
-            (self.next, self.astray) = (None, 0);
+        let few = self.equations.misfit.taxels < TAXELS_MIN;
+        self.astray = if self.confidence > 0 && !few { 0 } else { self.astray + 1 };
+        if few || self.astray > ASTRAY_MAX {
+            // Another start may find it. What was found before is kept meanwhile: the force must not jump.
+            self.next = None;
+            if self.astray > ASTRAY_MAX {
+                self.astray = 0;
+                self.fitted = self.fitted.filter(|_| !few);
+            }
             return;
         }
         let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);

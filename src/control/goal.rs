@@ -11,7 +11,11 @@ use crate::safety::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
 
-/// How much farther than twice the indentation a tip may have gone into what it touches and still go at full speed: 0.3 mm.
+/// How many times its indentation a tip may have gone into what it touches and still go at full speed: what yields goes along.
+const DEEPER: i32 = 2;
+/// The same on the way back: a force that is too high must not wait.
+const DEEPER_BACK: i32 = 5;
+/// How much farther than that, where there is hardly any indentation: 0.3 mm.
 const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
 
 /// How much the indentation may be off at rest, where the encoder is coarser than that: 0.4 um.
@@ -50,10 +54,11 @@ impl Goal {
         let (way, quick, slack) = if mode == Mode::Release {
             let way = Millimetres(self.rest.0.saturating_sub(travel.0));
             let pressed = travel.0 > self.rest.0.saturating_add(config.clearance.0);
-            (way, pressed && self.confirmed(contact, travel, config), config.count)
+            (way, pressed && self.confirmed(DEEPER_BACK, contact, travel, config), config.count)
         } else {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
-            let quick = mode == Mode::Force && self.confirmed(contact, travel, config);
+            let deeper = if way < Millimetres::ZERO { DEEPER_BACK } else { DEEPER };
+            let quick = mode == Mode::Force && self.confirmed(deeper, contact, travel, config);
             (within_travel(way, motion, config, limits), quick, config.count.min(FORCE_SLACK))
         };
         let limit = if quick { config.speed_max } else { config.approach };
@@ -76,7 +81,8 @@ impl Goal {
             self.surface = Some(Millimetres(travel.0.saturating_sub(contact.indentation.0)));
         }
         if mode == Mode::Release {
-            let clear = self.surface.map_or(travel, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
+            let clear =
+                self.surface.map_or(travel, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
             self.rest = clear.min(travel);
         }
     }
@@ -103,7 +109,9 @@ impl Goal {
             return wanted;
         }
         let mut sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
-        if contact.doubt > 0 && let Some(surface) = self.surface {
+        if contact.doubt > 0
+            && let Some(surface) = self.surface
+        {
             let deeper = motion.observer.travel.0.saturating_sub(surface.0).saturating_sub(sensed).max(I8F24::ZERO);
             if contact.doubt > u8::MAX / 2 {
                 limits.set(Limits::FROM_BELOW);
@@ -114,9 +122,9 @@ impl Goal {
         Millimetres(wanted.0.saturating_sub(sensed))
     }
 
-    /// Whether the array bears out how far the tip went into what it touches.
-    fn confirmed(&self, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
-        let deep = contact.indentation.0.saturating_mul_int(2).saturating_add(YIELDING.0);
+    /// Whether the array bears out how far the tip went into what it touches: no more than so many indentations.
+    fn confirmed(&self, deeper: i32, contact: &Contact, travel: Millimetres, config: &Config) -> bool {
+        let deep = contact.indentation.0.saturating_mul_int(deeper).saturating_add(YIELDING.0);
         contact.force >= config.contact_off
             && self.surface.is_some_and(|surface| travel.0.saturating_sub(surface.0) <= deep)
     }

@@ -26,12 +26,7 @@ pub struct Reference {
 impl Reference {
     /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`: up to 1000 m/s^2.
     #[inline(always)]
-    pub fn towards(
-        way: Millimetres,
-        speed: MillimetresPerSecond,
-        brake: MillimetresPerSecond2,
-        gains: &Gains,
-    ) -> Self {
+    pub fn towards(way: Millimetres, speed: MillimetresPerSecond, brake: MillimetresPerSecond2, gains: &Gains) -> Self {
         let (way_bits, speed_bits) = (way.to_bits(), speed.to_bits());
         let brake_bits = brake.to_bits().max(1);
         let slope = gains.slope_per_s;

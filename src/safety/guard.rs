@@ -30,8 +30,11 @@ const OTHER_NS: u32 = 500_000;
 const BEYOND: i32 = 1 << 24;
 /// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
 const LOOSE_NS: u32 = 20_000_000;
-/// How much farther than twice the indentation a tip may have gone and still count as pressed: 0.5 mm, Q24.
+/// How much farther than some indentations a tip may have gone and still count as pressed: 0.5 mm, Q24.
 const YIELDING: i32 = 1 << 23;
+/// So many on the way forward, and on the way back: what yields goes along with the tip.
+const DEEPER: i32 = 2;
+const DEEPER_BACK: i32 = 5;
 /// The force's mean follows it by 1/16 in each frame.
 const FORCE_BITS: u32 = 4;
 
@@ -67,8 +70,8 @@ pub struct Guard {
     /// What the model expects the speed to have changed by, and that as late as the encoder tells it.
     change: i32,
     late_change: i32,
-    /// Since the tip was last surely pressed.
-    loose_ns: u32,
+    /// Since the tip was last surely pressed, for the way forward and for the way back.
+    loose_ns: [u32; 2],
     /// For how long it has been too fast.
     fast_ns: u32,
     /// For how long the two ways have told another story.
@@ -95,9 +98,12 @@ impl Guard {
         self.measure(seen, config);
         self.touch(seen.pressing, config);
         let frame_ns = config.timing.frame_ns();
-        self.loose_ns = if self.pressed(config) { 0 } else { self.loose_ns.saturating_add(frame_ns) };
-        let limit = if self.loose_ns > LOOSE_NS { config.speed_loose } else { config.speed_any }.to_bits();
-        let [fast_forward, fast_back] = [self.speed > limit, self.speed < -limit];
+        let pressed = [self.pressed(DEEPER, config), self.pressed(DEEPER_BACK, config)];
+        for (loose_ns, pressed) in self.loose_ns.iter_mut().zip(pressed) {
+            *loose_ns = if pressed { 0 } else { loose_ns.saturating_add(frame_ns) };
+        }
+        let limit = |loose_ns| if loose_ns > LOOSE_NS { config.speed_loose } else { config.speed_any }.to_bits();
+        let [fast_forward, fast_back] = [self.speed > limit(self.loose_ns[0]), self.speed < -limit(self.loose_ns[1])];
         self.fast_ns = if fast_forward || fast_back { self.fast_ns.saturating_add(frame_ns) } else { 0 };
         let end = config.travel_max.to_bits();
         // In 1/256 s: Q16 mm/s are as many Q24 mm.
@@ -123,13 +129,18 @@ impl Guard {
         Duty::ZERO
     }
 
+    /// Whether the tip presses on something, as far as array and travel tell.
+    pub fn presses(&self, config: &Config) -> bool {
+        self.pressed(DEEPER_BACK, config)
+    }
+
     /// Whether the array and the travel agree that something is pressed: the deeper the tip went, the more force.
-    pub fn pressed(&self, config: &Config) -> bool {
+    fn pressed(&self, deeper: i32, config: &Config) -> bool {
         let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
         self.touching
             && self.surface.is_some_and(|surface| {
                 let deep = self.travel.saturating_sub(surface);
-                deep >= -YIELDING && deep <= (2 * depth).saturating_add(YIELDING)
+                deep >= -YIELDING && deep <= depth.saturating_mul(deeper).saturating_add(YIELDING)
             })
     }
 

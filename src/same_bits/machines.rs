@@ -242,7 +242,12 @@ pub const STEPS: [Step; 20] = [
 fn towards(machines: &Machines, sample: &Sample) -> Reference {
     let [way, speed, brake, _] = sample.words;
     let brake = MillimetresPerSecond2::from_bits(brake.max(0).min(BRAKE_MAX));
-    Reference::towards(Millimetres::from_bits(way), MillimetresPerSecond::from_bits(speed), brake, machines.motion.pace.gains(&machines.config))
+    Reference::towards(
+        Millimetres::from_bits(way),
+        MillimetresPerSecond::from_bits(speed),
+        brake,
+        machines.motion.pace.gains(&machines.config),
+    )
 }
 
 fn add_reference(mix: &mut Mix, reference: Reference) {

@@ -154,9 +154,18 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for speed in [speed_max, approach, speed_loose, speed_any] {
         mix.add(speed.to_bits());
     }
-    for number in
-        [damping_q17_per_s, voltage_limit, current_limit, slew_limit, frames_per_s, supply_weak_mv, guard_leak, acceleration_per_n, change_per_n, change_least]
-    {
+    for number in [
+        damping_q17_per_s,
+        voltage_limit,
+        current_limit,
+        slew_limit,
+        frames_per_s,
+        supply_weak_mv,
+        guard_leak,
+        acceleration_per_n,
+        change_per_n,
+        change_least,
+    ] {
         mix.add(*number);
     }
     for number in [brake_least, brake_usual, brake_most] {

@@ -97,10 +97,15 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
             inputs: 2,
             step: Box::new(move |observer: &mut Observer| {
                 let gains = &config.paces[pace];
-                pair.iter().for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
+                pair.iter()
+                    .for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
             outputs: vec![
-                ("travel", |observer| observer.travel.to_bits().into(), if pace == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING }),
+                (
+                    "travel",
+                    |observer| observer.travel.to_bits().into(),
+                    if pace == 0 { TRAVEL_SWING } else { CALM_TRAVEL_SWING },
+                ),
                 ("speed", |observer| observer.speed.to_bits().into(), SPEED_SWING),
                 ("disturbance", |observer| observer.disturbance.to_bits().into(), DISTURBANCE_SWING),
             ],

@@ -6,9 +6,9 @@
 //! | 1 tare | outputs low | enough frames are averaged: off |
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
-//! | 4 release | backs off to the set clearance, then holds there | goal > 0: approach |
+//! | 4 release | backs off to the set clearance behind the surface that it touched, then holds there | goal > 0: approach |
 //! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force | done or refused: approach (goal > 0), release (goal = 0) |
-//! | 5 fault | outputs low, motor coasts | the fault is cleared with torque off: off |
+//! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
 //! Identify, which measures Young's modulus, is asked for in approach, force or release.
 //!

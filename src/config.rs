@@ -1,6 +1,6 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This and `control/gains.rs`, which it calls, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
+//! This, `control/gains.rs` and `safety/bounds.rs`, which it calls, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
 use crate::contact::Geometry;
@@ -9,6 +9,7 @@ use crate::control::gains::{self, Gains, PACES};
 use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
+use crate::safety::bounds::{Bounds, Drives};
 use crate::scan::{ScanError, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::{I8F24, I16F16};
@@ -21,14 +22,6 @@ const CALM_COUNTS: f32 = 3.0;
 const CALM_MAX: i32 = 2 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 4.0;
-
-/// Time over which the guard compares motor and encoder, s,
-const GUARD_S: f32 = 0.005;
-/// for an encoder whose counts are no farther apart than this, mm; the others need longer, up to so many times.
-const GUARD_COUNT_MM: f32 = 0.008;
-const GUARD_LONGER: f32 = 8.0;
-/// It must expect a quarter of what the largest voltage does in that time, or this, mm/s; and what four counts may be wrong by.
-const GUARD_CHANGE: f32 = 40.0;
 
 /// Share of the converter's range up to saturation that a peak may use,
 const SEEN: f32 = 0.95;
@@ -135,22 +128,8 @@ pub struct Config {
     pub travel_max: Millimetres,
     /// See [`Params::clearance_um`].
     pub clearance: Millimetres,
-    /// How far behind where torque was enabled the tip may go: from the largest force to the clearance, and 1 mm.
-    pub travel_back: Millimetres,
-    /// For the guard: 1.5 times the approach speed, and 1.5 times the largest.
-    pub speed_loose: MillimetresPerSecond,
-    /// See [`Config::speed_loose`].
-    pub speed_any: MillimetresPerSecond,
-    /// Frames in a second.
-    pub frames_per_s: i32,
-    /// A frame's share of the guard's tau, Q16: at most an eighth.
-    pub guard_leak: i32,
-    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over the guard's tau, Q16 mm/s.
-    pub acceleration_per_n: i32,
-    /// See [`Config::acceleration_per_n`].
-    pub change_per_n: i32,
-    /// The change of speed that the guard must expect before it counts, Q16 mm/s.
-    pub change_least: i32,
+    /// What the guard goes by.
+    pub bounds: Bounds,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
@@ -200,11 +179,8 @@ impl Config {
         let mass = inertia * travel_rad_per_m * travel_rad_per_m;
         let turn_rad = 2.0 * core::f32::consts::PI;
         let mm_per_count = turn_rad * 1e3 / (p.encoder_counts_per_turn as f32 * travel_rad_per_m);
-        let guard_s = GUARD_S * (mm_per_count / GUARD_COUNT_MM).max(1.0).min(GUARD_LONGER);
-        let driven = 0.25 * g * p.voltage_max_mv as f32 * 1e-3 * guard_s;
-        let change_least = driven.min(GUARD_CHANGE) + 16.0 * mm_per_count / guard_s;
-        let deepest = tip.indentation(newtons(p.force_max_mn));
-        let travel_back = Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0));
+        let bounds =
+            Bounds::new(p, &tip, &Drives { frame_s, mm_per_count, mass, driven: g * p.voltage_max_mv as f32 * 1e-3 });
 
         let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
@@ -253,14 +229,7 @@ impl Config {
             approach: speed(p.approach_um_per_s),
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
-            travel_back,
-            speed_loose: speed(p.approach_um_per_s + p.approach_um_per_s / 2),
-            speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
-            frames_per_s: (1.0 / frame_s) as i32,
-            guard_leak: narrow((frame_s / guard_s).min(0.125) * exp2(16)),
-            acceleration_per_n: narrow(1e3 / mass * exp2(8)),
-            change_per_n: narrow(1e3 / mass * guard_s * exp2(16)),
-            change_least: narrow(change_least * exp2(16)),
+            bounds,
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen: force_seen(p, &tip),
@@ -287,7 +256,7 @@ fn tip(p: &Params) -> Result<Tip, ConfigError> {
 }
 
 /// 2^n, exactly.
-const fn exp2(n: u32) -> f32 {
+pub(crate) const fn exp2(n: u32) -> f32 {
     (1u64 << n) as f32
 }
 
@@ -299,7 +268,7 @@ fn wide(value: f32) -> i64 {
 }
 
 /// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
-fn narrow(value: f32) -> i32 {
+pub(crate) fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
 }
 
@@ -316,7 +285,7 @@ const fn thousandths(value: i32, bits: u32) -> i32 {
     ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
 }
 
-fn millimetres(um: i32) -> Millimetres {
+pub(crate) fn millimetres(um: i32) -> Millimetres {
     Millimetres(I8F24::from_bits(thousandths(um, 24)))
 }
 
@@ -325,6 +294,6 @@ pub fn newtons(mn: i32) -> Newtons {
     Newtons(I16F16::from_bits(thousandths(mn, 16)))
 }
 
-fn speed(um_per_s: i32) -> MillimetresPerSecond {
+pub(crate) fn speed(um_per_s: i32) -> MillimetresPerSecond {
     MillimetresPerSecond(I16F16::from_bits(thousandths(um_per_s, 16)))
 }

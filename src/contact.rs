@@ -6,6 +6,7 @@
 //! the measured errors.
 
 mod arith;
+mod doubt;
 mod effort;
 mod follow;
 mod geometry;

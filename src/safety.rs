@@ -16,6 +16,7 @@
 //! that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what holds the loop back just now)
 //! comes and goes by itself. The numbers are stable: hosts may store them.
 
+pub mod bounds;
 pub mod guard;
 pub mod monitor;
 

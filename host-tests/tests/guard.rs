@@ -28,7 +28,7 @@ fn count_mm(config: &Config) -> f64 {
 }
 
 fn time_s(frames: u32, config: &Config) -> f64 {
-    f64::from(frames) / f64::from(config.frames_per_s)
+    f64::from(frames) / f64::from(config.bounds.frames_per_s)
 }
 
 fn travel_mm(guard: &Guard) -> f64 {
@@ -53,7 +53,7 @@ fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);
     for _ in 0..1_000 {
         let config = config(&mut rng);
-        let (end, back): (f64, f64) = (config.travel_max.0.to_num(), config.travel_back.0.to_num());
+        let (end, back): (f64, f64) = (config.travel_max.0.to_num(), config.bounds.back.0.to_num());
         let origin = rng.i32(..);
         let mut guard = Guard::start(origin, &config);
         let (mut counts, mut pace) = (0_i32, 1);
@@ -97,7 +97,7 @@ impl Adversary {
         self.left -= 1;
         let duty = guard.allow(Duty(self.duty), &mut Limits::default());
         let voltage = i64::from(duty.0) * i64::from(config.voltage_limit) / i64::from(Duty::FULL);
-        let frame_s = 1.0 / f64::from(config.frames_per_s);
+        let frame_s = 1.0 / f64::from(config.bounds.frames_per_s);
         let damping = f64::from(config.damping_q17_per_s) / 131_072.0;
         let push = strength * voltage as f64 / 256.0 - push_mm_per_s2;
         self.speed_mm_per_s += (push - strength * damping * self.speed_mm_per_s) * frame_s;
@@ -150,7 +150,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
         let config = config(&mut rng);
         let strength = rng.f64() * 0.6 + 0.7;
         let wall_mm = rng.f64() * 8.0;
-        let per_n = f64::from(config.acceleration_per_n) / 256.0;
+        let per_n = f64::from(config.bounds.acceleration_per_n) / 256.0;
         let mut guard = Guard::start(0, &config);
         let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty: 0, left: 0 };
         let mut voltage = 0;

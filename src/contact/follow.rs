@@ -12,7 +12,7 @@ use super::guess::{Guess, Pressed};
 use super::step::{Bench, Equations};
 use super::sums::{self, from_sums};
 use super::view::{Scale, View};
-use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, hides, overhang};
+use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
 use crate::config::Config;
 use crate::frame::ROWS;
 use crate::pipeline::Contact;
@@ -29,7 +29,7 @@ const TAXELS_LEAST: i32 = 8;
 /// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times as large.
 const TAXELS_SURE: i32 = 12;
 /// Fractional bits of the ratio of the force to the sum.
-const RATIO_BITS: u32 = 16;
+pub(super) const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
@@ -147,7 +147,7 @@ impl Fit {
         if self.effort.rows() == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);
-            let doubt = if force < config.contact_off { 0 } else { unseen(&sums, picture, config) };
+            let doubt = if force < config.contact_off { 0 } else { doubt::of_sums(&sums, picture, config) };
             let centre = [sums.centre_x, sums.centre_y];
             let [centre_x, centre_y] = if self.effort == Effort::Sum { [Millimetres::ZERO; 2] } else { centre };
             return Contact { doubt, centre_x, centre_y, ..sums };
@@ -175,7 +175,7 @@ impl Fit {
             // A fit given up in this frame.
             (None, None) => from_sums(picture, config),
         };
-        self.doubt = follow_doubt(self.doubt, self.target_doubt(&contact, picture, config));
+        self.doubt = doubt::follow(self.doubt, self.target_doubt(&contact, picture, config));
         Contact { confidence: self.confidence, doubt: (self.doubt >> 8) as u8, ..contact }
     }
 
@@ -282,13 +282,8 @@ impl Fit {
     fn target_doubt(&self, contact: &Contact, picture: &Picture, config: &Config) -> u8 {
         match self.fitted {
             _ if self.covered => 0,
-            // A third of the force is hidden: only a good likeness says how much. Where less is, any fit does.
-            Some(fitted) => {
-                let hidden = ramp(fitted.ratio - (5 << RATIO_BITS) / 4, 1 << (RATIO_BITS - 1));
-                let unlike = ramp(160 - i32::from(self.confidence), 64);
-                ((u32::from(hidden) * u32::from(unlike)) >> 8) as u8
-            }
-            None => unseen(contact, picture, config),
+            Some(fitted) => doubt::of_fit(fitted.ratio, self.confidence),
+            None => doubt::of_sums(contact, picture, config),
         }
     }
 
@@ -302,27 +297,6 @@ impl Fit {
     fn forget(&mut self) {
         (self.next, self.fitted, self.astray) = (None, None, 0);
     }
-}
-
-/// 0 below 0, 255 from `whole` on, and a line between.
-fn ramp(value: i32, whole: i32) -> u8 {
-    (i64::from(value.max(0).min(whole)) * 255 / i64::from(whole.max(1))) as u8
-}
-
-/// How far the sums tell a force from below: not while the rim is within half a pitch of the edge, wholly from a pitch and a half on or
-/// where a bad taxel hides a part.
-fn unseen(sums: &Contact, picture: &Picture, config: &Config) -> u8 {
-    if hides(sums, picture, config) {
-        return u8::MAX;
-    }
-    let half_pitch = config.half_pitch.to_bits() >> 4;
-    ramp(overhang(sums, config) - half_pitch, 2 * half_pitch)
-}
-
-/// Doubt comes within 8 frames and goes within 64: what comes and goes must not push the finger about. Q8.
-fn follow_doubt(doubt: u32, target: u8) -> u32 {
-    let target = u32::from(target) << 8;
-    if target > doubt { doubt + (target - doubt).div_ceil(8) } else { doubt - (doubt - target).div_ceil(64) }
 }
 
 const _: () = assert!(ROWS == 10, "rows divide by 2, 5 and 10, and a step of 3 rows comes to each of them once");

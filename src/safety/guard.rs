@@ -89,7 +89,7 @@ struct May {
 impl Guard {
     /// Torque is enabled with the encoder at this count.
     pub fn start(encoder: i32, config: &Config) -> Self {
-        let floor = config.travel_back.to_bits().saturating_neg();
+        let floor = config.bounds.back.to_bits().saturating_neg();
         Self { origin: encoder, floor, may: May { forward: true, back: true }, ..Self::default() }
     }
 
@@ -102,7 +102,8 @@ impl Guard {
         for (loose_ns, pressed) in self.loose_ns.iter_mut().zip(pressed) {
             *loose_ns = if pressed { 0 } else { loose_ns.saturating_add(frame_ns) };
         }
-        let limit = |loose_ns| if loose_ns > LOOSE_NS { config.speed_loose } else { config.speed_any }.to_bits();
+        let limit =
+            |loose_ns| if loose_ns > LOOSE_NS { config.bounds.speed_loose } else { config.bounds.speed_any }.to_bits();
         let [fast_forward, fast_back] = [self.speed > limit(self.loose_ns[0]), self.speed < -limit(self.loose_ns[1])];
         self.fast_ns = if fast_forward || fast_back { self.fast_ns.saturating_add(frame_ns) } else { 0 };
         let end = config.travel_max.to_bits();
@@ -151,17 +152,18 @@ impl Guard {
         let moved = self.travel.saturating_sub(before);
         self.force += (seen.force.to_bits().max(0) - self.force) >> FORCE_BITS;
         // Q24 mm in a frame to Q16 mm/s.
-        let speed = saturated((i64::from(moved) * i64::from(config.frames_per_s)) >> 8);
-        self.speed = towards(self.speed, speed, 4 * config.guard_leak);
-        self.slow_speed = towards(self.slow_speed, self.speed, config.guard_leak);
+        let speed = saturated((i64::from(moved) * i64::from(config.bounds.frames_per_s)) >> 8);
+        self.speed = towards(self.speed, speed, 4 * config.bounds.leak);
+        self.slow_speed = towards(self.slow_speed, self.speed, config.bounds.leak);
 
-        let pushed = saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.acceleration_per_n)) >> 16);
+        let pushed =
+            saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.bounds.acceleration_per_n)) >> 16);
         // By the way itself: what a filtered speed is late by would add up.
         let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
         let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31);
-        self.change = towards(self.change.saturating_add(gained), 0, config.guard_leak);
-        self.late_change = towards(self.late_change, self.change, 4 * config.guard_leak);
+        self.change = towards(self.change.saturating_add(gained), 0, config.bounds.leak);
+        self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);
     }
 
     /// Where a touch begins and how far back it lets the tip go.
@@ -175,7 +177,7 @@ impl Guard {
                 let surface = self.travel.saturating_sub(depth);
                 self.surface = Some(surface);
                 let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
-                self.floor = back.max(config.travel_back.to_bits().saturating_neg());
+                self.floor = back.max(config.bounds.back.to_bits().saturating_neg());
             }
         }
     }
@@ -184,11 +186,11 @@ impl Guard {
     fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         // A quarter of what the force makes is left to its errors.
         let force = self.force.max(seen.force.to_bits());
-        let by_force = saturated((i64::from(force) * i64::from(config.change_per_n)) >> 18);
+        let by_force = saturated((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
         let expected = self.late_change.saturating_abs();
         let told = self.speed.saturating_sub(self.slow_speed);
         let along = if self.late_change < 0 { told.saturating_neg() } else { told };
-        if expected < config.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
+        if expected < config.bounds.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
             self.other_ns = 0;
             return None;
         }

@@ -111,14 +111,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         approach,
         travel_max,
         clearance,
-        travel_back,
-        speed_loose,
-        speed_any,
-        frames_per_s,
-        guard_leak,
-        acceleration_per_n,
-        change_per_n,
-        change_least,
+        bounds,
         force_fault,
         force_max,
         force_seen,
@@ -130,7 +123,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max, *force_seen] {
         mix.add(force.to_bits());
     }
-    for length in [half_pitch, count, calm_band, travel_max, clearance, travel_back] {
+    for length in [half_pitch, count, calm_band, travel_max, clearance, &bounds.back] {
         mix.add(length.to_bits());
     }
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
@@ -151,7 +144,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
             mix.add(*number);
         }
     }
-    for speed in [speed_max, approach, speed_loose, speed_any] {
+    for speed in [speed_max, approach, &bounds.speed_loose, &bounds.speed_any] {
         mix.add(speed.to_bits());
     }
     for number in [
@@ -159,12 +152,12 @@ fn add_config(mix: &mut Mix, config: &Config) {
         voltage_limit,
         current_limit,
         slew_limit,
-        frames_per_s,
         supply_weak_mv,
-        guard_leak,
-        acceleration_per_n,
-        change_per_n,
-        change_least,
+        &bounds.frames_per_s,
+        &bounds.leak,
+        &bounds.acceleration_per_n,
+        &bounds.change_per_n,
+        &bounds.change_least,
     ] {
         mix.add(*number);
     }

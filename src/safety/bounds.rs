@@ -1,0 +1,66 @@
+//! What the guard goes by, derived once from the parameters.
+
+use crate::config::{exp2, millimetres, narrow, newtons, speed};
+use crate::model::Tip;
+use crate::params::Params;
+use crate::units::{Millimetres, MillimetresPerSecond};
+
+/// Time over which the guard compares motor and encoder, s,
+const TAU_S: f32 = 0.005;
+/// for an encoder whose counts are no farther apart than this, mm; the others need longer, up to so many times.
+const COUNT_MM: f32 = 0.008;
+const LONGER: f32 = 8.0;
+/// It must expect a change of the speed by this, mm/s, or by a quarter of what the largest voltage does in that time;
+const CHANGE: f32 = 40.0;
+/// and by what so many counts in that time may be wrong by.
+const COUNTS: f32 = 16.0;
+
+/// The ends and speeds that the guard holds, and its model of the motor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// How far behind where torque was enabled the tip may go: from the largest force to the clearance, and 1 mm.
+    pub back: Millimetres,
+    /// Where nothing is pressed: 1.5 times the approach speed.
+    pub speed_loose: MillimetresPerSecond,
+    /// Ever: 1.5 times the largest speed.
+    pub speed_any: MillimetresPerSecond,
+    /// Frames in a second.
+    pub frames_per_s: i32,
+    /// A frame's share of tau, Q16: at most an eighth.
+    pub leak: i32,
+    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over tau, Q16 mm/s.
+    pub acceleration_per_n: i32,
+    /// See [`Bounds::acceleration_per_n`].
+    pub change_per_n: i32,
+    /// The change of speed that must be expected before it counts, Q16 mm/s.
+    pub change_least: i32,
+}
+
+/// What the configuration knows of frame, encoder and motor.
+pub(crate) struct Drives {
+    pub frame_s: f32,
+    pub mm_per_count: f32,
+    /// The motor's inertia at the tip, kg.
+    pub mass: f32,
+    /// g V_max, mm/s^2.
+    pub driven: f32,
+}
+
+impl Bounds {
+    pub(crate) fn new(p: &Params, tip: &Tip, drives: &Drives) -> Self {
+        let Drives { frame_s, mm_per_count, mass, driven } = *drives;
+        let tau_s = TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER);
+        let change_least = (0.25 * driven * tau_s).min(CHANGE) + COUNTS * mm_per_count / tau_s;
+        let deepest = tip.indentation(newtons(p.force_max_mn));
+        Self {
+            back: Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0)),
+            speed_loose: speed(p.approach_um_per_s + p.approach_um_per_s / 2),
+            speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
+            frames_per_s: (1.0 / frame_s) as i32,
+            leak: narrow((frame_s / tau_s).min(0.125) * exp2(16)),
+            acceleration_per_n: narrow(1e3 / mass * exp2(8)),
+            change_per_n: narrow(1e3 / mass * tau_s * exp2(16)),
+            change_least: narrow(change_least * exp2(16)),
+        }
+    }
+}

@@ -59,7 +59,9 @@ impl Goal {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
             let deeper = if way < Millimetres::ZERO { DEEPER_BACK } else { DEEPER };
             let quick = mode == Mode::Force && self.confirmed(deeper, contact, travel, config);
-            (within_travel(way, motion, config, limits), quick, config.count.min(FORCE_SLACK))
+            // An approach must come to the contact, however little is left.
+            let slack = if mode == Mode::Force { config.count.min(FORCE_SLACK) } else { Millimetres::ZERO };
+            (within_travel(way, motion, config, limits), quick, slack)
         };
         let limit = if quick { config.speed_max } else { config.approach };
         let (reference, limited) = motion.towards(way, slack, limit, config);

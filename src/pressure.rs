@@ -126,12 +126,7 @@ impl Array {
                 self.picture.peak_codes = 0;
             }
             // A masked taxel is no fault.
-            let bad = bad & !mask;
-            self.picture.bad[number] |= bad;
-            self.picture.bad_count += bad.count_ones() as u8;
-            if i32::from(self.picture.bad_count) <= config.params.bad_taxels_max {
-                highest = self.picture.leave_out(number, bad).max(highest);
-            }
+            highest = self.picture.leave_out(number, bad & !mask, config).max(highest);
         }
         if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {
             self.picture.taxels.as_flattened_mut().fill(0);

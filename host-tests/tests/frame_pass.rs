@@ -186,3 +186,24 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
         }
     }
 }
+
+/// As many bad taxels as are allowed are left out; of more than that nothing is shown.
+#[test]
+fn a_broken_array_shows_nothing() {
+    let config = config(1_667, 12);
+    let most = config.params.bad_taxels_max as usize;
+    let mut array = Array::new();
+    for bad in [most + 1, most, 0] {
+        // From none to saturated, in rows of their own.
+        let wild = (0..bad).map(|place| (place, 9 - place, if place % 2 == 0 { 4_095 } else { 0 })).collect();
+        let mut codes = Codes { levels: [300; COLUMNS], above: [[40; COLUMNS]; ROWS], wild };
+        codes.above[9][9] = 400;
+        let picture = *array.read(&codes.frame(), &config);
+        let taxels = picture.taxels.as_flattened();
+        let zeros = taxels.iter().filter(|taxel| **taxel == 0).count();
+        assert_eq!(usize::from(picture.bad_count), bad);
+        assert_eq!(zeros, if bad > most { ROWS * COLUMNS } else { bad });
+        assert_eq!(picture.peak, taxels.iter().fold(0, |peak, taxel| peak.max(*taxel)));
+        assert_eq!(picture.peak > 6_000, bad <= most, "{}", picture.peak);
+    }
+}

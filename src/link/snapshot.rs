@@ -35,7 +35,7 @@ pub struct Snapshot<'a> {
 impl Snapshot<'_> {
     /// Pressure on a taxel, row by row, in units of 10 Pa.
     pub fn pressure_10pa(&self, place: usize) -> u16 {
-        let pascals = (i64::from(of(self.taxels, place)) * self.pascals_per_sum_q32) >> 32;
+        let pascals = i64::from(of(self.taxels, place)).saturating_mul(self.pascals_per_sum_q32) >> 32;
         saturate(((pascals + 5) / 10) as i32)
     }
 
@@ -119,5 +119,34 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
             | Fault::Crash
             | Fault::Runaway,
         ) => 1 << 7,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn taxels_are_rounded_and_stay_within_their_registers() {
+        let (mut taxels, mut tare) = ([[0; COLUMNS]; ROWS], [[0; COLUMNS]; ROWS]);
+        // 8 Pa for a sixteenth of a code.
+        (taxels[0][1], taxels[0][2], taxels[9][9]) = (-3, 1, i32::MAX);
+        (tare[0][1], tare[0][2], tare[9][9]) = (-1 << TARE_BITS, (7 << TARE_BITS) + (1 << 15), i32::MAX);
+        let snapshot = Snapshot {
+            status: Status::default(),
+            supply_mv: 0,
+            tick_ms: 0,
+            loop_time_us: 0,
+            loop_time_max_us: 0,
+            reset_cause: ResetCause::Unknown,
+            crash: Crash::default(),
+            frame: &Frame::EMPTY,
+            taxels: &taxels,
+            pascals_per_sum_q32: 8 << 32,
+            tare: &tare,
+        };
+        let at = |place| (snapshot.pressure_10pa(place), snapshot.tare_codes(place));
+        assert_eq!([0, 1, 2, 100].map(at), [(0, 0), (0, 0), (1, 8), (0, 0)]);
+        assert_eq!(at(99), (u16::MAX, 32_767));
     }
 }

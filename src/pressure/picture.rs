@@ -45,9 +45,14 @@ impl Picture {
         undriven_max: 0,
     };
 
-    /// Takes bad taxels of a row, a bit each, out; the highest of them, at least 0.
-    pub(super) fn leave_out(&mut self, row: usize, bad: u16) -> i32 {
-        let Some(taxels) = self.taxels.get_mut(row) else { return 0 };
+    /// Notes bad taxels of a row, a bit each, and takes them out while the array is not broken; the highest of them, at least 0.
+    pub(super) fn leave_out(&mut self, row: usize, bad: u16, config: &Config) -> i32 {
+        let (Some(taxels), Some(bits)) = (self.taxels.get_mut(row), self.bad.get_mut(row)) else { return 0 };
+        *bits |= bad;
+        self.bad_count += bad.count_ones() as u8;
+        if i32::from(self.bad_count) > config.params.bad_taxels_max {
+            return 0;
+        }
         let (mut highest, mut left) = (0, u32::from(bad));
         while left != 0 {
             let column = (left.trailing_zeros() as usize).min(COLUMNS - 1);

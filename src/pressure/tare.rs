@@ -23,7 +23,7 @@ impl Array {
     /// Takes the picture last read into the tare's running means; true when the tare is complete.
     pub fn continue_tare(&mut self) -> bool {
         self.tare_frames = (self.tare_frames + 1).min(TARE_FRAMES);
-        let weight = ((1 << 16) / self.tare_frames) as i32;
+        let weight = ((1 << 16) / self.tare_frames.max(1)) as i32;
         // The sums are not rounded taxel by taxel, so they have a mean of their own.
         let Picture { sum, moment_x, moment_y, .. } = self.picture;
         let mut tare_sums = self.tare_sums;

@@ -1,0 +1,144 @@
+//! The pass by instructions: SSUB16, SMLAD, UQSUB16, SMMLA, SMULxy, SMMULR.
+
+use super::{BOOST_DROP, CODE_BITS, COLUMNS, Common, Pairs, Row, TARE_BITS, Total};
+
+/// [`super::portable_pass`].
+///
+/// Written out, because the compiler has too few registers for any order of these instructions, and keeps loading and
+/// storing. It works through a row in about 170 cycles.
+#[inline(always)]
+pub fn pass<const ROWS: usize>(
+    codes: &[Pairs; ROWS],
+    rows: &mut [Row; ROWS],
+    common: &Common,
+    taxels: &mut [[i32; COLUMNS]; ROWS],
+) -> Total {
+    const { assert!(ROWS > 0) };
+    let (first, second, running, largest, peak);
+    // SAFETY: reads the codes, the rows and what is common, writes each row's boost and the taxels; the types hold their
+    // lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
+    // operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
+    unsafe {
+        core::arch::asm!(
+            // The two columns of a pair, whose net codes are in `net`: sums, taxels, peak. The left one's tare goes to `left`; the first
+            // pair has no register left for it beside its own, and begins the sums.
+            ".macro columns place, net, left",
+            "ldr r8, [r1, #4 * \\place]", // gains
+            "ldr r9, [r1, #4 * \\place + {moments}]",
+            "ldr r10, [r1, #4 * \\place + {tare} + {pairs}]",
+            ".if \\place == 0",
+            "smuad lr, \\net, r8",
+            "smuad r11, \\net, r9",
+            ".else",
+            "ldr \\left, [r1, #4 * \\place + {tare}]",
+            "smlad lr, \\net, r8, lr",
+            "smlad r11, \\net, r9, r11",
+            ".endif",
+            "smultt r9, \\net, r8",
+            "smulbb r8, \\net, r8",
+            ".if \\place == 0",
+            "ldr \\left, [r1, #4 * \\place + {tare}]",
+            ".endif",
+            "smmulr r8, r8, r0",
+            "smmulr r9, r9, r0",
+            "sub r8, r8, \\left, asr #{tare_drop}",
+            "sub r9, r9, r10, asr #{tare_drop}",
+            "cmp r8, r12",
+            "it gt",
+            "movgt r12, r8",
+            "cmp r9, r12",
+            "it gt",
+            "movgt r12, r9",
+            "str r8, [r2, #4 * \\place]",
+            "str r9, [r2, #4 * \\place + {pairs}]",
+            ".endm",
+            // On the stack: what is common, the place among the codes, the totals, r6 and r7, the codes' end.
+            "push {{r6, r7, r9}}",
+            "movs r4, #0",
+            "movs r5, #0",
+            "movs r6, #0",
+            "movs r7, #0",
+            "push {{r0, r4-r7}}",
+            "ldm r3, {{r4-r8, r10, r11}}",
+            "push {{r4-r8, r10, r11}}",
+            "mov r12, #0", // the peak
+            "2:",
+            "ldm r0!, {{r3-r7}}", // codes, then net codes
+            "str r0, [sp, #28]",
+            "ldm sp, {{r0, r8-r11}}",
+            "ssub16 r3, r3, r0",
+            "ssub16 r4, r4, r8",
+            "ssub16 r5, r5, r9",
+            "ssub16 r6, r6, r10",
+            "ssub16 r7, r7, r11",
+            "ldr r8, [sp, #20]", // dead
+            "ldr r9, [sp, #24]", // sag
+            "smuad r11, r3, r9",
+            "smlad r11, r4, r9, r11",
+            "smlad r11, r5, r9, r11",
+            "smlad r11, r6, r9, r11",
+            "smlad r11, r7, r9, r11",
+            "ssub16 r10, r3, r8", // the row's largest
+            ".irp net, r4, r5, r6, r7",
+            "ssub16 r0, \\net, r8",
+            "uqsub16 r0, r0, r10",
+            "add r10, r10, r0",
+            ".endr",
+            "ldr r0, [sp, #44]", // that of all
+            "str r10, [r1, #{largest}]",
+            "uqsub16 r10, r10, r0",
+            "add r10, r10, r0",
+            "str r10, [sp, #44]",
+            "smmul r8, r11, r11", // the boost
+            "smmul r9, r8, r8",
+            "mov r0, #1 << 28",
+            "add r0, r0, r11, asr #4",
+            "smmla r9, r9, r9, r9",
+            "smmla r0, r0, r8, r0",
+            "smmla r0, r0, r9, r0",
+            "str r0, [r1, #{boost}]",
+            "asr r0, r0, #{boost_drop}",
+            "columns 0, r3, r3",
+            "columns 1, r4, r3",
+            "columns 2, r5, r4",
+            "columns 3, r6, r5",
+            "columns 4, r7, r6",
+            ".purgem columns",
+            "ldr r0, [sp, #28]",
+            "ldr r3, [sp, #32]", // the totals
+            "ldr r4, [sp, #36]",
+            "ldr r5, [sp, #40]",
+            "ldr r6, [r1, #{boost}]",
+            "ldr r7, [sp, #56]", // the codes' end
+            "smmla r3, lr, r6, r3",
+            "smmla r4, r11, r6, r4",
+            "add r5, r5, r3, asr #2",
+            "str r3, [sp, #32]",
+            "str r4, [sp, #36]",
+            "str r5, [sp, #40]",
+            "adds r1, #{row}",
+            "adds r2, #2 * {pairs}",
+            "cmp r0, r7",
+            "bne 2b",
+            "ldr r0, [sp, #44]",
+            "add sp, #48",
+            "pop {{r6, r7, r9}}",
+            pairs = const size_of::<Pairs>(),
+            row = const size_of::<Row>(),
+            moments = const core::mem::offset_of!(Row, moments),
+            tare = const core::mem::offset_of!(Row, tare),
+            boost = const core::mem::offset_of!(Row, boost),
+            largest = const core::mem::offset_of!(Row, largest),
+            tare_drop = const TARE_BITS - CODE_BITS,
+            boost_drop = const BOOST_DROP,
+            inout("r0") codes.as_ptr() => largest,
+            inout("r1") rows.as_mut_ptr() => _,
+            inout("r2") taxels.as_mut_ptr() => _,
+            inout("r3") common => first,
+            out("r4") second, out("r5") running,
+            out("r8") _, in("r9") codes.as_ptr_range().end,
+            out("r10") _, out("r11") _, out("r12") peak, out("lr") _,
+        );
+    }
+    Total { first, second, running, largest, peak }
+}

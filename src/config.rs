@@ -83,6 +83,8 @@ pub struct Config {
     pub half_pitch: Millimetres,
     /// See [`Params::contact_on_mn`].
     pub contact_on: Newtons,
+    /// Half of what the least contact adds to all taxels together, in sixteenths of a corrected code.
+    pub touch_line: i32,
     /// See [`Params::contact_off_mn`].
     pub contact_off: Newtons,
 
@@ -205,6 +207,7 @@ impl Config {
             half_pitch: millimetres(p.pitch_um / 2),
             contact_on: newtons(p.contact_on_mn),
             contact_off: newtons(p.contact_off_mn),
+            touch_line: narrow(0.5e-3 * p.contact_on_mn as f32 / newtons_per_sum),
             frame_s_q39: narrow(frame_s * exp2(39)),
             mm_per_count_q40,
             count: Millimetres(I8F24::from_bits(narrow(mm_per_count * exp2(24)))),

@@ -153,7 +153,7 @@ impl Pipeline {
             self.guard = Guard::start(sense.encoder, &self.config);
         }
         let unsafe_motion = if driven { self.guard.check(&seen, &self.config) } else { None };
-        let pressed = self.guard.presses(&self.config);
+        let pressed = self.guard.presses();
         let view = View { picture, contact: &contact, pressed, sense, motion: &self.motion, command };
         if starting {
             self.monitor.restart(&view);

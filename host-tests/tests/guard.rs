@@ -127,7 +127,7 @@ fn no_duty_makes_it_fast_in_the_air() {
                 stopped += 1;
                 break;
             }
-            air = if guard.presses(&config) { 0 } else { air + 1 };
+            air = if guard.presses() { 0 } else { air + 1 };
             let loose = time_s(air, &config) > 0.02;
             // The counts tell the speed no better than this.
             let unsure = 16.0 * count_mm(&config) / 0.005;

@@ -62,6 +62,7 @@ pub struct Guard {
     /// Where a touch began, less its indentation.
     surface: Option<i32>,
     touching: bool,
+    presses: bool,
     /// Mean force, Q16 N.
     force: i32,
     /// Speeds by the encoder, quick and slow, Q16 mm/s.
@@ -96,9 +97,12 @@ impl Guard {
     /// Takes a frame: what is to stop the motor.
     pub fn check(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         self.measure(seen, config);
-        self.touch(seen.pressing, config);
         let frame_ns = config.timing.frame_ns();
-        let pressed = [self.pressed(DEEPER, config), self.pressed(DEEPER_BACK, config)];
+        // As the mean force means; what is pressed is where it touched, or deeper, and the deeper the more force.
+        let depth = config.tip.indentation(Newtons::from_bits(self.force));
+        self.touch(seen.pressing, depth, config);
+        let pressed = [self.pressed(DEEPER, depth), self.pressed(DEEPER_BACK, depth)];
+        self.presses = pressed[1];
         for (loose_ns, pressed) in self.loose_ns.iter_mut().zip(pressed) {
             *loose_ns = if pressed { 0 } else { loose_ns.saturating_add(frame_ns) };
         }
@@ -131,21 +135,25 @@ impl Guard {
     }
 
     /// Whether the tip presses on something, as far as array and travel tell.
-    pub fn presses(&self, config: &Config) -> bool {
-        self.pressed(DEEPER_BACK, config)
+    pub fn presses(&self) -> bool {
+        self.presses
     }
 
-    /// Whether the array and the travel agree that something is pressed: the deeper the tip went, the more force.
-    fn pressed(&self, deeper: i32, config: &Config) -> bool {
-        let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
+    /// Travel since torque was enabled, by the encoder alone.
+    pub fn travel(&self) -> Millimetres {
+        Millimetres::from_bits(self.travel)
+    }
+
+    fn pressed(&self, deeper: i32, depth: Millimetres) -> bool {
         self.touching
             && self.surface.is_some_and(|surface| {
                 let deep = self.travel.saturating_sub(surface);
-                deep >= -YIELDING && deep <= depth.saturating_mul(deeper).saturating_add(YIELDING)
+                deep >= -YIELDING && deep <= depth.to_bits().saturating_mul(deeper).saturating_add(YIELDING)
             })
     }
 
-    /// Travel, force, and the two ways.
+    /// Travel, force, and the two changes of speed.
+    #[inline(always)]
     fn measure(&mut self, seen: &Seen, config: &Config) {
         let before = self.travel;
         self.travel = config.travel(seen.encoder.wrapping_sub(self.origin)).to_bits();
@@ -161,20 +169,21 @@ impl Guard {
         // By the way itself: what a filtered speed is late by would add up.
         let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
-        let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31);
+        // A frame's time is below 1/256 s, so this fits.
+        let gained = ((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31) as i32;
         self.change = towards(self.change.saturating_add(gained), 0, config.bounds.leak);
         self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);
     }
 
     /// Where a touch begins and how far back it lets the tip go.
-    fn touch(&mut self, pressing: bool, config: &Config) {
+    #[inline(always)]
+    fn touch(&mut self, pressing: bool, depth: Millimetres, config: &Config) {
         if self.force < config.contact_off.to_bits() {
             self.touching = false;
         } else if !self.touching && self.force >= config.contact_on.to_bits() {
             self.touching = true;
             if pressing {
-                let depth = config.tip.indentation(Newtons::from_bits(self.force)).to_bits();
-                let surface = self.travel.saturating_sub(depth);
+                let surface = self.travel.saturating_sub(depth.to_bits());
                 self.surface = Some(surface);
                 let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
                 self.floor = back.max(config.bounds.back.to_bits().saturating_neg());
@@ -183,11 +192,16 @@ impl Guard {
     }
 
     /// What the encoder tells against what the model expects, where that has been another for a while.
+    #[inline(always)]
     fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         // A quarter of what the force makes is left to its errors.
         let force = self.force.max(seen.force.to_bits());
-        let by_force = saturated((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
         let expected = self.late_change.saturating_abs();
+        if expected < config.bounds.change_least {
+            self.other_ns = 0;
+            return None;
+        }
+        let by_force = saturated((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
         let told = self.speed.saturating_sub(self.slow_speed);
         let along = if self.late_change < 0 { told.saturating_neg() } else { told };
         if expected < config.bounds.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
@@ -202,19 +216,15 @@ impl Guard {
     }
 }
 
-/// `value` moved by a share (Q16) of the way to `goal`.
+/// `value` moved by a share (Q16, at most a half) of the way to `goal`.
+#[inline(always)]
 fn towards(value: i32, goal: i32, share: i32) -> i32 {
-    value.saturating_add(saturated((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16))
+    // Half of 32 bits: it fits.
+    value.saturating_add(((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16) as i32)
 }
 
+#[inline(always)]
 fn saturated(value: i64) -> i32 {
-    value.clamp(i32::MIN.into(), i32::MAX.into()) as i32
-}
-
-/// The travel as a length.
-impl Guard {
-    /// Travel since torque was enabled, by the encoder alone.
-    pub fn travel(&self) -> Millimetres {
-        Millimetres::from_bits(self.travel)
-    }
+    let low = value as i32;
+    if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }

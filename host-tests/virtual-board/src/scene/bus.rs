@@ -83,6 +83,7 @@ fn status(bytes: &[u8]) -> Option<Status> {
             peak_pa: word(address::PEAK_PRESSURE_PA)? as u32,
             confidence: byte(address::CONFIDENCE)?,
             bad_taxels: byte(address::BAD_TAXELS)?,
+            ..Contact::default()
         },
         travel: mm(address::TRAVEL_UM)?,
         speed: MillimetresPerSecond::from_bits(scaled(word(address::SPEED_UM_PER_S)?, 1 << 16)),

@@ -65,6 +65,14 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
     }
 }
 
+/// What the core can report, a host may expect: nothing lies beyond what the table says of its register.
+#[test]
+fn the_last_fault_and_the_last_limit_are_in_the_table() {
+    let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
+    assert_eq!(largest(address::FAULT), Fault::Reversed as i64);
+    assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::GUARD) - 1);
+}
+
 #[test]
 fn each_figure_stands_where_the_page_says() {
     let mut bench = Bench::new();

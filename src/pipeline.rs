@@ -124,11 +124,16 @@ impl Pipeline {
             return (Duty::ZERO, &self.status);
         }
         // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything to fit to
-        // in a broken array.
-        let sound = broken.is_none();
+        // in a broken array. Where a frame shows nothing while the bridge is driven, the contact is the last one's.
+        let sound = monitor::array_sound(picture, &self.config);
         let fits = sound && self.status.mode != Mode::Identify;
-        let contact =
-            if fits { self.fit.read(picture, &self.config) } else { contact::from_sums(picture, &self.config) };
+        let contact = if fits {
+            self.fit.read(picture, &self.config)
+        } else if sound || !watched {
+            contact::from_sums(picture, &self.config)
+        } else {
+            self.status.contact
+        };
         self.budget.note(fits && self.fit.at_work());
         if picture.bad_count > 0 {
             limits.set(Limits::TAXELS);
@@ -145,7 +150,7 @@ impl Pipeline {
         let driven = watched && self.status.mode != Mode::Tare;
         let seen = Seen {
             encoder: sense.encoder,
-            force: contact.force.max(picture.force(&self.config)),
+            force: if sound { contact.force.max(picture.force(&self.config)) } else { contact.force },
             pressing: self.status.mode != Mode::Release,
             voltage: self.motion.drive.voltage(),
         };
@@ -153,7 +158,7 @@ impl Pipeline {
             self.guard = Guard::start(sense.encoder, &self.config);
         }
         let unsafe_motion = if driven { self.guard.check(&seen, &self.config) } else { None };
-        let pressed = self.guard.presses();
+        let pressed = self.guard.presses_in();
         let view = View { picture, contact: &contact, pressed, sense, motion: &self.motion, command };
         if starting {
             self.monitor.restart(&view);
@@ -187,7 +192,8 @@ impl Pipeline {
             Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
             None => self.motion.coast(),
         };
-        let allowed = self.guard.allow(duty, &mut limits);
+        // Nor does it drive by a frame that shows nothing: for that long the motor is shorted.
+        let allowed = if sound { self.guard.allow(duty, &mut limits) } else { Duty::ZERO };
         if allowed != duty {
             self.motion.drive.cut();
         }
@@ -209,14 +215,15 @@ impl Pipeline {
         (duty, &self.status)
     }
 
-    /// A look at a frame that is still being scanned, filled up from the frame before: stops where its array is broken, and tells
-    /// whether. A taxel that fails just after it was read is seen a frame later; without this look the step would judge it only at
-    /// that frame's end.
+    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array seems broken,
+    /// and tells whether. A taxel that fails just after it was read is seen a frame later; without this look the motor would be driven
+    /// until that frame's end. Whether it is a fault is for the step to say.
     pub fn glance(&mut self, frame: &Frame) -> bool {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {
-            self.stop(Fault::ArrayBroken);
+            self.motion.drive.cut();
+            self.status.duty = Duty::ZERO;
         }
         broken
     }
@@ -256,7 +263,7 @@ impl Pipeline {
             }
             Mode::Fault => Mode::Off,
             Mode::Tare => {
-                self.tared = self.array.continue_tare();
+                self.tared = sound && self.array.continue_tare();
                 if self.tared {
                     self.array.judge_tare(&self.config);
                 }

@@ -90,8 +90,9 @@ impl Array {
     /// a bad taxel.
     pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
         let [rows @ .., undriven] = &frame.pairs;
+        let before = self.picture.bad;
         if self.picture.bad_count != 0 {
-            (self.picture.bad, self.picture.bad_count) = (self.mask, 0);
+            (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
         let sound = Sound::new(undriven, config);
         let total = lanes::pass(rows, &mut self.rows, &sound.common, &mut self.picture.taxels);
@@ -105,7 +106,7 @@ impl Array {
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
         if sound.suspects(largest) {
-            self.leave_out(frame, &sound, config);
+            self.leave_out(frame, &sound, &before, config);
         }
         &self.picture
     }
@@ -114,7 +115,7 @@ impl Array {
     /// not take long: its taxels are all zero, and its sums mean nothing.
     #[cold]
     #[inline(never)]
-    fn leave_out(&mut self, frame: &Frame, sound: &Sound, config: &Config) {
+    fn leave_out(&mut self, frame: &Frame, sound: &Sound, before: &[u16; ROWS], config: &Config) {
         let [rows @ .., undriven] = &frame.pairs;
         let mut highest = 0;
         for (number, ((codes, row), mask)) in rows.iter().zip(&self.rows).zip(&self.mask).enumerate() {
@@ -126,7 +127,9 @@ impl Array {
                 self.picture.peak_codes = 0;
             }
             // A masked taxel is no fault.
-            highest = self.picture.leave_out(number, bad & !mask, config).max(highest);
+            let bad = bad & !mask;
+            self.picture.bad_again += (bad & before[number]).count_ones() as u8;
+            highest = self.picture.leave_out(number, bad, config).max(highest);
         }
         if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {
             self.picture.taxels.as_flattened_mut().fill(0);

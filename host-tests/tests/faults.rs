@@ -65,6 +65,28 @@ fn twelve_taxels_dead_or_shorted() {
     }
 }
 
+/// What interference makes of single frames: the motor is shorted for as long, and the contact stays what it was. The same taxels twice
+/// are a fault, and so is half of the array at once.
+#[test]
+fn taxels_that_are_bad_for_one_frame_are_no_fault() {
+    let mut board = holding(1_000);
+    let spoil = |board: &mut Native, first: usize, count: usize| {
+        board.step_with(|record| {
+            (first..first + count).for_each(|place| record.frame.set_code(place / 10 % 10, place % 10, 0));
+        })
+    };
+    let before = board.step().contact;
+    for number in 0..200 {
+        let status = spoil(&mut board, 12 * number, 12);
+        assert_eq!((status.fault, status.duty.0, status.contact), (None, 0, before), "{number}");
+        assert!(status.limits.has(Limits::TAXELS));
+    }
+    assert!((0.9..1.1).contains(&board.world.force_n()), "{} N", board.world.force_n());
+    spoil(&mut board, 0, 12);
+    assert_eq!(spoil(&mut board, 6, 12).fault, Some(Fault::ArrayBroken));
+    assert_eq!(spoil(&mut holding(1_000), 0, 51).fault, Some(Fault::ArrayBroken));
+}
+
 #[test]
 fn a_few_bad_taxels_are_a_limit() {
     let mut board = holding(1_000);

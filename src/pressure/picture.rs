@@ -27,6 +27,8 @@ pub struct Picture {
     pub bad: [u16; ROWS],
     /// Taxels that are dead or saturated, and not masked.
     pub bad_count: u8,
+    /// Those of them that were so in the frame before: a burst of interference does not hit the same ones twice.
+    pub bad_again: u8,
     /// The highest undriven column level.
     pub undriven_max: u16,
 }
@@ -42,6 +44,7 @@ impl Picture {
         peak_codes: 0,
         bad: [0; ROWS],
         bad_count: 0,
+        bad_again: 0,
         undriven_max: 0,
     };
 

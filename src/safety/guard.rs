@@ -152,6 +152,11 @@ impl Guard {
             })
     }
 
+    /// The same, and the tip is not behind where it touched: between there and the clearance the array may show the same for ever.
+    pub fn presses_in(&self) -> bool {
+        self.presses && self.surface.is_some_and(|surface| self.travel >= surface)
+    }
+
     /// Travel, force, and the two changes of speed.
     #[inline(always)]
     fn measure(&mut self, seen: &Seen, config: &Config) {

@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::control::SpeedLoop;
-use crate::frame::Sense;
+use crate::frame::{COLUMNS, ROWS, Sense};
 use crate::pipeline::{Command, Contact};
 use crate::pressure::Picture;
 use crate::safety::Fault;
@@ -13,13 +13,16 @@ const BLIND_TRAVEL: Millimetres = Millimetres::from_bits((1 << 24) / 5);
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
 const SUPPLY_FRAMES: u8 = 5;
 
+/// Half of the taxels.
+const HALF: u8 = (ROWS * COLUMNS / 2) as u8;
+
 /// What a frame shows, for judgement.
 pub struct View<'a> {
     /// The array.
     pub picture: &'a Picture,
     /// The contact read off it.
     pub contact: &'a Contact,
-    /// Whether the tip surely presses on something, by the guard.
+    /// Whether the tip surely presses into something, by the guard.
     pub pressed: bool,
     /// Encoder, supply, bus and bridge.
     pub sense: &'a Sense,
@@ -82,16 +85,24 @@ impl Monitor {
     }
 }
 
-/// A broken array: nothing is to be read off it.
+/// A broken array. The same taxels must be bad in two frames running, or half of them in one: what a burst of interference makes of a
+/// frame is no fault.
 pub fn array_broken(picture: &Picture, config: &Config) -> Option<Fault> {
     let p = &config.params;
+    let bad = if picture.bad_count > HALF { picture.bad_count } else { picture.bad_again };
     if i32::from(picture.undriven_max) > p.undriven_max_codes {
         Some(Fault::RowStuck)
-    } else if i32::from(picture.bad_count) > p.bad_taxels_max {
+    } else if i32::from(bad) > p.bad_taxels_max {
         Some(Fault::ArrayBroken)
     } else {
         None
     }
+}
+
+/// Whether anything is to be read off a frame's array: not where more taxels are bad than allowed, be it for this frame only.
+pub fn array_sound(picture: &Picture, config: &Config) -> bool {
+    let p = &config.params;
+    i32::from(picture.undriven_max) <= p.undriven_max_codes && i32::from(picture.bad_count) <= p.bad_taxels_max
 }
 
 fn bus_silent(view: &View) -> bool {

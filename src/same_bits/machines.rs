@@ -256,10 +256,12 @@ fn add_reference(mix: &mut Mix, reference: Reference) {
 }
 
 fn add_picture(mix: &mut Mix, picture: &Picture) {
-    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, undriven_max, peak_codes } = picture;
+    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
+        picture;
     taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
     bad.iter().chain([undriven_max, peak_codes]).for_each(|number| mix.add(*number));
     mix.add(*bad_count);
+    mix.add(*bad_again);
 }
 
 fn add_contact(mix: &mut Mix, contact: &Contact) {

@@ -8,9 +8,11 @@ use fingertip::contact::{self, Effort};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
+use fingertip::frame::Sense;
 use fingertip::pipeline::{Command, Contact, Pipeline};
 use fingertip::pressure::{Array, Picture};
 use fingertip::record::Record;
+use fingertip::safety::guard::{Guard, Seen};
 use fingertip::safety::{Limits, Mode};
 use fingertip::units::Duty;
 
@@ -26,6 +28,7 @@ struct Bench<'a> {
     contact: Contact,
     motion: SpeedLoop,
     goal: Goal,
+    guard: Guard,
     reference: Reference,
     limits: Limits,
     wanted: i32,
@@ -49,7 +52,7 @@ const OBSERVER: usize = 2;
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 7] = [
+const PARTS: [(&str, Kernel, bool); 8] = [
     ("**Array::read**", read, false),
     ("**contact::from_sums**", sums, false),
     ("**observer**", observe, true),
@@ -57,6 +60,7 @@ const PARTS: [(&str, Kernel, bool); 7] = [
     ("**speed law with limits**", follow, true),
     ("**limits alone, Drive::apply**", apply, true),
     ("**duty from the voltage**", duty, true),
+    ("**guard**", guard, true),
 ];
 
 extern "C" fn step(bench: &mut Bench) {
@@ -95,6 +99,14 @@ extern "C" fn duty(bench: &mut Bench) {
     bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
 }
 
+extern "C" fn guard(bench: &mut Bench) {
+    let Sense { encoder, .. } = bench.record.sense;
+    let seen = Seen { encoder, force: bench.contact.force, pressing: true, voltage: bench.motion.drive.voltage() };
+    if bench.guard.check(&seen, bench.config).is_none() {
+        bench.duty = bench.guard.allow(bench.duty, &mut bench.limits);
+    }
+}
+
 impl<'a> Bench<'a> {
     fn new(effort: Effort, config: &'a Config) -> Self {
         Self {
@@ -108,6 +120,7 @@ impl<'a> Bench<'a> {
             contact: Contact::default(),
             motion: SpeedLoop::new(),
             goal: Goal::default(),
+            guard: Guard::start(0, config),
             reference: Reference::default(),
             limits: Limits::default(),
             wanted: 0,
@@ -156,6 +169,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
                 }
             } else {
                 bench.motion = SpeedLoop::new();
+                bench.guard = Guard::start(bench.record.sense.encoder, config);
             }
             if drives || !driving {
                 pass_on(*region, kernel, &mut bench);

@@ -36,6 +36,9 @@ fn holding_over_the_edge() -> Rig {
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");
+    // As long as a frame in the air: the effort goes by the longest, and a tare must not miss its deadline.
+    let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
+    assert!(longest_us <= 45, "a frame of the tare, or at rest: {longest_us} us");
     hold(&mut rig);
     rig
 }

@@ -1,4 +1,4 @@
-//! Faults injected while the image holds 1 N: the time until the bridge is off, and the number on the bus.
+//! Faults injected while the image holds 1 N: the time until the bridge drives nothing, what it does then, and the number on the bus.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
@@ -6,8 +6,9 @@ mod common;
 
 use common::{WAIT_NS, holding, holding_on_a_bus, image, read_u8, write_goal, write_u8};
 use fingertip::link::table::address;
+use fingertip::params::Params;
 use fingertip::safety::Fault as Number;
-use host_tests::plant::{Faults, Row, Setup, Taxel, World};
+use host_tests::plant::{Bridge, Faults, Row, Setup, Taxel, World};
 use std::sync::Mutex;
 use virtual_board::{Fault, Options, Rig};
 
@@ -17,14 +18,44 @@ const TWO_FRAMES_US: f64 = 199.5;
 /// Where in a frame a fault of the array begins: every 9 us, so in each slot.
 const PHASES_US: std::ops::Range<u64> = 0..11;
 const PHASE_STEP_US: u64 = 9;
+/// Both inputs high, with the driver awake.
+const BRAKES: Bridge = Bridge::Driven { duty: 0.0 };
 
-/// Microseconds from now to the bridge's being off, within `limit_ms`.
+/// Faults that put the driver to sleep: nobody who could brake is left, or the driver is not to be trusted.
+const ASLEEP: [Number; 2] = [Number::LostFrames, Number::Bridge];
+
+/// Microseconds from now until the bridge drives nothing any more, within `limit_ms`.
 fn until_off_us(rig: &mut Rig, limit_ms: u64) -> f64 {
     let from_ns = rig.now_ns();
     rig.run_ms(limit_ms).expect("it runs");
     let edges = rig.bridge_edges().expect("it runs");
-    let off = edges.iter().find(|edge| edge.at_ns >= from_ns && !edge.on);
+    let off = edges.last().filter(|edge| edge.at_ns >= from_ns && !edge.on);
     off.map_or(f64::INFINITY, |edge| (edge.at_ns - from_ns) as f64 / 1e3)
+}
+
+/// What the bridge does now.
+fn bridge(rig: &mut Rig) -> Bridge {
+    rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
+}
+
+/// How far the tip, which pressed with 1 N, goes back in a fault that brakes: no farther than its own indentation, the clearance
+/// and 1 mm.
+fn check_way_back(rig: &mut Rig, name: &str, held_mm: f64) {
+    let params = Params::DEFAULT;
+    let indentation_mm = (1e6 / (std::f64::consts::PI * f64::from(params.modulus_pa))).sqrt();
+    let most_mm = indentation_mm + f64::from(params.clearance_um) * 1e-3 + 1.0;
+    let mut back_mm = 0.0_f64;
+    for _ in 0..10 {
+        rig.run_ms(10).expect("it runs");
+        back_mm = back_mm.max(held_mm - travel_mm(rig));
+        assert_eq!(bridge(rig), BRAKES, "{name}");
+    }
+    println!("{name}: the tip went back by {back_mm:.2} mm (limit {most_mm:.2})");
+    assert!(back_mm <= most_mm, "{name}: {back_mm} mm");
+}
+
+fn travel_mm(rig: &mut Rig) -> f64 {
+    rig.world(|world| world.travel_mm()).expect("it runs")
 }
 
 /// Mends everything, clears the fault, and has the board hold 1 N again.
@@ -62,6 +93,7 @@ fn break_and_time(name: &str, expected: &[Number], limit_us: f64, harm: impl Fn(
     for phase in PHASES_US {
         let frame_end_ns = rig.scan_counts().expect("it runs").frame_end_ns;
         rig.run_until_ns(frame_end_ns + 1_000_000 + phase * PHASE_STEP_US * 1_000).expect("it runs");
+        let held_mm = travel_mm(&mut rig);
         harm(&mut rig);
         let off_us = until_off_us(&mut rig, (limit_us / 1e3).ceil() as u64 + 1);
         let number = read_u8(&mut rig, address::FAULT);
@@ -69,6 +101,11 @@ fn break_and_time(name: &str, expected: &[Number], limit_us: f64, harm: impl Fn(
         assert!(expected.iter().any(|fault| *fault as u8 == number), "{name}: fault {number}");
         assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0, "{name}: a fault turns torque off");
         rig.check_gaps().expect("no unknown gap");
+        let asleep = ASLEEP.iter().any(|fault| *fault as u8 == number);
+        assert_eq!(bridge(&mut rig), if asleep { Bridge::Coast } else { BRAKES }, "{name}");
+        if !asleep && phase == 0 {
+            check_way_back(&mut rig, name, held_mm);
+        }
         hold_again(&mut rig);
         worst_us = worst_us.max(off_us);
     }

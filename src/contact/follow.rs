@@ -24,6 +24,8 @@ use fixed::types::I16F16;
 const ROW_STEP: usize = 3;
 /// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be found.
 const ASTRAY_MAX: u8 = 12;
+/// Refinements after which a new start is near a solution: until then what was found before counts.
+const AFRESH: u8 = 4;
 /// With fewer live taxels than this in the model's contact there are other contacts that look the same.
 const TAXELS_LEAST: i32 = 8;
 /// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times as large.
@@ -71,6 +73,8 @@ pub struct Fit {
     doubt: u32,
     /// Refinements without any confidence since the last that had some.
     astray: u8,
+    /// Refinements of a new start that do not count yet.
+    afresh: u8,
     /// What the last refinement made of the guess.
     next: Option<Guess>,
     /// What the last refinement with some confidence says.
@@ -119,6 +123,7 @@ impl Fit {
             confidence: 255,
             doubt: 0,
             astray: 0,
+            afresh: 0,
             next: None,
             fitted: None,
         }
@@ -240,18 +245,19 @@ impl Fit {
         self.astray = if self.confidence > 0 && !few { 0 } else { self.astray + 1 };
         if few || self.astray > ASTRAY_MAX {
             // Another start may find it. What was found before is kept meanwhile: the force must not jump.
-            self.next = None;
+            (self.next, self.afresh) = (None, AFRESH);
             if self.astray > ASTRAY_MAX {
                 self.astray = 0;
                 self.fitted = self.fitted.filter(|_| !few);
             }
             return;
         }
+        self.afresh = if self.confidence > 0 { 0 } else { self.afresh.saturating_sub(1) };
         let guess = self.equations.solve(&self.guess, &self.scale, &config.geometry);
         self.next = Some(Guess::new(self.followed(&guess, force), guess.x, guess.y, &config.geometry));
         let taxels = self.equations.misfit.taxels;
         let likely = self.confidence >= CONFIDENCE_LEAST || taxels >= TAXELS_SURE;
-        if taxels >= TAXELS_LEAST && (likely || self.fitted.is_some() && self.confidence > 0) {
+        if self.afresh == 0 && taxels >= TAXELS_LEAST && (likely || self.fitted.is_some() && self.confidence > 0) {
             // At the mean of the frames, where noise counts least.
             let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
             let rest = self.followed(&guess, Newtons::from_bits(mean));
@@ -295,7 +301,7 @@ impl Fit {
 
     /// Back to the sums.
     fn forget(&mut self) {
-        (self.next, self.fitted, self.astray) = (None, None, 0);
+        (self.next, self.fitted, self.astray, self.afresh) = (None, None, 0, 0);
     }
 }
 

@@ -128,7 +128,7 @@ impl Array {
             }
             // A masked taxel is no fault.
             let bad = bad & !mask;
-            self.picture.bad_again += (bad & before[number]).count_ones() as u8;
+            self.picture.bad_again += (bad & before.get(number).copied().unwrap_or(0)).count_ones() as u8;
             highest = self.picture.leave_out(number, bad, config).max(highest);
         }
         if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {

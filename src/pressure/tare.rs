@@ -47,7 +47,7 @@ impl Array {
     /// tip is surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as the
     /// filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
     pub fn follow_drift(&mut self, clear: bool) {
-        let quick = (1 << 16) / (self.clear_rounds + CLEAR_ROUNDS_FIRST);
+        let quick = (1 << 16) / (self.clear_rounds.max(0) + CLEAR_ROUNDS_FIRST);
         self.learn(self.baseline_row, if clear { quick.max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT });
         self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
         if clear && self.baseline_row == 0 {

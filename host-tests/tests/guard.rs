@@ -198,3 +198,47 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
         }
     }
 }
+
+/// Counts that make a travel.
+fn counts(travel_mm: f64, config: &Config) -> i32 {
+    (travel_mm / count_mm(config)).round() as i32
+}
+
+/// The tip goes back no farther behind a touch than the clearance and 1 mm behind the surface; what only looks like a touch while the
+/// host asks for none moves nothing.
+#[test]
+fn a_touch_bounds_the_retreat() {
+    let config = Config::new(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
+    for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
+        let mut guard = Guard::start(0, &config);
+        let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
+            let seen = Seen { encoder: counts(travel_mm, &config), force, pressing, voltage: 0 };
+            guard.check(&seen, &config)
+        };
+        // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.
+        let depth_mm: f64 = config.tip.indentation(newtons(1_000)).0.to_num();
+        for step in 0..10_000 {
+            let travel_mm = (10.0 + depth_mm) * f64::from(step) / 1e4;
+            let force = newtons(((travel_mm - 10.0).max(0.0).powi(2) * 785.0) as i32);
+            assert_eq!(at(travel_mm, force, &mut guard), None);
+        }
+        let mut travel_mm = 10.0 + depth_mm;
+        let mut cut_mm = None;
+        let fault = loop {
+            travel_mm -= 0.002;
+            let fault = at(travel_mm, Newtons::ZERO, &mut guard);
+            let [_, backward] = lets_through(&guard);
+            if !backward && cut_mm.is_none() {
+                cut_mm = Some(travel_mm);
+            }
+            if fault.is_some() {
+                break fault;
+            }
+        };
+        assert_eq!(fault, Some(Fault::Runaway));
+        // The touch is noticed at 0.04 N, some frames late; the guard looks 1/256 s ahead.
+        let cut_mm = cut_mm.expect("cut before it is stopped");
+        assert!((floor_mm - 0.05..floor_mm + 0.3).contains(&cut_mm), "{cut_mm} mm, {floor_mm} asked");
+        assert!((floor_mm - 1.05..floor_mm - 0.8).contains(&travel_mm), "{travel_mm} mm");
+    }
+}

@@ -60,10 +60,11 @@ fn coarse_encoders_do_not_swing() {
                     [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
                 );
                 // Half a second is what the coarsest take to settle.
-                let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all(&finger);
-                ran.stands_clear(1.0, &finger);
-                // Without friction it may drift about within a count.
+                // Nobody sees a drift within a count: where that is more than the envelope's 50 um, it is what counts.
                 let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
+                let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
+                let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen, &finger);
+                ran.stands_clear(1.0, &finger);
                 assert!(ran.of("rest_travel_um") < 1e3 * count_mm, "{finger}: {} um", ran.of("rest_travel_um"));
             }
         }

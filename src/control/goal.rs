@@ -20,6 +20,9 @@ const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
 
 /// How much the indentation may be off at rest, where the encoder is coarser than that: 0.4 um.
 const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
+/// The most doubt in a force with which the tip still goes on at full speed: an eighth. Where more of the contact may be hidden, the fit
+/// needs the time of an approach to find how much.
+const SURE: u8 = u8::MAX / 8;
 
 /// Where the surface is, and where a released tip is to stand.
 #[derive(Clone, Copy, Debug, Default)]
@@ -57,8 +60,10 @@ impl Goal {
             (way, pressed && self.confirmed(DEEPER_BACK, contact, travel, config), config.count)
         } else {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
-            let deeper = if way < Millimetres::ZERO { DEEPER_BACK } else { DEEPER };
-            let quick = mode == Mode::Force && self.confirmed(deeper, contact, travel, config);
+            let back = way < Millimetres::ZERO;
+            let deeper = if back { DEEPER_BACK } else { DEEPER };
+            let sure = back || contact.doubt <= SURE;
+            let quick = mode == Mode::Force && sure && self.confirmed(deeper, contact, travel, config);
             // An approach must come to the contact, however little is left.
             let slack = if mode == Mode::Force { config.count.min(FORCE_SLACK) } else { Millimetres::ZERO };
             (within_travel(way, motion, config, limits), quick, slack)

@@ -85,6 +85,19 @@ fn a_doubtful_fit_does_not_press_harder() {
     }
 }
 
+/// The contact's middle is 1.5 to 2.5 mm beside the array, which sees nothing until it is wide: it touched at full speed meanwhile.
+#[test]
+fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
+    for spread_percent in [0.0, 6.0] {
+        for (centre_mm, goal_n) in [([9.0, 0.0], 1.0), ([0.0, -9.0], 1.0), ([9.0, 0.0], 4.0), ([10.0, 0.0], 2.0)] {
+            let finger = format!("{centre_mm:?} mm, {spread_percent} %, {goal_n} N");
+            let ran = holds(goal_n, &off(centre_mm, spread_percent, "")).keeps_all_but(&["hold_error_mn"], &finger);
+            let held = ran.first_hold().mean_n / goal_n;
+            assert!((0.7..1.3).contains(&held), "{finger}: holds {held} of it");
+        }
+    }
+}
+
 /// It pressed 1.4 N too much on a ball of 20 mm.
 #[test]
 fn a_ball_beside_the_middle_is_not_pressed_harder() {

@@ -2,8 +2,6 @@
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 
-use core::sync::atomic::Ordering;
-
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::config::Config;

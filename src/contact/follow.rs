@@ -270,6 +270,8 @@ impl Fit {
 
     /// Takes a refinement's ratio, and its centre where it has one.
     fn settle(&mut self, ratio: i32, centre: Option<[Millimetres; 2]>) {
+        // Less than what the taxels carry is no force to press for: only a good likeness may say so.
+        let ratio = if self.confidence >= CONFIDENCE_LEAST { ratio } else { ratio.max(1 << RATIO_BITS) };
         match (&mut self.fitted, centre) {
             (Some(fitted), centre) => {
                 let way = ratio - fitted.ratio;

@@ -22,6 +22,12 @@ const LEAST: i32 = 1 << 4;
 /// What comes back in a frame, Q8.
 const RECOVERS: i32 = 2;
 
+impl Default for Drive {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
 impl Drive {
     /// Nothing at the motor.
     pub const fn new() -> Self {

@@ -89,7 +89,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
         ("the encoder's ends in turns", [(i32::MIN, i32::MAX), (i32::MAX, i32::MIN)]),
         ("the ends of the acceleration's type in turns", [(0, i32::MAX), (1, i32::MIN)]),
     ];
-    let machine = |((input, pair), pace): ((&str, [(i32, i32); 2]), usize)| {
+    let machine = |(input, pair): (&str, [(i32, i32); 2]), pace: usize| {
         let config = config.clone();
         Machine {
             name: format!("observer, {scan} scan, pace {pace}, {input}"),
@@ -111,7 +111,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
             ],
         }
     };
-    inputs.into_iter().flat_map(|input| [(input, 0), (input, PACES - 1)]).map(machine).collect()
+    inputs.into_iter().flat_map(|input| [0, PACES - 1].map(|pace| machine(input, pace))).collect()
 }
 
 /// The wanted acceleration, held or in turns.

@@ -120,3 +120,14 @@ fn a_step_beside_the_middle_stays_in_the_envelope() {
         asks(&script, 2.7, &off([7.5, 0.0], spread_percent, "")).keeps_all(&finger).stands_clear(1.0, &finger);
     }
 }
+
+/// A doubtful fit once said that a force was a thirteenth of what the taxels carry, and the tip was pressed for the rest.
+#[test]
+fn a_doubtful_fit_never_says_less_than_the_taxels() {
+    let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
+    for number in [233, 911] {
+        let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
+        let outcome = sim::run::run(&finger.scene, &crate::native, &mut []).expect("it runs");
+        assert!(outcome.passed(), "finger {number}: {:#?}", outcome.verdicts);
+    }
+}

@@ -1,6 +1,6 @@
 //! The link task: bytes from the bus to the server, its replies back, and what it asks of the firmware.
-
-use core::sync::atomic::Ordering;
+//!
+//! What it heard crosses to control as one: the command, and the count of packets that a bus watchdog goes by.
 
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};

@@ -280,7 +280,10 @@ impl Pipeline {
                 self.press.start(&self.motion);
                 Mode::Identify
             }
-            Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => Mode::Force,
+            Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => {
+                self.goal.felt = self.guard.depth_felt(&self.config);
+                Mode::Force
+            }
             Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => {
                 self.array.touched();
                 Mode::Force

@@ -19,6 +19,7 @@
 pub mod bounds;
 pub mod guard;
 pub mod monitor;
+mod unseen;
 
 /// What the controller is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,6 +76,8 @@ pub enum Fault {
     Runaway = 14,
     /// The encoder runs against what the motor is driven to: its channels or the motor's leads are swapped.
     Reversed = 15,
+    /// The motor presses on something that the array does not see.
+    Unseen = 16,
 }
 
 /// What holds the loop back just now: a set of flags, stable by bit.
@@ -102,13 +105,12 @@ impl Limits {
     pub const SLEW: u16 = 1 << 8;
     /// There is no time for the effort that was asked for; see [`crate::pipeline::budget`].
     pub const EFFORT: u16 = 1 << 9;
+    /// Something touched the tip during the last tare: what the array shows is less by that.
+    pub const TARED_TOUCHING: u16 = 1 << 10;
     /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds it from above.
     pub const FROM_BELOW: u16 = 1 << 11;
     /// The guard holds the duty back, see [`guard`].
     pub const GUARD: u16 = 1 << 12;
-
-    /// Something touched the tip during the last tare: what the array shows is less by that.
-    pub const TARED_TOUCHING: u16 = 1 << 10;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! The quickest pace is the one that the dead time allows, `1 / (5 T)`, or the one at which a count moves the voltage by three
-//! quarters of the largest, whichever is slower: so a coarse encoder makes a slower loop, never a swinging one. Each
+//! quarters of the largest or is taken for 60 mm/s, whichever is slowest: so a coarse encoder makes a slower loop, never a swinging one. Each
 //! further pace is half as quick and answers with a quarter. At rest a count is worth 1/64 of that.
 
 use crate::root::floor_sqrt;
@@ -28,6 +28,8 @@ const OBSERVER_TO_SPEED: f32 = 2.5;
 const KICK: f32 = 5.8;
 /// Share of the largest voltage that a count may move at the quickest pace.
 const KICK_MOST: f32 = 0.75;
+/// Speed that a count may be taken for at the quickest pace, mm/s.
+const SPEED_MOST: f32 = 60.0;
 /// The slowest speed loop, in 1/s: what the profile's arithmetic holds.
 const SPEED_GAIN_LEAST: f32 = 60.0;
 
@@ -52,7 +54,8 @@ pub(crate) fn paces(frame_s: f32, mm_per_count: f32, voltage_limit: f32) -> [Gai
     // In Q8, of at most 2^31 /s^2.
     let square = (KICK_MOST * voltage_limit / (KICK * mm_per_count)).min(2_147_483_648.0);
     let by_counts = floor_sqrt((square * 65_536.0) as u64) as f32 / 256.0;
-    let mut speed_gain = by_time.min(by_counts);
+    let by_speed = SPEED_MOST / (OBSERVER_TO_SPEED * mm_per_count);
+    let mut speed_gain = by_time.min(by_counts).min(by_speed);
     [(); PACES].map(|()| {
         let gains = Gains::new(speed_gain.max(SPEED_GAIN_LEAST), frame_s);
         speed_gain *= 0.5;

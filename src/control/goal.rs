@@ -30,7 +30,11 @@ pub struct Goal {
     mode: Mode,
     /// Travel at which the surface was last touched.
     surface: Option<Millimetres>,
+    /// Whether that contact was lost without letting go.
+    lost: bool,
     rest: Millimetres,
+    /// How deep the tip is by what the motor felt when the contact began: beside the array a touch is seen late.
+    pub felt: Millimetres,
 }
 
 impl Goal {
@@ -82,11 +86,15 @@ impl Goal {
         if mode == self.mode {
             return;
         }
-        let enabled = self.mode == Mode::Off;
-        self.mode = mode;
-        if mode == Mode::Force || enabled && contact.force >= config.contact_on {
-            self.surface = Some(Millimetres(travel.0.saturating_sub(contact.indentation.0)));
+        let before = core::mem::replace(&mut self.mode, mode);
+        if mode == Mode::Force || before == Mode::Off && contact.force >= config.contact_on {
+            let deep = if contact.doubt > 0 { contact.indentation.max(self.felt) } else { contact.indentation };
+            let surface = Millimetres(travel.0.saturating_sub(deep.0));
+            // A contact that was lost only to the array is where it was.
+            let kept = self.surface.filter(|_| self.lost && contact.doubt > 0);
+            self.surface = Some(kept.map_or(surface, |before| before.min(surface)));
         }
+        self.lost = before == Mode::Force && mode == Mode::Approach;
         if mode == Mode::Release {
             let clear =
                 self.surface.map_or(travel, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
@@ -123,7 +131,9 @@ impl Goal {
             if contact.doubt > u8::MAX / 2 {
                 limits.set(Limits::FROM_BELOW);
             }
-            let doubtful = (i64::from(deeper.to_bits()) * i64::from(contact.doubt)) / i64::from(u8::MAX);
+            // What the motor felt and the array did not see bears out the doubt.
+            let doubt = if self.felt > Millimetres::ZERO { contact.doubt.saturating_mul(4) } else { contact.doubt };
+            let doubtful = (i64::from(deeper.to_bits()) * i64::from(doubt)) / i64::from(u8::MAX);
             sensed = sensed.saturating_add(I8F24::from_bits(doubtful as i32));
         }
         Millimetres(wanted.0.saturating_sub(sensed))

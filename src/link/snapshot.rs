@@ -110,7 +110,7 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
         Some(Fault::EncoderFrozen | Fault::Reversed) => 1 << 3,
         Some(Fault::Bridge) => 1 << 4,
         Some(Fault::OverForce) => 1 << 5,
-        Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen) => 1 << 6,
+        Some(Fault::ArrayBroken | Fault::RowStuck | Fault::ArrayFrozen | Fault::Unseen) => 1 << 6,
         Some(
             Fault::LostFrames
             | Fault::BusSilent

@@ -12,8 +12,12 @@ const COUNT_MM: f32 = 0.008;
 const LONGER: f32 = 8.0;
 /// It must expect a change of the speed by this, mm/s, or by a quarter of what the largest voltage does in that time;
 const CHANGE: f32 = 40.0;
+/// by so many times what friction takes in that time, where that is more;
+const RUBBED: f32 = 3.0;
 /// and by what so many counts in that time may be wrong by.
 const COUNTS: f32 = 16.0;
+/// What the model of a sound motor is off by while it goes steadily, mm/s.
+const OFF: f32 = 0.5;
 
 /// The ends and speeds that the guard holds, and its model of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,6 +38,10 @@ pub struct Bounds {
     pub change_per_n: i32,
     /// The change of speed that must be expected before it counts, Q16 mm/s.
     pub change_least: i32,
+    /// What the speed changes less than expected by a contact that the array does not see: by 1 N and the friction, Q16 mm/s.
+    pub change_unseen: i32,
+    /// The part of such a change that counts and model may be wrong by.
+    pub change_unsure: i32,
 }
 
 /// What the configuration knows of frame, encoder and motor.
@@ -50,7 +58,11 @@ impl Bounds {
     pub(crate) fn new(p: &Params, tip: &Tip, drives: &Drives) -> Self {
         let Drives { frame_s, mm_per_count, mass, driven } = *drives;
         let tau_s = TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER);
-        let change_least = (0.25 * driven * tau_s).min(CHANGE) + COUNTS * mm_per_count / tau_s;
+        let friction_n = 1e-6 * p.friction_unm as f32 * p.reduction_mrad_per_mm as f32;
+        let change_per_n = 1e3 / mass * tau_s;
+        let (count, rubbed) = (mm_per_count / tau_s, friction_n * change_per_n);
+        let change_least = (0.25 * driven * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
+        let change_unseen = change_per_n + rubbed + 0.5 * COUNTS * count + OFF;
         let deepest = tip.indentation(newtons(p.force_max_mn));
         Self {
             back: Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0)),
@@ -59,8 +71,10 @@ impl Bounds {
             frames_per_s: (1.0 / frame_s) as i32,
             leak: narrow((frame_s / tau_s).min(0.125) * exp2(16)),
             acceleration_per_n: narrow(1e3 / mass * exp2(8)),
-            change_per_n: narrow(1e3 / mass * tau_s * exp2(16)),
+            change_per_n: narrow(change_per_n * exp2(16)),
             change_least: narrow(change_least * exp2(16)),
+            change_unseen: narrow(change_unseen * exp2(16)),
+            change_unsure: narrow((2.0 * count + 0.2 * OFF) * exp2(16)),
         }
     }
 }

@@ -8,6 +8,8 @@
 //! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a tip that stays
 //!    so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
+//! 5. A tip that goes steadily forward stops where the motor feels 1 N and its friction more than before, and the array no contact;
+//!    see [`super::unseen`].
 //!
 //! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells, and the one that its
 //! model of the motor expects. Both pass the same two filters, so a sound finger shows the same sign whatever it is asked for:
@@ -19,6 +21,7 @@
 //! An encoder whose counts are farther apart than 8 um makes tau longer, up to eight times.
 
 use crate::config::Config;
+use crate::safety::unseen::{Going, Unseen};
 use crate::safety::{Fault, Limits};
 use crate::units::{Duty, Millimetres, Newtons};
 
@@ -77,6 +80,7 @@ pub struct Guard {
     fast_ns: u32,
     /// For how long the two ways have told another story.
     other_ns: u32,
+    unseen: Unseen,
     may: May,
 }
 
@@ -121,7 +125,7 @@ impl Guard {
         if outside || self.fast_ns > LOOSE_NS {
             return Some(Fault::Runaway);
         }
-        self.disagreement(seen, config)
+        self.disagreement(seen, config).or_else(|| self.unseen(config))
     }
 
     /// The duty that is let through; sets [`Limits::GUARD`] where that is not what was asked for.
@@ -196,6 +200,22 @@ impl Guard {
         }
     }
 
+    /// What the motor feels where the array shows nothing.
+    #[inline(always)]
+    fn unseen(&mut self, config: &Config) -> Option<Fault> {
+        if self.force >= config.contact_off.to_bits() {
+            self.unseen.seen();
+            return None;
+        }
+        let told = self.speed.saturating_sub(self.slow_speed);
+        self.unseen.check(&Going { speed: self.speed, told, expected: self.late_change }, config)
+    }
+
+    /// How deep the tip is by what the motor felt before the array saw a contact.
+    pub fn depth_felt(&self, config: &Config) -> Millimetres {
+        self.unseen.depth(self.force, self.speed, config)
+    }
+
     /// What the encoder tells against what the model expects, where that has been another for a while.
     #[inline(always)]
     fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
@@ -228,8 +248,9 @@ fn towards(value: i32, goal: i32, share: i32) -> i32 {
     value.saturating_add(((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16) as i32)
 }
 
+/// The nearest number of 32 bits.
 #[inline(always)]
-fn saturated(value: i64) -> i32 {
+pub(super) fn saturated(value: i64) -> i32 {
     let low = value as i32;
     if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }

@@ -59,6 +59,7 @@ fn every_fault_has_a_bit() {
         (Fault::Crash, 7),
         (Fault::Runaway, 7),
         (Fault::Reversed, 3),
+        (Fault::Unseen, 6),
     ];
     for (fault, bit) in faults {
         bench.set_fault(Some(fault));

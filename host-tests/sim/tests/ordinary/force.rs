@@ -98,6 +98,48 @@ fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
     }
 }
 
+/// 2.5 mm beside the array the motor feels the touch before the array sees it: 3.7 N were pressed at goal 1.
+#[test]
+fn the_motor_feels_a_touch_that_the_array_sees_late() {
+    let friction = "[effects.dry_friction]\ntorque_mnm = 0.12\n";
+    // What the array sees of it is too little to hold it still.
+    let spared = ["hold_error_mn", "hold_swing_mn", "rest_duty_percent"];
+    for (centre_mm, goal_n) in [([10.0, 0.0], 1.0), ([10.0, 0.0], 3.0), ([-10.0, 0.0], 1.0), ([0.0, 10.0], 1.0)] {
+        let finger = format!("{centre_mm:?} mm, {goal_n} N");
+        let ran = holds(goal_n, &off(centre_mm, 0.0, friction)).keeps_all_but(&spared, &finger);
+        let held = ran.first_hold().mean_n / goal_n;
+        assert!((0.8..1.45).contains(&held), "{finger}: holds {held} of it");
+        // Where taxels differ, too, how much is hidden is told less well.
+        let peak_n = holds(goal_n, &off(centre_mm, 6.0, friction)).of("peak_force_n");
+        assert!((0.8 * goal_n..goal_n + 1.3).contains(&peak_n), "{finger}, gains that spread by 6 %: {peak_n} N");
+    }
+}
+
+/// Still farther out the array sees nothing of the first newton, and loses what it saw: 4.8 N were pressed at goal 0.5, 2.4 N at goal 1.
+#[test]
+fn a_touch_that_the_array_hardly_sees_is_pressed_no_harder() {
+    for (goal_n, spread_percent) in [(0.5, 0.0), (0.5, 6.0), (1.0, 0.0), (1.0, 6.0)] {
+        let friction = "[effects.dry_friction]\ntorque_mnm = 0.12\n";
+        let peak_n = holds(goal_n, &off([11.5, 0.0], spread_percent, friction)).of("peak_force_n");
+        assert!((1.0..2.1).contains(&peak_n), "{goal_n} N, {spread_percent} %: {peak_n} N");
+    }
+}
+
+/// A thing that does not touch the array at all was pressed with 8.8 N, until the motor stood.
+#[test]
+fn a_touch_that_the_array_does_not_see_ends_by_what_the_motor_feels() {
+    for (centre_mm, friction_mnm) in [(14.0, 0.12), (20.0, 0.12), (20.0, 0.0)] {
+        for goal_n in [0.5, 2.0, 7.0] {
+            let finger = format!("{centre_mm} mm, {goal_n} N, friction {friction_mnm} mN m");
+            let friction = format!("[effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n");
+            let ran = holds(goal_n, &off([centre_mm, 0.0], 0.0, &friction));
+            let (peak_n, fault) = (ran.of("peak_force_n"), ran.of("fault_number"));
+            assert_eq!(fault, 16.0, "{finger}: {peak_n} N");
+            assert!((1.4..3.2).contains(&peak_n), "{finger}: {peak_n} N");
+        }
+    }
+}
+
 /// It pressed 1.4 N too much on a ball of 20 mm.
 #[test]
 fn a_ball_beside_the_middle_is_not_pressed_harder() {

@@ -101,3 +101,20 @@ fn a_weak_source_is_spared() {
         }
     }
 }
+
+/// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5, at three times the
+/// speed of the approach.
+#[test]
+fn a_small_reduction_is_no_fault() {
+    for (ratio, counts) in [(1.2, 1_600), (2.4, 1_600), (6.0, 256), (12.0, 256)] {
+        let finger = format!("ratio {ratio}, {counts} counts");
+        let tables = format!(
+            "[transmission]\nratio = {ratio:?}\n[motor]\nencoder_counts_per_turn = {counts}\n\
+            [effects.dry_friction]\ntorque_mnm = 0.12\n"
+        );
+        // At 40 um a count no force is held to 15 %.
+        let ran = holds(1.0, &tables).keeps_all_but(&["hold_error_mn"], &finger);
+        let held = ran.first_hold().mean_n;
+        assert!((0.5..1.1).contains(&held), "{finger}: holds {held} N");
+    }
+}

@@ -122,6 +122,7 @@ fn fault(number: u8) -> Option<Fault> {
         Fault::Crash,
         Fault::Runaway,
         Fault::Reversed,
+        Fault::Unseen,
     ]
     .into_iter()
     .find(|fault| *fault as u8 == number)

@@ -1,6 +1,7 @@
 //! Metrics and bounds.
 
 use crate::{native, wall};
+use fingertip::config::newtons;
 use fingertip::frame::{Frame, Sense};
 use fingertip::pipeline::{Command, Status};
 use fingertip::safety::Fault;
@@ -76,6 +77,25 @@ fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
     let alone = measure([None, Some((high, 0.25))]);
     assert!(alone[0] == number(high) && alone[1].is_some() && alone[2] == Some(1.0), "{alone:?}");
     assert_eq!(measure([None, None]), [Some(0.0), None, Some(0.0)]);
+}
+
+/// As where nothing grows with the goal: what one finger lacks, the other does not make up for.
+#[test]
+fn of_two_fingers_one_without_a_value_breaks_what_grows_with_the_goal() {
+    let mut meter = Meter::default();
+    // Only the first is asked for a force.
+    for (step, (finger, goal_mn)) in (0..600).flat_map(|step| [(step, (0, 1_000)), (step, (1, 0))]) {
+        let command = Command { goal: newtons(goal_mn), ..Command::default() };
+        let truth = Truth { force_n: f64::from(goal_mn) * 1e-3, ..Truth::default() };
+        let (frame, sense, status) = (&Frame::EMPTY, &Sense::default(), &Status::default());
+        let time_s = f64::from(step) * 1e-3;
+        meter.step(&Step { finger, time_s, frame, sense, command: &command, status, truth: &truth });
+    }
+    let bound = |metric: &str| Bound { metric: metric.into(), min: None, max: Some(50.0), max_per_goal_n: Some(100.0) };
+    let bounds = ["hold_swing_mn", "finger0.hold_swing_mn", "finger1.hold_swing_mn"].map(bound);
+    let verdicts = meter.verdicts(&bounds);
+    let values: Vec<_> = verdicts.iter().map(|verdict| (verdict.value, verdict.held)).collect();
+    assert_eq!(values, [(None, false), (Some(0.0), true), (None, false)]);
 }
 
 #[test]

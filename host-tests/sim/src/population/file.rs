@@ -29,12 +29,13 @@ pub fn load(name: &str) -> Result<Population, String> {
     let found = if beside.is_file() { beside } else { folder().join(base).with_extension("toml") };
     let told = |why: String| format!("{file} extends {base}: {why}");
     let text = fs::read_to_string(&found).map_err(|error| told(unknown(base, &error)))?;
-    // What is wrong in it is told as it stands there.
-    let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
-    let mut whole: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| told(error.to_string()))?;
-    if whole.contains_key("extends") {
+    let whole: Result<DocumentMut, toml_edit::TomlError> = text.parse();
+    if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {
         return Err(told(format!("{base} extends another itself; extend that one, or none")));
     }
+    // What is wrong in it is told as it stands there.
+    let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
+    let mut whole = whole.map_err(|error| told(error.to_string()))?;
     overlay(whole.as_table_mut(), over.as_table());
     let label = format!("{file} over {}", known.name);
     let population = read(&label, &whole.to_string()).map_err(|errors| errors.to_string())?;

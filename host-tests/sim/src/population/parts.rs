@@ -12,8 +12,8 @@ use crate::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES};
 use std::ops::Range;
 use toml_edit::{Document, Item, Table, TableLike};
 
-/// What a population's file has beside what a scene has.
-const OWN: [&str; 4] = ["extends", "magnitude", "draw", "count"];
+/// What a population's file has beside what a scene has, once it extends nothing any more.
+const OWN: [&str; 3] = ["magnitude", "draw", "count"];
 
 /// Reads a population that extends nothing any more.
 ///

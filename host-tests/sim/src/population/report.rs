@@ -1,7 +1,7 @@
 //! What became of a population: every finger's draws and verdicts, and what they come to.
 
 use super::spread::Spread;
-use super::{Drawn, Finger, Population};
+use super::{Counted, Drawn, Finger, Population};
 use crate::run::{Outcome, RunError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -26,6 +26,8 @@ pub struct Report {
     pub of_fingers: usize,
     /// Of the population's text, the seed and the number of fingers: shards of one whole have the same.
     pub id: String,
+    /// What is counted beside the envelope.
+    pub counted: Vec<Counted>,
     /// What they come to, for scripts.
     pub summary: Value,
     /// Each finger.
@@ -150,7 +152,6 @@ impl Report {
         let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
         let id =
             format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()));
-        let counted = population.counted.iter().map(|counted| (counted.metric.clone(), json!(counted.above))).collect();
         let mut report = Self {
             population: population.name.clone(),
             about: population.about.clone(),
@@ -159,10 +160,11 @@ impl Report {
             seed,
             of_fingers,
             id,
+            counted: population.counted.clone(),
             summary: Value::Null,
             fingers,
         };
-        report.finish(counted);
+        report.finish();
         report
     }
 
@@ -198,19 +200,17 @@ impl Report {
             );
         }
         whole.fingers = fingers.into_values().collect();
-        let counted = whole.counted().into_iter().map(|(metric, above, _)| (metric, json!(above))).collect();
-        whole.finish(counted);
+        whole.finish();
         Ok(whole)
     }
 
-    fn finish(&mut self, counted: Map<String, Value>) {
+    fn finish(&mut self) {
         self.fingers.sort_by_key(|ran| ran.finger);
         let promises: Vec<Value> = self.promises().iter().map(Row::json).collect();
         let [percent, mn] = self.errors().map(|spread| spread.json());
-        let counted = counted.into_iter().map(|(metric, above)| {
-            let over = |ran: &&Ran| ran.metric(&metric) > above.as_f64();
-            json!({ "metric": metric, "above": above, "fingers": self.fingers.iter().filter(over).count() })
-        });
+        let counted = self.counted().map(
+            |(Counted { metric, above }, fingers)| json!({ "metric": metric, "above": above, "fingers": fingers }),
+        );
         self.summary = json!({
             "fingers": self.fingers.len(),
             "inside": self.inside(),
@@ -226,12 +226,12 @@ impl Report {
         self.fingers.iter().filter(|ran| ran.inside).count()
     }
 
-    /// What is counted beside the envelope: metric, above what, and how many fingers.
-    pub fn counted(&self) -> Vec<(String, f64, u64)> {
-        let counted = self.summary["counted"].as_array().into_iter().flatten();
-        let row =
-            |row: &Value| Some((row["metric"].as_str()?.to_owned(), row["above"].as_f64()?, row["fingers"].as_u64()?));
-        counted.filter_map(row).collect()
+    /// What is counted beside the envelope, and of how many fingers it is so.
+    pub fn counted(&self) -> impl Iterator<Item = (&Counted, usize)> {
+        self.counted.iter().map(|counted| {
+            let above = |ran: &&Ran| ran.metric(&counted.metric) > Some(counted.above);
+            (counted, self.fingers.iter().filter(above).count())
+        })
     }
 
     /// Each promise over all fingers.

@@ -1,5 +1,6 @@
 //! A population's report for people.
 
+use super::Counted;
 use super::report::{Promise, Ran, Report};
 use super::spread::Spread;
 use crate::metrics::shown;
@@ -28,8 +29,8 @@ pub fn text(report: &Report) -> String {
         let (broken, share) = (row.broken, percent(row.broken));
         let _ = writeln!(text, "  {:width$} {broken:>8} {share:>8.1} {median:>10} {most:>10} {worst:>10}", row.metric);
     }
-    for (metric, above, fingers) in report.counted() {
-        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers as usize));
+    for (Counted { metric, above }, fingers) in report.counted() {
+        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers));
     }
     let [of_goal, mn] = report.errors();
     let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);

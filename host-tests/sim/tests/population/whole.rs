@@ -37,6 +37,9 @@ fn touching() -> Population {
         [[count]]
         metric = "travel_max_mm"
         above = 1.0
+        [[count]]
+        metric = "travel_max_mm"
+        above = 2.0
         "#,
     )
 }
@@ -68,6 +71,7 @@ fn shards_put_together_are_the_whole_byte_for_byte() {
     let shards = [3, 1, 2].map(shard);
     let merged = Report::merge(&shards).unwrap();
     assert_eq!(merged, whole);
+    assert_eq!(merged.summary["counted"].as_array().unwrap().len(), 2, "two counts of one metric are two");
     merged.write(&folder.join("merged.json")).unwrap();
     assert_eq!(fs::read(folder.join("merged.json")).unwrap(), fs::read(folder.join("whole.json")).unwrap());
 

@@ -4,6 +4,7 @@ use super::Counted;
 use super::report::{Promise, Ran, Report};
 use super::spread::Spread;
 use crate::metrics::shown;
+use crate::run::asked;
 use std::fmt::Write as _;
 
 /// Fingers that are named each.
@@ -56,19 +57,10 @@ pub fn text(report: &Report) -> String {
 
 /// What a finger broke, in a line.
 pub fn broken(ran: &Ran) -> String {
-    let asked = |promise: &Promise| {
-        let sides = [
-            promise.min.map(|min| format!("{} or more", shown(Some(min)))),
-            promise.max.map(|max| format!("{} or less", shown(Some(max)))),
-        ];
-        format!(
-            "{} {} ({})",
-            promise.metric,
-            shown(promise.value),
-            sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
-        )
+    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
+        format!("{metric} {} ({})", shown(*value), asked(*min, *max))
     };
-    format!("finger {}: {}", ran.finger, ran.broken().map(asked).collect::<Vec<_>>().join("; "))
+    format!("finger {}: {}", ran.finger, ran.broken().map(promise).collect::<Vec<_>>().join("; "))
 }
 
 fn values(spread: &Spread) -> [String; 3] {

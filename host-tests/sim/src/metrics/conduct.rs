@@ -5,6 +5,7 @@ use super::at_goal::{AtGoal, note};
 use super::finger::{duty, newtons, trimmed};
 use crate::watch::{Controller, Step};
 use fingertip::params::Params;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// A contact that ended may still drive the tip for this long.
@@ -25,7 +26,7 @@ struct Sample {
 }
 
 /// A force that was held: the last part of its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     /// What was asked for.
     pub goal_n: f64,

@@ -2,6 +2,7 @@
 
 use super::spread::Spread;
 use super::{Counted, Drawn, Finger, Population};
+use crate::metrics::Hold;
 use crate::run::{Outcome, RunError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -48,7 +49,7 @@ pub struct Ran {
     /// What it promised, and what became of it.
     pub promises: Vec<Promise>,
     /// The forces that it held.
-    pub holds: Vec<Held>,
+    pub holds: Vec<Hold>,
     /// All metrics; null where the run has none.
     pub metrics: Map<String, Value>,
     /// Of its run.
@@ -68,19 +69,6 @@ pub struct Promise {
     pub max: Option<f64>,
     /// Whether it is kept.
     pub held: bool,
-}
-
-/// A force that was held.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Held {
-    /// What was asked for.
-    pub goal_n: f64,
-    /// Mean of the true force at the end.
-    pub mean_n: f64,
-    /// Whether nothing was touched.
-    pub missed: bool,
-    /// Whether a fault had stopped the motor.
-    pub faulty: bool,
 }
 
 impl Promise {
@@ -111,20 +99,13 @@ impl Ran {
             max: verdict.max,
             held: verdict.held,
         });
-        let holds = outcome.holds.iter();
-        let holds = holds.map(|hold| Held {
-            goal_n: hold.goal_n,
-            mean_n: hold.mean_n,
-            missed: hold.missed,
-            faulty: hold.faulty,
-        });
         Self {
             finger: number + 1,
             seed: finger.scene.seed,
             inside: outcome.passed(),
             drawn: drawn.collect(),
             promises: promises.collect(),
-            holds: holds.collect(),
+            holds: outcome.holds.clone(),
             metrics: outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
             digest: outcome.summary.digest.clone(),
         }
@@ -250,7 +231,7 @@ impl Report {
     /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no fault came before.
     pub fn errors(&self) -> [Spread; 2] {
         let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty && !hold.missed);
-        let off_n = |hold: &Held| (hold.mean_n - hold.goal_n).abs();
+        let off_n = |hold: &Hold| (hold.mean_n - hold.goal_n).abs();
         let percent = holds().map(|hold| 100.0 * off_n(hold) / hold.goal_n).collect();
         [Spread::of(percent), Spread::of(holds().map(|hold| 1e3 * off_n(hold)).collect())]
     }

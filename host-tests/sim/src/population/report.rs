@@ -1,7 +1,7 @@
 //! What became of a population: every finger's draws and verdicts, and what they come to.
 
 use super::spread::Spread;
-use super::{Counted, Drawn, Finger, Population};
+use super::{Counted, Finger, Population};
 use crate::metrics::Hold;
 use crate::run::{Outcome, RunError};
 use serde::{Deserialize, Serialize};
@@ -83,15 +83,6 @@ impl Promise {
 impl Ran {
     /// What became of a finger.
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
-        let drawn = finger.drawn.iter().map(|(name, value)| {
-            (
-                name.clone(),
-                match value {
-                    Drawn::Number(number) => json!(number),
-                    Drawn::Word(word) => json!(word),
-                },
-            )
-        });
         let promises = outcome.verdicts.iter().map(|verdict| Promise {
             metric: verdict.bound.metric.clone(),
             value: verdict.value,
@@ -103,7 +94,7 @@ impl Ran {
             finger: number + 1,
             seed: finger.scene.seed,
             inside: outcome.passed(),
-            drawn: drawn.collect(),
+            drawn: finger.drawn.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
             promises: promises.collect(),
             holds: outcome.holds.clone(),
             metrics: outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),

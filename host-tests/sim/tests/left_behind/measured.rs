@@ -1,15 +1,15 @@
 //! Metrics and bounds.
 
-use crate::{native, wall};
+use crate::wall;
 use fingertip::config::newtons;
 use fingertip::frame::{Frame, Sense};
 use fingertip::pipeline::{Command, Status};
 use fingertip::safety::Fault;
-use sim::ledger;
 use sim::metrics::{self, METRICS, Meter};
 use sim::run::run;
 use sim::scene::Bound;
 use sim::watch::{Step, Truth, Watch};
+use sim::{ledger, native};
 use std::collections::BTreeSet;
 
 #[test]
@@ -28,7 +28,7 @@ fn every_metric_has_a_name_with_a_unit_and_stands_once() {
 #[test]
 fn the_wall_is_measured() {
     let scene = wall();
-    let outcome = run(&scene, &native, &mut []).unwrap();
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
     let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!((0.99..1.05).contains(&value("peak_force_n")), "{}", value("peak_force_n"));
     assert!((0.0..5.0).contains(&value("overshoot_percent")));
@@ -108,7 +108,7 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
         bound("peak_force_n", Some(0.9), Some(1.2)),
         bound("slip_noticed_ms", None, Some(10.0)),
     ];
-    let outcome = run(&scene, &native, &mut []).unwrap();
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
     let held: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
     assert_eq!(held, [false, false, true, false]);
     assert!(!outcome.passed());
@@ -124,8 +124,8 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
 #[test]
 fn an_ablation_shows_what_an_effect_changes() {
     let scene = wall();
-    let whole = run(&scene, &native, &mut []).unwrap();
-    let ablated = ledger::ablate(&scene, &native).unwrap();
+    let whole = run(&scene, &native::board, &mut []).unwrap();
+    let ablated = ledger::ablate(&scene, &native::board).unwrap();
     assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
     let rows = ledger::differences(&whole.measured, &ablated);
     assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));

@@ -127,7 +127,7 @@ fn a_doubtful_fit_never_says_less_than_the_taxels() {
     let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
     for number in [233, 911] {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
-        let outcome = sim::run::run(&finger.scene, &crate::native, &mut []).expect("it runs");
+        let outcome = sim::run::run(&finger.scene, &sim::native::board, &mut []).expect("it runs");
         assert!(outcome.passed(), "finger {number}: {:#?}", outcome.verdicts);
     }
 }

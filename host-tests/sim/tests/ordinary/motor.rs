@@ -1,8 +1,8 @@
 //! The motor at rest, coarse encoders, and what must not stop it: noise, bursts, a weak source.
 
-use crate::{asks, holds, native};
-use sim::population;
+use crate::{asks, holds};
 use sim::run::run;
+use sim::{native, population};
 
 /// Fingers that hold one force each. Noise, friction, encoder and place are those of `ordinary`.
 const HOLDS: &str = r#"
@@ -37,7 +37,7 @@ fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
     let mut quiet = 0;
     for number in 0..100 {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
-        let outcome = run(&finger.scene, &native, &mut []).expect("it runs");
+        let outcome = run(&finger.scene, &native::board, &mut []).expect("it runs");
         let [duty, error_mn] =
             ["rest_duty_percent", "hold_error_mn"].map(|metric| outcome.measured.get(metric).expect("it holds"));
         assert!(outcome.passed(), "finger {number} deviates by {duty} %: {:?}", finger.drawn);

@@ -1,20 +1,13 @@
 //! Fingers that are run: shards and the whole, and the worst ones again.
 
 use crate::population;
-use sim::native::simulate;
+use sim::native;
 use sim::population::{Population, Report, run, worst};
-use sim::run::RunError;
-use sim::scene::Scene;
 use sim::sweep::Shard;
-use sim::watch::{Summary, Watch};
 use std::fs;
 use std::path::PathBuf;
 
 const FINGERS: usize = 7;
-
-fn native(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
-    simulate(scene, watch).map_err(Into::into)
-}
 
 /// Touches within 20 ms; some break a bound, some keep it.
 fn touching() -> Population {
@@ -45,7 +38,7 @@ fn touching() -> Population {
 }
 
 fn report(population: &Population, shard: Shard) -> Report {
-    let fingers = run::fingers(population, 3, FINGERS, shard, &native).unwrap_or_else(|error| panic!("{error}"));
+    let fingers = run::fingers(population, 3, FINGERS, shard, &native::board).unwrap_or_else(|error| panic!("{error}"));
     Report::new(population, "native", 3, FINGERS, fingers)
 }
 
@@ -102,7 +95,7 @@ fn the_worst_run_again_as_they_did() {
         let text = fs::read_to_string(path).unwrap();
         assert!(text.contains("It broke:") && ran.broken().all(|promise| text.contains(&promise.metric)), "{text}");
         let scene = sim::cli::load(path.to_str().unwrap(), &[], None).unwrap_or_else(|error| panic!("{error}"));
-        let outcome = sim::run::run(&scene, &native, &mut []).unwrap();
+        let outcome = sim::run::run(&scene, &native::board, &mut []).unwrap();
         assert_eq!(outcome.summary.digest, ran.digest);
         let again: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
         let before: Vec<bool> = ran.promises.iter().map(|promise| promise.held).collect();
@@ -115,6 +108,6 @@ fn a_finger_that_cannot_be_run_is_named() {
     let population = population(
         "[tip]\nmodulus_kpa = { uniform = [1500, 2000] }\n[motor]\ninertia_g_cm2 = 0.01\n[world]\nstep_us = { uniform = [900, 1000] }\n",
     );
-    let error = run::fingers(&population, 1, 2, Shard::WHOLE, &native).unwrap_err().to_string();
+    let error = run::fingers(&population, 1, 2, Shard::WHOLE, &native::board).unwrap_err().to_string();
     assert!(error.contains("test.toml: finger ") && error.contains("step_us"), "{error}");
 }

@@ -72,7 +72,7 @@ pub const METRICS: &[Metric] = &[
     metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that was there for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm)),
     metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that was there for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share)),
     metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that was there for 400 ms; the worst of all", |f| largest(&swings(f))),
-    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| if f.faults > 0 { largest(&errors(f)).or(Some(0.0)) } else { largest(&errors(f)) }),
+    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or((f.faults > 0).then_some(0.0))),
     metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 

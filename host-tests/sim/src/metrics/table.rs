@@ -44,7 +44,7 @@ pub const METRICS: &[Metric] = &[
     metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
     metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
     metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),
-    metric("limit_goal_percent", Largest, "share of the time in which the goal was cut to the largest force", limited::<3>),
+    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", limited::<3>),
     metric("limit_travel_percent", Largest, "share of the time at the travel's end", limited::<4>),
     metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", limited::<5>),
     metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", limited::<8>),

@@ -23,7 +23,7 @@ fn the_fit_begins_on_every_contact_off_the_middle() {
     }
 }
 
-/// A frame of a slow scan is so long that the touch was over before a row was wanted.
+/// A frame of a slow scan is so long that the touch was over before the fit began.
 #[test]
 fn the_fit_begins_with_a_slow_scan() {
     for settle_ns in [40_000, 100_000] {

@@ -36,37 +36,34 @@ pub fn records() -> Vec<Record> {
     let mut random = Rng::with_seed(SEED);
     let mut clears = 0;
     let mut held = Sense::default();
-    (0..RECORDS)
-        .map(|index| {
-            board.command.tare_request = 1;
-            board.command.torque = index >= 100;
-            if let Some((_, goal_mn)) = GOALS_MN.iter().find(|(from, _)| *from == index) {
-                board.command.goal = newtons(*goal_mn);
-            }
-            let mut given = None;
-            // What breaks comes before the core, so that the finger does what the core makes of it.
-            board.step_with(|record| {
-                if let Some(since) = index.checked_sub(BROKEN_FROM) {
-                    let (burst, phase) = (since / BURST_EVERY, since % BURST_EVERY);
-                    match phase {
-                        0..BURST => {
-                            if phase == 0 {
-                                held = record.sense;
-                            }
-                            spoil(record, burst, &held, &mut random);
+    let mut records = Vec::with_capacity(RECORDS);
+    for index in 0..RECORDS {
+        board.command.tare_request = 1;
+        board.command.torque = index >= 100;
+        if let Some((_, goal_mn)) = GOALS_MN.iter().find(|(from, _)| *from == index) {
+            board.command.goal = newtons(*goal_mn);
+        }
+        // What breaks comes before the core, so that the finger does what the core makes of it.
+        board.step_with(|record| {
+            if let Some(since) = index.checked_sub(BROKEN_FROM) {
+                let (burst, phase) = (since / BURST_EVERY, since % BURST_EVERY);
+                match phase {
+                    0..BURST => {
+                        if phase == 0 {
+                            held = record.sense;
                         }
-                        BURST => clears += 1,
-                        _ => {}
+                        spoil(record, burst, &held, &mut random);
                     }
-                    record.command.torque &= !(BURST..BURST + CLEAR).contains(&phase);
-                    record.command.clear_request = clears;
+                    BURST => clears += 1,
+                    _ => {}
                 }
-                given = Some(*record);
-            });
-            given
-        })
-        .collect::<Option<_>>()
-        .unwrap_or_default()
+                record.command.torque &= !(BURST..BURST + CLEAR).contains(&phase);
+                record.command.clear_request = clears;
+            }
+            records.push(*record);
+        });
+    }
+    records
 }
 
 /// What a recording's file holds.

@@ -5,6 +5,7 @@ use std::process::{Command, Output};
 
 /// Paths below are compiled in: by this they are compiled anew where the checkout was moved.
 const _: &str = env!("FINGERTIP_ROOT");
+
 /// 60 us at one instruction a cycle of 168 MHz.
 const STEP_INSTRUCTIONS_MAX: u32 = 10_080;
 

@@ -5,6 +5,7 @@ use fingertip::identify::{Identification, Refusal};
 use fingertip::params::Params;
 use fingertip::pipeline::Taring;
 use fingertip::pressure::TARE_FRAMES;
+use fingertip::record::Record;
 use fingertip::safety::{Fault, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};
@@ -32,17 +33,37 @@ fn ready() -> Native {
 /// Stopped by an overload of the bridge that is over.
 fn faulted() -> Native {
     let mut board = ready();
-    let mut sense = board.sense;
-    sense.bridge_fault = true;
-    let mut frame = board.frame;
-    frame.sequence += 1;
-    assert_eq!(board.pipeline.step(&frame, &sense, &board.command).1.fault, Some(Fault::Bridge));
+    assert_eq!(board.step_with(overloaded).fault, Some(Fault::Bridge));
     board.command.torque = false;
     board
 }
 
-fn break_array(board: &mut Native) {
+/// What makes a step a fault.
+type Spoil = fn(&mut Record);
+
+/// A fault that is found before the contact is estimated, and one that is found later.
+const EARLY_AND_LATE: [(Spoil, Fault); 2] = [(broken, Fault::ArrayBroken), (silent, Fault::BusSilent)];
+
+fn broken(record: &mut Record) {
+    let mut board = new();
     board.world.faults.array.taxels = [[Taxel::Dead; 10]; 10];
+    board.step();
+    record.frame.pairs = board.frame.pairs;
+}
+
+fn overloaded(record: &mut Record) {
+    record.sense.bridge_fault = true;
+}
+
+fn silent(record: &mut Record) {
+    (record.command.bus_watchdog_ms, record.sense.bus_silent_ms) = (20, 20);
+}
+
+/// By about 14 N.
+fn pressed(record: &mut Record) {
+    let mut board = at(-4.2);
+    board.step();
+    record.frame.pairs = board.frame.pairs;
 }
 
 fn tares(board: &mut Native) {
@@ -100,31 +121,20 @@ fn a_tare_in_a_fault_is_refused_for_all_to_see() {
 #[test]
 fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
     let mut board = ready();
-    break_array(&mut board);
     board.command.torque = false;
     board.command.tare_request += 1;
-    let status = board.step();
+    let status = board.step_with(broken);
     assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
 }
 
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
-    for late in [false, true] {
+    for (spoil, fault) in EARLY_AND_LATE {
         let mut board = new();
         board.command.tare_request += 1;
         board.step();
-        if late {
-            board.command.bus_watchdog_ms = 20;
-            let (mut sense, mut frame) = (board.sense, board.frame);
-            sense.bus_silent_ms = 20;
-            frame.sequence += 1;
-            let status = *board.pipeline.step(&frame, &sense, &board.command).1;
-            assert_eq!((status.fault, status.tare), (Some(Fault::BusSilent), Taring::Refused));
-        } else {
-            break_array(&mut board);
-            let status = board.step();
-            assert_eq!((status.fault, status.tare), (Some(Fault::ArrayBroken), Taring::Refused));
-        }
+        let status = board.step_with(spoil);
+        assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
     let mut board = new();
     board.command.tare_request += 1;
@@ -160,25 +170,11 @@ fn new_parameters_during_a_tare_begin_it_anew() {
 
 #[test]
 fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
-    for late in [false, true] {
+    for (spoil, fault) in EARLY_AND_LATE {
         let mut board = ready();
         board.command.identify_request += 1;
-        if late {
-            board.command.bus_watchdog_ms = 20;
-        } else {
-            break_array(&mut board);
-        }
-        let mut command = board.command;
-        command.torque = true;
-        if late {
-            let (mut sense, mut frame) = (board.sense, board.frame);
-            sense.bus_silent_ms = 20;
-            frame.sequence += 1;
-            assert_eq!(board.pipeline.step(&frame, &sense, &command).1.identification, NOT_READY);
-        } else {
-            let status = board.step();
-            assert_eq!((status.mode, status.identification), (Mode::Fault, NOT_READY));
-        }
+        let status = board.step_with(spoil);
+        assert_eq!((status.mode, status.fault, status.identification), (Mode::Fault, Some(fault), NOT_READY));
     }
 }
 
@@ -257,35 +253,15 @@ fn measuring() -> Native {
 /// Like every later frame: not driven at all where it shows a fault.
 #[test]
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
-    type Break = fn(&mut Native);
-    let cases: [(Break, Fault); 4] = [
-        (break_array, Fault::ArrayBroken),
-        (|board| board.sense.bridge_fault = true, Fault::Bridge),
-        (|board| (board.command.bus_watchdog_ms, board.sense.bus_silent_ms) = (20, 20), Fault::BusSilent),
-        (|board| board.frame = pressed(), Fault::OverForce),
-    ];
-    for (spoil, fault) in cases {
+    let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
+    for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
         let mut board = new();
         board.tare_and_enable();
         board.command.torque = false;
         board.command.goal = newtons(7_000);
         board.step();
-        spoil(&mut board);
         board.command.torque = true;
-        if fault == Fault::ArrayBroken {
-            board.step();
-        } else {
-            board.frame.sequence += 1;
-            board.pipeline.step(&board.frame, &board.sense, &board.command);
-        }
-        let status = board.pipeline.status();
+        let status = board.step_with(spoil);
         assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
     }
-}
-
-/// A frame of about 14 N.
-fn pressed() -> fingertip::frame::Frame {
-    let mut board = at(-4.2);
-    board.step();
-    fingertip::frame::Frame { sequence: 1_000, ..board.frame }
 }

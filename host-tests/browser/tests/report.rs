@@ -4,7 +4,7 @@
 
 use browser::{Browser, Look, complaints};
 use sim::report::{Report, Trace, page};
-use sim::run::{Run, run};
+use sim::run::run;
 use sim::{cli, ledger, native};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -45,10 +45,9 @@ fn nothing_is_wrong(name: &str) {
     let (folder, mut browser) = browser(name);
     let scene = format!("{}/host-tests/sim/tests/left_behind/{name}.toml", env!("FINGERTIP_ROOT"));
     let scene = cli::load(&scene, &[], None).unwrap();
-    let board: Run = &|scene, watch| Ok(native::simulate(scene, watch)?);
     let mut trace = Trace::new(scene.duration_s);
-    let outcome = run(&scene, board, &mut [&mut trace]).unwrap();
-    let ablated = ledger::ablate(&scene, board).unwrap();
+    let outcome = run(&scene, &native::board, &mut [&mut trace]).unwrap();
+    let ablated = ledger::ablate(&scene, &native::board).unwrap();
     let report = Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated };
     let path = folder.join("report.html");
     fs::write(&path, page(&report).unwrap()).unwrap();

@@ -65,7 +65,7 @@ pub enum Part {
     Packets(Box<dyn link::Packets>),
 }
 
-/// The seed of an effect's own stream, so that naming one effect does not change the numbers of another.
+/// The seed of an effect's or a drawn value's own stream, so that naming one does not change the numbers of another.
 pub fn stream(seed: u64, name: &str, finger: usize) -> u64 {
     // FNV-1a over the name, then SplitMix64 over all three.
     let name = name

@@ -87,9 +87,9 @@ impl Meter {
     }
 
     fn verdict(&self, measured: &Measured, bound: &Bound) -> Verdict {
-        let value = measured.get(&bound.metric);
-        let (mut value, mut max) = (value, bound.max);
-        if let (Some(base), Some(share)) = (bound.max, bound.max_per_goal_n) {
+        let (mut value, mut max) = (measured.get(&bound.metric), bound.max);
+        // A finger without a value leaves the scene without one.
+        if let (Some(_), Some(base), Some(share)) = (value, bound.max, bound.max_per_goal_n) {
             // That of the goal at which it is farthest beyond what it may be, as a share of that.
             let allowed = |at: &AtGoal| base + share * at.goal_n;
             let used = |at: &AtGoal| if allowed(at) > 0.0 { at.value / allowed(at) } else { at.value - allowed(at) };

@@ -14,6 +14,7 @@ use crate::host::grip::Reading;
 use crate::ledger;
 use crate::mechanics::body::Surroundings;
 use crate::mechanics::contact::Place;
+use crate::run::RunError;
 use crate::scene::Scene;
 use crate::scene::controller;
 use crate::watch::{Controller, Cost, Step, Summary, Watch};
@@ -41,6 +42,14 @@ pub enum SimError {
     /// The world cannot be simulated.
     #[error(transparent)]
     World(#[from] WorldError),
+}
+
+/// [`simulate`] as a [`Run`](crate::run::Run).
+///
+/// # Errors
+/// As [`simulate`].
+pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
+    Ok(simulate(scene, watch)?)
 }
 
 /// Runs a scene with the effects that it names.

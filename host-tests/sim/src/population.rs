@@ -25,6 +25,7 @@ use crate::metrics;
 use crate::scene::{self, Scene, SceneErrors};
 use draw::Draw;
 use fastrand::Rng;
+use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// A population.
@@ -58,7 +59,7 @@ struct Place {
 }
 
 /// Fingers whose metric is above something are counted.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counted {
     /// The metric.
     pub metric: String,

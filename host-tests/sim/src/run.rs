@@ -94,7 +94,8 @@ impl Outcome {
         let _ = writeln!(text, "digest {digest}");
         let broken: Vec<_> = self.verdicts.iter().filter(|verdict| !verdict.held).collect();
         for verdict in &broken {
-            let _ = writeln!(text, "BROKEN {}: {}, {}", verdict.bound.metric, shown(verdict.value), asked(verdict));
+            let (metric, asked) = (&verdict.bound.metric, asked(verdict.bound.min, verdict.max));
+            let _ = writeln!(text, "BROKEN {metric}: {}, {asked} asked", shown(verdict.value));
         }
         let held = self.verdicts.len() - broken.len();
         let _ = writeln!(text, "{held} of {} bounds held", self.verdicts.len());
@@ -104,18 +105,20 @@ impl Outcome {
     fn bound_of(&self, name: &str) -> String {
         let verdict = self.verdicts.iter().find(|verdict| verdict.bound.metric == name);
         verdict.map_or(String::new(), |verdict| {
-            format!("  {}: {}", asked(verdict), if verdict.held { "held" } else { "BROKEN" })
+            let asked = asked(verdict.bound.min, verdict.max);
+            format!("  {asked} asked: {}", if verdict.held { "held" } else { "BROKEN" })
         })
     }
 }
 
-/// What a bound asks for.
-pub fn asked(verdict: &Verdict) -> String {
-    match (verdict.bound.min, verdict.max) {
-        (Some(min), Some(max)) => format!("{min} to {max} asked"),
-        (Some(min), None) => format!("{min} or more asked"),
-        (None, Some(max)) => format!("{max} or less asked"),
-        (None, None) => "nothing asked".into(),
+/// What a bound asks for, for people.
+pub fn asked(min: Option<f64>, max: Option<f64>) -> String {
+    let [least, most] = [min, max].map(shown);
+    match (min, max) {
+        (Some(_), Some(_)) => format!("{least} to {most}"),
+        (Some(_), None) => format!("{least} or more"),
+        (None, Some(_)) => format!("{most} or less"),
+        (None, None) => "nothing".into(),
     }
 }
 

@@ -3,7 +3,7 @@
 pub mod controller;
 pub mod error;
 pub mod library;
-mod reader;
+pub(crate) mod reader;
 pub mod tables;
 pub mod text;
 

@@ -3,7 +3,7 @@
 
 use fingertip::frame::{COLUMNS, ROWS, SLOTS};
 use sim::metrics::Verdict;
-use sim::native::simulate;
+use sim::native;
 use sim::registry;
 use sim::run::run;
 use sim::scene::{Bound, Scene, library};
@@ -19,7 +19,7 @@ fn scene(name: &str) -> Scene {
 fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
     let scene = sim::cli::load(name, &[], seed).unwrap_or_else(|error| panic!("{error}"));
     let two_sided = scene.bounds.iter().any(|bound| bound.min.is_some() && bound.max.is_some());
-    let outcome = run(&scene, &|scene, watch| Ok(simulate(scene, watch)?), &mut []).expect("it runs");
+    let outcome = run(&scene, &native::board, &mut []).expect("it runs");
     let verdicts = outcome.verdicts.iter().filter(|verdict| !verdict.held);
     let unbounded = (!two_sided).then(|| format!("{name}: nothing is bounded on both sides"));
     let broken = verdicts.map(|verdict| format!("{name}: {:?} is {:?}", verdict.bound, verdict.value));
@@ -82,7 +82,7 @@ fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     let mut broken = BTreeSet::new();
     for key in keys {
         let scene = sim::cli::load(name, &[(*key).into()], None).unwrap_or_else(|error| panic!("{error}"));
-        let outcome = run(&scene, &|scene, watch| Ok(simulate(scene, watch)?), &mut []).expect("it runs");
+        let outcome = run(&scene, &native::board, &mut []).expect("it runs");
         let stopped = outcome.measured.get("faults_count") != Some(0.0);
         for (side, breaks) in outcome.verdicts.iter().flat_map(sides) {
             all.insert(side.clone());
@@ -165,7 +165,7 @@ fn figures_10_and_11_of_the_paper_come_out_of_the_compression_test() {
     const PARTS: usize = 40;
     let (a, modulus_kpa) = (10.0_f64, 250.0);
     let mut gauge = Gauge { until_s: vec![0.399, 0.649, 0.899], shown: Vec::new() };
-    simulate(&scene("compression"), &mut gauge).expect("it runs");
+    native::simulate(&scene("compression"), &mut gauge).expect("it runs");
     assert_eq!(gauge.shown.len(), 3);
     for (shown, asked_mm) in gauge.shown.iter().zip([1.0, 2.0, 3.0]) {
         let d = shown.depth_mm;

@@ -19,7 +19,7 @@ fn param(name: &str) -> u16 {
     address::PARAMS + 4 * place as u16
 }
 
-/// Tares, then holds 1 N half a millimetre away, over the array's edge: its last column is centred at 6.75 mm.
+/// Holds 1 N half a millimetre away, over the array's edge: its last column is centred at 6.75 mm.
 fn hold(rig: &mut Rig) {
     write_u8(rig, address::TORQUE_ENABLE, 1);
     write_goal(rig, 1_000);

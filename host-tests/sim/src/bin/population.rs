@@ -11,5 +11,5 @@ fn main() -> ExitCode {
         eprintln!("this program is the native board: `cargo xtask population --board virtual` runs the flash image");
         return ExitCode::from(2);
     }
-    cli::answer(&args, &|scene, watch| native::simulate(scene, watch).map_err(Into::into))
+    cli::answer(&args, &native::board)
 }

@@ -66,9 +66,7 @@ fn main() -> ExitCode {
         None => {
             let plan =
                 Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or(Shard::WHOLE), out };
-            let board =
-                |scene: &_, watch: &mut dyn sim::watch::Watch| native::simulate(scene, watch).map_err(Into::into);
-            (sweep(&plan, &board), plan.out.clone(), plan.shard.is_whole())
+            (sweep(&plan, &native::board), plan.out.clone(), plan.shard.is_whole())
         }
     };
     verdict(table.map(|table| {

@@ -3,8 +3,9 @@
 
 use super::at_goal::{AtGoal, note};
 use super::finger::{duty, newtons, trimmed};
-use crate::watch::{Controller, Step};
+use crate::watch::Step;
 use fingertip::params::Params;
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// A contact that ended may still drive the tip for this long.
@@ -25,7 +26,7 @@ struct Sample {
 }
 
 /// A force that was held: the last part of its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
     /// What was asked for.
     pub goal_n: f64,
@@ -74,10 +75,17 @@ pub(super) struct Ended {
 
 impl Default for Conduct {
     fn default() -> Self {
+        Self::of(&Params::DEFAULT)
+    }
+}
+
+impl Conduct {
+    /// With the limits that the controller is given.
+    pub fn of(params: &Params) -> Self {
         Self {
-            approach_mm_per_s: f64::from(Params::DEFAULT.approach_um_per_s) * 1e-3,
-            clearance_mm: f64::from(Params::DEFAULT.clearance_um) * 1e-3,
-            travel_limit_mm: f64::from(Params::DEFAULT.travel_max_um) * 1e-3,
+            approach_mm_per_s: f64::from(params.approach_um_per_s) * 1e-3,
+            clearance_mm: f64::from(params.clearance_um) * 1e-3,
+            travel_limit_mm: f64::from(params.travel_max_um) * 1e-3,
             goal_n: 0.0,
             since_s: 0.0,
             counted_n: 0.0,
@@ -93,23 +101,13 @@ impl Default for Conduct {
             over_force: Vec::new(),
         }
     }
-}
-
-impl Conduct {
-    /// With the limits that the controller is given.
-    pub fn of(controller: &Controller) -> Self {
-        let Params { approach_um_per_s, clearance_um, travel_max_um, .. } = controller.params;
-        let [approach_mm_per_s, clearance_mm, travel_limit_mm] =
-            [approach_um_per_s, clearance_um, travel_max_um].map(|um| f64::from(um) * 1e-3);
-        Self { approach_mm_per_s, clearance_mm, travel_limit_mm, ..Self::default() }
-    }
 
     /// A control step, from the scene's start on.
     pub(super) fn step(&mut self, step: &Step) {
         let goal_n = newtons(step.command.goal);
         if goal_n != self.goal_n {
             if !trimmed(self.goal_n, goal_n) {
-                self.end();
+                self.ended = self.ended();
                 self.since_s = step.time_s;
                 self.last.clear();
             }
@@ -151,24 +149,11 @@ impl Conduct {
         self.runaway_mm = self.runaway_mm.max(beyond_mm);
     }
 
-    /// Judges the goal that is over.
-    fn end(&mut self) {
-        let mut ended = core::mem::take(&mut self.ended);
-        self.judge(&mut ended);
-        self.ended = ended;
-    }
-
-    /// All goals, the one under way included.
+    /// All goals, the one under way included where it had its time.
     pub(super) fn ended(&self) -> Ended {
         let mut ended = self.ended.clone();
-        self.judge(&mut ended);
-        ended
-    }
-
-    /// Adds the goal under way, where it had its time.
-    fn judge(&self, ended: &mut Ended) {
         if self.last.back().is_none_or(|last| last.time_s < self.since_s + JUDGED_S) {
-            return;
+            return ended;
         }
         let worse = |known: Option<f64>, value: f64| Some(known.map_or(value, |known| known.max(value)));
         let [force_n, travel_mm, duty] = [|s: &Sample| s.force_n, |s: &Sample| s.travel_mm, |s: &Sample| s.duty]
@@ -185,6 +170,7 @@ impl Conduct {
         } else {
             ended.rest_mm = worse(ended.rest_mm, travel_mm.width);
         }
+        ended
     }
 
     /// Largest true force beyond each goal, where no lesser goal has a larger one.

@@ -127,7 +127,7 @@ pub struct Finger {
 impl Finger {
     /// With what its controller is given.
     pub(super) fn of(controller: &Controller) -> Self {
-        Self { conduct: Conduct::of(controller), ..Self::default() }
+        Self { conduct: Conduct::of(&controller.params), ..Self::default() }
     }
 
     pub(super) fn step(&mut self, step: &Step) {

@@ -44,7 +44,7 @@ pub const METRICS: &[Metric] = &[
     metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
     metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
     metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),
-    metric("limit_goal_percent", Largest, "share of the time in which the goal was cut to the largest force", limited::<3>),
+    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", limited::<3>),
     metric("limit_travel_percent", Largest, "share of the time at the travel's end", limited::<4>),
     metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", limited::<5>),
     metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", limited::<8>),
@@ -72,7 +72,7 @@ pub const METRICS: &[Metric] = &[
     metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that was there for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm)),
     metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that was there for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share)),
     metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that was there for 400 ms; the worst of all", |f| largest(&swings(f))),
-    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| if f.faults > 0 { largest(&errors(f)).or(Some(0.0)) } else { largest(&errors(f)) }),
+    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or((f.faults > 0).then_some(0.0))),
     metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 

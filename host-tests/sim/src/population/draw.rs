@@ -3,9 +3,11 @@
 use super::expression::Expression;
 use crate::effects::random::normal_within_3;
 use fastrand::Rng;
+use serde::Serialize;
 
 /// A drawn value.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Drawn {
     /// A number.
     Number(f64),

@@ -1,7 +1,7 @@
 //! A population's file, and the one that it extends.
 
 use super::{Population, read};
-use crate::scene::error::alike;
+use crate::scene::library;
 use crate::scene::tables::SCRIPT;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,9 +17,7 @@ pub fn folder() -> PathBuf {
 /// # Errors
 /// There is none, or it is not one; the text is for people.
 pub fn load(name: &str) -> Result<Population, String> {
-    let named = folder().join(name).with_extension("toml");
-    let path = if Path::new(name).is_file() || !named.is_file() { PathBuf::from(name) } else { named };
-    let text = fs::read_to_string(&path).map_err(|error| unknown(name, &error))?;
+    let (path, text) = library::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
     let over: DocumentMut =
         text.parse().map_err(|error: toml_edit::TomlError| format!("{file}: this is not TOML: {error}"))?;
@@ -28,26 +26,19 @@ pub fn load(name: &str) -> Result<Population, String> {
     let beside = path.with_file_name(base).with_extension("toml");
     let found = if beside.is_file() { beside } else { folder().join(base).with_extension("toml") };
     let told = |why: String| format!("{file} extends {base}: {why}");
-    let text = fs::read_to_string(&found).map_err(|error| told(unknown(base, &error)))?;
-    // What is wrong in it is told as it stands there.
-    let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
-    let mut whole: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| told(error.to_string()))?;
-    if whole.contains_key("extends") {
+    let unknown = |error| told(library::unknown(&folder(), "population", base, &error));
+    let text = fs::read_to_string(&found).map_err(unknown)?;
+    let whole: Result<DocumentMut, toml_edit::TomlError> = text.parse();
+    if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {
         return Err(told(format!("{base} extends another itself; extend that one, or none")));
     }
+    // What is wrong in it is told as it stands there.
+    let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
+    let mut whole = whole.map_err(|error| told(error.to_string()))?;
     overlay(whole.as_table_mut(), over.as_table());
     let label = format!("{file} over {}", known.name);
     let population = read(&label, &whole.to_string()).map_err(|errors| errors.to_string())?;
     Ok(Population { name: stem(&file), ..population })
-}
-
-fn unknown(name: &str, error: &std::io::Error) -> String {
-    let entries = fs::read_dir(folder()).into_iter().flatten().flatten();
-    let mut known: Vec<String> = entries.map(|entry| stem(&entry.path().to_string_lossy())).collect();
-    known.sort();
-    let meant = alike(name, known.iter().map(String::as_str));
-    let meant = meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
-    format!("no population {name}: {error}{meant}\n  those that come with the project: {}", known.join(", "))
 }
 
 /// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole.

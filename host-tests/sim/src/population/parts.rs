@@ -2,18 +2,19 @@
 
 use super::draw::Draw;
 use super::file::stem;
-use super::read::{DrawReader, Wrong};
+use super::read::{DrawReader, Wrong, number};
 use super::{Counted, Place, Population};
 use crate::key::{Key, Kind};
 use crate::metrics;
 use crate::registry;
 use crate::scene::error::{SceneError, SceneErrors, alike};
+use crate::scene::reader::{item_span, key_span};
 use crate::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES};
 use std::ops::Range;
 use toml_edit::{Document, Item, Table, TableLike};
 
-/// What a population's file has beside what a scene has.
-const OWN: [&str; 4] = ["extends", "magnitude", "draw", "count"];
+/// What a population's file has beside what a scene has, once it extends nothing any more.
+const OWN: [&str; 3] = ["magnitude", "draw", "count"];
 
 /// Reads a population that extends nothing any more.
 ///
@@ -27,7 +28,8 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     })?;
     let root = document.as_table();
     let mut wrong: Vec<Wrong> = Vec::new();
-    let magnitude = root.get("magnitude").map_or(Some(1.0), number).filter(|magnitude| *magnitude > 0.0);
+    let magnitude =
+        root.get("magnitude").map_or(Some(1.0), |item| number(item.as_value()?)).filter(|magnitude| *magnitude > 0.0);
     if magnitude.is_none() {
         wrong.push((
             item_span(root, "magnitude"),
@@ -158,7 +160,7 @@ impl Parts {
         let mut counted = Vec::new();
         for table in tables.into_iter().flatten() {
             let metric = table.get("metric").and_then(Item::as_str).unwrap_or_default();
-            let above = table.get("above").and_then(number);
+            let above = table.get("above").and_then(Item::as_value).and_then(number);
             let known = metrics::names().contains(&metric);
             match above.filter(|_| known && table.len() == 2) {
                 Some(above) => counted.push(Counted { metric: metric.into(), above }),
@@ -223,16 +225,4 @@ fn numbers(key: &Key) -> Option<[f64; 2]> {
         Kind::Whole { min, max, .. } => Some([min as f64, max as f64]),
         _ => None,
     }
-}
-
-fn number(item: &Item) -> Option<f64> {
-    item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
-}
-
-fn key_span(table: &Table, name: &str) -> Range<usize> {
-    table.key(name).and_then(toml_edit::Key::span).unwrap_or(0..0)
-}
-
-fn item_span(table: &Table, name: &str) -> Range<usize> {
-    table.get(name).and_then(Item::span).unwrap_or(0..0)
 }

@@ -177,7 +177,8 @@ impl DrawReader<'_> {
     }
 }
 
-fn number(value: &Value) -> Option<f64> {
+/// A number that is finite.
+pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
 }
 

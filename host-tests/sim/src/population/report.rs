@@ -1,7 +1,8 @@
 //! What became of a population: every finger's draws and verdicts, and what they come to.
 
 use super::spread::Spread;
-use super::{Drawn, Finger, Population};
+use super::{Counted, Finger, Population};
+use crate::metrics::Hold;
 use crate::run::{Outcome, RunError};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -26,6 +27,8 @@ pub struct Report {
     pub of_fingers: usize,
     /// Of the population's text, the seed and the number of fingers: shards of one whole have the same.
     pub id: String,
+    /// What is counted beside the envelope.
+    pub counted: Vec<Counted>,
     /// What they come to, for scripts.
     pub summary: Value,
     /// Each finger.
@@ -46,7 +49,7 @@ pub struct Ran {
     /// What it promised, and what became of it.
     pub promises: Vec<Promise>,
     /// The forces that it held.
-    pub holds: Vec<Held>,
+    pub holds: Vec<Hold>,
     /// All metrics; null where the run has none.
     pub metrics: Map<String, Value>,
     /// Of its run.
@@ -68,19 +71,6 @@ pub struct Promise {
     pub held: bool,
 }
 
-/// A force that was held.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Held {
-    /// What was asked for.
-    pub goal_n: f64,
-    /// Mean of the true force at the end.
-    pub mean_n: f64,
-    /// Whether nothing was touched.
-    pub missed: bool,
-    /// Whether a fault had stopped the motor.
-    pub faulty: bool,
-}
-
 impl Promise {
     /// How far beyond what is allowed it is, as a share of that; what is only counted is far beyond.
     pub fn excess(&self) -> f64 {
@@ -93,15 +83,6 @@ impl Promise {
 impl Ran {
     /// What became of a finger.
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
-        let drawn = finger.drawn.iter().map(|(name, value)| {
-            (
-                name.clone(),
-                match value {
-                    Drawn::Number(number) => json!(number),
-                    Drawn::Word(word) => json!(word),
-                },
-            )
-        });
         let promises = outcome.verdicts.iter().map(|verdict| Promise {
             metric: verdict.bound.metric.clone(),
             value: verdict.value,
@@ -109,20 +90,13 @@ impl Ran {
             max: verdict.max,
             held: verdict.held,
         });
-        let holds = outcome.holds.iter();
-        let holds = holds.map(|hold| Held {
-            goal_n: hold.goal_n,
-            mean_n: hold.mean_n,
-            missed: hold.missed,
-            faulty: hold.faulty,
-        });
         Self {
             finger: number + 1,
             seed: finger.scene.seed,
             inside: outcome.passed(),
-            drawn: drawn.collect(),
+            drawn: finger.drawn.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
             promises: promises.collect(),
-            holds: holds.collect(),
+            holds: outcome.holds.clone(),
             metrics: outcome.measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect(),
             digest: outcome.summary.digest.clone(),
         }
@@ -150,7 +124,6 @@ impl Report {
         let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
         let id =
             format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()));
-        let counted = population.counted.iter().map(|counted| (counted.metric.clone(), json!(counted.above))).collect();
         let mut report = Self {
             population: population.name.clone(),
             about: population.about.clone(),
@@ -159,10 +132,11 @@ impl Report {
             seed,
             of_fingers,
             id,
+            counted: population.counted.clone(),
             summary: Value::Null,
             fingers,
         };
-        report.finish(counted);
+        report.finish();
         report
     }
 
@@ -198,19 +172,17 @@ impl Report {
             );
         }
         whole.fingers = fingers.into_values().collect();
-        let counted = whole.counted().into_iter().map(|(metric, above, _)| (metric, json!(above))).collect();
-        whole.finish(counted);
+        whole.finish();
         Ok(whole)
     }
 
-    fn finish(&mut self, counted: Map<String, Value>) {
+    fn finish(&mut self) {
         self.fingers.sort_by_key(|ran| ran.finger);
         let promises: Vec<Value> = self.promises().iter().map(Row::json).collect();
         let [percent, mn] = self.errors().map(|spread| spread.json());
-        let counted = counted.into_iter().map(|(metric, above)| {
-            let over = |ran: &&Ran| ran.metric(&metric) > above.as_f64();
-            json!({ "metric": metric, "above": above, "fingers": self.fingers.iter().filter(over).count() })
-        });
+        let counted = self.counted().map(
+            |(Counted { metric, above }, fingers)| json!({ "metric": metric, "above": above, "fingers": fingers }),
+        );
         self.summary = json!({
             "fingers": self.fingers.len(),
             "inside": self.inside(),
@@ -226,12 +198,12 @@ impl Report {
         self.fingers.iter().filter(|ran| ran.inside).count()
     }
 
-    /// What is counted beside the envelope: metric, above what, and how many fingers.
-    pub fn counted(&self) -> Vec<(String, f64, u64)> {
-        let counted = self.summary["counted"].as_array().into_iter().flatten();
-        let row =
-            |row: &Value| Some((row["metric"].as_str()?.to_owned(), row["above"].as_f64()?, row["fingers"].as_u64()?));
-        counted.filter_map(row).collect()
+    /// What is counted beside the envelope, and of how many fingers it is so.
+    pub fn counted(&self) -> impl Iterator<Item = (&Counted, usize)> {
+        self.counted.iter().map(|counted| {
+            let above = |ran: &&Ran| ran.metric(&counted.metric) > Some(counted.above);
+            (counted, self.fingers.iter().filter(above).count())
+        })
     }
 
     /// Each promise over all fingers.
@@ -250,7 +222,7 @@ impl Report {
     /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no fault came before.
     pub fn errors(&self) -> [Spread; 2] {
         let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty && !hold.missed);
-        let off_n = |hold: &Held| (hold.mean_n - hold.goal_n).abs();
+        let off_n = |hold: &Hold| (hold.mean_n - hold.goal_n).abs();
         let percent = holds().map(|hold| 100.0 * off_n(hold) / hold.goal_n).collect();
         [Spread::of(percent), Spread::of(holds().map(|hold| 1e3 * off_n(hold)).collect())]
     }

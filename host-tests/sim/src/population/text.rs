@@ -1,8 +1,10 @@
 //! A population's report for people.
 
+use super::Counted;
 use super::report::{Promise, Ran, Report};
 use super::spread::Spread;
 use crate::metrics::shown;
+use crate::run::asked;
 use std::fmt::Write as _;
 
 /// Fingers that are named each.
@@ -28,8 +30,8 @@ pub fn text(report: &Report) -> String {
         let (broken, share) = (row.broken, percent(row.broken));
         let _ = writeln!(text, "  {:width$} {broken:>8} {share:>8.1} {median:>10} {most:>10} {worst:>10}", row.metric);
     }
-    for (metric, above, fingers) in report.counted() {
-        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers as usize));
+    for (Counted { metric, above }, fingers) in report.counted() {
+        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers));
     }
     let [of_goal, mn] = report.errors();
     let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);
@@ -55,19 +57,10 @@ pub fn text(report: &Report) -> String {
 
 /// What a finger broke, in a line.
 pub fn broken(ran: &Ran) -> String {
-    let asked = |promise: &Promise| {
-        let sides = [
-            promise.min.map(|min| format!("{} or more", shown(Some(min)))),
-            promise.max.map(|max| format!("{} or less", shown(Some(max)))),
-        ];
-        format!(
-            "{} {} ({})",
-            promise.metric,
-            shown(promise.value),
-            sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
-        )
+    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
+        format!("{metric} {} ({})", shown(*value), asked(*min, *max))
     };
-    format!("finger {}: {}", ran.finger, ran.broken().map(asked).collect::<Vec<_>>().join("; "))
+    format!("finger {}: {}", ran.finger, ran.broken().map(promise).collect::<Vec<_>>().join("; "))
 }
 
 fn values(spread: &Spread) -> [String; 3] {

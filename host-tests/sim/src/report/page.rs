@@ -79,7 +79,7 @@ fn bounds(verdicts: &[Verdict]) -> Markup {
                 thead { tr { th scope="col" { "metric" } th scope="col" { "asked" } th.number scope="col" { "measured" } th scope="col" { "" } } }
                 tbody { @for verdict in verdicts { tr {
                     td { code { (verdict.bound.metric) } }
-                    td.asked { (asked(verdict).trim_end_matches(" asked")) }
+                    td.asked { (asked(verdict.bound.min, verdict.max)) }
                     td.number { (shown(verdict.value)) }
                     td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
                 } } }

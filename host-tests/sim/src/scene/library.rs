@@ -1,5 +1,6 @@
 //! The scenes that come with the project, and where a scene is found.
 
+use super::error::alike;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,8 +15,13 @@ pub fn folder() -> PathBuf {
 /// # Errors
 /// The folder cannot be read.
 pub fn names() -> io::Result<Vec<String>> {
+    names_in(&folder())
+}
+
+/// The names of a folder's TOML files, in order.
+fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
-    for entry in fs::read_dir(folder())? {
+    for entry in fs::read_dir(folder)? {
         let path = entry?.path();
         if path.extension().is_some_and(|extension| extension == "toml") {
             names.extend(path.file_stem().map(|stem| stem.to_string_lossy().into_owned()));
@@ -30,16 +36,24 @@ pub fn names() -> io::Result<Vec<String>> {
 /// # Errors
 /// There is none.
 pub fn text(scene: &str) -> Result<(PathBuf, String), String> {
-    let named = folder().join(scene).with_extension("toml");
-    let path = if Path::new(scene).is_file() || !named.is_file() { PathBuf::from(scene) } else { named };
-    match fs::read_to_string(&path) {
-        Ok(text) => Ok((path, text)),
-        Err(error) => {
-            let names = names().unwrap_or_default();
-            let words = names.iter().map(String::as_str);
-            let meant =
-                super::error::alike(scene, words).map_or(String::new(), |name| format!("; did you mean `{name}`?"));
-            Err(format!("no scene {scene}: {error}{meant}\n  in the library: {}", names.join(", ")))
-        }
-    }
+    find(&folder(), "scene", scene)
+}
+
+/// The path and the text of a file, by its path or by its name in a folder; `what` it is, errors tell.
+///
+/// # Errors
+/// There is none.
+pub fn find(folder: &Path, what: &str, name: &str) -> Result<(PathBuf, String), String> {
+    let named = folder.join(name).with_extension("toml");
+    let path = if Path::new(name).is_file() || !named.is_file() { PathBuf::from(name) } else { named };
+    let text = fs::read_to_string(&path).map_err(|error| unknown(folder, what, name, &error))?;
+    Ok((path, text))
+}
+
+/// Why there is no such file, and which there are in the folder.
+pub fn unknown(folder: &Path, what: &str, name: &str, error: &io::Error) -> String {
+    let names = names_in(folder).unwrap_or_default();
+    let meant = alike(name, names.iter().map(String::as_str));
+    let meant = meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
+    format!("no {what} {name}: {error}{meant}\n  those that come with the project: {}", names.join(", "))
 }

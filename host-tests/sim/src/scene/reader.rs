@@ -12,7 +12,7 @@ use fingertip::config::Config;
 use std::ops::Range;
 use std::path::Path;
 use toml_edit::{Document, TableLike};
-use values::{item_span, key_span};
+pub(crate) use values::{item_span, key_span};
 
 /// Reads a scene. `file` names it in errors; `metrics` are those that `[[expect]]` may name.
 ///

@@ -6,18 +6,11 @@ mod reported;
 mod swept;
 
 use sim::cli;
-use sim::run::RunError;
 use sim::scene::Scene;
-use sim::watch::{Summary, Watch};
 
 /// A wall with one effect.
 const SCENE: &str = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/tests/left_behind/wall.toml");
 
 fn wall() -> Scene {
     cli::load(SCENE, &[], None).unwrap()
-}
-
-/// The native board.
-fn native(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
-    Ok(sim::native::simulate(scene, watch)?)
 }

@@ -1,14 +1,15 @@
 //! Metrics and bounds.
 
-use crate::{native, wall};
+use crate::wall;
+use fingertip::config::newtons;
 use fingertip::frame::{Frame, Sense};
 use fingertip::pipeline::{Command, Status};
 use fingertip::safety::Fault;
-use sim::ledger;
 use sim::metrics::{self, METRICS, Meter};
 use sim::run::run;
 use sim::scene::Bound;
 use sim::watch::{Step, Truth, Watch};
+use sim::{ledger, native};
 use std::collections::BTreeSet;
 
 #[test]
@@ -27,7 +28,7 @@ fn every_metric_has_a_name_with_a_unit_and_stands_once() {
 #[test]
 fn the_wall_is_measured() {
     let scene = wall();
-    let outcome = run(&scene, &native, &mut []).unwrap();
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
     let value = |name: &str| outcome.measured.get(name).unwrap_or_else(|| panic!("no {name}"));
     assert!((0.99..1.05).contains(&value("peak_force_n")), "{}", value("peak_force_n"));
     assert!((0.0..5.0).contains(&value("overshoot_percent")));
@@ -78,6 +79,25 @@ fn of_two_fingers_faults_the_first_in_time_is_the_scenes() {
     assert_eq!(measure([None, None]), [Some(0.0), None, Some(0.0)]);
 }
 
+/// As where nothing grows with the goal: what one finger lacks, the other does not make up for.
+#[test]
+fn of_two_fingers_one_without_a_value_breaks_what_grows_with_the_goal() {
+    let mut meter = Meter::default();
+    // Only the first is asked for a force.
+    for (step, (finger, goal_mn)) in (0..600).flat_map(|step| [(step, (0, 1_000)), (step, (1, 0))]) {
+        let command = Command { goal: newtons(goal_mn), ..Command::default() };
+        let truth = Truth { force_n: f64::from(goal_mn) * 1e-3, ..Truth::default() };
+        let (frame, sense, status) = (&Frame::EMPTY, &Sense::default(), &Status::default());
+        let time_s = f64::from(step) * 1e-3;
+        meter.step(&Step { finger, time_s, frame, sense, command: &command, status, truth: &truth });
+    }
+    let bound = |metric: &str| Bound { metric: metric.into(), min: None, max: Some(50.0), max_per_goal_n: Some(100.0) };
+    let bounds = ["hold_swing_mn", "finger0.hold_swing_mn", "finger1.hold_swing_mn"].map(bound);
+    let verdicts = meter.verdicts(&bounds);
+    let values: Vec<_> = verdicts.iter().map(|verdict| (verdict.value, verdict.held)).collect();
+    assert_eq!(values, [(None, false), (Some(0.0), true), (None, false)]);
+}
+
 #[test]
 fn a_bound_breaks_on_either_side_and_without_a_value() {
     let mut scene = wall();
@@ -88,7 +108,7 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
         bound("peak_force_n", Some(0.9), Some(1.2)),
         bound("slip_noticed_ms", None, Some(10.0)),
     ];
-    let outcome = run(&scene, &native, &mut []).unwrap();
+    let outcome = run(&scene, &native::board, &mut []).unwrap();
     let held: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
     assert_eq!(held, [false, false, true, false]);
     assert!(!outcome.passed());
@@ -104,8 +124,8 @@ fn a_bound_breaks_on_either_side_and_without_a_value() {
 #[test]
 fn an_ablation_shows_what_an_effect_changes() {
     let scene = wall();
-    let whole = run(&scene, &native, &mut []).unwrap();
-    let ablated = ledger::ablate(&scene, &native).unwrap();
+    let whole = run(&scene, &native::board, &mut []).unwrap();
+    let ablated = ledger::ablate(&scene, &native::board).unwrap();
     assert_eq!(ablated.iter().map(|without| without.effect).collect::<Vec<_>>(), ["row_sag"]);
     let rows = ledger::differences(&whole.measured, &ablated);
     assert!(rows.iter().any(|(name, ..)| *name == "force_error_rms_mn"));

@@ -1,13 +1,13 @@
 //! Recordings and their replay.
 
-use crate::{native, wall};
+use crate::wall;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use mcap::{MessageStream, Writer};
-use sim::cli;
 use sim::metrics::shown;
 use sim::recording::{Recorder, replay};
 use sim::report::{Report, Trace, page};
 use sim::run::run;
+use sim::{cli, native};
 use std::fs;
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ fn record(name: &str) -> PathBuf {
     let mut scene = wall();
     scene.duration_s = 0.05;
     let mut recorder = Recorder::new(&path, &scene, 10).unwrap();
-    let outcome = run(&scene, &native, &mut [&mut recorder]).unwrap();
+    let outcome = run(&scene, &native::board, &mut [&mut recorder]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();
     path
 }
@@ -44,7 +44,7 @@ fn two_fingers_are_measured_recorded_and_drawn_each() {
     let path = folder("grasp").join("grasp.mcap");
     let mut recorder = Recorder::new(&path, &scene, 1).unwrap();
     let mut trace = Trace::new(scene.duration_s);
-    let outcome = run(&scene, &native, &mut [&mut recorder, &mut trace]).unwrap();
+    let outcome = run(&scene, &native::board, &mut [&mut recorder, &mut trace]).unwrap();
     recorder.finish(&outcome.summary.digest).unwrap();
     let replayed = replay(&path).unwrap();
     assert_eq!(replayed.difference, None);

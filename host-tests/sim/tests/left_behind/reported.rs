@@ -1,17 +1,17 @@
 //! The report as text; how a browser takes it is tested by `cargo xtask test`.
 
-use crate::{native, wall};
-use sim::ledger;
+use crate::wall;
 use sim::report::{Report, Trace, page};
 use sim::run::run;
+use sim::{ledger, native};
 
 #[test]
 fn a_report_stands_alone_and_has_every_part() {
     let mut scene = wall();
     scene.about = "A <b>wall</b> & more".into();
     let mut trace = Trace::new(scene.duration_s);
-    let outcome = run(&scene, &native, &mut [&mut trace]).unwrap();
-    let ablated = ledger::ablate(&scene, &native).unwrap();
+    let outcome = run(&scene, &native::board, &mut [&mut trace]).unwrap();
+    let ablated = ledger::ablate(&scene, &native::board).unwrap();
     let page = page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated });
     let page = page.unwrap();
     for part in ["bounds", "plots", "metrics", "ledger", "ablation", "scene"] {

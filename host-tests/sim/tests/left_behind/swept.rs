@@ -1,8 +1,8 @@
 //! Sweeps, shards and merging.
 
-use crate::{SCENE, native};
-use sim::cli;
+use crate::SCENE;
 use sim::sweep::{Plan, Shard, Table, merge, sweep};
+use sim::{cli, native};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -33,7 +33,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 fn whole(name: &str) -> (PathBuf, Table) {
     let out = folder(name);
-    let table = sweep(&plan(&out, Shard::WHOLE), &native).unwrap();
+    let table = sweep(&plan(&out, Shard::WHOLE), &native::board).unwrap();
     (out, table)
 }
 
@@ -51,7 +51,7 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     let shards = folder("shards");
     // The last first: the order of the files does not count.
     for shard in (1..=4).rev() {
-        sweep(&plan(&shards, Shard { number: shard, of: 4 }), &native).unwrap();
+        sweep(&plan(&shards, Shard { number: shard, of: 4 }), &native::board).unwrap();
     }
     let parts: Vec<PathBuf> = (1..=4).rev().map(|shard| shards.join(format!("runs-{shard}-of-4.csv"))).collect();
     let merged = folder("merged");
@@ -63,7 +63,7 @@ fn shards_merged_are_the_whole_byte_for_byte() {
     assert!(refused(&parts[1..]).contains("3 of 12 runs are missing, run 4 the first"), "{}", refused(&parts[1..]));
     assert!(refused(&[parts.clone(), vec![parts[0].clone()]].concat()).contains("there twice"));
     let other = folder("other");
-    sweep(&Plan { seeds: 1, ..plan(&other, Shard { number: 1, of: 2 }) }, &native).unwrap();
+    sweep(&Plan { seeds: 1, ..plan(&other, Shard { number: 1, of: 2 }) }, &native::board).unwrap();
     assert!(refused(&[parts[0].clone(), other.join("runs-1-of-2.csv")]).contains("is of the sweep"));
     assert!(refused(&[whole.join("summary.csv")]).contains("is no shard"));
 }
@@ -87,7 +87,7 @@ fn runs_are_numbered_point_by_point_and_seed_by_seed() {
     let set = ["duration_s=0.04", "object.distance_mm=0.5", "tip.modulus_kpa=250", "tip.radius_mm=10.5"];
     let scene = cli::load(SCENE, &set.map(String::from), Some(2)).unwrap();
     let mut last = sim::metrics::Meter::default();
-    assert_eq!(row[column("digest")], native(&scene, &mut last).unwrap().digest);
+    assert_eq!(row[column("digest")], native::board(&scene, &mut last).unwrap().digest);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
     let ran = AtomicUsize::new(0);
     let again = sweep(&plan(&out, Shard::WHOLE), &|scene, watch| {
         ran.fetch_add(1, Ordering::Relaxed);
-        native(scene, watch)
+        native::board(scene, watch)
     });
     assert_eq!(again.unwrap(), table);
     assert_eq!(ran.into_inner(), 6);
@@ -117,7 +117,7 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
     let other = Plan { seeds: 1, ..plan(&out, Shard::WHOLE) };
     let other = sweep(&other, &|scene, watch| {
         ran.fetch_add(1, Ordering::Relaxed);
-        native(scene, watch)
+        native::board(scene, watch)
     });
     assert_eq!((other.unwrap().rows.len(), ran.into_inner()), (6, 6));
 }
@@ -126,7 +126,7 @@ fn a_stopped_sweep_goes_on_where_it_stood() {
 fn what_cannot_be_run_is_told() {
     let out = folder("wrong");
     let plan = Plan { vary: vec!["tip.radius_mm=10..1000:2".parse().unwrap()], ..plan(&out, Shard::WHOLE) };
-    assert!(sweep(&plan, &native).unwrap_err().to_string().contains("radius_mm"));
+    assert!(sweep(&plan, &native::board).unwrap_err().to_string().contains("radius_mm"));
     let failing = sweep(&self::plan(&out, Shard::WHOLE), &|_, _| Err("the board burns".into()));
     assert!(failing.unwrap_err().to_string().contains("the board burns"));
 }

@@ -23,7 +23,7 @@ fn the_fit_begins_on_every_contact_off_the_middle() {
     }
 }
 
-/// A frame of a slow scan is so long that the touch was over before a row was wanted.
+/// A frame of a slow scan is so long that the touch was over before the fit began.
 #[test]
 fn the_fit_begins_with_a_slow_scan() {
     for settle_ns in [40_000, 100_000] {
@@ -169,7 +169,7 @@ fn a_doubtful_fit_never_says_less_than_the_taxels() {
     let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
     for number in [233, 911] {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
-        let outcome = sim::run::run(&finger.scene, &crate::native, &mut []).expect("it runs");
+        let outcome = sim::run::run(&finger.scene, &sim::native::board, &mut []).expect("it runs");
         assert!(outcome.passed(), "finger {number}: {:#?}", outcome.verdicts);
     }
 }

@@ -6,11 +6,11 @@ mod letting_go;
 mod motor;
 
 use sim::metrics::Hold;
-use sim::native::simulate;
+use sim::native;
 use sim::population;
-use sim::run::{Outcome, RunError, run};
+use sim::run::{Outcome, run};
 use sim::scene::{Bound, Scene, read};
-use sim::watch::{Step, Summary, Truth, Watch};
+use sim::watch::{Step, Truth, Watch};
 use std::sync::OnceLock;
 
 /// How a finger went.
@@ -21,10 +21,6 @@ struct Ran {
     end: Truth,
     /// Where the tip first touched.
     touch_mm: Option<f64>,
-}
-
-fn native(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
-    Ok(simulate(scene, watch)?)
 }
 
 /// The promises of `ordinary`.
@@ -46,7 +42,7 @@ fn asks(script: &[(f64, f64)], duration_s: f64, tables: &str) -> Ran {
         ..read("test.toml", &text, &[]).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
     };
     let mut last = Last::default();
-    let outcome = run(&scene, &native, &mut [&mut last]).expect("it runs");
+    let outcome = run(&scene, &native::board, &mut [&mut last]).expect("it runs");
     Ran { outcome, end: last.end, touch_mm: last.touch_mm }
 }
 

@@ -1,8 +1,8 @@
 //! The motor at rest, coarse encoders, and what must not stop it: noise, bursts, a weak source.
 
-use crate::{asks, holds, native};
-use sim::population;
+use crate::{asks, holds};
 use sim::run::run;
+use sim::{native, population};
 
 /// Fingers that hold one force each. Noise, friction, encoder and place are those of `ordinary`.
 const HOLDS: &str = r#"
@@ -37,7 +37,7 @@ fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
     let mut quiet = 0;
     for number in 0..100 {
         let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
-        let outcome = run(&finger.scene, &native, &mut []).expect("it runs");
+        let outcome = run(&finger.scene, &native::board, &mut []).expect("it runs");
         let [duty, error_mn] =
             ["rest_duty_percent", "hold_error_mn"].map(|metric| outcome.measured.get(metric).expect("it holds"));
         assert!(outcome.passed(), "finger {number} deviates by {duty} %: {:?}", finger.drawn);
@@ -59,10 +59,10 @@ fn coarse_encoders_do_not_swing() {
                     "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
                     [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
                 );
-                // Half a second is what the coarsest take to settle.
                 // Nobody sees a drift within a count: where that is more than the envelope's 50 um, it is what counts.
                 let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
                 let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
+                // Half a second is what the coarsest take to settle.
                 let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen, &finger);
                 ran.stands_clear(1.0, &finger);
                 assert!(ran.of("rest_travel_um") < 1e3 * count_mm, "{finger}: {} um", ran.of("rest_travel_um"));

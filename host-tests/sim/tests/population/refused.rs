@@ -116,9 +116,18 @@ fn extending_what_is_not_there_or_extends_itself() {
         population::load(path.to_str().unwrap()).map(|_| ())
     };
     assert!(load("none.toml", "extends = \"ordinry\"").unwrap_err().contains("did you mean `ordinary`?"));
-    assert!(load("itself.toml", "extends = \"itself\"\nabout = \"\"\nduration_s = 1").unwrap_err().contains("extends"));
-    let chained = load("chained.toml", "extends = \"careful\"").unwrap_err();
-    assert!(chained.contains("careful"), "{chained}");
+    let itself = load("itself.toml", "extends = \"itself\"\nabout = \"\"\nduration_s = 1").unwrap_err();
+    assert!(itself.contains("itself extends another itself"), "{itself}");
+    for known in ["careful", "rough"] {
+        let chained = load("chained.toml", &format!("extends = \"{known}\"")).unwrap_err();
+        assert!(chained.contains(&format!("{known} extends another itself")), "{chained}");
+    }
+    std::fs::write(folder.join("broken.toml"), "about =").unwrap();
+    let broken = load("over.toml", "extends = \"broken\"").unwrap_err();
+    assert!(
+        broken.contains("over.toml extends broken: ") && broken.contains("broken.toml:1:8: this is not TOML"),
+        "{broken}"
+    );
     assert_eq!(load("fine.toml", "extends = \"ordinary\"\nmagnitude = 0.1"), Ok(()));
     let wrong = load("wrong.toml", "extends = \"ordinary\"\n[tip]\nradius = 9").unwrap_err();
     assert!(wrong.contains("wrong.toml over ordinary") && wrong.contains("radius_mm"), "{wrong}");

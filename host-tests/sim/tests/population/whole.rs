@@ -1,20 +1,13 @@
 //! Fingers that are run: shards and the whole, and the worst ones again.
 
 use crate::population;
-use sim::native::simulate;
+use sim::native;
 use sim::population::{Population, Report, run, worst};
-use sim::run::RunError;
-use sim::scene::Scene;
 use sim::sweep::Shard;
-use sim::watch::{Summary, Watch};
 use std::fs;
 use std::path::PathBuf;
 
 const FINGERS: usize = 7;
-
-fn native(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
-    simulate(scene, watch).map_err(Into::into)
-}
 
 /// Touches within 20 ms; some break a bound, some keep it.
 fn touching() -> Population {
@@ -37,12 +30,15 @@ fn touching() -> Population {
         [[count]]
         metric = "travel_max_mm"
         above = 1.0
+        [[count]]
+        metric = "travel_max_mm"
+        above = 2.0
         "#,
     )
 }
 
 fn report(population: &Population, shard: Shard) -> Report {
-    let fingers = run::fingers(population, 3, FINGERS, shard, &native).unwrap_or_else(|error| panic!("{error}"));
+    let fingers = run::fingers(population, 3, FINGERS, shard, &native::board).unwrap_or_else(|error| panic!("{error}"));
     Report::new(population, "native", 3, FINGERS, fingers)
 }
 
@@ -68,6 +64,7 @@ fn shards_put_together_are_the_whole_byte_for_byte() {
     let shards = [3, 1, 2].map(shard);
     let merged = Report::merge(&shards).unwrap();
     assert_eq!(merged, whole);
+    assert_eq!(merged.summary["counted"].as_array().unwrap().len(), 2, "two counts of one metric are two");
     merged.write(&folder.join("merged.json")).unwrap();
     assert_eq!(fs::read(folder.join("merged.json")).unwrap(), fs::read(folder.join("whole.json")).unwrap());
 
@@ -98,7 +95,7 @@ fn the_worst_run_again_as_they_did() {
         let text = fs::read_to_string(path).unwrap();
         assert!(text.contains("It broke:") && ran.broken().all(|promise| text.contains(&promise.metric)), "{text}");
         let scene = sim::cli::load(path.to_str().unwrap(), &[], None).unwrap_or_else(|error| panic!("{error}"));
-        let outcome = sim::run::run(&scene, &native, &mut []).unwrap();
+        let outcome = sim::run::run(&scene, &native::board, &mut []).unwrap();
         assert_eq!(outcome.summary.digest, ran.digest);
         let again: Vec<bool> = outcome.verdicts.iter().map(|verdict| verdict.held).collect();
         let before: Vec<bool> = ran.promises.iter().map(|promise| promise.held).collect();
@@ -111,6 +108,6 @@ fn a_finger_that_cannot_be_run_is_named() {
     let population = population(
         "[tip]\nmodulus_kpa = { uniform = [1500, 2000] }\n[motor]\ninertia_g_cm2 = 0.01\n[world]\nstep_us = { uniform = [900, 1000] }\n",
     );
-    let error = run::fingers(&population, 1, 2, Shard::WHOLE, &native).unwrap_err().to_string();
+    let error = run::fingers(&population, 1, 2, Shard::WHOLE, &native::board).unwrap_err().to_string();
     assert!(error.contains("test.toml: finger ") && error.contains("step_us"), "{error}");
 }

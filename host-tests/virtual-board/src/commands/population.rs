@@ -18,7 +18,7 @@ pub struct Arguments {
 /// Runs it.
 pub fn run(arguments: &Arguments) -> ExitCode {
     cli::answer(&arguments.population, &|scene, watch| match arguments.population.board {
-        Board::Native => sim::simulate(scene, watch).map_err(Into::into),
+        Board::Native => sim::native::board(scene, watch),
         Board::Virtual => scene::simulate(&arguments.image, scene, watch).map_err(Into::into),
     })
 }

@@ -18,7 +18,7 @@ pub struct Arguments {
 /// Runs it.
 pub fn run(arguments: &Arguments) -> ExitCode {
     sim::cli::answer(&arguments.scene, &|scene, watch| match arguments.scene.board {
-        Board::Native => sim::simulate(scene, watch).map_err(Into::into),
+        Board::Native => sim::native::board(scene, watch),
         Board::Virtual | Board::Both => scene::simulate(&arguments.image, scene, watch).map_err(Into::into),
     })
 }

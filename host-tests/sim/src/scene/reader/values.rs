@@ -122,11 +122,11 @@ fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
 }
 
 /// Where a key stands.
-pub(super) fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+pub(crate) fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {
     table.get_key_value(name).and_then(|(key, _)| key.span()).unwrap_or(0..0)
 }
 
 /// Where its value stands.
-pub(super) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
     table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
 }

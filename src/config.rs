@@ -170,7 +170,7 @@ impl Config {
         let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16).map_err(ConfigError::Scan)?;
         let tip = tip(p)?;
 
-        let frame_s = timing.frame_ns() as f32 * 1e-9;
+        let frame_s = timing.frame_ns as f32 * 1e-9;
         let travel_rad_per_m = p.reduction_mrad_per_mm as f32;
         let inertia = p.inertia_ug_m2 as f32 * 1e-9;
         let torque_constant = p.torque_constant_unm_per_a as f32 * 1e-6;

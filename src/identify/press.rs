@@ -151,7 +151,7 @@ impl Press {
             self.moved_to = travel;
             self.still_ns = 0;
         }
-        self.still_ns = self.still_ns.saturating_add(config.timing.frame_ns());
+        self.still_ns = self.still_ns.saturating_add(config.timing.frame_ns);
         self.still_ns > STALL_NS
     }
 

@@ -101,7 +101,7 @@ impl Guard {
     /// Takes a frame: what is to stop the motor.
     pub fn check(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
         self.measure(seen, config);
-        let frame_ns = config.timing.frame_ns();
+        let frame_ns = config.timing.frame_ns;
         // As the mean force means; what is pressed is where it touched, or deeper, and the deeper the more force.
         let depth = config.tip.indentation(Newtons::from_bits(self.force));
         self.touch(seen.pressing, depth, config);
@@ -233,7 +233,7 @@ impl Guard {
             self.other_ns = 0;
             return None;
         }
-        self.other_ns = self.other_ns.saturating_add(config.timing.frame_ns());
+        self.other_ns = self.other_ns.saturating_add(config.timing.frame_ns);
         // At an end stop the speed changes against the drive, too, but only to none.
         let speed_along = if self.late_change < 0 { self.speed.saturating_neg() } else { self.speed };
         let wrong = along.max(speed_along) < -(expected >> NONE_BITS);

@@ -47,7 +47,7 @@ impl Unseen {
     #[inline(always)]
     pub fn check(&mut self, going: &Going, config: &Config) -> Option<Fault> {
         let Going { speed, told, expected } = *going;
-        let (approach, frame_ns) = (config.approach.to_bits(), config.timing.frame_ns());
+        let (approach, frame_ns) = (config.approach.to_bits(), config.timing.frame_ns);
         let steady =
             speed > approach / 2 && speed <= approach.saturating_mul(2) && told.saturating_abs() < approach / 4;
         self.steady_ns = if steady { self.steady_ns.saturating_add(frame_ns) } else { 0 };

@@ -81,7 +81,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     let Config {
         params: _,
         geometry: _,
-        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles },
+        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles, frame_ns },
         tip,
         sag_q32,
         dead_codes,
@@ -130,7 +130,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
         mix.add(*number);
     }
-    for number in [jump, voltage_shift, duty_gain, share_per_mv_q32] {
+    for number in [frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }
     for number in [*frame_s_q39, *counts_max, calm_frames.cast_signed()] {

@@ -51,7 +51,7 @@ impl Row {
         let sampling_s = (f64::from(sample_cycles) - 0.5) * cycle_s;
         Some(Self {
             setting,
-            rate_hz: 1e9 / f64::from(timing.frame_ns()) / f64::from(frames),
+            rate_hz: 1e9 / f64::from(timing.frame_ns) / f64::from(frames),
             row: decay(f64::from(settle_ns) * 1e-9 / array.settle_tau_s),
             column: decay(sampling_s / SAMPLING_TAU_S),
             noise_codes: NOISE_CODES / f64::from(frames).sqrt(),

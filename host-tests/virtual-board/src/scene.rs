@@ -61,7 +61,7 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     let begun = Instant::now();
     let params = controller::params(scene);
     let config = Config::new(&params).map_err(SimError::Controller)?;
-    let frame_ns = u64::from(config.timing.frame_ns());
+    let frame_ns = u64::from(config.timing.frame_ns);
     let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
     let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
     let moves_from_s = -(MS as f64) * 1e-9;

@@ -8,6 +8,7 @@
 mod arith;
 mod doubt;
 mod effort;
+mod fitted;
 mod follow;
 mod geometry;
 mod guess;

@@ -3,7 +3,7 @@
 //! It is a measure and not a verdict, and it comes and goes slowly: a loop that goes by it must not jump where a rim touches the array's
 //! edge.
 
-use super::follow::RATIO_BITS;
+use super::fitted::RATIO_BITS;
 use super::{hides, overhang};
 use crate::config::Config;
 use crate::pipeline::Contact;

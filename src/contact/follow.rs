@@ -7,10 +7,11 @@
 
 use super::arith::{Divisor, within};
 use super::effort::Effort;
+use super::fitted::{Fitted, RATIO_BITS};
 use super::geometry::ONE;
 use super::guess::{Guess, Pressed};
 use super::step::{Bench, Equations};
-use super::sums::{self, from_sums};
+use super::sums::from_sums;
 use super::view::{Scale, View};
 use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
 use crate::config::Config;
@@ -18,7 +19,6 @@ use crate::frame::ROWS;
 use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
-use fixed::types::I16F16;
 
 /// A row a frame is taken in steps of this many rows, so that what changes meanwhile is not taken for a slope.
 const ROW_STEP: usize = 3;
@@ -30,8 +30,6 @@ const AFRESH: u8 = 4;
 const TAXELS_LEAST: i32 = 8;
 /// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times as large.
 const TAXELS_SURE: i32 = 12;
-/// Fractional bits of the ratio of the force to the sum.
-pub(super) const RATIO_BITS: u32 = 16;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
@@ -79,23 +77,6 @@ pub struct Fit {
     next: Option<Guess>,
     /// What the last refinement with some confidence says.
     fitted: Option<Fitted>,
-}
-
-/// A contact of which the array sees a part.
-#[derive(Clone, Copy, Debug)]
-struct Fitted {
-    /// Of the force to the sum.
-    ratio: i32,
-    centre: [Millimetres; 2],
-}
-
-impl Fitted {
-    /// The contact, where the sum makes this force.
-    fn contact(self, force: Newtons, picture: &Picture, config: &Config) -> Contact {
-        let wide = (i64::from(force.to_bits()) * i64::from(self.ratio)) >> RATIO_BITS;
-        let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
-        sums::of_force(force, self.centre, picture, config)
-    }
 }
 
 impl Default for Fit {

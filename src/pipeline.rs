@@ -2,6 +2,7 @@
 
 pub mod budget;
 mod exchange;
+mod modes;
 mod requests;
 
 pub use exchange::{Bridge, Command, Contact, Status, Taken, Taring};
@@ -18,9 +19,8 @@ use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
-use crate::units::{Duty, Newtons};
+use crate::units::Duty;
 use budget::Budget;
-use requests::Asked;
 
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
@@ -243,66 +243,5 @@ impl Pipeline {
         }
         self.status.sequence = sequence;
         limits
-    }
-
-    /// The mode table of [`crate::safety`], with what each change of mode prepares.
-    fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
-        let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
-        let before = self.status.mode;
-        let cleared = before == Mode::Fault && asked.clear && !command.torque;
-        if cleared {
-            self.status.fault = None;
-        }
-        let mode = match before {
-            Mode::Fault if !cleared => Mode::Fault,
-            // The bus lets it through with torque off alone, which may be on again by now.
-            _ if asked.tare => {
-                self.array.start_tare();
-                self.tared = false;
-                Mode::Tare
-            }
-            Mode::Fault => Mode::Off,
-            Mode::Tare => {
-                self.tared = sound && self.array.continue_tare();
-                if self.tared {
-                    self.array.judge_tare(&self.config);
-                }
-                if self.tared { Mode::Off } else { Mode::Tare }
-            }
-            Mode::Off if command.torque && self.tared => wanted,
-            _ if !command.torque => {
-                self.follow_drift(contact, sound);
-                Mode::Off
-            }
-            Mode::Off => Mode::Off,
-            Mode::Identify if self.press.running() => Mode::Identify,
-            Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
-                self.press.start(&self.motion);
-                Mode::Identify
-            }
-            Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => {
-                self.goal.felt = self.guard.depth_felt(&self.config);
-                Mode::Force
-            }
-            Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => {
-                self.array.touched();
-                Mode::Force
-            }
-            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
-                self.follow_drift(contact, sound);
-                wanted
-            }
-        };
-        self.note_requests(asked, before, mode, command);
-        mode
-    }
-
-    /// Lets the baseline follow drift where nothing is touched.
-    fn follow_drift(&mut self, contact: &Contact, sound: bool) {
-        let clear = self.goal.clear(self.motion.observer.travel, &self.config);
-        let untouched = sound && (clear || contact.force < self.config.contact_off);
-        if self.tared && self.config.params.baseline_follows != 0 && untouched {
-            self.array.follow_drift(clear);
-        }
     }
 }

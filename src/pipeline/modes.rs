@@ -1,0 +1,69 @@
+//! Which mode comes next, and what each change of mode prepares.
+
+use super::requests::Asked;
+use super::{Command, Contact, Pipeline};
+use crate::safety::Mode;
+use crate::units::Newtons;
+
+impl Pipeline {
+    /// The mode table of [`crate::safety`], with what each change of mode prepares.
+    pub(super) fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
+        let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
+        let before = self.status.mode;
+        let cleared = before == Mode::Fault && asked.clear && !command.torque;
+        if cleared {
+            self.status.fault = None;
+        }
+        let mode = match before {
+            Mode::Fault if !cleared => Mode::Fault,
+            // The bus lets it through with torque off alone, which may be on again by now.
+            _ if asked.tare => {
+                self.array.start_tare();
+                self.tared = false;
+                Mode::Tare
+            }
+            Mode::Fault => Mode::Off,
+            Mode::Tare => {
+                self.tared = sound && self.array.continue_tare();
+                if self.tared {
+                    self.array.judge_tare(&self.config);
+                }
+                if self.tared { Mode::Off } else { Mode::Tare }
+            }
+            Mode::Off if command.torque && self.tared => wanted,
+            _ if !command.torque => {
+                self.follow_drift(contact, sound);
+                Mode::Off
+            }
+            Mode::Off => Mode::Off,
+            Mode::Identify if self.press.running() => Mode::Identify,
+            Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
+                self.press.start(&self.motion);
+                Mode::Identify
+            }
+            Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => {
+                self.goal.felt = self.guard.depth_felt(&self.config);
+                Mode::Force
+            }
+            Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => {
+                self.array.touched();
+                Mode::Force
+            }
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
+                self.follow_drift(contact, sound);
+                wanted
+            }
+        };
+        self.note_requests(asked, before, mode, command);
+        mode
+    }
+
+    /// Lets the baseline follow drift where nothing is touched.
+    fn follow_drift(&mut self, contact: &Contact, sound: bool) {
+        let clear = self.goal.clear(self.motion.observer.travel, &self.config);
+        let untouched = sound && (clear || contact.force < self.config.contact_off);
+        if self.tared && self.config.params.baseline_follows != 0 && untouched {
+            self.array.follow_drift(clear);
+        }
+    }
+}

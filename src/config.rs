@@ -1,18 +1,21 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This, `control/gains.rs` and `safety/bounds.rs`, which it calls, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
+//! This file and those below it, each for a stage of the loop, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
 //! the bit. The formulas and their reasons stand in `docs/control.md`.
 
-use crate::contact::Geometry;
-use crate::control::BRAKE_SHARE_Q8;
-use crate::control::gains::{self, Gains, PACES};
+pub mod bounds;
+pub mod gains;
+pub mod geometry;
+
 use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
-use crate::safety::bounds::{Bounds, Drives};
 use crate::scan::{ScanError, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
+use bounds::{Bounds, Drives};
 use fixed::types::{I8F24, I16F16};
+use gains::{Gains, PACES};
+use geometry::Geometry;
 
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
@@ -27,6 +30,8 @@ const CALM_TIME_CONSTANTS: f32 = 4.0;
 const SEEN: f32 = 0.95;
 /// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not as more than this.
 const LEVEL_MAX: i32 = 1_024;
+/// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
+pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
 /// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i64 = 1_000_000 << 8;
 /// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,

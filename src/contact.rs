@@ -10,8 +10,8 @@ mod doubt;
 mod effort;
 mod fitted;
 mod follow;
-mod geometry;
 mod guess;
+mod reading;
 mod rim;
 mod start;
 mod step;
@@ -20,12 +20,12 @@ mod view;
 
 pub use effort::Effort;
 pub use follow::Fit;
-pub use geometry::Geometry;
+pub use reading::Contact;
 pub use sums::from_sums;
 
 use crate::config::Config;
+use crate::config::geometry::{Geometry, SQUARE_BITS};
 use crate::frame::COLUMNS;
-use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use guess::{CENTRE_BITS, Guess, Pressed};
 use rim::Rim;
@@ -191,8 +191,7 @@ fn refine(start: Guess, refined: Refined, which: Taxels, view: &View, geometry: 
 
 /// The largest change of a coordinate, Q24.
 fn distance(from: &Guess, to: &Guess) -> u32 {
-    let rest =
-        (from.rest >> (geometry::SQUARE_BITS - CENTRE_BITS)).abs_diff(to.rest >> (geometry::SQUARE_BITS - CENTRE_BITS));
+    let rest = (from.rest >> (SQUARE_BITS - CENTRE_BITS)).abs_diff(to.rest >> (SQUARE_BITS - CENTRE_BITS));
     rest.max(from.x.abs_diff(to.x)).max(from.y.abs_diff(to.y))
 }
 

@@ -11,7 +11,7 @@
 //! travel of the tip) and everything else, the contact force and friction among it, in the disturbance w.
 //!
 //! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still stop there;
-//! [`pace`] says how quick the loop is, by the [`gains`] of the paces; [`observer`] estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits.
+//! [`pace`] says how quick the loop is, by the [`gains`](crate::config::gains) of the paces; [`observer`] estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits.
 //! The law that joins them is
 //!
 //! ```text
@@ -23,23 +23,19 @@
 
 mod arith;
 pub mod drive;
-pub mod gains;
 pub mod goal;
 pub mod observer;
 pub mod pace;
 pub mod profile;
 
-use crate::config::Config;
-use crate::safety::Limits;
+use crate::config::{BRAKE_SHARE_Q8, Config};
+use crate::state::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 use arith::{held, high, product};
 use drive::Drive;
 use observer::Observer;
 use pace::Pace;
 use profile::Reference;
-
-/// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
-pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
 
 /// The state of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

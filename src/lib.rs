@@ -21,17 +21,21 @@ pub mod root;
 
 pub mod params;
 
-pub mod config;
+pub mod model;
+
+pub mod frame;
 
 pub mod scan;
 
-pub mod frame;
+pub mod config;
+
+pub mod state;
 
 pub mod pressure;
 
 pub mod contact;
 
-pub mod model;
+pub mod command;
 
 pub mod control;
 
@@ -41,10 +45,10 @@ pub mod safety;
 
 pub mod pipeline;
 
-pub mod record;
-
-pub mod same_bits;
+pub mod store;
 
 pub mod link;
 
-pub mod store;
+pub mod record;
+
+pub mod same_bits;

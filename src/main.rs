@@ -22,7 +22,7 @@ use fingertip::config::{Config, ConfigError};
 use fingertip::link::Settings;
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
-use fingertip::safety::Fault;
+use fingertip::state::Fault;
 use fingertip::store::Record;
 use static_cell::StaticCell;
 

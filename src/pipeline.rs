@@ -1,14 +1,15 @@
 //! One frame's way from codes to duty.
 
 pub mod budget;
-mod exchange;
 mod modes;
+mod report;
 mod requests;
 
-pub use exchange::{Bridge, Command, Contact, Status, Taken, Taring};
+pub use report::{Bridge, Status, Taken, Taring};
 
+use crate::command::Command;
 use crate::config::Config;
-use crate::contact::{self, Fit};
+use crate::contact::{self, Contact, Fit};
 use crate::control::SpeedLoop;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
@@ -17,8 +18,8 @@ use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
-use crate::safety::{Fault, Limits, Mode};
 use crate::scan::answer_ticks;
+use crate::state::{Fault, Limits, Mode};
 use crate::units::Duty;
 use budget::Budget;
 

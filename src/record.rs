@@ -2,10 +2,12 @@
 //!
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
+use crate::command::Command;
+use crate::contact::Contact;
 use crate::contact::Effort;
 use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
 use crate::identify::Modulus;
-use crate::pipeline::{Command, Contact, Status, Taken};
+use crate::pipeline::{Status, Taken};
 use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 
@@ -160,7 +162,7 @@ mod tests {
     use super::*;
     use crate::identify::{Identification, Refusal};
     use crate::pipeline::Taring;
-    use crate::safety::{Fault, Limits, Mode};
+    use crate::state::{Fault, Limits, Mode};
     use crate::units::{Millimetres, MillimetresPerSecond};
 
     #[test]

@@ -15,9 +15,12 @@
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use crate::contact::Effort;
-use crate::link::packet::ID_MAX;
-use crate::link::settings::BAUD_RATES;
 use crate::params::{ParamError, Params};
+
+/// The largest ID of a device on the bus.
+pub const ID_MAX: u8 = 252;
+/// The bus speeds that the clocks allow, by the protocol's code (APB1 runs at 42 MHz: 4 and 4.5 Mbaud are 4 % off).
+pub const BAUD_RATES: [u32; 6] = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000];
 
 const MAGIC: [u8; 4] = *b"FTIP";
 const HEADER_BYTES: usize = 12;

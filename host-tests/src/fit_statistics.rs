@@ -6,8 +6,8 @@
 use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
 use fingertip::config::Config;
+use fingertip::contact::Contact;
 use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Fit, Refined};
-use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 use std::sync::atomic::{AtomicUsize, Ordering};
 

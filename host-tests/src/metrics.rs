@@ -8,7 +8,7 @@ pub use response::Response;
 
 use crate::optimal::{Unreachable, minimum_time_s};
 use crate::plant::Setup;
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 
 /// A step counts as settled inside this share of the goal or of the step, whichever is smaller.
 pub const SETTLED_SHARE: f64 = 0.02;

@@ -1,9 +1,10 @@
 //! The same core on the host, closed over the plant: fast, and without a microcontroller in between.
 
 use crate::plant::{Bridge, Setup, World};
+use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::frame::{Frame, SLOTS, Sense};
-use fingertip::pipeline::{self, Command, Pipeline, Status};
+use fingertip::pipeline::{self, Pipeline, Status};
 use fingertip::record::Record;
 use fingertip::units::Duty;
 

@@ -6,10 +6,11 @@
 use crate::native::Native;
 use crate::plant::Setup;
 use fastrand::Rng;
+use fingertip::command::Command;
 use fingertip::config::{Config, newtons};
 use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline};
+use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
 use fingertip::units::Newtons;
 

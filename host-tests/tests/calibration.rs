@@ -1,11 +1,12 @@
 //! Gains and masks of single taxels.
 
+use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline};
+use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, CalibrationError, GAIN_MAX, GAIN_ONE, TARE_FRAMES};
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use host_tests::plant::{Setup, World};
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];

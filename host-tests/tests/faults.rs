@@ -3,7 +3,7 @@
 use fingertip::config::{Config, newtons};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::safety::{Fault, Limits, Mode};
+use fingertip::state::{Fault, Limits, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Faults, Row, Setup, Taxel};
 

@@ -1,10 +1,10 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
 use fingertip::config::Config;
+use fingertip::contact::Contact;
 use fingertip::contact::{CONFIDENCE_LEAST, Effort, Fit, Refined, from_sums, read};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 use fingertip::units::{Millimetres, Newtons};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};

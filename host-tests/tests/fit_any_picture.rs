@@ -1,10 +1,10 @@
 //! Any picture that the array's reading can make, under any finger's parameters: the fit ends, within its range.
 
 use fingertip::config::Config;
+use fingertip::contact::Contact;
 use fingertip::contact::{Effort, Fit, Refined, read};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 use host_tests::fit_cases::picture;
 use proptest::prelude::*;

@@ -1,10 +1,11 @@
 //! A contact that is there from one frame to the next is fitted, wherever on the array it lies.
 
+use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::contact::{CONFIDENCE_LEAST, Effort};
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline, Status};
+use fingertip::pipeline::{Pipeline, Status};
 use fingertip::pressure::TARE_FRAMES;
 use host_tests::plant::{Setup, World};
 

@@ -4,7 +4,7 @@ use fastrand::Rng;
 use fingertip::config::{Config, newtons};
 use fingertip::params::Params;
 use fingertip::safety::guard::{Guard, Seen};
-use fingertip::safety::{Fault, Limits};
+use fingertip::state::{Fault, Limits};
 use fingertip::units::{Duty, Newtons};
 
 /// Steps over all cases of a test.

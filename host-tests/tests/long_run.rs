@@ -4,7 +4,7 @@ use fastrand::Rng;
 use fingertip::config::Config;
 use fingertip::control::observer::Observer;
 use fingertip::params::Params;
-use fingertip::safety::{Fault, Mode};
+use fingertip::state::{Fault, Mode};
 use host_tests::long_run::{Cycle, Machine, all, cycle, hold};
 
 #[test]

@@ -1,6 +1,6 @@
 //! The figures of a run against traces made by hand, whose figures are known.
 
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use host_tests::metrics::{self, DriveLimits, MetricsError, Sample};
 use host_tests::plant::Setup;
 use proptest::prelude::*;

@@ -3,7 +3,7 @@
 use fingertip::config::Config;
 use fingertip::params::Params;
 use fingertip::pipeline::{Pipeline, Status};
-use fingertip::safety::{Fault, Mode};
+use fingertip::state::{Fault, Mode};
 use host_tests::stimulus;
 use std::collections::BTreeSet;
 

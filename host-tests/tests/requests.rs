@@ -6,7 +6,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Taring;
 use fingertip::pressure::TARE_FRAMES;
 use fingertip::record::Record;
-use fingertip::safety::{Fault, Mode};
+use fingertip::state::{Fault, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};
 

@@ -1,10 +1,10 @@
 //! Codes to contact: the plant's electrical model against what the core reads back.
 
 use fingertip::config::Config;
+use fingertip::contact::Contact;
 use fingertip::contact::from_sums;
 use fingertip::frame::{Frame, ROWS, SLOTS};
 use fingertip::params::Params;
-use fingertip::pipeline::Contact;
 use fingertip::pressure::{Array, TARE_FRAMES};
 use host_tests::plant::{Setup, World};
 

@@ -1,12 +1,13 @@
 //! A tare while something touches is told from one on a free tip, over arrays as they come; and it is never refused.
 
 use fastrand::Rng;
+use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline, Taring};
+use fingertip::pipeline::{Pipeline, Taring};
 use fingertip::pressure::{Calibration, GAIN_ONE, TARE_FRAMES};
-use fingertip::safety::Limits;
+use fingertip::state::Limits;
 use host_tests::plant::Setup;
 use host_tests::plant::cells::Cell;
 
@@ -174,7 +175,7 @@ fn an_odd_array_is_flagged_and_works() {
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let status = finger.pipeline.step(&finger.frame, &sense, &finger.command).1;
     assert!(status.fault.is_none() && status.limits.has(Limits::TARED_TOUCHING));
-    assert_eq!(status.mode, fingertip::safety::Mode::Release);
+    assert_eq!(status.mode, fingertip::state::Mode::Release);
 }
 
 /// A tare that was taken with one calibration says nothing of the next.

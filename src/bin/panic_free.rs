@@ -7,8 +7,9 @@
 #![no_main]
 
 use core::hint::black_box;
+use fingertip::command::Command;
 use fingertip::frame::{Frame, Sense};
-use fingertip::pipeline::{Command, Pipeline};
+use fingertip::pipeline::Pipeline;
 use fingertip::units::Duty;
 
 /// The step, with a pipeline and arguments of which the compiler knows nothing.

@@ -4,12 +4,13 @@
 
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
+use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Bridge as Wanted, Command, Pipeline};
-use fingertip::safety::Fault;
+use fingertip::pipeline::{Bridge as Wanted, Pipeline};
 use fingertip::scan::answer_ticks;
+use fingertip::state::Fault;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;

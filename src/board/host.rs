@@ -5,7 +5,7 @@
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply, Server, Snapshot};
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use fingertip::store::Record;
 
 use super::bus::Bus;

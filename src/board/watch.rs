@@ -3,7 +3,7 @@
 use defmt::{info, warn};
 use embassy_stm32::gpio::Output;
 use embassy_time::Timer;
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 
 use super::exchange::{HEARD, REPORT};
 

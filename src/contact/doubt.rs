@@ -6,7 +6,7 @@
 use super::fitted::RATIO_BITS;
 use super::{hides, overhang};
 use crate::config::Config;
-use crate::pipeline::Contact;
+use crate::contact::Contact;
 use crate::pressure::Picture;
 
 /// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two fifths.

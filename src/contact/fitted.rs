@@ -2,7 +2,7 @@
 
 use super::sums;
 use crate::config::Config;
-use crate::pipeline::Contact;
+use crate::contact::Contact;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 use fixed::types::I16F16;

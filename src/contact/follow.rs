@@ -8,15 +8,15 @@
 use super::arith::{Divisor, within};
 use super::effort::Effort;
 use super::fitted::{Fitted, RATIO_BITS};
-use super::geometry::ONE;
 use super::guess::{Guess, Pressed};
 use super::step::{Bench, Equations};
 use super::sums::from_sums;
 use super::view::{Scale, View};
 use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
 use crate::config::Config;
+use crate::config::geometry::ONE;
+use crate::contact::Contact;
 use crate::frame::ROWS;
-use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 

@@ -1,8 +1,8 @@
 //! A contact supposed, and what the model makes of it for each taxel.
 
 use super::arith::{between, high, root, within};
-use super::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
 use super::view::Scale;
+use crate::config::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
 use crate::frame::{COLUMNS, ROWS};
 use crate::model::Tip;
 use crate::units::Millimetres;

@@ -5,9 +5,9 @@
 //! and what of each lies inside the contact has two Gauss points.
 
 use super::arith::{between, root};
-use super::geometry::{Geometry, ONE, PLACE_BITS, SQUARE_BITS};
 use super::guess::{Guess, interval};
 use super::view::View;
+use crate::config::geometry::{Geometry, ONE, PLACE_BITS, SQUARE_BITS};
 
 /// 1/sqrt(3), Q15: Gauss points on -1 to 1.
 const GAUSS: i32 = 18_919;

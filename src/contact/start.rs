@@ -7,10 +7,10 @@
 //! s^2, and then D.
 
 use super::arith::{Divisor, high, root, within};
-use super::geometry::{Geometry, ONE, SQUARE_BITS};
 use super::guess::{CENTRE_BITS, Guess};
 use super::step::Taxels;
 use super::view::{PEAK_BITS, View};
+use crate::config::geometry::{Geometry, ONE, SQUARE_BITS};
 use crate::frame::{COLUMNS, ROWS};
 
 /// Taxels below an eighth of the peak are left out: the rim crosses most of them.

@@ -5,10 +5,10 @@
 //! to 1/4 at the peak, in the close ones to 1/25.
 
 use super::arith::{Divisor, high, within};
-use super::geometry::{Geometry, PLACE_BITS};
 use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
 use super::rim::Rim;
 use super::view::{PEAK_BITS, Scale, View};
+use crate::config::geometry::{Geometry, PLACE_BITS};
 use crate::frame::{COLUMNS, ROWS};
 
 /// A residual stops at half of the peak.

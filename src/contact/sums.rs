@@ -1,7 +1,7 @@
 //! The contact read off the sums.
 
 use crate::config::Config;
-use crate::pipeline::Contact;
+use crate::contact::Contact;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 use fixed::types::I8F24;

@@ -1,7 +1,7 @@
 //! The picture in shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
 
 use super::arith::{high, reciprocal};
-use super::geometry::Geometry;
+use crate::config::geometry::Geometry;
 use crate::pressure::{CODE_BITS, Picture};
 
 /// Fractional bits of a pressure as a share of the peak.

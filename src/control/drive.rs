@@ -2,7 +2,7 @@
 
 use super::arith::nearest_share;
 use crate::config::Config;
-use crate::safety::Limits;
+use crate::state::Limits;
 use crate::units::Duty;
 
 /// What the bridge was last told, as accelerations (Q8 mm/s^2): the observer's input.

@@ -4,10 +4,10 @@
 //! array says on the way. Noise, creep, warmth and hysteresis can look like a contact in the air; none of them moves that place.
 
 use crate::config::Config;
+use crate::contact::Contact;
 use crate::control::SpeedLoop;
 use crate::control::profile::Reference;
-use crate::pipeline::Contact;
-use crate::safety::{Limits, Mode};
+use crate::state::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
 

@@ -13,8 +13,8 @@
 //! rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
 
 use super::arith::{nearest_product, nearest_share};
-use super::gains::Gains;
 use crate::config::Config;
+use crate::config::gains::Gains;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// The estimate at the last frame.

@@ -5,8 +5,8 @@
 //! four of the loop's own time constants, it is calmer. A loop that swings therefore slows down, however it came to
 //! swing. Only gains change, never what the observer and the drive hold, so a change of pace moves nothing.
 
-use super::gains::{Gains, PACES};
 use crate::config::Config;
+use crate::config::gains::{Gains, PACES};
 use crate::units::Millimetres;
 
 /// The way's mean follows it by 1/8 in each frame: white noise counts a quarter.

@@ -11,7 +11,7 @@
 //! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
 
 use super::arith::product;
-use super::gains::Gains;
+use crate::config::gains::Gains;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// What the speed loop is to follow.

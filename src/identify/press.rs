@@ -8,14 +8,14 @@ use super::fit::TravelFit;
 use super::{Identification, Modulus, Refusal};
 use crate::config::Config;
 use crate::contact;
+use crate::contact::Contact;
 use crate::control::SpeedLoop;
 use crate::control::goal::within_travel;
 use crate::control::profile::Reference;
 use crate::frame::COLUMNS;
-use crate::pipeline::Contact;
 use crate::pressure::Picture;
 use crate::root::floor_sqrt;
-use crate::safety::Limits;
+use crate::state::Limits;
 use crate::units::{Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 
 /// Speed of the press: 2 mm/s.

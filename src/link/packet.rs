@@ -12,8 +12,6 @@
 pub const HEADER: [u8; 4] = [0xFF, 0xFF, 0xFD, 0x00];
 /// The ID that addresses every device.
 pub const BROADCAST: u8 = 254;
-/// The largest ID of a device.
-pub const ID_MAX: u8 = 252;
 /// Sent after FF FF FD, and dropped by the receiver.
 pub const STUFFING: u8 = 0xFD;
 

@@ -6,7 +6,8 @@
 use heapless::Vec;
 
 use super::crc;
-use super::packet::{BROADCAST, HEADER, ID_MAX, Packet, STUFFING};
+use super::packet::{BROADCAST, HEADER, Packet, STUFFING};
+use crate::store::ID_MAX;
 
 /// Parameters that are kept of a packet: a Sync Read of every ID there is, or a Sync Write of 76 goal forces.
 pub const PARAMS_MAX: usize = 384;

@@ -5,7 +5,8 @@ mod execute;
 
 use heapless::Vec;
 
-use crate::pipeline::{Command, Status};
+use crate::command::Command;
+use crate::pipeline::Status;
 use crate::store::Record;
 use crate::units::Newtons;
 

@@ -1,14 +1,11 @@
 //! What the host may change, and what it may ask the firmware to do.
 
+use crate::command::Command;
 use crate::config::{Config, ConfigError};
-use crate::pipeline::Command;
-use crate::store::Record;
+use crate::store::{BAUD_RATES, Record};
 use crate::units::Newtons;
 
 use super::packet::StatusError;
-
-/// The bus speeds that the clocks allow, by the protocol's code (APB1 runs at 42 MHz: 4 and 4.5 Mbaud are 4 % off).
-pub const BAUD_RATES: [u32; 6] = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 3_000_000];
 
 /// Everything that a write can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use crate::frame::{COLUMNS, Frame, ROWS};
 use crate::pipeline::Status;
 use crate::pressure::TARE_BITS;
-use crate::safety::Fault;
+use crate::state::Fault;
 
 /// A picture of the controller at one moment.
 #[derive(Clone, Copy, Debug)]

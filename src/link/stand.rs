@@ -4,8 +4,9 @@
 //! by these is refused with the result error. What comes in between, as a fault in the next frame, shows in the registers
 //! `tare_state`, `identify_state` and `saved_state`.
 
-use crate::pipeline::{Command, Status, Taken};
-use crate::safety::{Fault, Limits, Mode};
+use crate::command::Command;
+use crate::pipeline::{Status, Taken};
+use crate::state::{Fault, Limits, Mode};
 use crate::units::Newtons;
 
 use super::packet::StatusError;

@@ -9,9 +9,10 @@ mod define;
 mod registers;
 mod values;
 
+use crate::contact::Contact;
 use crate::identify::{Identification, Modulus};
 use crate::params::Params;
-use crate::pipeline::{Contact, Taring};
+use crate::pipeline::Taring;
 
 use super::packet::StatusError;
 use super::server::{Counters, State};

@@ -2,7 +2,7 @@
 
 use super::requests::Asked;
 use super::{Command, Contact, Pipeline};
-use crate::safety::Mode;
+use crate::state::Mode;
 use crate::units::Newtons;
 
 impl Pipeline {

@@ -8,7 +8,7 @@
 
 use super::{Command, Pipeline, Taring};
 use crate::identify::Refusal;
-use crate::safety::Mode;
+use crate::state::Mode;
 
 /// Requests that a command brings.
 #[derive(Clone, Copy)]

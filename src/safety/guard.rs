@@ -22,7 +22,7 @@
 
 use crate::config::Config;
 use crate::safety::unseen::{Going, Unseen};
-use crate::safety::{Fault, Limits};
+use crate::state::{Fault, Limits};
 use crate::units::{Duty, Millimetres, Newtons};
 
 /// A change of speed that is less than this part of what is expected is none: 1/8.

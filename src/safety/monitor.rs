@@ -1,11 +1,12 @@
 //! What must hold in every frame while the motor may move.
 
+use crate::command::Command;
 use crate::config::Config;
+use crate::contact::Contact;
 use crate::control::SpeedLoop;
 use crate::frame::{COLUMNS, ROWS, Sense};
-use crate::pipeline::{Command, Contact};
 use crate::pressure::Picture;
-use crate::safety::Fault;
+use crate::state::Fault;
 use crate::units::Millimetres;
 
 /// Travel that must not leave the picture of a contact unchanged to the last bit (0.2 mm).

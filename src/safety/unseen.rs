@@ -5,7 +5,7 @@
 
 use super::guard::saturated;
 use crate::config::Config;
-use crate::safety::Fault;
+use crate::state::Fault;
 use crate::units::{Millimetres, Newtons};
 
 /// The mean follows a lesser force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for friction.

@@ -2,8 +2,8 @@
 
 use super::machines::Machines;
 use super::{Mix, Source, frames};
+use crate::config::gains::Gains;
 use crate::config::{Config, ConfigError};
-use crate::control::gains::Gains;
 use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use crate::params::Params;
 use crate::pressure::CalibrationError;

@@ -4,10 +4,10 @@ use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::config::Config;
+use fingertip::contact::Contact;
 use fingertip::contact::{self, Effort, Fit, Refined};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::Contact;
 use fingertip::pressure::Picture;
 
 /// What the variants read and write.

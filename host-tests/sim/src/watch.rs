@@ -1,8 +1,9 @@
 //! What a run shows of itself, a control step at a time.
 
+use fingertip::command::Command;
 use fingertip::frame::{COLUMNS, Frame, ROWS, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Status};
+use fingertip::pipeline::Status;
 use serde::{Deserialize, Serialize};
 
 /// What a finger's controller is set to when a run begins. With every [`Step`] after it, a replay needs nothing else.

@@ -2,15 +2,15 @@
 
 use super::{Machine, Outcome};
 use fingertip::config::Config;
+use fingertip::config::gains::PACES;
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
-use fingertip::control::gains::PACES;
 use fingertip::control::observer::Observer;
 use fingertip::frame::{Frame, ROWS, SATURATED, SLOTS};
 use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
 use fingertip::pressure::{Array, TARE_FRAMES};
-use fingertip::safety::Limits;
+use fingertip::state::Limits;
 use fingertip::units::{Millimetres, Newtons, Ratio};
 use std::sync::Mutex;
 

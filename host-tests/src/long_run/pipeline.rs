@@ -1,10 +1,11 @@
 //! The whole pipeline under frames, senses and commands that do not change.
 
 use super::{Cycle, Outcome};
+use fingertip::command::Command;
 use fingertip::config::{Config, newtons};
 use fingertip::frame::{Frame, ROWS, SLOTS, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Pipeline, Status};
+use fingertip::pipeline::{Pipeline, Status};
 use fingertip::pressure::TARE_FRAMES;
 
 /// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat itself no sooner

@@ -3,7 +3,7 @@
 use fingertip::config::Config;
 use fingertip::identify::{Identification, Modulus, Refusal};
 use fingertip::params::Params;
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};
 

@@ -1,13 +1,14 @@
 //! A server with a made-up loop behind it, and a host's side of the talk.
 
+use fingertip::command::Command;
 use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Reply, ResetCause, Server, Snapshot};
-use fingertip::pipeline::{Command, Status, Taken, Taring};
+use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::safety::{Fault, Mode};
+use fingertip::state::{Fault, Mode};
 use fingertip::store::Record;
 
 /// The ID of the device under test.

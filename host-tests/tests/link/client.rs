@@ -6,7 +6,7 @@ use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::serial2::SerialPort;
 use dynamixel2::{Bus, MotorError, ReadError, TransferError};
 use fingertip::link::table::address;
-use fingertip::safety::Fault;
+use fingertip::state::Fault;
 
 use crate::bench::{Bench, ID};
 

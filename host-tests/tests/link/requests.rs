@@ -1,9 +1,10 @@
 //! Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went can be read.
 
+use fingertip::command::Command;
 use fingertip::identify::{Identification, Refusal};
 use fingertip::link::table::address;
-use fingertip::pipeline::{Command, Taring};
-use fingertip::safety::{Fault, Limits, Mode};
+use fingertip::pipeline::Taring;
+use fingertip::state::{Fault, Limits, Mode};
 
 use crate::bench::{Bench, ID, packet};
 

@@ -1,7 +1,7 @@
 //! Faults and the bus watchdog as the host sees them.
 
 use fingertip::link::table::address;
-use fingertip::safety::Fault;
+use fingertip::state::Fault;
 use fingertip::units::Newtons;
 
 use crate::bench::{Bench, packet};

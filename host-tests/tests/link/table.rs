@@ -4,7 +4,7 @@ use fingertip::contact::Effort;
 use fingertip::frame::TAXELS;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{READ_MAX, REGISTERS, address};
-use fingertip::safety::{Fault, Limits, Mode};
+use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 
 use crate::bench::Bench;

@@ -4,7 +4,7 @@ use fingertip::link::Actions;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, REGISTERS, Register, address};
 use fingertip::params::Params;
-use fingertip::safety::Fault;
+use fingertip::state::Fault;
 
 use crate::bench::Bench;
 

@@ -1,7 +1,7 @@
 //! Parameters at and between the ends of their ranges, and the configurations they make.
 
 use fingertip::config::Config;
-use fingertip::control::gains::Gains;
+use fingertip::config::gains::Gains;
 use fingertip::params::Params;
 use proptest::prelude::*;
 

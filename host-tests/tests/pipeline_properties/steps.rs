@@ -6,7 +6,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::{Pipeline, Status, Taring};
 use fingertip::pressure::TARE_FRAMES;
 use fingertip::record::Digest;
-use fingertip::safety::{Fault, Mode};
+use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Newtons};
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;

@@ -9,7 +9,7 @@ use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use fingertip::contact::Effort;
 use fingertip::link::table::address;
 use fingertip::params::Params;
-use fingertip::safety::Limits;
+use fingertip::state::Limits;
 use host_tests::plant::{Setup, World};
 use virtual_board::{Options, Rig};
 
@@ -117,6 +117,6 @@ fn a_change_of_effort_does_not_stop_the_scan() {
     let (to_ns, to) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
     let (scanned, stepped) = ((to_ns - from_ns) / frame_ns, u64::from(to - from));
     assert!(stepped > 20 && scanned.abs_diff(stepped) <= 12, "{stepped} of {scanned} frames");
-    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), fingertip::safety::Mode::Force as u8);
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), fingertip::state::Mode::Force as u8);
     said(&mut rig);
 }

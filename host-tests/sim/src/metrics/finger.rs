@@ -3,7 +3,7 @@
 use super::conduct::Conduct;
 use super::slips::Slips;
 use crate::watch::{Controller, Step};
-use fingertip::safety::{Fault, Limits};
+use fingertip::state::{Fault, Limits};
 use fingertip::units::{Duty, Millimetres, Newtons};
 use host_tests::metrics::Response;
 

@@ -1,8 +1,10 @@
 //! What a run was, in one number.
 
+use fingertip::command::Command;
+use fingertip::contact::Contact;
 use fingertip::frame::{Frame, Sense};
 use fingertip::identify::Modulus;
-use fingertip::pipeline::{Command, Contact, Status};
+use fingertip::pipeline::Status;
 use fingertip::units::Duty;
 use twox_hash::xxhash3_128::Hasher;
 

@@ -1,6 +1,6 @@
 //! What the tests of the world share.
 
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use sim::scene::{Scene, read};
 use sim::watch::{Step, Truth, Watch};
 

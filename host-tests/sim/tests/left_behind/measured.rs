@@ -1,10 +1,11 @@
 //! Metrics and bounds.
 
 use crate::wall;
+use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::frame::{Frame, Sense};
-use fingertip::pipeline::{Command, Status};
-use fingertip::safety::Fault;
+use fingertip::pipeline::Status;
+use fingertip::state::Fault;
 use sim::metrics::{self, METRICS, Meter};
 use sim::run::run;
 use sim::scene::Bound;

@@ -1,10 +1,11 @@
 //! Each promise of the envelope, by a finger made by hand: kept by a little, and broken by a little.
 
+use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::{Command, Status};
-use fingertip::safety::Fault;
+use fingertip::pipeline::Status;
+use fingertip::state::Fault;
 use fingertip::units::Duty;
 use sim::metrics::Meter;
 use sim::population::load;

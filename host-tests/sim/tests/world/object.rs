@@ -1,7 +1,7 @@
 //! Objects that can move, one finger and two.
 
 use crate::bench::{Last, close, run, scene, world};
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use host_tests::plant::Bridge;
 use sim::watch::{Step, Watch};
 

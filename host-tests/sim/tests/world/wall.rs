@@ -1,7 +1,7 @@
 //! The wall scene, natively.
 
 use crate::bench::{Last, scene};
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use sim::effects::set::Named;
 use sim::native::simulate_with;
 

@@ -6,7 +6,7 @@ use crate::client::Client;
 use dynamixel2::{InvalidMessage, ReadError, TransferError};
 use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::link::table::address;
-use fingertip::safety::Mode;
+use fingertip::state::Mode;
 use host_tests::heatmap::Pressures;
 
 /// The board's address on the bus.

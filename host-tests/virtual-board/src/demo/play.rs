@@ -8,7 +8,7 @@ use crate::gaps::Gap;
 use crate::measure::Latency;
 use crate::recorder::Recorder;
 use fingertip::link::table::address;
-use fingertip::safety::{Limits, Mode};
+use fingertip::state::{Limits, Mode};
 use host_tests::demo::{self, Phase, Picture};
 use host_tests::heatmap::Pressures;
 

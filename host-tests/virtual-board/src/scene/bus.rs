@@ -1,12 +1,13 @@
 //! What the scene's host sends and reads: goals out, status registers in.
 
+use fingertip::contact::Contact;
 use fingertip::link::Reply;
 use fingertip::link::packet::instruction;
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::table::address;
-use fingertip::pipeline::{Contact, Status};
-use fingertip::safety::{Fault, Limits, Mode};
+use fingertip::pipeline::Status;
+use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond};
 
 /// The board's address on the bus.

@@ -1,60 +1,18 @@
-//! What goes into a step beside the frame, and what comes out of it beside the duty.
+//! What a step reports beside the duty.
 
-use crate::contact::Effort;
+use crate::contact::{Contact, Effort};
 use crate::identify::Identification;
-use crate::safety::{Fault, Limits, Mode};
-use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
-
-/// What the host asks of the loop; a snapshot, replaced as a whole.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Command {
-    /// Whether the bridge may be driven.
-    pub torque: bool,
-    /// The force to hold, 0 to let go.
-    pub goal: Newtons,
-    /// Bus watchdog in ms; 0 is off.
-    pub bus_watchdog_ms: u16,
-    /// How much work may be put into the contact.
-    pub effort: Effort,
-    /// A change of this number asks for a tare.
-    pub tare_request: u8,
-    /// A change of this number clears a fault.
-    pub clear_request: u8,
-    /// A change of this number asks for a measurement of Young's modulus.
-    pub identify_request: u8,
-}
-
-/// What a frame says of the contact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Contact {
-    /// Total normal force.
-    pub force: Newtons,
-    /// Indentation of the tip, from the force by the model.
-    pub indentation: Millimetres,
-    /// Centre of pressure along the columns, from the array's middle.
-    pub centre_x: Millimetres,
-    /// Centre of pressure along the rows, from the array's middle.
-    pub centre_y: Millimetres,
-    /// Contact radius, by the model.
-    pub radius: Millimetres,
-    /// Highest pressure on a taxel, Pa.
-    pub peak_pa: u32,
-    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
-    pub confidence: u8,
-    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit says how much.
-    pub doubt: u8,
-    /// Taxels left out because they are dead or saturated.
-    pub bad_taxels: u8,
-}
+use crate::state::{Fault, Limits, Mode};
+use crate::units::{Duty, Millimetres, MillimetresPerSecond};
 
 /// The numbers of the requests last taken up: a command's number that differs still waits, for a frame or for torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Taken {
-    /// See [`Command::tare_request`].
+    /// See [`crate::command::Command::tare_request`].
     pub tare: u8,
-    /// See [`Command::clear_request`].
+    /// See [`crate::command::Command::clear_request`].
     pub clear: u8,
-    /// See [`Command::identify_request`].
+    /// See [`crate::command::Command::identify_request`].
     pub identify: u8,
 }
 

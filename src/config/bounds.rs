@@ -1,6 +1,6 @@
 //! What the guard goes by, derived once from the parameters.
 
-use crate::config::{exp2, millimetres, narrow, newtons, speed};
+use super::{exp2, millimetres, narrow, newtons, speed};
 use crate::model::Tip;
 use crate::params::Params;
 use crate::units::{Millimetres, MillimetresPerSecond};

@@ -15,19 +15,19 @@ use crate::params::Params;
 use crate::root::floor_sqrt;
 
 /// Fractional bits of a squared distance, of a column's length and of s.
-pub(super) const SQUARE_BITS: u32 = 28;
+pub(crate) const SQUARE_BITS: u32 = 28;
 /// Fractional bits of a taxel's place.
-pub(super) const PLACE_BITS: u32 = 15;
+pub(crate) const PLACE_BITS: u32 = 15;
 /// Squared distance from node to node: 1/128.
-pub(super) const NODE_BITS: u32 = SQUARE_BITS - 7;
+pub(crate) const NODE_BITS: u32 = SQUARE_BITS - 7;
 /// Nodes of the table; the last stands at 1.5, where no contact within the radius reaches a taxel.
-pub(super) const NODES: usize = 193;
+pub(crate) const NODES: usize = 193;
 /// 1 in Q28.
-pub(super) const ONE: i32 = 1 << SQUARE_BITS;
+pub(crate) const ONE: i32 = 1 << SQUARE_BITS;
 
 /// The model at one distance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Node {
+pub(crate) struct Node {
     /// G, Q26.
     pub mean_inverse_length: i32,
     /// L, Q28.
@@ -42,17 +42,17 @@ pub(super) struct Node {
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// h, Q28.
-    pub(super) pitch: i32,
+    pub(crate) pitch: i32,
     /// Middles of the columns, and of the rows, Q15.
-    pub(super) places: [i32; COLUMNS],
+    pub(crate) places: [i32; COLUMNS],
     /// 2/h, Q20.
-    pub(super) inverse_half_pitch: i32,
+    pub(crate) inverse_half_pitch: i32,
     /// 2^56 over the tip's radius in units of its last place.
-    pub(super) inverse_radius: i32,
+    pub(crate) inverse_radius: i32,
     /// What a taxel under the pressure Y shows, in sixteenths of a code, Q8.
-    pub(super) modulus_q8: u32,
+    pub(crate) modulus_q8: u32,
     /// The model over the squared distance.
-    pub(super) nodes: [Node; NODES],
+    pub(crate) nodes: [Node; NODES],
 }
 
 impl Geometry {

@@ -1,0 +1,23 @@
+//! What the host asks of the loop.
+
+use crate::contact::Effort;
+use crate::units::Newtons;
+
+/// What the host asks of the loop; a snapshot, replaced as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Command {
+    /// Whether the bridge may be driven.
+    pub torque: bool,
+    /// The force to hold, 0 to let go.
+    pub goal: Newtons,
+    /// Bus watchdog in ms; 0 is off.
+    pub bus_watchdog_ms: u16,
+    /// How much work may be put into the contact.
+    pub effort: Effort,
+    /// A change of this number asks for a tare.
+    pub tare_request: u8,
+    /// A change of this number clears a fault.
+    pub clear_request: u8,
+    /// A change of this number asks for a measurement of Young's modulus.
+    pub identify_request: u8,
+}

@@ -1,0 +1,119 @@
+//! Modes, faults and limits: what the controller is doing, why it stopped, and what holds it back.
+//!
+//! | mode | bridge | leaves when |
+//! | --- | --- | --- |
+//! | 0 off | outputs low, motor coasts | torque is enabled on a tared array: approach (goal > 0), release (goal = 0) |
+//! | 1 tare | outputs low | enough frames are averaged: off |
+//! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
+//! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
+//! | 4 release | backs off to the set clearance behind the surface that it touched, then holds there | goal > 0: approach |
+//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force | done or refused: approach (goal > 0), release (goal = 0) |
+//! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
+//!
+//! Identify, which measures Young's modulus, is asked for in approach, force or release.
+//!
+//! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault, and from a fault
+//! that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what holds the loop back just now)
+//! comes and goes by itself. The numbers are stable: hosts may store them.
+
+/// What the controller is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mode {
+    /// The bridge is off.
+    #[default]
+    Off = 0,
+    /// The zero of every taxel is being measured; the bridge is off.
+    Tare = 1,
+    /// Towards the object at the set speed.
+    Approach = 2,
+    /// Holding the goal force.
+    Force = 3,
+    /// Letting go, then holding clear of the object.
+    Release = 4,
+    /// Stopped by a fault.
+    Fault = 5,
+    /// Pressing to measure Young's modulus.
+    Identify = 6,
+}
+
+/// Why the motor was stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// No frame within 1.75 frame times of the last one: the scan stands.
+    LostFrames = 1,
+    /// More taxels are dead or saturated than allowed.
+    ArrayBroken = 2,
+    /// A column shows current with no row driven: a row is stuck on.
+    RowStuck = 3,
+    /// The array does not follow the motion that the encoder reports.
+    ArrayFrozen = 4,
+    /// The encoder does not follow what the motor is driven to: it stands, or the motor is blocked.
+    EncoderFrozen = 5,
+    /// The contact force passed its limit.
+    OverForce = 6,
+    /// No valid packet within the bus watchdog's time.
+    BusSilent = 7,
+    /// The stored parameters are damaged or out of range.
+    BrokenParameters = 8,
+    /// The supply is below its limit.
+    SupplyLow = 9,
+    /// The supply is above its limit.
+    SupplyHigh = 10,
+    /// The bridge's driver reported a fault.
+    Bridge = 11,
+    /// The control step came later than its deadline.
+    MissedDeadline = 12,
+    /// The firmware was reset by its watchdog, a panic or a hard fault; see the crash record.
+    Crash = 13,
+    /// The tip left its envelope: an end of the travel, a retreat without end, or speed where nothing is touched.
+    Runaway = 14,
+    /// The encoder runs against what the motor is driven to: its channels or the motor's leads are swapped.
+    Reversed = 15,
+    /// The motor presses on something that the array does not see.
+    Unseen = 16,
+}
+
+/// What holds the loop back just now: a set of flags, stable by bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Limits(pub u16);
+
+impl Limits {
+    /// The voltage or the supply is used up.
+    pub const VOLTAGE: u16 = 1 << 0;
+    /// The current limit (by the motor's model) holds the voltage back.
+    pub const CURRENT: u16 = 1 << 1;
+    /// The speed limit is reached.
+    pub const SPEED: u16 = 1 << 2;
+    /// The goal is above the largest force allowed or below the least that is a contact, and was moved to it.
+    pub const GOAL: u16 = 1 << 3;
+    /// The travel's end is reached without contact.
+    pub const TRAVEL: u16 = 1 << 4;
+    /// Some taxels are dead or saturated and are left out.
+    pub const TAXELS: u16 = 1 << 5;
+    /// The array was never tared since reset.
+    pub const NOT_TARED: u16 = 1 << 6;
+    /// A frame was missed since the last step.
+    pub const FRAME_MISSED: u16 = 1 << 7;
+    /// The voltage's slew limit holds it back.
+    pub const SLEW: u16 = 1 << 8;
+    /// There is no time for the effort that was asked for; see [`crate::pipeline::budget`].
+    pub const EFFORT: u16 = 1 << 9;
+    /// Something touched the tip during the last tare: what the array shows is less by that.
+    pub const TARED_TOUCHING: u16 = 1 << 10;
+    /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds it from above.
+    pub const FROM_BELOW: u16 = 1 << 11;
+    /// The guard holds the duty back, see [`guard`].
+    pub const GUARD: u16 = 1 << 12;
+
+    /// Adds a flag.
+    pub fn set(&mut self, flag: u16) {
+        self.0 |= flag;
+    }
+
+    /// Whether a flag is set.
+    pub fn has(self, flag: u16) -> bool {
+        self.0 & flag != 0
+    }
+}

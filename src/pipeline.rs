@@ -18,7 +18,7 @@ use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
-use crate::scan::answer_ticks;
+use crate::scan::deadline_ticks;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::Duty;
 use budget::Budget;
@@ -105,7 +105,7 @@ impl Pipeline {
     pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
-        let deadline = answer_ticks(self.config.timing.frame_ticks());
+        let deadline = deadline_ticks(self.config.timing.frame_ticks());
         let effort = self.budget.next(command.effort, sense.answer_ticks, deadline);
         self.fit.set_effort(effort);
         if effort < command.effort {

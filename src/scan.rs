@@ -53,7 +53,7 @@ impl core::fmt::Display for ScanError {
 impl core::error::Error for ScanError {}
 
 /// What control has from a frame's end to its new duty; the last quarter of the frame's time is left for the tasks below it.
-pub const fn answer_ticks(frame_ticks: u32) -> u32 {
+pub const fn deadline_ticks(frame_ticks: u32) -> u32 {
     frame_ticks / 4 * 3
 }
 

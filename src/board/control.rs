@@ -9,7 +9,7 @@ use fingertip::config::Config;
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge as Wanted, Pipeline};
-use fingertip::scan::answer_ticks;
+use fingertip::scan::deadline_ticks;
 use fingertip::state::Fault;
 
 use super::bridge::{self, Bridge};
@@ -148,7 +148,7 @@ impl State {
         self.report.supply_mv = sense.supply_mv;
         self.report.loop_ticks = loop_ticks;
         self.report.loop_ticks_max = self.report.loop_ticks_max.max(loop_ticks);
-        if loop_ticks <= answer_ticks(frame_ticks) {
+        if loop_ticks <= deadline_ticks(frame_ticks) {
             guard::restart(completed.stamp, frame_ticks);
             parts.watchdog.pet();
         } else {

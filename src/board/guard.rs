@@ -12,7 +12,7 @@ use embassy_stm32::interrupt::InterruptExt;
 use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::peripherals::TIM5;
 use embassy_stm32::{Peri, pac, rcc};
-use fingertip::scan::{ScanTiming, TIMER_HZ, answer_ticks};
+use fingertip::scan::{ScanTiming, TIMER_HZ, deadline_ticks};
 
 use super::{bridge, scan};
 
@@ -49,7 +49,7 @@ pub fn now() -> u32 {
 
 /// Lets a frame of `frame_ticks` and the time to answer it pass from the instant `from` before the guard trips.
 pub fn restart(from: u32, frame_ticks: u32) {
-    let period = frame_ticks + answer_ticks(frame_ticks);
+    let period = frame_ticks + deadline_ticks(frame_ticks);
     PERIOD.store(period, Ordering::Relaxed);
     pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
     if !pac::TIM5.dier().read().ccie(COMPARE_1) {

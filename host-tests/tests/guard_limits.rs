@@ -236,6 +236,18 @@ fn a_tip_that_stands_is_stopped_from_what_must_be_expected_on() {
     }
 }
 
+/// A jump of the encoder is faster than 32 bits tell: as fast as they tell, and not slow.
+#[test]
+fn a_jump_is_fast() {
+    for (jump_mm, lets) in [(5.0, [false, true]), (-5.0, [true, false])] {
+        let mut finger = Finger::new();
+        assert_eq!(finger.placed(8.0), None);
+        finger.travel_mm += jump_mm;
+        assert_eq!(finger.frame(), None);
+        assert_eq!(finger.lets(), lets, "{jump_mm} mm");
+    }
+}
+
 #[test]
 fn the_travel_is_that_of_the_encoder() {
     let mut finger = Finger::new();

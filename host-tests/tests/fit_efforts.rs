@@ -86,6 +86,39 @@ fn another_effort_keeps_what_was_found() {
     }
 }
 
+/// The next contact is no part of the last one: until a refinement of its own it is its sum.
+#[test]
+fn what_was_found_goes_with_the_contact() {
+    let (config, picture) = (config(), still(1.5));
+    let mut fit = Fit::new(Effort::OneRow);
+    for _ in 0..100 {
+        fit.read(&picture, &config);
+    }
+    assert!(fit.read(&picture, &config).force > from_sums(&picture, &config).force);
+    fit.read(&Picture::EMPTY, &config);
+    for _ in 0..10 {
+        let contact = fit.read(&picture, &config);
+        assert_eq!((contact.force, contact.confidence), (from_sums(&picture, &config).force, 255));
+    }
+}
+
+/// Where the array comes to see all of the contact, its sum counts again, to the last bit.
+#[test]
+fn a_contact_that_comes_into_sight_is_its_sum() {
+    let config = config();
+    let scene = Scene { x_mm: 0.5, ..cut_off(1.0) };
+    let seen = picture(&scene, Noise::None, &mut Rng::with_seed(0));
+    let mut fit = Fit::new(Effort::AllRows);
+    for _ in 0..40 {
+        fit.read(&still(1.0), &config);
+    }
+    for _ in 0..40 {
+        fit.read(&seen, &config);
+    }
+    let (contact, sums) = (fit.read(&seen, &config), from_sums(&seen, &config));
+    assert_eq!((contact.force, contact.centre_x, contact.centre_y), (sums.force, sums.centre_x, sums.centre_y));
+}
+
 #[test]
 fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
     let (config, picture) = (config(), still(1.5));

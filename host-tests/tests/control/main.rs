@@ -1,0 +1,22 @@
+//! The parts of the force loop, each by itself: pace, drive, observer, profile, law, and what each mode asks of them.
+
+mod drive;
+mod gains;
+mod goal;
+mod law;
+mod observer;
+mod pace;
+mod release;
+
+use fingertip::config::Config;
+use fingertip::params::Params;
+use fingertip::units::Millimetres;
+
+/// The reference finger's.
+fn config() -> Config {
+    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+}
+
+fn mm(value: f64) -> Millimetres {
+    Millimetres::from_bits((value * f64::from(1 << 24)).round() as i32)
+}

@@ -1,0 +1,108 @@
+//! When the loop is quicker, and when it is calmer, frame by frame.
+
+use crate::config;
+use fingertip::config::Config;
+use fingertip::config::gains::PACES;
+use fingertip::control::pace::Pace;
+use fingertip::units::Millimetres;
+
+/// The pace's number, by the gains that it gives.
+fn number(pace: &Pace, config: &Config) -> usize {
+    let number = config.paces.iter().position(|gains| gains == pace.gains(config)).expect("one of the paces");
+    assert_eq!(pace.calm(), number > 0);
+    number
+}
+
+/// After each of so many frames with a way of so many bits.
+fn run(pace: &mut Pace, way: i32, frames: u32, config: &Config) -> Vec<usize> {
+    let mut note = |_| {
+        pace.note(Millimetres::from_bits(way), config);
+        number(pace, config)
+    };
+    (0..frames).map(&mut note).collect()
+}
+
+/// At the calmest pace, with a mean way of 0.
+fn calmest(config: &Config) -> Pace {
+    let mut pace = Pace::QUICK;
+    run(&mut pace, 0, 10 * config.calm_frames, config);
+    assert_eq!(number(&pace, config), PACES - 1);
+    pace
+}
+
+#[test]
+fn without_a_way_each_pace_lasts_twice_as_long_as_the_one_before() {
+    let config = config();
+    let mut pace = Pace::QUICK;
+    for slower in 0..PACES - 1 {
+        let lasts = config.calm_frames << slower;
+        assert_eq!(run(&mut pace, 0, lasts, &config), vec![slower; lasts as usize]);
+        assert_eq!(run(&mut pace, 0, 1, &config), [slower + 1]);
+    }
+    assert_eq!(run(&mut pace, 0, 1_000, &config), [PACES - 1; 1_000], "there is none calmer");
+}
+
+/// Two bands at the calmest pace, twice that at each quicker one. A mean that comes down to its way meets it to the last bit.
+#[test]
+fn a_pace_is_kept_up_to_its_longest_way_and_no_farther() {
+    let config = config();
+    let band = config.calm_band.to_bits();
+    for (at, longest) in [(3, 2 * band), (2, 4 * band), (1, 8 * band)] {
+        // From the calmest pace, quicker as far as the one looked at.
+        let mut pace = calmest(&config);
+        run(&mut pace, -longest / 2 - 1, 10 * config.calm_frames, &config);
+        run(&mut pace, -longest, 200, &config);
+        assert_eq!(number(&pace, &config), at, "{longest}");
+        // Once more, as long as it takes to be calm.
+        assert_eq!(*run(&mut pace, -longest, 1_000, &config).last().unwrap(), at);
+        assert_eq!(*run(&mut pace, -longest - 1, 200, &config).last().unwrap(), at - 1);
+        // Rounded down, the mean stays up to 7 below a positive way.
+        let mut pace = calmest(&config);
+        assert!(run(&mut pace, longest, 1_000, &config).iter().all(|number| *number >= at));
+        assert_eq!(*run(&mut pace, longest + 8, 200, &config).last().unwrap(), at - 1);
+    }
+}
+
+/// Half of its longest way lets a pace be left for the next, a bit more does not.
+#[test]
+fn half_as_long_a_way_is_calm() {
+    let config = config();
+    let band = config.calm_band.to_bits();
+    for (at, calm) in [(0, 4 * band), (1, 2 * band), (2, band)] {
+        for (way, next) in [(calm, at + 1), (calm + 1, at)] {
+            let mut pace = Pace::QUICK;
+            run(&mut pace, i32::MAX, 100, &config);
+            run(&mut pace, calm + 1, 20 * config.calm_frames, &config);
+            assert_eq!(number(&pace, &config), at, "at {calm}");
+            assert_eq!(*run(&mut pace, way, 20 * config.calm_frames, &config).last().unwrap(), next, "{way} of {calm}");
+        }
+    }
+}
+
+#[test]
+fn a_long_way_is_soon_met_and_soon_forgotten() {
+    let config = config();
+    for way in [i32::MAX, i32::MIN] {
+        let mut pace = calmest(&config);
+        // The mean goes 1/8 of the way to 16 bands: 2, 3.75, 5.3, 6.6, 7.8, 8.8 of them. Rounding leaves the first one at its limit or
+        // just beyond it.
+        let met = run(&mut pace, way, 6, &config);
+        assert_eq!(met[1..], [2, 1, 1, 1, 0]);
+        run(&mut pace, way, 1_000, &config);
+        // Down to a quarter in 11 frames; calm from then on.
+        let frames = run(&mut pace, 0, 1_000, &config).iter().position(|number| *number == 1).unwrap() as u32;
+        assert!((10..=11).contains(&(frames - config.calm_frames)), "{frames} frames");
+    }
+}
+
+#[test]
+fn a_way_in_between_makes_the_calm_begin_anew() {
+    let config = config();
+    let mut pace = Pace::QUICK;
+    run(&mut pace, 0, config.calm_frames - 2, &config);
+    // The third frame of 16 bands makes a mean of 5.3, which is again below 4 after three without a way.
+    run(&mut pace, i32::MAX, 3, &config);
+    let lasts = 2 + config.calm_frames;
+    assert_eq!(run(&mut pace, 0, lasts, &config), vec![0; lasts as usize]);
+    assert_eq!(run(&mut pace, 0, 1, &config), [1]);
+}

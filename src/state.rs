@@ -104,7 +104,7 @@ impl Limits {
     pub const TARED_TOUCHING: u16 = 1 << 10;
     /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds it from above.
     pub const FROM_BELOW: u16 = 1 << 11;
-    /// The guard holds the duty back, see [`guard`].
+    /// The guard holds the duty back, see [`crate::safety::guard`].
     pub const GUARD: u16 = 1 << 12;
 
     /// Adds a flag.

@@ -6,7 +6,7 @@ use crate::state::Mode;
 use crate::units::Newtons;
 
 impl Pipeline {
-    /// The mode table of [`crate::safety`], with what each change of mode prepares.
+    /// The mode table of [`crate::state`], with what each change of mode prepares.
     pub(super) fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
         let before = self.status.mode;

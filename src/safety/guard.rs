@@ -9,7 +9,7 @@
 //!    so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
 //! 5. A tip that goes steadily forward stops where the motor feels 1 N and its friction more than before, and the array no contact;
-//!    see [`super::unseen`].
+//!    see `unseen.rs`.
 //!
 //! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells, and the one that its
 //! model of the motor expects. Both pass the same two filters, so a sound finger shows the same sign whatever it is asked for:

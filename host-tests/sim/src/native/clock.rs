@@ -45,5 +45,14 @@ fn long(units: i128) -> f64 {
 }
 
 fn units(seconds: f64) -> i128 {
-    (seconds * UNITS as f64 + 0.5) as i128
+    let units = seconds * UNITS as f64 + 0.5;
+    // The same number either way, as above.
+    if units.abs() < i64::MAX as f64 { i128::from(units as i64) } else { long_units(units) }
+}
+
+/// As [`long`].
+#[cold]
+#[inline(never)]
+fn long_units(units: f64) -> i128 {
+    units as i128
 }

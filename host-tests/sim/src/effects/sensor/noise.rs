@@ -1,7 +1,7 @@
 //! Noise of amplifiers and converter.
 
 use super::{Codes, Row};
-use crate::effects::random::normal;
+use crate::effects::random::normals;
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
@@ -34,6 +34,7 @@ struct Noise {
 
 impl Codes for Noise {
     fn apply(&mut self, _slot: usize, _time_s: f64, codes: &mut Row) {
-        codes.iter_mut().for_each(|code| *code += self.rms_codes * normal(&mut self.rng));
+        let noise: Row = normals(&mut self.rng);
+        codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += self.rms_codes * noise);
     }
 }

@@ -4,10 +4,11 @@
 
 mod common;
 
-use common::{WAIT_NS, image, scratch};
+use common::{WAIT_NS, image, on_a_shared, scratch};
 use host_tests::plant::{Setup, World};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
+use std::sync::Mutex;
 use virtual_board::flash::SECTOR;
 use virtual_board::{Fault, Options, Rig};
 
@@ -18,20 +19,27 @@ fn running(options: &Options) -> Rig {
     rig
 }
 
+/// One of these that nothing lasting is done to.
+fn with_one_running(test: impl FnOnce(&mut Rig)) {
+    static RUNNING: Mutex<Option<Rig>> = Mutex::new(None);
+    on_a_shared(&RUNNING, || running(&Options::default()), test);
+}
+
 fn frames(rig: &mut Rig) -> u64 {
     rig.scan_counts().expect("it runs").frames
 }
 
 #[test]
 fn converters_stall_and_go_on() {
-    let mut rig = running(&Options::default());
-    rig.inject(Fault::ConvertersStall).expect("it runs");
-    let before = frames(&mut rig);
-    rig.run_ms(2).expect("it runs");
-    assert!(frames(&mut rig) <= before + 1, "a frame under way may end");
-    rig.mend(Fault::ConvertersStall).expect("it runs");
-    rig.run_ms(2).expect("it runs");
-    assert!(frames(&mut rig) > before + 15);
+    with_one_running(|rig| {
+        rig.inject(Fault::ConvertersStall).expect("it runs");
+        let before = frames(rig);
+        rig.run_ms(2).expect("it runs");
+        assert!(frames(rig) <= before + 1, "a frame under way may end");
+        rig.mend(Fault::ConvertersStall).expect("it runs");
+        rig.run_ms(2).expect("it runs");
+        assert!(frames(rig) > before + 15);
+    });
 }
 
 #[test]
@@ -97,29 +105,30 @@ fn what_is_stored_survives_a_snapshot_and_a_reboot() {
 
 #[test]
 fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast() {
-    let mut rig = running(&Options::default());
-    for travel_mm in [1.0, 0.3, 0.301] {
-        rig.world(move |world| world.place(travel_mm)).expect("it runs");
-        rig.run_ms(3).expect("it runs");
-        let (counted, turned) = rig
-            .with(|stand| {
-                const TIM3_CNT: u64 = 0x4000_0424;
-                let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
-                (counted as u16, stand.bench.front_end.lock().world.encoder_counts(stand.stop.at.0) as u16)
-            })
-            .expect("it runs");
-        assert_ne!(turned, 0);
-        assert_eq!(counted, turned, "at {travel_mm} mm");
-    }
+    with_one_running(|rig| {
+        for travel_mm in [1.0, 0.3, 0.301] {
+            rig.world(move |world| world.place(travel_mm)).expect("it runs");
+            rig.run_ms(3).expect("it runs");
+            let (counted, turned) = rig
+                .with(|stand| {
+                    const TIM3_CNT: u64 = 0x4000_0424;
+                    let counted = stand.session.mcu().peek(stand.stop.at, TIM3_CNT, Width::W32).expect("TIM3 counts");
+                    (counted as u16, stand.bench.front_end.lock().world.encoder_counts(stand.stop.at.0) as u16)
+                })
+                .expect("it runs");
+            assert_ne!(turned, 0);
+            assert_eq!(counted, turned, "at {travel_mm} mm");
+        }
+    });
 }
 
 #[test]
 fn a_damaged_sector_can_be_preset() {
     let damaged = Options { presets: vec![(SECTOR.start, vec![0x55; 64])], ..Options::default() };
-    let logs = |options: &Options| {
-        let lines = running(options).log().expect("it runs");
+    let logs = |rig: &mut Rig| {
+        let lines = rig.log().expect("it runs");
         lines.iter().any(|line| line.level.as_deref() != Some("info") && line.text.contains("record"))
     };
-    assert!(logs(&damaged));
-    assert!(!logs(&Options::default()));
+    assert!(logs(&mut running(&damaged)));
+    with_one_running(|rig| assert!(!logs(rig)));
 }

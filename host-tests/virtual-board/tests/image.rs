@@ -4,16 +4,28 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, image, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, scratch};
 use fingertip::link::table::{REGISTERS, address};
 use fingertip::params::Params;
 use host_tests::plant::{Setup, World};
+use std::sync::Mutex;
 use virtual_board::{Options, Rig};
 
 fn rig() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
     Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts")
+}
+
+/// A board that is up.
+fn with_one_that_is_up(test: impl FnOnce(&mut Rig)) {
+    static UP: Mutex<Option<Rig>> = Mutex::new(None);
+    let start = || {
+        let mut rig = rig();
+        rig.run_until_ns(20_000_000).expect("it runs");
+        rig
+    };
+    on_a_shared(&UP, start, test);
 }
 
 /// An instruction packet that asks ID 1 whether it is there.
@@ -42,33 +54,34 @@ const TARE: u16 = 260;
 
 #[test]
 fn it_boots_and_frames_arrive_at_the_scans_rate() {
-    let mut rig = rig();
-    rig.run_until_ns(100_000_000).expect("it runs");
-    let before = rig.scan_counts().expect("it runs");
-    rig.run_until_ns(200_000_000).expect("it runs");
-    let after = rig.scan_counts().expect("it runs");
-    let frames = after.frames - before.frames;
-    assert!((1_000..=1_005).contains(&frames), "{frames} frames in 100 ms");
-    let conversions = after.conversions - before.conversions;
-    assert!(conversions.abs_diff(frames * 110) <= 110, "{conversions} conversions for {frames} frames");
-    assert_eq!(rig.miswired_pins().expect("it runs"), Vec::<String>::new());
-    assert_eq!(rig.resets().expect("it runs"), vec![]);
-    rig.check_gaps().expect("no unknown gap");
+    with_one_that_is_up(|rig| {
+        rig.run_ms(80).expect("it runs");
+        let before = rig.scan_counts().expect("it runs");
+        rig.run_ms(100).expect("it runs");
+        let after = rig.scan_counts().expect("it runs");
+        let frames = after.frames - before.frames;
+        assert!((1_000..=1_005).contains(&frames), "{frames} frames in 100 ms");
+        let conversions = after.conversions - before.conversions;
+        assert!(conversions.abs_diff(frames * 110) <= 110, "{conversions} conversions for {frames} frames");
+        assert_eq!(rig.miswired_pins().expect("it runs"), Vec::<String>::new());
+        assert_eq!(rig.resets().expect("it runs"), vec![]);
+        rig.check_gaps().expect("no unknown gap");
+    });
 }
 
 #[test]
 fn it_answers_a_ping_at_its_baud_rate() {
-    let mut rig = rig();
-    rig.run_until_ns(20_000_000).expect("it runs");
-    rig.send(&PING).expect("it runs");
-    rig.run_until_ns(25_000_000).expect("it runs");
-    let reply = rig.take_received().expect("it runs");
-    let bytes: Vec<u8> = reply.iter().map(|timed| timed.byte).collect();
-    assert_eq!(bytes[..9], [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00]);
-    assert_eq!(bytes.len(), 14);
-    // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
-    let took_ns = reply[13].at_ns - reply[0].at_ns;
-    assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
+    with_one_that_is_up(|rig| {
+        rig.send(&PING).expect("it runs");
+        rig.run_ms(5).expect("it runs");
+        let reply = rig.take_received().expect("it runs");
+        let bytes: Vec<u8> = reply.iter().map(|timed| timed.byte).collect();
+        assert_eq!(bytes[..9], [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00]);
+        assert_eq!(bytes.len(), 14);
+        // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
+        let took_ns = reply[13].at_ns - reply[0].at_ns;
+        assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
+    });
 }
 
 #[test]
@@ -103,13 +116,13 @@ fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
 
 #[test]
 fn the_crate_dynamixel2_is_understood() {
-    let mut rig = rig();
-    rig.run_until_ns(20_000_000).expect("it runs");
-    let (ping, unknown) = rig
-        .client(WAIT_NS, |bus| (bus.ping(1).expect("the image answers").motor_id, bus.ping(7).is_err()))
-        .expect("the client runs");
-    assert_eq!(ping, 1);
-    assert!(unknown, "nobody has ID 7");
+    with_one_that_is_up(|rig| {
+        let (ping, unknown) = rig
+            .client(WAIT_NS, |bus| (bus.ping(1).expect("the image answers").motor_id, bus.ping(7).is_err()))
+            .expect("the client runs");
+        assert_eq!(ping, 1);
+        assert!(unknown, "nobody has ID 7");
+    });
 }
 
 #[test]

@@ -5,7 +5,7 @@ use fingertip::link::table::address;
 use fingertip::store::{self, Record};
 use host_tests::plant::{Setup, World};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 use virtual_board::flash::SECTOR;
 use virtual_board::{Options, Rig};
 
@@ -41,6 +41,15 @@ pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
 pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
     let read = rig.client(WAIT_NS, move |bus| bus.read_u32(1, register).map(|reply| reply.data));
     read.expect("the client runs").expect("the image answers")
+}
+
+/// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it. Where a test
+/// fails the next one has a new board.
+pub fn on_a_shared(board: &Mutex<Option<Rig>>, start: impl FnOnce() -> Rig, test: impl FnOnce(&mut Rig)) {
+    let mut shared = board.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut rig = shared.take().unwrap_or_else(start);
+    test(&mut rig);
+    *shared = Some(rig);
 }
 
 /// A file of this test program's in the build folder.

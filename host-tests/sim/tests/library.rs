@@ -61,7 +61,7 @@ const BREAKERS: &[Breakers] = &[
     ("slip_and_recovery", &[LOW, "effects.tangential.still=5", "host.read_ms=20", "effects.tangential.drift_mm_per_s=20", "effects.tangential.drift_mm_per_s=1"]),
     ("soft_ball", &[LOW, MORE, LESS, "effects.object_stiffness.yield_mm_per_n=0.2", "effects.object_stiffness.yield_mm_per_n=1"]),
     ("step_ladder", &[LOW, "controller.inertia_ug_m2=20", "controller.inertia_ug_m2=300", "motor.inertia_g_cm2=0.2", "controller.modulus_pa=100000", "controller.force_max_mn=50"]),
-    ("tilted_plane", &[LOW, LESS, MORE, "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5", "motor.encoder_counts_per_turn=65536"]),
+    ("tilted_plane", &[LOW, LESS, MORE, "object.centre_x_mm=7", "effects.tilted_plane.along_columns_deg=0.5"]),
     ("wall", &[MORE, LESS]),
     ("worn_sensor", &[LOW, MORE, LESS, "effects.broken_taxels.dead=[]", "effects.creep.rate_percent_per_decade=0"]),
 ];

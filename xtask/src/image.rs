@@ -60,6 +60,11 @@ impl Image {
         Sha256::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
+    /// Whether these bytes are among the flashable ones.
+    fn holds(&self, wanted: &[u8]) -> bool {
+        self.bytes.windows(wanted.len()).any(|bytes| bytes == wanted)
+    }
+
     /// Path, size and SHA-256, a line each.
     pub fn summary(&self) -> String {
         format!(
@@ -95,6 +100,9 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let image = Image::read(&build(toolchain, "firmware", "firmware", console)?)?;
+    if toolchain::sources().is_some_and(|folder| image.holds(folder.as_os_str().as_encoded_bytes())) {
+        bail!("the image names a folder of this machine: it would be other bytes on another one");
+    }
     fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
     Ok(image)
 }

@@ -67,7 +67,10 @@ fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
     let mut command = toolchain.cargo("build");
     command.args(["--profile", PROFILE, "--package", "fingertip", "--bin", NAME, "--features", NAME]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
-    console.build(command.env("RUSTFLAGS", "-C opt-level=3"), "the study, as quick as can be", IMAGE)?;
+    let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
+    // Flags may hold blanks: a separator that no path has.
+    command.env("CARGO_ENCODED_RUSTFLAGS", flags.collect::<Vec<_>>().join("\u{1f}"));
+    console.build(&mut command, "the study, as quick as can be", IMAGE)?;
     Ok(toolchain.images().with_file_name(PROFILE).join(NAME))
 }
 

@@ -3,7 +3,7 @@
 use crate::{apt, console, console::Console, paths};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
-use std::{path::PathBuf, process::Command};
+use std::{env, path::PathBuf, process::Command};
 
 /// The microcontroller, in the compiler's words.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -46,6 +46,10 @@ impl Toolchain {
             }
         };
         command.args(["--target", TARGET]);
+        if let Some(short) = short_paths() {
+            // Added to the flags of `.cargo/config.toml`.
+            command.arg("--config").arg(format!("target.{TARGET}.rustflags=[{short:?}]"));
+        }
         command
     }
 
@@ -61,6 +65,18 @@ impl Toolchain {
             Self::Debian => paths::target().join("debian"),
         }
     }
+}
+
+/// The flag that names the sources of other crates by their place in cargo's home: where a panic would be is part of the image,
+/// which is the same bytes on every machine.
+pub fn short_paths() -> Option<String> {
+    Some(format!("--remap-path-prefix={}=crates", sources()?.display()))
+}
+
+/// Where cargo keeps the sources of other crates.
+pub fn sources() -> Option<PathBuf> {
+    let home = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(env::home_dir()?.join(".cargo")))?;
+    Some(home.join("registry").join("src"))
 }
 
 /// Finds or installs a compiler for the firmware.
@@ -101,7 +117,7 @@ fn debian(console: &mut Console) -> Result<Toolchain> {
 
 /// Whether the compiler that cargo takes has `core` for the target.
 fn has_target() -> bool {
-    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let Ok(output) = Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]).output() else {
         return false;
     };

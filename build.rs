@@ -16,7 +16,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
     // What the image logs is part of the image: it does not hang on the builder's environment.
     println!("cargo:rustc-env=DEFMT_LOG=info");
-    // The flash image alone logs with defmt.
-    println!("cargo:rustc-link-arg-bin=firmware=-Tdefmt.x");
+    println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
     Ok(())
 }

@@ -48,7 +48,3 @@ pub mod pipeline;
 pub mod store;
 
 pub mod link;
-
-pub mod record;
-
-pub mod same_bits;

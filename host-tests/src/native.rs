@@ -5,8 +5,8 @@ use fingertip::command::Command;
 use fingertip::config::Config;
 use fingertip::frame::{Frame, SLOTS, Sense};
 use fingertip::pipeline::{self, Pipeline, Status};
-use fingertip::record::Record;
 use fingertip::units::Duty;
+use images::record::Record;
 
 /// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
 const DUTY_DELAY_SLOTS: usize = 3;

@@ -11,8 +11,8 @@ use fingertip::config::{Config, newtons};
 use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
-use fingertip::record::{Digest, MAGIC, Record};
 use fingertip::units::Newtons;
+use images::record::{Digest, MAGIC, Record};
 
 /// Frames in the recording.
 pub const RECORDS: usize = 10_000;

@@ -5,10 +5,10 @@ use fingertip::identify::{Identification, Refusal};
 use fingertip::params::Params;
 use fingertip::pipeline::Taring;
 use fingertip::pressure::TARE_FRAMES;
-use fingertip::record::Record;
 use fingertip::state::{Fault, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};
+use images::record::Record;
 
 const NOT_READY: Identification = Identification::Refused(Refusal::NotReady);
 

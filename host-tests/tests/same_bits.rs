@@ -1,8 +1,8 @@
 //! What is compared between processors: every public function of the model, over its whole domain, and more than refusals.
 
-use fingertip::same_bits::model::Sample;
-use fingertip::same_bits::{Comparison, Source, names};
 use host_tests::prove::domain::reference_tip;
+use images::same_bits::model::Sample;
+use images::same_bits::{Comparison, Source, names};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

@@ -16,6 +16,7 @@ use sha2::{Digest, Sha256};
 use std::{
     fs,
     path::{Path, PathBuf},
+    process::Command,
 };
 
 /// What an erased byte of flash reads.
@@ -99,7 +100,7 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 /// No compiler, or the firmware does not compile.
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let image = Image::read(&build(toolchain, "firmware", "firmware", console)?)?;
+    let image = Image::read(&built(flashed(toolchain, "build").arg("--release"), toolchain, "firmware", console)?)?;
     if toolchain::sources().is_some_and(|folder| image.holds(folder.as_os_str().as_encoded_bytes())) {
         bail!("the image names a folder of this machine: it would be other bytes on another one");
     }
@@ -107,19 +108,30 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     Ok(image)
 }
 
-/// Builds one of the images and returns where it lies.
+/// Builds an image for the emulated core and returns where it lies.
 ///
 /// # Errors
 /// It does not compile or link.
 pub fn build(toolchain: Toolchain, name: &str, feature: &str, console: &mut Console) -> Result<PathBuf> {
-    console.build(&mut build_command(toolchain, name, feature), &format!("the image {name}"), IMAGE)?;
+    built(emulated(toolchain, "build", name, feature).arg("--release"), toolchain, name, console)
+}
+
+fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut Console) -> Result<PathBuf> {
+    console.build(command, &format!("the image {name}"), IMAGE)?;
     Ok(toolchain.images().join(name))
 }
 
-/// The command that builds one of the images.
-pub fn build_command(toolchain: Toolchain, name: &str, feature: &str) -> std::process::Command {
-    let mut command = toolchain.cargo("build");
-    command.args(["--release", "--package", "fingertip", "--bin", name, "--features", feature]);
+/// `cargo <subcommand>` of the flash image.
+pub fn flashed(toolchain: Toolchain, subcommand: &str) -> Command {
+    let mut command = toolchain.cargo(subcommand);
+    command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
+    command
+}
+
+/// `cargo <subcommand>` of an image for the emulated core.
+pub fn emulated(toolchain: Toolchain, subcommand: &str, name: &str, feature: &str) -> Command {
+    let mut command = toolchain.cargo(subcommand);
+    command.args(["--package", "images", "--bin", name, "--features", feature]);
     command
 }
 

@@ -2,7 +2,7 @@
 
 use crate::{
     console::{self, Console},
-    paths,
+    image, paths,
     stages::Stages,
     toolchain::{self, Choice, TARGET, Toolchain},
 };
@@ -11,15 +11,9 @@ use std::{path::PathBuf, process::Command};
 
 /// The version is part of the promise that a passing check passes tomorrow.
 const CARGO_DENY: &str = "cargo-deny@0.20.2";
-/// Every feature set that is flashed, emulated or linked as a proof.
-const IMAGES: [(&str, &str); 6] = [
-    ("firmware", "firmware"),
-    ("qemu", "qemu"),
-    ("panic-free", "proof"),
-    ("timing", "timing"),
-    ("timing-check", "timing"),
-    ("study", "study"),
-];
+/// Every image that is emulated or linked as a proof, and its feature.
+const IMAGES: [(&str, &str); 5] =
+    [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
 
 /// Runs all checks that are no tests.
 ///
@@ -41,17 +35,9 @@ pub fn run(choice: Choice) -> Result<()> {
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;
         ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
+        console.run(&mut denying_warnings(image::flashed(toolchain, "clippy")))?;
         for (name, feature) in IMAGES {
-            console.run(&mut clippy(&[
-                "--target",
-                TARGET,
-                "--package",
-                "fingertip",
-                "--bin",
-                name,
-                "--features",
-                feature,
-            ]))?;
+            console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
         }
         Ok(())
     });
@@ -67,10 +53,15 @@ pub fn run(choice: Choice) -> Result<()> {
     stages.finish("lint")
 }
 
+fn denying_warnings(mut clippy: Command) -> Command {
+    clippy.args(["--ignore-rust-version", "--", "-D", "warnings"]);
+    clippy
+}
+
 fn clippy(arguments: &[&str]) -> Command {
     let mut command = console::cargo("clippy");
-    command.args(arguments).args(["--ignore-rust-version", "--", "-D", "warnings"]);
-    command
+    command.args(arguments);
+    denying_warnings(command)
 }
 
 /// Finds or installs cargo-deny, in the build folder.

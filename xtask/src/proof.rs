@@ -9,6 +9,8 @@ use anyhow::{Result, bail};
 use object::{Object, ObjectSymbol};
 use std::{fs, path::Path};
 
+/// The image.
+const NAME: &str = "panic-free";
 /// The symbol that the proof's panic handler calls and nobody defines.
 const UNDEFINED: &str = "fingertip_step_can_panic";
 
@@ -32,18 +34,19 @@ pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
 
 /// Links the proof.
 fn link(toolchain: Toolchain, console: &mut Console) -> Result<std::path::PathBuf> {
-    image::build(toolchain, "panic-free", "proof", console).map_err(|error| {
+    image::build(toolchain, NAME, "proof", console).map_err(|error| {
         error.context(format!("the proof does not link; if {UNDEFINED} is missing above, the step can panic"))
     })
 }
 
 /// Shows that the proof can fail.
 fn controls(toolchain: Toolchain, console: &mut Console) -> Result<()> {
-    let output = console.run_to_failure(&mut image::build_command(toolchain, "panic-free", "proof-control-panic"))?;
+    let output =
+        console.run_to_failure(image::emulated(toolchain, "build", NAME, "proof-control-panic").arg("--release"))?;
     if !output.contains(UNDEFINED) {
         bail!("the control that panics fails for another reason:\n{output}");
     }
-    let elf = image::build(toolchain, "panic-free", "proof-control-float", console)?;
+    let elf = image::build(toolchain, NAME, "proof-control-float", console)?;
     if float_calls(&elf)?.is_empty() {
         bail!("the control that computes in f64 shows no floating-point routine in {}", paths::shown(&elf));
     }

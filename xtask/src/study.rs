@@ -64,8 +64,8 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 
 /// The image as quick as the compiler makes it, without what keeps the firmware's small.
 fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
-    let mut command = toolchain.cargo("build");
-    command.args(["--profile", PROFILE, "--package", "fingertip", "--bin", NAME, "--features", NAME]);
+    let mut command = image::emulated(toolchain, "build", NAME, NAME);
+    command.args(["--profile", PROFILE]);
     // Instead of the flags that `.cargo/config.toml` has for the target.
     let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
     // Flags may hold blanks: a separator that no path has.

@@ -2,8 +2,8 @@
 //!
 //! `same-bits IMAGE [INPUTS [FUNCTION]]`: the image, how many inputs (10^6), a function that is made to differ.
 
-use fingertip::same_bits::{Comparison, INPUTS};
 use host_tests::emulator;
+use images::same_bits::{Comparison, INPUTS};
 use std::{env, error::Error, fmt::Write as _, path::Path, process::ExitCode, thread};
 
 fn main() -> ExitCode {

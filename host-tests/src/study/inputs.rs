@@ -9,7 +9,7 @@ use crate::stimulus;
 use fastrand::Rng;
 use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::pressure::Picture;
-use fingertip::record::Record;
+use images::record::Record;
 
 const SEED: u64 = 2003;
 

@@ -6,7 +6,7 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::config::Config;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::Calibration;
-use fingertip::record::{Digest, Record};
+use images::record::{Digest, Record};
 use mcap::read::Options;
 use mcap::records::Metadata;
 use mcap::{McapResult, MessageStream};

@@ -78,7 +78,7 @@ fn raw_image() -> Value {
 }
 
 fn core() -> Value {
-    let record = "Frame, sense and command in the layout of fingertip::record::Record, base64";
+    let record = "Frame, sense and command in the layout of images::record::Record, base64";
     let digest = "CRC-64/XZ of the duty and of every field of the status, hexadecimal";
     json!({
         "title": "fingertip.Core",

@@ -4,21 +4,21 @@
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
-use crate::config::Config;
-use crate::contact::Contact;
-use crate::contact::{self, Effort, Fit, Refined};
-use crate::control::SpeedLoop;
-use crate::control::drive::Drive;
-use crate::control::goal::Goal;
-use crate::control::observer::Observer;
-use crate::control::profile::Reference;
-use crate::frame::{COLUMNS, Frame};
-use crate::identify::{DepthFit, Modulus, Refusal, TravelFit};
-use crate::model::{Relaxation, RelaxationState, Tip};
-use crate::pipeline::budget::Budget;
-use crate::pressure::{Array, Picture};
-use crate::state::{Limits, Mode};
-use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
+use fingertip::config::Config;
+use fingertip::contact::Contact;
+use fingertip::contact::{self, Effort, Fit, Refined};
+use fingertip::control::SpeedLoop;
+use fingertip::control::drive::Drive;
+use fingertip::control::goal::Goal;
+use fingertip::control::observer::Observer;
+use fingertip::control::profile::Reference;
+use fingertip::frame::{COLUMNS, Frame};
+use fingertip::identify::{DepthFit, Modulus, Refusal, TravelFit};
+use fingertip::model::{Relaxation, RelaxationState, Tip};
+use fingertip::pipeline::budget::Budget;
+use fingertip::pressure::{Array, Picture};
+use fingertip::state::{Limits, Mode};
+use fingertip::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Common, Row, Total};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
@@ -241,7 +241,7 @@ pub const STEPS: [Step; 20] = [
 /// The way of an input at its speed, with its braking.
 fn towards(machines: &Machines, sample: &Sample) -> Reference {
     let [way, speed, brake, _] = sample.words;
-    let brake = MillimetresPerSecond2::from_bits(brake.max(0).min(BRAKE_MAX));
+    let brake = MillimetresPerSecond2::from_bits(brake.clamp(0, BRAKE_MAX));
     Reference::towards(
         Millimetres::from_bits(way),
         MillimetresPerSecond::from_bits(speed),

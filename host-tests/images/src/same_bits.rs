@@ -11,8 +11,8 @@ pub mod made;
 pub mod model;
 mod pictures;
 
-use crate::config::{Config, ConfigError};
-use crate::params::Params;
+use fingertip::config::{Config, ConfigError};
+use fingertip::params::Params;
 use machines::Machines;
 use model::Sample;
 

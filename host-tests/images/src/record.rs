@@ -2,14 +2,14 @@
 //!
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
-use crate::command::Command;
-use crate::contact::Contact;
-use crate::contact::Effort;
-use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
-use crate::identify::Modulus;
-use crate::pipeline::{Status, Taken};
-use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
+use fingertip::command::Command;
+use fingertip::contact::Contact;
+use fingertip::contact::Effort;
+use fingertip::frame::{COLUMNS, Frame, SLOTS, Sense};
+use fingertip::identify::Modulus;
+use fingertip::pipeline::{Status, Taken};
+use fingertip::units::{Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
 pub const MAGIC: [u8; 8] = *b"fingert\x04";
@@ -160,10 +160,10 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::{Identification, Refusal};
-    use crate::pipeline::Taring;
-    use crate::state::{Fault, Limits, Mode};
-    use crate::units::{Millimetres, MillimetresPerSecond};
+    use fingertip::identify::{Identification, Refusal};
+    use fingertip::pipeline::Taring;
+    use fingertip::state::{Fault, Limits, Mode};
+    use fingertip::units::{Millimetres, MillimetresPerSecond};
 
     #[test]
     fn a_record_survives_the_way_to_bytes_and_back() {

@@ -2,8 +2,8 @@
 
 use super::Source;
 use super::model::Sample;
-use crate::frame::{COLUMNS, Frame, ROWS, SLOTS};
-use crate::pressure::{Calibration, CalibrationError, GAIN_MAX};
+use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
+use fingertip::pressure::{Calibration, CalibrationError, GAIN_MAX};
 
 /// What a column shows with no row driven.
 const LEVEL: u16 = 372;

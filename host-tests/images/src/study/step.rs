@@ -13,10 +13,10 @@ use fingertip::control::profile::Reference;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Picture};
-use fingertip::record::Record;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::Duty;
+use images::record::Record;
 
 /// What the parts read and write.
 struct Bench<'a> {

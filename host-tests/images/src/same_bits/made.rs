@@ -2,13 +2,13 @@
 
 use super::machines::Machines;
 use super::{Mix, Source, frames};
-use crate::config::gains::Gains;
-use crate::config::{Config, ConfigError};
-use crate::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
-use crate::params::Params;
-use crate::pressure::CalibrationError;
-use crate::scan::ScanTiming;
-use crate::units::{Newtons, Ratio};
+use fingertip::config::gains::Gains;
+use fingertip::config::{Config, ConfigError};
+use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
+use fingertip::params::Params;
+use fingertip::pressure::CalibrationError;
+use fingertip::scan::ScanTiming;
+use fingertip::units::{Newtons, Ratio};
 
 /// A constructor's name, and one call of it with what that adds to its digest.
 pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));

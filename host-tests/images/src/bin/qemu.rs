@@ -22,10 +22,10 @@ use embassy_executor::Spawner;
 use fingertip::config::Config;
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
-use fingertip::record::{Digest, MAGIC, Record};
-use fingertip::same_bits::Comparison;
 use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
+use images::record::{Digest, MAGIC, Record};
+use images::same_bits::Comparison;
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;

@@ -20,10 +20,10 @@ use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Picture};
-use fingertip::record::{MAGIC, Record};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Duty, Millimetres};
 use host::{File, command_line, fail, say};
+use images::record::{MAGIC, Record};
 
 /// What the kernels read and write.
 struct Bench<'a> {

@@ -1,11 +1,11 @@
 //! Pictures for the fit: contacts by the model, on and beside the array, that spoil bit by bit.
 
 use super::model::Sample;
-use crate::config::Config;
-use crate::frame::{COLUMNS, ROWS, TAXELS};
-use crate::pressure::Picture;
-use crate::root::floor_sqrt;
-use crate::units::Millimetres;
+use fingertip::config::Config;
+use fingertip::frame::{COLUMNS, ROWS, TAXELS};
+use fingertip::pressure::Picture;
+use fingertip::root::floor_sqrt;
+use fingertip::units::Millimetres;
 
 /// Pictures from one contact; each spoils up to two taxels more.
 const PICTURES: u32 = 64;
@@ -98,9 +98,9 @@ fn sum_up(picture: &mut Picture) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::{self, Refined};
-    use crate::params::Params;
     use crate::same_bits::Source;
+    use fingertip::contact::{self, Refined};
+    use fingertip::params::Params;
 
     #[test]
     fn many_pictures_are_contacts_that_take_the_fit_and_many_are_not() {

@@ -3,12 +3,12 @@
 use core::num::NonZeroU16;
 
 use super::{Mix, Source};
-use crate::model::{
+use fingertip::model::{
     Displacement, LimitSurface, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError, force_on, pressure_of,
     strain_of,
 };
-use crate::root::floor_sqrt;
-use crate::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
+use fingertip::root::floor_sqrt;
+use fingertip::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
 
 /// A function's name and what it adds to its digest.
 pub type Function = (&'static str, fn(&Sample, &mut Mix));

@@ -10,6 +10,7 @@ pub mod fit_cases;
 pub mod fit_statistics;
 pub mod fit_tables;
 pub mod heatmap;
+pub mod imports;
 pub mod long_run;
 pub mod metrics;
 pub mod native;

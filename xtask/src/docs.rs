@@ -9,9 +9,10 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the package and its example that print their text.
-const GENERATED: [(&str, (&str, &str)); 3] = [
+const GENERATED: [(&str, (&str, &str)); 4] = [
     ("docs/control-table.md", ("host-tests", "control-table")),
     ("docs/scenes.md", ("sim", "scenes-page")),
+    ("docs/pictures/imports.svg", ("host-tests", "imports")),
     ("examples/python/registers.py", ("host-tests", "registers-python")),
 ];
 /// The demonstration's figures, as the README shows them.

@@ -1,9 +1,9 @@
-//! The fingertip controller's core: one frame of a 10 x 10 tactile array in, one motor duty out.
+#![doc = include_str!("README.md")]
+//!
+//! # Reading on
 //!
 //! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
-//! Nothing here knows hardware, allocates, panics or, after configuration, uses floating point but for the first guess of a
-//! [`root`], which is then set right in integers. So the same code runs on the host, under an emulator and on the
-//! microcontroller, and gives the same bits.
+//! Nothing here uses floating point after configuration but the first guess of a [`root`], which is then set right in integers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -14,6 +14,8 @@
 
 #[cfg(test)]
 extern crate std;
+
+pub use fixed;
 
 pub mod units;
 

@@ -78,7 +78,7 @@ pub const COMMAND: &str = "cargo xtask docs";
 pub fn page() -> String {
     let mut page = format!(
         "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
-        include_str!("explain/scenes.md").trim()
+        include_str!("explain/scenes.md").trim().replace("{wall}", include_str!("../scenes/wall.toml"))
     );
     library_of(&mut page);
     stages(&mut page);

@@ -11,22 +11,22 @@ use core::panic::PanicInfo;
 use cortex_m_semihosting::{debug, nr, syscall1};
 
 global_asm!(
-    include_str!("../../m4-timing/silicon/aes-armcortexm/aes128.s"),
-    include_str!("../../m4-timing/silicon/aes-armcortexm/aes128ctr.s"),
-    include_str!("../../m4-timing/silicon/aes-armcortexm/aes192ctr.s"),
-    include_str!("../../m4-timing/silicon/aes-armcortexm/aes256ctr.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/common.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_keyschedule_enc.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_keyschedule_enc.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_keyschedule_dec.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_encrypt.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES_decrypt.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_encrypt_unrolled.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_encrypt_unrolled.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES128_decrypt_unrolled.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM3_1T_AES256_decrypt_unrolled.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM4_DSPsBOX_AES_encrypt.s"),
-    include_str!("../../m4-timing/silicon/cortexm-aes/CM4_DSPsBOX_AES_decrypt.s"),
+    include_str!("../../../../m4-timing/tests/kernels/aes-armcortexm/aes128.s"),
+    include_str!("../../../../m4-timing/tests/kernels/aes-armcortexm/aes128ctr.s"),
+    include_str!("../../../../m4-timing/tests/kernels/aes-armcortexm/aes192ctr.s"),
+    include_str!("../../../../m4-timing/tests/kernels/aes-armcortexm/aes256ctr.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/common.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES128_keyschedule_enc.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES256_keyschedule_enc.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES_keyschedule_dec.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES_encrypt.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES_decrypt.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES128_encrypt_unrolled.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES256_encrypt_unrolled.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES128_decrypt_unrolled.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM3_1T_AES256_decrypt_unrolled.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM4_DSPsBOX_AES_encrypt.s"),
+    include_str!("../../../../m4-timing/tests/kernels/cortexm-aes/CM4_DSPsBOX_AES_decrypt.s"),
     options(raw)
 );
 

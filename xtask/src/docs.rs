@@ -4,6 +4,7 @@ use crate::{
     console::{self, Console},
     figures, host, image, paths,
     toolchain::Choice,
+    tools,
 };
 use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
@@ -15,6 +16,9 @@ const GENERATED: [(&str, (&str, &str)); 4] = [
     ("docs/pictures/imports.svg", ("host-tests", "imports")),
     ("examples/python/registers.py", ("host-tests", "registers-python")),
 ];
+/// What the packages offer that others may depend on.
+const OFFERED: [(&str, &str); 2] =
+    [("docs/api/fingertip.txt", "fingertip"), ("docs/api/fingertip-lanes.txt", "fingertip-lanes")];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Its pictures, and those of the paper.
@@ -40,6 +44,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED {
         renew(path, &print(example, None)?, args.check, &mut stale, console)?;
+    }
+    for (path, package) in OFFERED {
+        renew(path, &tools::public_items(package, console)?, args.check, &mut stale, console)?;
     }
     let drawn = paths::target().join("docs").join("figures");
     figures::draw(&drawn, console)?;

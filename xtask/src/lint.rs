@@ -1,16 +1,14 @@
 //! Format, lints, documentation and licences.
 
 use crate::{
-    console::{self, Console},
-    image, paths,
+    console, image,
     stages::Stages,
     toolchain::{self, Choice, TARGET, Toolchain},
+    tools,
 };
-use anyhow::{Context, Result, ensure};
-use std::{path::PathBuf, process::Command};
+use anyhow::{Result, ensure};
+use std::process::Command;
 
-/// The version is part of the promise that a passing check passes tomorrow.
-const CARGO_DENY: &str = "cargo-deny@0.20.2";
 /// Every image that is emulated or linked as a proof, and its feature.
 const IMAGES: [(&str, &str); 5] =
     [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
@@ -47,7 +45,7 @@ pub fn run(choice: Choice) -> Result<()> {
         console.run(command.env("RUSTDOCFLAGS", "-D warnings"))
     });
     stages.stage("licences and sources of the dependencies", |console| {
-        let program = ensure_deny(console)?;
+        let program = tools::DENY.ensure(console)?;
         console.run(Command::new(program).args(["check", "bans", "licenses", "sources"]))
     });
     stages.finish("lint")
@@ -62,21 +60,4 @@ fn clippy(arguments: &[&str]) -> Command {
     let mut command = console::cargo("clippy");
     command.args(arguments);
     denying_warnings(command)
-}
-
-/// Finds or installs cargo-deny, in the build folder.
-///
-/// # Errors
-/// It is missing and cannot be installed.
-pub fn ensure_deny(console: &mut Console) -> Result<PathBuf> {
-    let folder = paths::target().join("tools");
-    let program = folder.join("bin").join("cargo-deny");
-    if !program.is_file() {
-        console.say(&format!("Installing {CARGO_DENY} to {}: it checks the licences.", paths::shown(&folder)));
-        // Unoptimised: it compiles in a third of the time, and runs for seconds.
-        let mut install = console::cargo("install");
-        install.args([CARGO_DENY, "--locked", "--debug", "--no-default-features", "--root"]).arg(&folder);
-        console.run(&mut install).context("cannot install cargo-deny: is crates.io in reach?")?;
-    }
-    Ok(program)
 }

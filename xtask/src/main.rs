@@ -24,6 +24,7 @@ mod study;
 mod test;
 mod timing;
 mod toolchain;
+mod tools;
 
 use clap::{Parser, Subcommand};
 use console::Console;
@@ -142,7 +143,7 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     qemu::ensure(console)?;
     python::ensure(console)?;
     browser::ensure(console)?;
-    lint::ensure_deny(console)?;
+    tools::ensure_all(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
         "All set up: demo, sim, sweep, population, test, build, qemu, timing, size, lint and docs work offline now.",

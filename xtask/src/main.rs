@@ -12,6 +12,7 @@ mod host;
 mod image;
 mod lint;
 mod model;
+mod package;
 mod paths;
 mod progress;
 mod proof;
@@ -96,6 +97,8 @@ enum Command {
     Lint,
     /// Write the generated files anew, or check that they are fresh
     Docs(docs::Args),
+    /// Make the packages that others take, and test them from a project outside of this workspace
+    Package,
     /// Install everything that the other commands need, for use offline
     Setup,
 }
@@ -132,6 +135,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::PanicFree => proof::run(toolchain, console),
         Command::Lint => lint::run(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
+        Command::Package => package::run(console),
         Command::Setup => setup(toolchain, console),
     }
 }

@@ -1,0 +1,1 @@
+//! A finger of somebody else's.

@@ -1,4 +1,4 @@
-//! The fingertip controller's core: one frame of a 10 x 10 tactile array in, one motor duty out.
+//! The fingertip controller's core: one frame of a tactile array in, one motor duty out.
 //!
 //! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
 //! Nothing here knows hardware, allocates, panics or, after configuration, uses floating point but for the first guess of a
@@ -48,6 +48,8 @@ pub mod pipeline;
 pub mod store;
 
 pub mod link;
+
+pub mod shipped;
 
 pub mod record;
 

@@ -5,9 +5,10 @@
 use crate::command::Command;
 use crate::contact::Contact;
 use crate::contact::Effort;
-use crate::frame::{COLUMNS, Frame, SLOTS, Sense};
+use crate::frame::Sense;
 use crate::identify::Modulus;
 use crate::pipeline::{Status, Taken};
+use crate::shipped::{COLUMNS, Frame, SLOTS};
 use crate::units::{Duty, Newtons};
 use crc::{CRC_64_XZ, Crc, Table};
 

@@ -11,8 +11,9 @@ pub mod made;
 pub mod model;
 mod pictures;
 
-use crate::config::{Config, ConfigError};
+use crate::config::ConfigError;
 use crate::params::Params;
+use crate::shipped::Config;
 use machines::Machines;
 use model::Sample;
 

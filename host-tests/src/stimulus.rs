@@ -7,11 +7,11 @@ use crate::native::Native;
 use crate::plant::Setup;
 use fastrand::Rng;
 use fingertip::command::Command;
-use fingertip::config::{Config, newtons};
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::config::newtons;
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
+use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 
 /// Frames in the recording.

@@ -19,11 +19,10 @@ use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_rt::{ExceptionFrame, exception};
 use cortex_m_semihosting::debug;
 use embassy_executor::Spawner;
-use fingertip::config::Config;
 use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
 use fingertip::record::{Digest, MAGIC, Record};
 use fingertip::same_bits::Comparison;
+use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
 

@@ -1,10 +1,8 @@
 //! Pictures for the fit: contacts by the model, on and beside the array, that spoil bit by bit.
 
 use super::model::Sample;
-use crate::config::Config;
-use crate::frame::{COLUMNS, ROWS, TAXELS};
-use crate::pressure::Picture;
 use crate::root::floor_sqrt;
+use crate::shipped::{COLUMNS, Config, Picture, ROWS, TAXELS};
 use crate::units::Millimetres;
 
 /// Pictures from one contact; each spoils up to two taxels more.
@@ -92,7 +90,7 @@ fn sum_up(picture: &mut Picture) {
             *peak = (*peak).max(*taxel);
         }
     }
-    *bad_count = bad.iter().map(|row| row.count_ones() as u8).sum();
+    *bad_count = bad.iter().map(|row| row.count_ones() as u16).sum();
 }
 
 #[cfg(test)]

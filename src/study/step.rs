@@ -4,17 +4,15 @@ use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::say;
 use fingertip::command::Command;
-use fingertip::config::Config;
 use fingertip::contact::Contact;
 use fingertip::contact::{self, Effort};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::frame::Sense;
-use fingertip::pipeline::Pipeline;
-use fingertip::pressure::{Array, Picture};
 use fingertip::record::Record;
 use fingertip::safety::guard::{Guard, Seen};
+use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::Duty;
 

@@ -3,9 +3,9 @@
 use crate::inputs::{Arguments, Input, any_inputs};
 use crate::params::{any_params, config};
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status, Taring};
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::pipeline::{Status, Taring};
 use fingertip::record::Digest;
+use fingertip::shipped::{Pipeline, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Newtons};
 use proptest::prelude::*;

@@ -3,10 +3,8 @@
 use super::{END, SETUP, WHOLE, controller_of, topic};
 use crate::run::RunError;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use fingertip::config::Config;
-use fingertip::pipeline::Pipeline;
-use fingertip::pressure::Calibration;
 use fingertip::record::{Digest, Record};
+use fingertip::shipped::{Calibration, Config, Pipeline};
 use mcap::read::Options;
 use mcap::records::Metadata;
 use mcap::{McapResult, MessageStream};

@@ -6,6 +6,9 @@
 pub mod bounds;
 pub mod gains;
 pub mod geometry;
+mod shaped;
+
+pub use shaped::Shaped;
 
 use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
@@ -64,7 +67,7 @@ impl core::fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// What the loop derives from [`Params`].
+/// What the loop derives from [`Params`], the same for arrays of all shapes but for the scan's time; see [`Shaped`].
 #[derive(Clone, Debug)]
 pub struct Config {
     /// The parameters it was made from.
@@ -153,11 +156,8 @@ impl Config {
         Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
     }
 
-    /// Checks the parameters and derives the loop's constants.
-    ///
-    /// # Errors
-    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each other.
-    pub fn new(params: &Params) -> Result<Self, ConfigError> {
+    /// See [`Shaped::new`].
+    pub(crate) fn new(params: &Params, rows: usize, columns: usize) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
         // By how much the one must be below the other, the two, and their names.
@@ -172,7 +172,12 @@ impl Config {
                 return Err(ConfigError::Order([(names.0, low), (names.1, high)]));
             }
         }
-        let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16).map_err(ConfigError::Scan)?;
+        let timing =
+            ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16, rows, columns).map_err(ConfigError::Scan)?;
+        if p.row_sag_ppb_per_code > sag_max(columns) {
+            let (name, value, max) = ("row_sag_ppb_per_code", p.row_sag_ppb_per_code, sag_max(columns));
+            return Err(ConfigError::Param(ParamError { name, value, min: 0, max }));
+        }
         let tip = tip(p)?;
 
         let frame_s = timing.frame_ns as f32 * 1e-9;
@@ -208,7 +213,7 @@ impl Config {
             dead_codes: p.dead_codes as u16,
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
-            geometry: Geometry::new(p),
+            geometry: Geometry::new(p, rows, columns),
             half_pitch: millimetres(p.pitch_um / 2),
             contact_on: newtons(p.contact_on_mn),
             contact_off: newtons(p.contact_off_mn),
@@ -243,6 +248,12 @@ impl Config {
             force_seen: force_seen(p, &tip),
         })
     }
+}
+
+/// The largest [`Params::row_sag_ppb_per_code`] that leaves a row of so many columns, all at the converter's top, a sag of 0.32: what the
+/// boost's series and 32 bits hold. Up to ten columns that is more than the parameter's own range.
+const fn sag_max(columns: usize) -> i32 {
+    (320_000_000 / (4_095 * columns)) as i32
 }
 
 /// See [`Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.

@@ -23,13 +23,12 @@ pub use follow::Fit;
 pub use reading::Contact;
 pub use sums::from_sums;
 
-use crate::config::Config;
-use crate::config::geometry::{Geometry, SQUARE_BITS};
-use crate::frame::COLUMNS;
+use crate::config::geometry::SQUARE_BITS;
+use crate::config::{Config, Shaped};
 use crate::pressure::Picture;
 use guess::{CENTRE_BITS, Guess, Pressed};
 use rim::Rim;
-use step::{Bench, Equations, Misfit, Taxels};
+use step::{Bench, Bits, Equations, Misfit, Taxels};
 use view::{Scale, View};
 
 /// How often the reading of a single picture is refined. What the loop does from frame to frame is its [`Effort`].
@@ -77,7 +76,11 @@ const TAXELS_MIN: i32 = 5;
 /// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps the
 /// sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with no
 /// confidence at all.
-pub fn read(picture: &Picture, refined: Refined, config: &Config) -> Contact {
+pub fn read<const ROWS: usize, const COLUMNS: usize>(
+    picture: &Picture<ROWS, COLUMNS>,
+    refined: Refined,
+    config: &Shaped<ROWS, COLUMNS>,
+) -> Contact {
     let sums = from_sums(picture, config);
     let geometry = &config.geometry;
     if sums.force < config.contact_off {
@@ -91,12 +94,15 @@ pub fn read(picture: &Picture, refined: Refined, config: &Config) -> Contact {
     let which = if refined == Refined::One && picture.sum / LARGE > picture.peak { Taxels::HALF } else { Taxels::ALL };
     let guess = Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, geometry);
     if covers(&sums, picture, config) {
-        return Contact { confidence: confidence(&misfit(&guess, which, &view, geometry), &scale), ..sums };
+        return Contact {
+            confidence: confidence::<ROWS, COLUMNS>(&misfit(&guess, which, &view, config), &scale),
+            ..sums
+        };
     }
     let start = start::plane(&view, which, geometry).unwrap_or(guess);
-    let guess = refine(start, refined, which, &view, geometry);
-    let misfit = misfit(&guess, which, &view, geometry);
-    let confidence = confidence(&misfit, &scale);
+    let guess = refine(start, refined, which, &view, config);
+    let misfit = misfit(&guess, which, &view, config);
+    let confidence = confidence::<ROWS, COLUMNS>(&misfit, &scale);
     if misfit.taxels < TAXELS_MIN || confidence == 0 {
         return Contact { confidence, ..sums };
     }
@@ -114,27 +120,41 @@ pub fn read(picture: &Picture, refined: Refined, config: &Config) -> Contact {
 }
 
 /// How far a guess and the picture are apart.
-fn misfit(guess: &Guess, which: Taxels, view: &View, geometry: &Geometry) -> Misfit {
+fn misfit<const ROWS: usize, const COLUMNS: usize>(
+    guess: &Guess,
+    which: Taxels,
+    view: &View<ROWS, COLUMNS>,
+    config: &Shaped<ROWS, COLUMNS>,
+) -> Misfit {
     let mut misfit = Misfit::NONE;
-    misfit.compare(Bench { pressed: &Pressed::new(guess, &view.scale, geometry), view, geometry }, which);
+    misfit
+        .compare(Bench { pressed: &Pressed::new(guess, &view.scale, config), view, geometry: &config.geometry }, which);
     misfit
 }
 
 /// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a unit of these is
 /// 8 nm, and nothing overflows.
-fn overhang(contact: &Contact, config: &Config) -> i32 {
+fn overhang<const ROWS: usize, const COLUMNS: usize>(contact: &Contact, config: &Config) -> i32 {
     let [x, y, radius, half_pitch] =
         [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
-    x.abs().max(y.abs()) + radius - COLUMNS as i32 * half_pitch
+    (x.abs() - COLUMNS as i32 * half_pitch).max(y.abs() - ROWS as i32 * half_pitch) + radius
 }
 
 /// Whether the whole contact lies on good taxels of the array.
-fn covers(contact: &Contact, picture: &Picture, config: &Config) -> bool {
-    overhang(contact, config) <= 0 && !hides(contact, picture, config)
+fn covers<const ROWS: usize, const COLUMNS: usize>(
+    contact: &Contact,
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> bool {
+    overhang::<ROWS, COLUMNS>(contact, config) <= 0 && !hides(contact, picture, config)
 }
 
 /// Whether a bad taxel hides a part of a contact.
-fn hides(contact: &Contact, picture: &Picture, config: &Config) -> bool {
+fn hides<const ROWS: usize, const COLUMNS: usize>(
+    contact: &Contact,
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> bool {
     if picture.bad.iter().all(|bad| *bad == 0) {
         return false;
     }
@@ -143,8 +163,8 @@ fn hides(contact: &Contact, picture: &Picture, config: &Config) -> bool {
     // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.
     let reach = radius + half_pitch + (half_pitch >> 1);
     for (row, bad) in picture.bad.iter().enumerate() {
-        let mut left = u32::from(*bad);
-        let dy = (2 * row as i32 + 1 - COLUMNS as i32) * half_pitch - y;
+        let mut left = *bad;
+        let dy = (2 * row as i32 + 1 - ROWS as i32) * half_pitch - y;
         while left != 0 {
             let dx = (2 * left.trailing_zeros() as i32 + 1 - COLUMNS as i32) * half_pitch - x;
             if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
@@ -157,17 +177,24 @@ fn hides(contact: &Contact, picture: &Picture, config: &Config) -> bool {
 }
 
 /// Refines a guess as often as asked for.
-fn refine(start: Guess, refined: Refined, which: Taxels, view: &View, geometry: &Geometry) -> Guess {
+fn refine<const ROWS: usize, const COLUMNS: usize>(
+    start: Guess,
+    refined: Refined,
+    which: Taxels,
+    view: &View<ROWS, COLUMNS>,
+    config: &Shaped<ROWS, COLUMNS>,
+) -> Guess {
+    let geometry = &config.geometry;
     let (mut quick, mut close) = refined.steps();
     let mut guess = start;
     let mut again = true;
     while quick + close > 0 {
-        let bench = Bench { pressed: &Pressed::new(&guess, &view.scale, geometry), view, geometry };
-        let mut equations = Equations::NONE;
+        let bench = Bench { pressed: &Pressed::new(&guess, &view.scale, config), view, geometry };
+        let mut equations = Equations::<ROWS, COLUMNS>::NONE;
         if quick > 0 {
             equations.take(bench, which);
         } else {
-            equations.take_closely(bench, &Rim::new(&guess, view, geometry));
+            equations.take_closely(bench, &Rim::new(&guess, &view.scale, geometry));
         }
         let next = equations.solve(&guess, &view.scale, geometry);
         let moved = distance(&guess, &next);
@@ -196,11 +223,12 @@ fn distance(from: &Guess, to: &Guess) -> u32 {
 }
 
 /// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
-fn confidence(misfit: &Misfit, scale: &Scale) -> u8 {
+fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scale: &Scale) -> u8 {
     let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
-    // Squares count 2^-24, 4 bits fewer than a share's square.
+    // Squares count fewer bits than a share's square.
+    let drop = Bits::<ROWS, COLUMNS>::ALL;
     let larger = mean(misfit.inside, misfit.taxels).max(mean(misfit.outside, misfit.others));
-    let mean = larger.min(u32::MAX >> 4) << 4;
+    let mean = larger.min(u32::MAX >> drop) << drop;
     let residual = arith::root(mean.saturating_sub(scale.converter_square()));
     (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
 }

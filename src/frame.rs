@@ -1,56 +1,60 @@
 //! One scan of the array, as the converters leave it in memory.
+//!
+//! Everything that goes by the array has its rows and columns as parameters: `ROWS` driven rows and `COLUMNS` sensed columns, a [`Shape`].
+//! A scan has a slot for each row and one with no row driven. That last one reads what the columns show with nothing
+//! selected: the amplifiers' offsets, and a row that is stuck in the driven state.
 
-/// Driven rows of the array.
-pub const ROWS: usize = 10;
-/// Sensed columns of the array.
-pub const COLUMNS: usize = 10;
-/// Taxels in the array.
-pub const TAXELS: usize = ROWS * COLUMNS;
-/// Steps of a scan: the rows, and one with no row driven.
-///
-/// The last slot reads what the columns show with nothing selected: the amplifiers' offsets, and a row that is stuck
-/// in the driven state.
-pub const SLOTS: usize = ROWS + 1;
+pub use lanes::Codes;
+
 /// Converters that work side by side.
 pub const BANKS: usize = 2;
-/// Columns that each converter reads: the pairs of codes that come at the same instant.
-pub const BANK_COLUMNS: usize = COLUMNS / BANKS;
 /// A code from which a taxel counts as saturated (12-bit converter).
 pub const SATURATED: u16 = 4090;
 
-/// 110 codes of 12 bits, in pairs as the two converters read them at the same instant.
+/// The rows and columns of an array: 3 x 3 to 16 x 32. Another shape does not compile.
+pub struct Shape<const ROWS: usize, const COLUMNS: usize>;
+
+impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
+    /// Whoever takes a shape evaluates this.
+    pub(crate) const CHECKED: () = assert!(
+        3 <= ROWS && ROWS <= 16 && 3 <= COLUMNS && COLUMNS <= 32,
+        "an array has 3 to 16 rows and 3 to 32 columns"
+    );
+    /// Taxels in the array.
+    pub const TAXELS: usize = ROWS * COLUMNS;
+    /// Steps of a scan.
+    pub const SLOTS: usize = ROWS + 1;
+    /// Columns that the first converter reads: the pairs of codes that come at the same instant. Of an odd number the second one reads one
+    /// fewer.
+    pub const BANK_COLUMNS: usize = lanes::pairs(COLUMNS);
+    /// The larger of both.
+    pub(crate) const SIDE: usize = if ROWS > COLUMNS { ROWS } else { COLUMNS };
+}
+
+/// Codes of 12 bits, in pairs as the two converters read them at the same instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// `pairs[slot][column % 5]`: columns 0 to 4 in the low halves, 5 to 9 in the high ones.
-    pub pairs: [[u32; BANK_COLUMNS]; SLOTS],
+pub struct Frame<const ROWS: usize, const COLUMNS: usize> {
+    /// The first half of the columns in the low halves of words, the second in the high ones.
+    pub codes: Codes<ROWS, COLUMNS>,
     /// Counts frames scanned, missed ones too; wraps.
     pub sequence: u32,
 }
 
-impl Frame {
+impl<const ROWS: usize, const COLUMNS: usize> Frame<ROWS, COLUMNS> {
     /// A frame of zeros.
-    pub const EMPTY: Self = Self { pairs: [[0; BANK_COLUMNS]; SLOTS], sequence: 0 };
+    pub const EMPTY: Self = Self { codes: Codes::ZERO, sequence: 0 };
 
-    /// The code of a taxel (`slot` below [`ROWS`]) or of a column with nothing driven (`slot` = [`ROWS`]).
+    /// The code of a taxel (`slot` below `ROWS`) or of a column with nothing driven (`slot` = `ROWS`).
     ///
     /// Out of range reads as 0.
     pub fn code(&self, slot: usize, column: usize) -> u16 {
-        let pair = self.pairs.get(slot).and_then(|pairs| pairs.get(column % BANK_COLUMNS)).copied().unwrap_or(0);
-        match column / BANK_COLUMNS {
-            0 => pair as u16,
-            1 => (pair >> 16) as u16,
-            _ => 0,
-        }
+        self.codes.slot(slot).and_then(|codes| codes.get(lanes::place(column, COLUMNS))).copied().unwrap_or(0)
     }
 
     /// Sets what [`Frame::code`] reads; out of range does nothing.
     pub fn set_code(&mut self, slot: usize, column: usize, code: u16) {
-        if let Some(pair) = self.pairs.get_mut(slot).and_then(|pairs| pairs.get_mut(column % BANK_COLUMNS)) {
-            match column / BANK_COLUMNS {
-                0 => *pair = *pair & 0xffff_0000 | u32::from(code),
-                1 => *pair = *pair & 0x0000_ffff | u32::from(code) << 16,
-                _ => {}
-            }
+        if let Some(place) = self.codes.slot_mut(slot).and_then(|codes| codes.get_mut(lanes::place(column, COLUMNS))) {
+            *place = code;
         }
     }
 }

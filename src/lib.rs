@@ -50,3 +50,5 @@ pub mod pipeline;
 pub mod store;
 
 pub mod link;
+
+pub mod shipped;

@@ -8,12 +8,12 @@ mod requests;
 pub use report::{Bridge, Status, Taken, Taring};
 
 use crate::command::Command;
-use crate::config::Config;
+use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
 use crate::control::SpeedLoop;
 use crate::control::goal::Goal;
 use crate::control::observer::Observer;
-use crate::frame::{Frame, Sense};
+use crate::frame::{Frame, Sense, Shape};
 use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
@@ -25,11 +25,11 @@ use budget::Budget;
 
 /// The loop's state between frames.
 #[derive(Clone, Debug)]
-pub struct Pipeline {
-    config: Config,
-    array: Array,
-    budget: Budget,
-    fit: Fit,
+pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
+    config: Shaped<ROWS, COLUMNS>,
+    array: Array<ROWS, COLUMNS>,
+    budget: Budget<ROWS, COLUMNS>,
+    fit: Fit<ROWS, COLUMNS>,
     motion: SpeedLoop,
     monitor: Monitor,
     guard: Guard,
@@ -39,9 +39,10 @@ pub struct Pipeline {
     tared: bool,
 }
 
-impl Pipeline {
+impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// A pipeline in the mode off.
-    pub fn new(config: &Config) -> Self {
+    pub fn new(config: &Shaped<ROWS, COLUMNS>) -> Self {
+        const { Shape::<ROWS, COLUMNS>::CHECKED };
         Self {
             config: config.clone(),
             array: Array::new(),
@@ -58,14 +59,14 @@ impl Pipeline {
     }
 
     /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins anew.
-    pub fn configure(&mut self, config: &Config) {
+    pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
         self.leave();
     }
 
     /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one under way
     /// begins anew.
-    pub fn calibrate(&mut self, calibration: &Calibration) {
+    pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
         self.tared = false;
         self.leave();
@@ -91,18 +92,18 @@ impl Pipeline {
     }
 
     /// The array's last picture and its calibration.
-    pub fn array(&self) -> &Array {
+    pub fn array(&self) -> &Array<ROWS, COLUMNS> {
         &self.array
     }
 
     /// The configuration in force.
-    pub fn config(&self) -> &Config {
+    pub fn config(&self) -> &Shaped<ROWS, COLUMNS> {
         &self.config
     }
 
     /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy it takes as long
     /// as the speed law.
-    pub fn step(&mut self, frame: &Frame, sense: &Sense, command: &Command) -> (Duty, &Status) {
+    pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
         let deadline = deadline_ticks(self.config.timing.frame_ticks());
@@ -219,7 +220,7 @@ impl Pipeline {
     /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array seems broken,
     /// and tells whether. A taxel that fails just after it was read is seen a frame later; without this look the motor would be driven
     /// until that frame's end. Whether it is a fault is for the step to say.
-    pub fn glance(&mut self, frame: &Frame) -> bool {
+    pub fn glance(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {

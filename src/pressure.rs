@@ -17,11 +17,10 @@ mod touched;
 
 pub use calibration::{Calibration, CalibrationError};
 pub use picture::Picture;
-pub use tare::TARE_FRAMES;
 
 use crate::config::Config;
-use crate::frame::{COLUMNS, Frame, ROWS};
-use lanes::{BOOST_BITS, GAIN_BITS, Pairs, Row};
+use crate::frame::{Frame, Shape};
+use lanes::{BOOST_BITS, Codes, GAIN_BITS, Row};
 use row::Sound;
 use touched::Touched;
 
@@ -36,33 +35,34 @@ pub const GAIN_MAX: u16 = (1 << 15) - 1;
 
 /// Per-taxel calibration and the last picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Array {
-    picture: Picture,
+pub struct Array<const ROWS: usize, const COLUMNS: usize> {
+    picture: Picture<ROWS, COLUMNS>,
     /// Gains, the reading without contact, and the sag of the last frame.
-    rows: [Row; ROWS],
+    rows: [Row<COLUMNS>; ROWS],
     /// A bit for each column that is left out.
-    mask: [u16; ROWS],
+    mask: [u32; ROWS],
     /// Sum of each row's tares and their moment, in sixteenths of a corrected code.
     tare_lines: [[i32; 2]; ROWS],
     /// Sum and moments of the tare, in sixteenths of a corrected code.
     tare_sums: [i32; 3],
     tare_frames: u32,
-    touched: Touched,
+    touched: Touched<ROWS>,
     baseline_row: usize,
     /// Rounds of the baseline over all rows since a contact.
     clear_rounds: i32,
 }
 
-impl Default for Array {
+impl<const ROWS: usize, const COLUMNS: usize> Default for Array<ROWS, COLUMNS> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl Array {
+impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Gains of one and no tare.
     pub const fn new() -> Self {
-        let [gains, moments] = Calibration::NONE.weights[0];
+        const { Shape::<ROWS, COLUMNS>::CHECKED };
+        let [gains, moments] = Calibration::<ROWS, COLUMNS>::NONE.weights[0];
         Self {
             picture: Picture::EMPTY,
             rows: [Row { gains, moments, tare: [0; COLUMNS], boost: 1 << BOOST_BITS, largest: 0 }; ROWS],
@@ -77,7 +77,7 @@ impl Array {
     }
 
     /// The picture of the last frame.
-    pub fn picture(&self) -> &Picture {
+    pub fn picture(&self) -> &Picture<ROWS, COLUMNS> {
         &self.picture
     }
 
@@ -88,20 +88,19 @@ impl Array {
 
     /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot show becomes
     /// a bad taxel.
-    pub fn read(&mut self, frame: &Frame, config: &Config) -> &Picture {
-        let [rows @ .., undriven] = &frame.pairs;
+    pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &Picture<ROWS, COLUMNS> {
         let before = self.picture.bad;
         if self.picture.bad_count != 0 {
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
-        let sound = Sound::new(undriven, config);
-        let total = lanes::pass(rows, &mut self.rows, &sound.common, &mut self.picture.taxels);
+        let sound = Sound::new(&frame.codes.undriven, config);
+        let total = lanes::pass(&frame.codes, &mut self.rows, &sound.common, &mut self.picture.taxels);
         let largest = row::larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
         let [sum, moment_x, moment_y] = self.tare_sums;
-        let [total_sum, total_x, total_y] = row::sixteenths(&total);
+        let [total_sum, total_x, total_y] = row::sixteenths::<ROWS, COLUMNS>(&total);
         self.picture.sum = total_sum.wrapping_sub(sum);
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
@@ -115,8 +114,14 @@ impl Array {
     /// not take long: its taxels are all zero, and its sums mean nothing.
     #[cold]
     #[inline(never)]
-    fn leave_out(&mut self, frame: &Frame, sound: &Sound, before: &[u16; ROWS], config: &Config) {
-        let [rows @ .., undriven] = &frame.pairs;
+    fn leave_out(
+        &mut self,
+        frame: &Frame<ROWS, COLUMNS>,
+        sound: &Sound<COLUMNS>,
+        before: &[u32; ROWS],
+        config: &Config,
+    ) {
+        let Codes { rows, undriven } = &frame.codes;
         let mut highest = 0;
         for (number, ((codes, row), mask)) in rows.iter().zip(&self.rows).zip(&self.mask).enumerate() {
             if !sound.suspects(row::larger_lane(row.largest)) {
@@ -128,7 +133,7 @@ impl Array {
             }
             // A masked taxel is no fault.
             let bad = bad & !mask;
-            self.picture.bad_again += (bad & before.get(number).copied().unwrap_or(0)).count_ones() as u8;
+            self.picture.bad_again += (bad & before.get(number).copied().unwrap_or(0)).count_ones() as u16;
             highest = self.picture.leave_out(number, bad, config).max(highest);
         }
         if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {
@@ -140,8 +145,8 @@ impl Array {
     }
 
     /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
-    pub fn bad_taxels(&self, frame: &Frame, config: &Config) -> u32 {
-        let [rows @ .., undriven] = &frame.pairs;
+    pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> u32 {
+        let Codes { rows, undriven } = &frame.codes;
         let sound = Sound::new(undriven, config);
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
@@ -153,7 +158,7 @@ impl Array {
     }
 
     /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
-    pub fn calibrate(&mut self, calibration: &Calibration) {
+    pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         let Calibration { weights, mask } = calibration;
         for (row, [gains, moments]) in self.rows.iter_mut().zip(weights) {
             (row.gains, row.moments) = (*gains, *moments);
@@ -163,10 +168,4 @@ impl Array {
         self.touched = Touched::NONE;
         self.start_tare();
     }
-}
-
-/// Every place in turn, written out: the compiler would keep the loop where it builds for size.
-#[inline(always)]
-fn each(mut act: impl FnMut(usize) -> u32) -> Pairs {
-    [act(0), act(1), act(2), act(3), act(4)]
 }

@@ -1,11 +1,11 @@
 //! The frame budget: settle, sampling and conversion of every row, in one place.
 
-use crate::frame::{BANK_COLUMNS, SLOTS};
-
 /// Ticks of the scan timer in a second (TIM8 at 168 MHz).
 pub const TIMER_HZ: u32 = 168_000_000;
 /// Scan timer ticks in a cycle of the converter's clock (21 MHz).
 pub const TICKS_PER_ADC_CYCLE: u32 = 8;
+/// The longest frame: 1/256 s, what the loop's 32 bits hold of a frame's time.
+pub const FRAME_TICKS_MAX: u32 = TIMER_HZ / 256;
 /// Converter cycles for a 12-bit conversion, after sampling.
 pub const CONVERSION_CYCLES: u32 = 12;
 /// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
@@ -21,6 +21,8 @@ pub struct ScanTiming {
     pub slot_ticks: u16,
     /// How long each column is sampled, converter cycles.
     pub sample_cycles: u16,
+    /// Rows of the array, and one slot with no row driven.
+    pub slots: u16,
     /// From frame to frame, ns, rounded.
     pub frame_ns: u32,
 }
@@ -35,6 +37,11 @@ pub enum ScanError {
         /// What the settle time and the conversions add up to.
         ticks: u32,
     },
+    /// The frame is longer than the loop's arithmetic holds: `ticks` of at most [`FRAME_TICKS_MAX`].
+    FrameTooLong {
+        /// What its slots add up to.
+        ticks: u32,
+    },
 }
 
 impl core::fmt::Display for ScanError {
@@ -45,6 +52,9 @@ impl core::fmt::Display for ScanError {
             }
             Self::SlotTooLong { ticks } => {
                 write!(f, "settle_ns and sample_cycles make a slot of {ticks} ticks: {} are allowed", u16::MAX)
+            }
+            Self::FrameTooLong { ticks } => {
+                write!(f, "settle_ns and sample_cycles make a frame of {ticks} ticks: {FRAME_TICKS_MAX} are allowed")
             }
         }
     }
@@ -63,22 +73,27 @@ impl ScanTiming {
     /// 15 cycles at 21 MHz settle a source of up to 10 kOhm to half a code (RM0390 and DS10693, table "ADC accuracy").
     pub const DEFAULT_SAMPLE_CYCLES: u16 = 15;
 
-    /// The tightest scan that gives each row `settle_ns` before its conversions.
+    /// The tightest scan of so many rows and columns that gives each row `settle_ns` before its conversions.
     ///
     /// # Errors
-    /// A sampling time that the converter lacks, or a slot beyond the timer's range.
-    pub const fn new(settle_ns: u32, sample_cycles: u16) -> Result<Self, ScanError> {
+    /// A sampling time that the converter lacks, a slot beyond the timer's range, or a frame beyond the loop's.
+    pub const fn new(settle_ns: u32, sample_cycles: u16, rows: usize, columns: usize) -> Result<Self, ScanError> {
         if !matches!(sample_cycles, 3 | 15 | 28 | 56 | 84 | 112 | 144 | 480) {
             return Err(ScanError::SampleCycles(sample_cycles));
         }
         let settle = (settle_ns as u64 * TIMER_HZ as u64).div_ceil(1_000_000_000);
-        let cycles = BANK_COLUMNS as u32 * (sample_cycles as u32 + CONVERSION_CYCLES) + TRIGGER_CYCLES;
+        let cycles = lanes::pairs(columns) as u32 * (sample_cycles as u32 + CONVERSION_CYCLES) + TRIGGER_CYCLES;
         let slot = settle + (cycles * TICKS_PER_ADC_CYCLE) as u64;
         if slot > u16::MAX as u64 {
             let ticks = if slot > u32::MAX as u64 { u32::MAX } else { slot as u32 };
             return Err(ScanError::SlotTooLong { ticks });
         }
-        let mut timing = Self { settle_ticks: settle as u16, slot_ticks: slot as u16, sample_cycles, frame_ns: 0 };
+        let slots = rows as u16 + 1;
+        let mut timing =
+            Self { settle_ticks: settle as u16, slot_ticks: slot as u16, sample_cycles, slots, frame_ns: 0 };
+        if timing.frame_ticks() >= FRAME_TICKS_MAX {
+            return Err(ScanError::FrameTooLong { ticks: timing.frame_ticks() });
+        }
         let frame = timing.frame_ticks() as u64 * 1_000_000_000;
         timing.frame_ns = ((frame + TIMER_HZ as u64 / 2) / TIMER_HZ as u64) as u32;
         Ok(timing)
@@ -86,7 +101,7 @@ impl ScanTiming {
 
     /// From frame to frame, scan timer ticks.
     pub const fn frame_ticks(self) -> u32 {
-        self.slot_ticks as u32 * SLOTS as u32
+        self.slot_ticks as u32 * self.slots as u32
     }
 }
 
@@ -96,14 +111,22 @@ mod tests {
 
     #[test]
     fn the_default_scan_makes_ten_thousand_frames_a_second() {
-        let timing = ScanTiming::new(ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES).unwrap();
+        let timing = ScanTiming::new(ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES, 10, 10).unwrap();
         assert!((90_000..=100_000).contains(&timing.frame_ns), "{} ns", timing.frame_ns);
     }
 
     #[test]
     fn what_the_hardware_cannot_time_is_refused() {
-        assert_eq!(ScanTiming::new(2_000, 16), Err(ScanError::SampleCycles(16)));
-        assert!(matches!(ScanTiming::new(400_000, 15), Err(ScanError::SlotTooLong { .. })));
-        assert!(matches!(ScanTiming::new(u32::MAX, 15), Err(ScanError::SlotTooLong { .. })));
+        assert_eq!(ScanTiming::new(2_000, 16, 10, 10), Err(ScanError::SampleCycles(16)));
+        assert!(matches!(ScanTiming::new(400_000, 15, 10, 10), Err(ScanError::SlotTooLong { .. })));
+        assert!(matches!(ScanTiming::new(u32::MAX, 15, 10, 10), Err(ScanError::SlotTooLong { .. })));
+        assert!(matches!(ScanTiming::new(300_000, 15, 16, 16), Err(ScanError::FrameTooLong { .. })));
+    }
+
+    #[test]
+    fn each_row_and_each_pair_of_columns_takes_its_time() {
+        let frame_us = |rows, columns| ScanTiming::new(2_400, 15, rows, columns).unwrap().frame_ns / 1_000;
+        let shapes = [(3, 3), (3, 5), (4, 4), (8, 8), (16, 16), (16, 32)];
+        assert_eq!(shapes.map(|(rows, columns)| frame_us(rows, columns)), [20, 26, 26, 70, 219, 394]);
     }
 }

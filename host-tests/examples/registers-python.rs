@@ -1,6 +1,7 @@
 //! Prints `examples/python/registers.py`: the control table by name, for Python.
 
-use fingertip::link::table::{Kind, REGISTERS};
+use fingertip::link::table::Kind;
+use fingertip::shipped::REGISTERS;
 
 fn main() {
     println!("\"\"\"The control table by name; see docs/control-table.md.");

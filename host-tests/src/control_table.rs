@@ -1,8 +1,9 @@
 //! Renders the control table's definition as `docs/control-table.md`.
 
 use fingertip::link::packet::StatusError;
-use fingertip::link::table::{Access, Kind, READ_MAX, REGISTERS, Register, address};
+use fingertip::link::table::{Access, Kind, READ_MAX, Register};
 use fingertip::params::Params;
+use fingertip::shipped::{REGISTERS, address};
 
 /// How this page is made anew.
 pub const COMMAND: &str = "cargo xtask docs";

@@ -6,9 +6,9 @@
 use crate::heatmap::Pressures;
 use crate::plot::{Curve, Curves, Map, PlotError, curves, maps};
 use fastrand::Rng;
-use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::identify::{DepthFit, Modulus, Refusal};
 use fingertip::model::Tip;
+use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
 
 /// Distance from taxel to taxel: the largest contact shown, 14.3 mm across, fits the array.

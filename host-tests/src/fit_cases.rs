@@ -8,10 +8,8 @@ use crate::plant::Setup;
 use crate::plant::cells::Cell;
 use core::f64::consts::{PI, TAU};
 use fastrand::Rng;
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, ROWS};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Config, Picture, ROWS};
 
 /// Radius of the reference tip.
 pub const RADIUS_MM: f64 = 10.0;
@@ -158,7 +156,7 @@ impl Scene {
     }
 
     /// The share of the force on the live taxels that an edge takes; None without an edge.
-    pub fn cut(&self, pressures: &Pressures, bad: &[u16; ROWS]) -> Option<f64> {
+    pub fn cut(&self, pressures: &Pressures, bad: &[u32; ROWS]) -> Option<f64> {
         let Object::Edge { angle_rad, .. } = self.object else { return None };
         // The same samples without the edge.
         let whole = Self { object: Object::Edge { offset_mm: f64::INFINITY, angle_rad }, ..*self }.pressures();
@@ -251,8 +249,8 @@ pub struct Reading {
 
 impl Reading {
     /// Dead taxels, drawn at random: a bit for each column, for each row.
-    pub fn dead(&self, rng: &mut Rng) -> [u16; ROWS] {
-        let mut bad = [0_u16; ROWS];
+    pub fn dead(&self, rng: &mut Rng) -> [u32; ROWS] {
+        let mut bad = [0_u32; ROWS];
         let mut left = self.dead;
         while left > 0 {
             let (row, column) = (rng.usize(..ROWS), rng.usize(..COLUMNS));
@@ -264,7 +262,7 @@ impl Reading {
 
     /// The picture of pressures on the taxels that are not bad, and how many of these see the contact: those with pressure
     /// before noise.
-    pub fn picture(&self, pressures: &Pressures, bad: [u16; ROWS], rng: &mut Rng) -> (Picture, usize) {
+    pub fn picture(&self, pressures: &Pressures, bad: [u32; ROWS], rng: &mut Rng) -> (Picture, usize) {
         let peak = pressures.iter().flatten().fold(0.0, |peak: f64, kpa| peak.max(*kpa));
         let mut seen = 0;
         let mut taxels = [[0; COLUMNS]; ROWS];
@@ -290,7 +288,7 @@ impl Reading {
 }
 
 /// A picture of these taxels with its sums, as the pipeline makes it; bad taxels read 0.
-pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u16; ROWS]) -> Picture {
+pub fn picture(taxels: &[[i32; COLUMNS]; ROWS], bad: [u32; ROWS]) -> Picture {
     let mut picture = Picture { taxels: *taxels, bad, ..Picture::EMPTY };
     for (row, line) in picture.taxels.iter_mut().enumerate() {
         for (column, taxel) in line.iter_mut().enumerate() {

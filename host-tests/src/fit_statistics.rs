@@ -5,10 +5,9 @@
 
 use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Fit, Refined};
-use fingertip::pressure::Picture;
+use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Refined};
+use fingertip::shipped::{Config, Fit, Picture};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A contact that fewer live taxels see is not judged.
@@ -211,7 +210,7 @@ pub fn pressed(number: usize, um_per_frame: f64, effort: Effort, configs: &Confi
     let mut settled = 0;
     scene.d_mm = 0.1;
     while scene.d_mm < end {
-        let (picture, seen) = clean.reading.picture(&scene.pressures(), [0; fingertip::frame::ROWS], &mut rng);
+        let (picture, seen) = clean.reading.picture(&scene.pressures(), [0; fingertip::shipped::ROWS], &mut rng);
         let outcome = Outcome::of(&fit.read(&picture, config), &scene, false);
         settled = if seen < TAXELS_MIN || scene.d_mm < 0.3 { 0 } else { settled + 1 };
         if settled > FRAMES {

@@ -2,7 +2,7 @@
 
 use console::style;
 use core::fmt::Write as _;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 
 /// Pressures in kPa, `[row][column]`.
 pub type Pressures = [[f64; COLUMNS]; ROWS];

@@ -2,9 +2,9 @@
 
 use crate::plant::{Bridge, Setup, World};
 use fingertip::command::Command;
-use fingertip::config::Config;
-use fingertip::frame::{Frame, SLOTS, Sense};
-use fingertip::pipeline::{self, Pipeline, Status};
+use fingertip::frame::Sense;
+use fingertip::pipeline::{self, Status};
+use fingertip::shipped::{Config, Frame, Pipeline, SLOTS};
 use fingertip::units::Duty;
 use images::record::Record;
 
@@ -79,7 +79,7 @@ impl Native {
     /// Tares, then enables torque with no goal.
     pub fn tare_and_enable(&mut self) {
         self.command.tare_request = self.command.tare_request.wrapping_add(1);
-        for _ in 0..fingertip::pressure::TARE_FRAMES + 2 {
+        for _ in 0..fingertip::shipped::TARE_FRAMES + 2 {
             self.step();
         }
         self.command.torque = true;

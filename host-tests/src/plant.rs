@@ -24,7 +24,8 @@ pub use setup::Setup;
 
 use core::f64::consts::TAU;
 use drive::{Dynamics, Shaft, Source};
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::frame::Sense;
+use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use serde::{Deserialize, Serialize};
 
 /// What the bridge does.

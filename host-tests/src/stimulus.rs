@@ -7,10 +7,10 @@ use crate::native::Native;
 use crate::plant::Setup;
 use fastrand::Rng;
 use fingertip::command::Command;
-use fingertip::config::{Config, newtons};
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::config::newtons;
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
+use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
 

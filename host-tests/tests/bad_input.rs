@@ -1,9 +1,10 @@
 //! What constructors refuse: each error names the parameter, its value and its range.
 
-use fingertip::config::{Config, ConfigError};
+use fingertip::config::ConfigError;
 use fingertip::model::{Relaxation, RelaxationError, RelaxationTerm, Tip};
 use fingertip::params::{ParamError, Params};
 use fingertip::scan::{ScanError, ScanTiming};
+use fingertip::shipped::Config;
 use fingertip::units::{Kilopascals, Millimetres, Ratio};
 
 fn refused(params: &Params) -> ConfigError {
@@ -57,7 +58,7 @@ fn a_scan_that_the_hardware_cannot_time() {
     let params = Params { sample_cycles: 16, ..Params::DEFAULT };
     assert_eq!(refused(&params), ConfigError::Scan(ScanError::SampleCycles(16)));
     assert_eq!(refused(&params).to_string(), "sample_cycles of 16: 3, 15, 28, 56, 84, 112, 144 and 480 are allowed");
-    let error = ScanTiming::new(400_000, 15).unwrap_err();
+    let error = ScanTiming::new(400_000, 15, 10, 10).unwrap_err();
     assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68320 ticks: 65535 are allowed");
 }
 

@@ -1,9 +1,9 @@
 //! What the bridge is told by each mode, and by a look at a frame that is still being scanned.
 
-use fingertip::config::{Config, newtons};
-use fingertip::frame::Frame;
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Status};
+use fingertip::shipped::{Config, Frame};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
 use host_tests::native::Native;

@@ -1,7 +1,8 @@
 //! The budget of the loop's time, against any way in which frames may take time.
 
 use fingertip::contact::Effort;
-use fingertip::pipeline::budget::{Budget, WAIT_MAX, WINDOW};
+use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
+use fingertip::shipped::Budget;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -1,7 +1,8 @@
 //! The budget frame by frame: when the effort falls, when it rises, and how long it waits.
 
 use fingertip::contact::Effort;
-use fingertip::pipeline::budget::{Budget, WAIT_MAX, WINDOW};
+use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
+use fingertip::shipped::Budget;
 
 /// Ticks that are all to be used.
 const DEADLINE: u32 = 32_000;

@@ -1,11 +1,9 @@
 //! Gains and masks of single taxels.
 
 use fingertip::command::Command;
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
-use fingertip::pressure::{Array, Calibration, CalibrationError, GAIN_MAX, GAIN_ONE, TARE_FRAMES};
+use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
+use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use fingertip::state::Mode;
 use host_tests::plant::{Setup, World};
 
@@ -83,7 +81,7 @@ fn what_cannot_be_is_refused_by_name() {
     let mut mask = [0; ROWS];
     mask[6] = 0x400;
     let error = Calibration::new(&GAINS, &mask).unwrap_err();
-    assert_eq!(error, CalibrationError::Mask { row: 6, value: 0x400 });
+    assert_eq!(error, CalibrationError::Mask { row: 6, value: 0x400, all: 0x3ff });
     assert_eq!(error.to_string(), "mask of 0x400 for row 6: 0 to 0x3ff are allowed");
     let mut gains = GAINS;
     (gains[2][2], gains[2][3], mask[6]) = (1, GAIN_MAX, 0x3ff);

@@ -1,16 +1,14 @@
 //! How far a force is known only from below: by the sums, by a fit, and from frame to frame.
 
 use fastrand::Rng;
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{Effort, Fit, from_sums};
-use fingertip::frame::ROWS;
+use fingertip::contact::{Effort, from_sums};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{Config, Fit, Picture, ROWS};
 use fingertip::units::Millimetres;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
-const NONE: [u16; ROWS] = [0; ROWS];
+const NONE: [u32; ROWS] = [0; ROWS];
 /// The reference array's.
 const PITCH_MM: f64 = 1.5;
 
@@ -23,7 +21,7 @@ fn mm(length: Millimetres) -> f64 {
 }
 
 /// A plane contact, with what its taxels differ by.
-fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u16; ROWS], rng: &mut Rng) -> Picture {
+fn plane(d_mm: f64, [x_mm, y_mm]: [f64; 2], spread: f64, bad: [u32; ROWS], rng: &mut Rng) -> Picture {
     let scene = Scene { pitch_mm: PITCH_MM, d_mm, x_mm, y_mm, object: Object::Plane };
     let noise = if spread > 0.0 { Noise::OfReading(spread) } else { Noise::None };
     Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), bad, rng).0
@@ -35,7 +33,7 @@ fn ramp(value: f64, from: f64, to: f64) -> f64 {
 }
 
 /// How near the nearest bad taxel is to a contact's centre.
-fn nearest_bad_mm(contact: &Contact, bad: &[u16; ROWS]) -> f64 {
+fn nearest_bad_mm(contact: &Contact, bad: &[u32; ROWS]) -> f64 {
     let place = |index: usize| (index as f64 - 4.5) * PITCH_MM;
     let bad = (0..ROWS * 10).filter(|taxel| bad[taxel / 10] >> (taxel % 10) & 1 != 0);
     let apart =

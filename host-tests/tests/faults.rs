@@ -1,8 +1,9 @@
 //! Each fault natively: found in time, latched, and cleared only with torque off.
 
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Config;
 use fingertip::state::{Fault, Limits, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Faults, Row, Setup, Taxel};
@@ -176,7 +177,7 @@ fn an_array_that_stands_still() {
     let mut fault = None;
     for n in 1..500 {
         sense.encoder += 5;
-        let frame = fingertip::frame::Frame { sequence: frozen.sequence + n, ..frozen };
+        let frame = fingertip::shipped::Frame { sequence: frozen.sequence + n, ..frozen };
         fault = board.pipeline.step(&frame, &sense, &command).1.fault;
         if fault.is_some() {
             break;
@@ -200,7 +201,7 @@ fn a_silent_bus() {
     command.bus_watchdog_ms = 40;
     for (silent_ms, expected) in [(39, None), (40, Some(Fault::BusSilent))] {
         sense.bus_silent_ms = silent_ms;
-        let frame = fingertip::frame::Frame { sequence: board.frame.sequence + 1, ..board.frame };
+        let frame = fingertip::shipped::Frame { sequence: board.frame.sequence + 1, ..board.frame };
         assert_eq!(board.pipeline.step(&frame, &sense, &command).1.fault, expected);
     }
 }

@@ -1,18 +1,16 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort, Fit, Refined, from_sums, read};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::contact::{CONFIDENCE_LEAST, Effort, Refined, from_sums, read};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use fingertip::units::{Millimetres, Newtons};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
 
 /// A converter that gives its smallest and its largest code, in sixteenths.
 const FULL: i32 = 4095 * 16;
-const NONE: [u16; ROWS] = [0; ROWS];
+const NONE: [u32; ROWS] = [0; ROWS];
 /// Places of the ways in a verdict.
 const MOMENTS: usize = 0;
 const TWO: usize = 2;
@@ -46,13 +44,13 @@ fn mm(length: Millimetres) -> f64 {
 }
 
 /// A scene's picture without noise.
-fn still(scene: &Scene, bad: [u16; ROWS]) -> (Picture, usize) {
+fn still(scene: &Scene, bad: [u32; ROWS]) -> (Picture, usize) {
     let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
     reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
 }
 
 /// Two refinements of one picture, and a fit of any effort after many frames, keep force and centre within their bounds.
-fn holds(scene: &Scene, bad: [u16; ROWS]) {
+fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
     let config = scene.config();

@@ -1,11 +1,9 @@
 //! Any picture that the array's reading can make, under any finger's parameters: the fit ends, within its range.
 
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{Effort, Fit, Refined, read};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::contact::{Effort, Refined, read};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::picture;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -36,7 +34,7 @@ fn any_picture() -> impl Strategy<Value = Picture> {
     ];
     let level = prop_oneof![extremes, 0..LARGEST, -40..4_000];
     let spikes = proptest::collection::vec(taxel, ROWS * COLUMNS);
-    let bad = prop_oneof![3 => Just([0; ROWS]), 1 => proptest::array::uniform10(0..1_u16 << COLUMNS)];
+    let bad = prop_oneof![3 => Just([0; ROWS]), 1 => proptest::array::uniform10(0..1_u32 << COLUMNS)];
     (level, prop::bool::ANY, spikes, bad).prop_map(|(level, even, spikes, bad)| {
         let taxels = core::array::from_fn(|row| {
             core::array::from_fn(|column| if even { level } else { spikes[row * COLUMNS + column].unwrap_or(level) })

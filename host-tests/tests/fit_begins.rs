@@ -1,12 +1,11 @@
 //! A contact that is there from one frame to the next is fitted, wherever on the array it lies.
 
 use fingertip::command::Command;
-use fingertip::config::Config;
 use fingertip::contact::{CONFIDENCE_LEAST, Effort};
-use fingertip::frame::{Frame, Sense};
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
 use host_tests::plant::{Setup, World};
 
 /// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames: the true force

@@ -1,15 +1,13 @@
 //! The fit's work, spread over frames: when a refinement begins and ends, and what it follows meanwhile.
 
 use fastrand::Rng;
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort, Fit, from_sums};
-use fingertip::frame::ROWS;
+use fingertip::contact::{CONFIDENCE_LEAST, Effort, from_sums};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
-const NONE: [u16; ROWS] = [0; ROWS];
+const NONE: [u32; ROWS] = [0; ROWS];
 /// Efforts that take the model, and the frames of a refinement.
 const BY_MODEL: [(Effort, usize); 4] =
     [(Effort::OneRow, 11), (Effort::TwoRows, 6), (Effort::FiveRows, 3), (Effort::AllRows, 1)];

@@ -1,13 +1,11 @@
 //! A single look at a picture: what it looks at, and what it leaves to the sums.
 
-use fingertip::config::Config;
-use fingertip::contact::{Effort, Fit, Refined, from_sums, read};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::contact::{Effort, Refined, from_sums, read};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 
-const NONE: [u16; ROWS] = [0; ROWS];
+const NONE: [u32; ROWS] = [0; ROWS];
 
 fn config() -> Config {
     Config::new(&Params::DEFAULT).expect("the defaults are allowed")

@@ -1,8 +1,9 @@
 //! The loop natively: touch, steps, release. The same bounds hold for the flash image on the virtual board.
 
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Config;
 use fingertip::state::{Limits, Mode};
 use host_tests::native::Native;
 use host_tests::plant::Setup;

@@ -1,9 +1,9 @@
 //! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
 
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SATURATED};
+use fingertip::frame::SATURATED;
 use fingertip::params::Params;
-use fingertip::pressure::{Array, CODE_BITS, Calibration, GAIN_MAX, Picture, TARE_BITS, TARE_FRAMES};
+use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
+use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Picture, ROWS, TARE_FRAMES};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -41,7 +41,7 @@ fn codes(wild: usize, code_max: u16) -> impl Strategy<Value = Codes> {
 
 fn calibration() -> impl Strategy<Value = Calibration> {
     let gains = proptest::array::uniform10(proptest::array::uniform10(1..=GAIN_MAX));
-    let mask = proptest::array::uniform10(prop_oneof![4 => Just(0), 1 => 0_u16..1 << COLUMNS]);
+    let mask = proptest::array::uniform10(prop_oneof![4 => Just(0), 1 => 0_u32..1 << COLUMNS]);
     (gains, mask).prop_map(|(gains, mask)| Calibration::new(&gains, &mask).unwrap())
 }
 
@@ -61,12 +61,12 @@ fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
 }
 
 /// The bad columns of a row by their definition.
-fn bad(frame: &Frame, row: usize, config: &Config) -> u16 {
+fn bad(frame: &Frame, row: usize, config: &Config) -> u32 {
     let wrong = |column: usize| {
         let (code, level) = (frame.code(row, column), frame.code(ROWS, column) & 0xfff);
         code >= SATURATED || i32::from(code) - i32::from(level) < i32::from(config.dead_codes)
     };
-    (0..COLUMNS).map(|column| u16::from(wrong(column)) << column).sum()
+    (0..COLUMNS).map(|column| u32::from(wrong(column)) << column).sum()
 }
 
 proptest! {
@@ -181,7 +181,7 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
         for (code, bad) in [(SATURATED, 1), (SATURATED - 1, 0), (levels[column] + 11, 1), (levels[column] + 12, 0)] {
             let mut array = Array::new();
             let picture = array.read(&codes(code), &config);
-            assert_eq!((picture.bad_count, picture.bad[4]), (bad, u16::from(bad) << column), "{code} in {column}");
+            assert_eq!((picture.bad_count, picture.bad[4]), (bad, u32::from(bad) << column), "{code} in {column}");
             let peak = if bad == 0 { (code - levels[column]).max(40) } else { 0 };
             assert_eq!(picture.peak_codes, peak, "{code} in {column}");
             assert_eq!(array.bad_taxels(&codes(code), &config), u32::from(bad));

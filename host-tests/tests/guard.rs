@@ -1,9 +1,10 @@
 //! The guard alone, against any frames, senses and duties: what it promises holds whatever the loop, the array and the host do.
 
 use fastrand::Rng;
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::safety::guard::{Guard, Seen};
+use fingertip::shipped::Config;
 use fingertip::state::{Fault, Limits};
 use fingertip::units::{Duty, Newtons};
 

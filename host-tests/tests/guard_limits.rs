@@ -1,8 +1,9 @@
 //! Where the guard begins to hold back, and where it does not yet: each of its limits from both sides.
 
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::safety::guard::{Guard, Seen};
+use fingertip::shipped::Config;
 use fingertip::state::{Fault, Limits};
 use fingertip::units::{Duty, Newtons};
 

@@ -1,8 +1,8 @@
 //! The model's hard cases, one test each.
 
-use fingertip::config::Config;
 use fingertip::model::{Displacement, Load, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use fingertip::units::{Kilopascals, Millimetres, Radians, Ratio};
 use host_tests::prove::domain::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
 use host_tests::prove::exact;

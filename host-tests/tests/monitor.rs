@@ -1,13 +1,13 @@
 //! The monitor by itself: each limit on both sides, and for how many frames.
 
 use fingertip::command::Command;
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
 use fingertip::safety::monitor::{Monitor, View, array_broken, array_sound};
+use fingertip::shipped::{COLUMNS, Config, Picture, ROWS};
 use fingertip::state::Fault;
 use fingertip::units::{Millimetres, Newtons};
 
@@ -34,7 +34,7 @@ impl Shown {
         }
     }
 
-    fn view(&self) -> View<'_> {
+    fn view(&self) -> View<'_, ROWS, COLUMNS> {
         let Self { picture, contact, pressed, sense, motion, command } = self;
         View { picture, contact, pressed: *pressed, sense, motion, command }
     }
@@ -151,7 +151,7 @@ fn an_array_that_shows_any_change_or_no_contact_does_not() {
 #[test]
 fn an_array_is_broken_from_the_very_limit_on() {
     let config = config();
-    let most = config.params.bad_taxels_max as u8;
+    let most = config.params.bad_taxels_max as u16;
     let stuck = config.params.undriven_max_codes as u16;
     let broken = Some(Fault::ArrayBroken);
     for (bad_count, bad_again, undriven_max, fault, sound) in [

@@ -1,7 +1,8 @@
 //! The pictures: well-formed, complete, and the same bytes every time.
 
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use host_tests::metrics::Sample;
 use host_tests::native::Native;
 use host_tests::plant::Setup;

@@ -1,8 +1,8 @@
 //! The recording that QEMU replays: deterministic, and it goes everywhere.
 
-use fingertip::config::Config;
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
+use fingertip::pipeline::Status;
+use fingertip::shipped::{Config, Pipeline};
 use fingertip::state::{Fault, Mode};
 use host_tests::stimulus;
 use std::collections::BTreeSet;

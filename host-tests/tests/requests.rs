@@ -1,10 +1,10 @@
 //! Requests in the loop: what comes in one frame is done, and what cannot be done leaves a word. The first frame with torque.
 
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::identify::{Identification, Refusal};
 use fingertip::params::Params;
 use fingertip::pipeline::Taring;
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::shipped::{Config, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};
@@ -48,7 +48,7 @@ fn broken(record: &mut Record) {
     let mut board = new();
     board.world.faults.array.taxels = [[Taxel::Dead; 10]; 10];
     board.step();
-    record.frame.pairs = board.frame.pairs;
+    record.frame.codes = board.frame.codes;
 }
 
 fn overloaded(record: &mut Record) {
@@ -63,7 +63,7 @@ fn silent(record: &mut Record) {
 fn pressed(record: &mut Record) {
     let mut board = at(-4.2);
     board.step();
-    record.frame.pairs = board.frame.pairs;
+    record.frame.codes = board.frame.codes;
 }
 
 fn tares(board: &mut Native) {

@@ -1,11 +1,9 @@
 //! Codes to contact: the plant's electrical model against what the core reads back.
 
-use fingertip::config::Config;
 use fingertip::contact::Contact;
 use fingertip::contact::from_sums;
-use fingertip::frame::{Frame, ROWS, SLOTS};
 use fingertip::params::Params;
-use fingertip::pressure::{Array, TARE_FRAMES};
+use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use host_tests::plant::{Setup, World};
 
 struct Bench {

@@ -2,11 +2,11 @@
 
 use fastrand::Rng;
 use fingertip::command::Command;
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Taring};
-use fingertip::pressure::{Calibration, GAIN_ONE, TARE_FRAMES};
+use fingertip::pipeline::Taring;
+use fingertip::pressure::GAIN_ONE;
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
 use host_tests::plant::Setup;
 use host_tests::plant::cells::Cell;
@@ -47,7 +47,7 @@ impl Finger {
             ..Params::DEFAULT
         };
         let mut pipeline = Pipeline::new(&Config::new(&params).unwrap());
-        let mut mask = [0u16; ROWS];
+        let mut mask = [0u32; ROWS];
         for _ in 0..rng.usize(..4) {
             mask[rng.usize(..ROWS)] |= 1 << rng.usize(..COLUMNS);
         }

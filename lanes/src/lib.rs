@@ -11,7 +11,10 @@ extern crate std;
 
 mod rows;
 
-pub use rows::{BOOST_BITS, CODE_BITS, Common, GAIN_BITS, Row, TARE_BITS, Total, pass, portable_pass};
+pub use rows::{
+    BOOST_BITS, CODE_BITS, Codes, Common, GAIN_BITS, Row, TARE_BITS, Total, codes_at, each_pair, filled, moment_bits,
+    pairs, pass, place, portable_pass, sum_drop,
+};
 
 /// The sign bits of both lanes.
 pub const SIGNS: u32 = 0x8000_8000;
@@ -44,9 +47,6 @@ pub fn larger(a: u32, b: u32) -> u32 {
     // No lane carries: the sum is one of the two.
     a.wrapping_add(excess(b, a))
 }
-
-/// Five pairs.
-pub type Pairs = [u32; 5];
 
 /// The same functions without the instructions.
 pub mod portable {

@@ -1,8 +1,8 @@
 //! One pass over the rows of a frame: from codes to taxels above their tare, their sums, and the highest of them.
 //!
-//! [`portable_pass`] is the pass to read; [`pass`] gives the same bits by the target's instructions.
+//! [`portable_pass`] is the pass to read; [`pass`] gives the same bits, for rows of ten columns by the target's instructions.
 
-use super::{Pairs, high, low, portable};
+use super::{high, low, pair, portable};
 
 /// Fractional bits of a taxel.
 pub const CODE_BITS: u32 = 4;
@@ -14,21 +14,129 @@ pub const TARE_BITS: u32 = 16;
 pub const BOOST_BITS: u32 = 28;
 /// By so many bits the boost is shortened for single taxels, whose product is then an upper half.
 const BOOST_DROP: u32 = GAIN_BITS + BOOST_BITS - CODE_BITS - 32;
+/// Pairs whose products with gains add up to 32 bits: 16 x 4095 x 32767 is just below 2^31.
+const BLOCK: usize = 8;
 
-/// Columns of a row: the two lanes of five pairs.
-pub const COLUMNS: usize = 2 * PLACES;
-/// Pairs of a row.
-const PLACES: usize = 5;
+/// Codes of a frame, in the order in which two converters read them: each row as pairs of the same instant, one column of the
+/// first half and one of the second. It begins on a word's border.
+#[repr(C, align(4))]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Codes<const ROWS: usize, const COLUMNS: usize> {
+    /// With this row driven, see [`place`].
+    pub rows: [[u16; COLUMNS]; ROWS],
+    /// With none.
+    pub undriven: [u16; COLUMNS],
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Codes<ROWS, COLUMNS> {
+    /// Zeros.
+    pub const ZERO: Self = Self { rows: [[0; COLUMNS]; ROWS], undriven: [0; COLUMNS] };
+
+    /// With this row driven, or with none where it is one more than there are.
+    #[inline(always)]
+    pub fn slot(&self, slot: usize) -> Option<&[u16; COLUMNS]> {
+        if slot == ROWS { Some(&self.undriven) } else { self.rows.get(slot) }
+    }
+
+    /// The same to be written.
+    #[inline(always)]
+    pub fn slot_mut(&mut self, slot: usize) -> Option<&mut [u16; COLUMNS]> {
+        if slot == ROWS { Some(&mut self.undriven) } else { self.rows.get_mut(slot) }
+    }
+}
+
+/// Pairs of a row; an odd number of columns leaves the last one half empty.
+pub const fn pairs(columns: usize) -> usize {
+    columns.div_ceil(2)
+}
+
+/// Where a column stands in a row of codes, gains or moments; beyond the row where there is no such column.
+///
+/// ```
+/// let places = |columns| (0..columns).map(move |column| lanes::place(column, columns));
+/// assert!(places(6).eq([0, 2, 4, 1, 3, 5]));
+/// assert!(places(5).eq([0, 2, 4, 1, 3]));
+/// ```
+#[inline(always)]
+pub const fn place(column: usize, columns: usize) -> usize {
+    let half = pairs(columns);
+    if column < half {
+        2 * column
+    } else if column < columns {
+        2 * (column - half) + 1
+    } else {
+        columns
+    }
+}
+
+/// A pair of a row of codes; 0 where there is none.
+#[inline(always)]
+pub fn codes_at<const COLUMNS: usize>(row: &[u16; COLUMNS], at: usize) -> u32 {
+    let code = |place: usize| row.get(place).copied().unwrap_or(0);
+    u32::from(code(2 * at)) | u32::from(code(2 * at + 1)) << 16
+}
+
+/// A pair of a row of gains or moments; 0 where there is none.
+#[inline(always)]
+fn weights_at<const COLUMNS: usize>(row: &[i16; COLUMNS], at: usize) -> u32 {
+    let weight = |place: usize| row.get(place).copied().unwrap_or(0);
+    pair(weight(2 * at), weight(2 * at + 1))
+}
+
+/// Every pair of a row in turn, five at a time written out: the compiler would keep the loop where it builds for size.
+#[inline(always)]
+pub fn each_pair<const COLUMNS: usize>(mut act: impl FnMut(usize)) {
+    let mut at = 0;
+    while at + 5 <= pairs(COLUMNS) {
+        act(at);
+        act(at + 1);
+        act(at + 2);
+        act(at + 3);
+        act(at + 4);
+        at += 5;
+    }
+    while at < pairs(COLUMNS) {
+        act(at);
+        at += 1;
+    }
+}
+
+/// What stands in for the lane that the last pair of an odd row lacks: the other lane.
+#[inline(always)]
+pub const fn filled<const COLUMNS: usize>(of: u32, at: usize) -> u32 {
+    if 2 * at + 1 < COLUMNS { of } else { of & 0xffff | of << 16 }
+}
+
+/// Fractional bits of a row's moment: as many as leave the largest weight, a gain of 2 times `columns - 1`, 16 bits.
+pub const fn moment_bits(columns: usize) -> u32 {
+    if columns <= 16 { 10 } else { 9 }
+}
+
+/// Bits dropped from a row's sum, so that neither it nor the sum of all rows nor their moment passes 32 bits.
+///
+/// A code adds at most 4095 and a gain nearly 2 in Q14, a boost at most 1.5; a total is 4 bits coarser than a sum. The moment along the rows is
+/// a quarter of the total's, and what of it has one sign has the weights 1, 3, 5 .. of half of the rows. 10 x 10 drops none, 16 x 16 one
+/// bit, 16 x 32 two.
+pub const fn sum_drop(rows: usize, columns: usize) -> u32 {
+    let row = columns as u64 * 4095 * 32_767;
+    let total = row / 16 * 3 / 2 * rows as u64;
+    let moment = row / 64 * 3 / 2 * (rows as u64 * rows as u64 / 4);
+    let mut drop = 0;
+    while row >> drop >= 1 << 31 || total >> drop >= 1 << 31 || moment >> drop >= 1 << 31 {
+        drop += 1;
+    }
+    drop
+}
 
 /// What is known of a row before the pass, and what the pass finds.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Row {
-    /// The gain of each column.
-    pub gains: Pairs,
-    /// The weight of each column in the row's moment, its gain in it.
-    pub moments: Pairs,
-    /// What each column reads without contact.
+pub struct Row<const COLUMNS: usize> {
+    /// The gain of each column, in the order of the codes.
+    pub gains: [i16; COLUMNS],
+    /// The weight of each column in the row's moment, its gain in it, in the order of the codes.
+    pub moments: [i16; COLUMNS],
+    /// What each column reads without contact, in the columns' order.
     pub tare: [i32; COLUMNS],
     /// Found: 1 / (1 - x) in Q28, where x is the row's sag.
     pub boost: i32,
@@ -39,9 +147,9 @@ pub struct Row {
 /// What is common to the rows of a pass.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct Common {
-    /// What each column's codes are taken above.
-    pub undriven: Pairs,
+pub struct Common<const COLUMNS: usize> {
+    /// What each column's codes are taken above, in the order of the codes.
+    pub undriven: [u16; COLUMNS],
     /// A column that shows less is dead; in both lanes.
     pub dead: u32,
     /// The sag for each code, Q32; in both lanes.
@@ -51,7 +159,7 @@ pub struct Common {
 /// What the rows add up to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
-    /// Sum of the rows' sums, each times its boost; upper half of the product.
+    /// Sum of the rows' sums, each less [`sum_drop`] bits times its boost; upper half of the product.
     pub first: i32,
     /// The same of their moments.
     pub second: i32,
@@ -86,32 +194,44 @@ fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
 /// From codes to `taxels`, row by row: net codes, the row's sag by their sum, each column by its gain and the row's boost, less its
 /// tare; and the rows' sums by the same gains and boosts, which are not rounded taxel by taxel.
 #[inline(always)]
-pub fn portable_pass<const ROWS: usize>(
-    codes: &[Pairs; ROWS],
-    rows: &mut [Row; ROWS],
-    common: &Common,
+pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
+    codes: &Codes<ROWS, COLUMNS>,
+    rows: &mut [Row<COLUMNS>; ROWS],
+    common: &Common<COLUMNS>,
     taxels: &mut [[i32; COLUMNS]; ROWS],
 ) -> Total {
+    let (pairs, drop) = (const { pairs(COLUMNS) }, const { sum_drop(ROWS, COLUMNS) });
     let mut total = Total::default();
-    for ((codes, row), taxels) in codes.iter().zip(rows).zip(taxels) {
-        let mut nets = [0; PLACES];
-        let (mut sag, mut sum, mut moment) = (0, 0, 0);
+    for ((codes, row), taxels) in codes.rows.iter().zip(rows).zip(taxels) {
+        // One for each pair; the rest is not used.
+        let mut nets = [0; COLUMNS];
+        let (mut sag, mut sum, mut moment) = (0, 0, 0_i32);
         row.largest = 0;
-        for (place, net) in nets.iter_mut().enumerate() {
-            *net = portable::sub(codes[place], common.undriven[place]);
-            row.largest = super::larger(row.largest, portable::sub(*net, common.dead));
-            sag = portable::dot(*net, common.sag, sag);
-            sum = portable::dot(*net, row.gains[place], sum);
-            moment = portable::dot(*net, row.moments[place], moment);
+        for (number, block) in nets[..pairs].chunks_mut(BLOCK).enumerate() {
+            let (mut block_sum, mut block_moment) = (0, 0);
+            for (at, net) in (BLOCK * number..).zip(block) {
+                *net = portable::sub(codes_at(codes, at), codes_at(&common.undriven, at));
+                let above = filled::<COLUMNS>(portable::sub(*net, common.dead), at);
+                row.largest = super::larger(row.largest, above);
+                sag = portable::dot(*net, common.sag, sag);
+                block_sum = portable::dot(*net, weights_at(&row.gains, at), block_sum);
+                block_moment = portable::dot(*net, weights_at(&row.moments, at), block_moment);
+            }
+            sum = i32::wrapping_add(sum, block_sum >> drop);
+            moment = moment.wrapping_add(block_moment);
         }
         total.largest = super::larger(total.largest, row.largest);
         row.boost = boost(sag);
         let short = row.boost >> BOOST_DROP;
-        for (place, net) in nets.into_iter().enumerate() {
-            let (left, right) = (place, place + PLACES);
-            taxels[left] = taxel(low(net), low(row.gains[place]), short, row.tare[left]);
-            taxels[right] = taxel(high(net), high(row.gains[place]), short, row.tare[right]);
-            total.peak = total.peak.max(taxels[left]).max(taxels[right]);
+        for (at, net) in nets.into_iter().enumerate().take(pairs) {
+            let gains = weights_at(&row.gains, at);
+            let (left, right) = (at, at + pairs);
+            taxels[left] = taxel(low(net), low(gains), short, row.tare[left]);
+            total.peak = total.peak.max(taxels[left]);
+            if right < COLUMNS {
+                taxels[right] = taxel(high(net), high(gains), short, row.tare[right]);
+                total.peak = total.peak.max(taxels[right]);
+            }
         }
         total.first = portable::add_high(total.first, sum, row.boost);
         total.second = portable::add_high(total.second, moment, row.boost);
@@ -129,68 +249,4 @@ mod instructions;
 pub use instructions::pass;
 
 #[cfg(test)]
-mod tests {
-    use super::super::pair;
-    use super::{BOOST_BITS, Common, PLACES, Row, boost, pass};
-
-    const ONE: f64 = (1_u64 << 32) as f64;
-
-    #[test]
-    fn the_boost_takes_the_sag_out() {
-        let (mut ends, mut usual) = (0.0_f64, 0.0_f64);
-        for x in (-1_370_000_000..=1_370_000_000).step_by(100_003) {
-            let exact = f64::from(1 << BOOST_BITS) / (1.0 - f64::from(x) / ONE);
-            let error = (f64::from(boost(x)) - exact).abs() / exact;
-            ends = ends.max(error);
-            if x.abs() < 300_000_000 {
-                usual = usual.max(error);
-            }
-        }
-        let unit = 1.0 / f64::from(1 << BOOST_BITS);
-        assert!(ends < 1.2 / 1_048_576.0 && ends > 0.8 / 1_048_576.0, "{ends:e}");
-        assert!(usual < 4.0 * unit && usual > unit, "{usual:e}");
-    }
-
-    #[test]
-    fn a_pass_is_what_its_parts_say() {
-        let codes = [[0x0102_0304, 5, 6 << 16, 0x0fff_0fff, 9], [0x0001_0002, 0, 0, 0, 0x0100_0001]];
-        let common = Common { undriven: [1, 2, 1 << 16, 0x0ffe_0ffe, 3], dead: 2 | 2 << 16, sag: 3 | 3 << 16 };
-        let tare = [5 << 16, -(3 << 16), 0, 0, 7, 9 << 12, 0, 0, -1, 1 << 20];
-        let (gains, moments) = ([2 << 14 | 1 << 30; PLACES], [0xffff, 3, 0, 0, 5]);
-        let mut rows = [Row { gains, moments, tare, boost: 0, largest: 7 }; 2];
-        let mut taxels = [[0; 10]; 2];
-        let total = pass(&codes, &mut rows, &common, &mut taxels);
-        let lanes = |pair: u32| [i64::from(pair as u16 as i16), i64::from((pair >> 16) as u16 as i16)];
-        let (mut first, mut second, mut running, mut peak, mut all) = (0, 0, 0, 0, [0; 2]);
-        for ((codes, row), taxels) in codes.iter().zip(&rows).zip(taxels) {
-            let net = |column: usize| {
-                let [place, lane] = [column % PLACES, column / PLACES];
-                lanes(codes[place])[lane] - lanes(common.undriven[place])[lane]
-            };
-            let by = |weights: [u32; 5], column: usize| lanes(weights[column % PLACES])[column / PLACES];
-            assert_eq!(row.boost, boost((0..10).map(|column| 3 * net(column)).sum::<i64>() as i32));
-            let mut largest = [0; 2];
-            for (column, taxel) in taxels.into_iter().enumerate() {
-                let exact = net(column) as f64 * by(gains, column) as f64 / 16_384.0 * f64::from(row.boost);
-                let exact = 16.0 * exact / f64::from(1 << BOOST_BITS) - f64::from(tare[column] >> 12);
-                assert!((f64::from(taxel) - exact).abs() <= 0.51, "{column}: {taxel}, not {exact}");
-                peak = peak.max(taxel);
-                let above = (net(column) - 2) as u16;
-                largest[column / PLACES] = above.max(largest[column / PLACES]);
-            }
-            assert_eq!(row.largest, pair(largest[0] as i16, largest[1] as i16), "{:x}", row.largest);
-            all = [0, 1].map(|lane| largest[lane].max(all[lane]));
-            let boosted =
-                |weights| ((0..10).map(|c| net(c) * by(weights, c)).sum::<i64>() * i64::from(row.boost)) >> 32;
-            first += boosted(gains);
-            second += boosted(moments);
-            running += first >> 2;
-        }
-        assert_eq!([total.first, total.second, total.running].map(i64::from), [first, second, running]);
-        assert_eq!(total.peak, peak);
-        assert!(peak > 1_000, "there is one");
-        // The second row's codes below their levels are huge.
-        assert_eq!(total.largest, pair(all[0] as i16, all[1] as i16), "{:x}", total.largest);
-        assert!(all.into_iter().all(|largest| largest > 0xff00), "{all:x?}");
-    }
-}
+mod tests;

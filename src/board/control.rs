@@ -5,11 +5,11 @@
 use embassy_stm32::peripherals::IWDG;
 use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::command::Command;
-use fingertip::config::Config;
-use fingertip::frame::{Frame, Sense};
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::{Bridge as Wanted, Pipeline};
+use fingertip::pipeline::Bridge as Wanted;
 use fingertip::scan::deadline_ticks;
+use fingertip::shipped::{Config, Frame, Pipeline};
 use fingertip::state::Fault;
 
 use super::bridge::{self, Bridge};

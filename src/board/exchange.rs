@@ -6,9 +6,9 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use fingertip::command::Command;
-use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::{COLUMNS, Frame, ROWS};
 
 /// What control reports after every step, and after every trip of the guard.
 #[derive(Clone, Copy, Default)]

@@ -4,7 +4,8 @@
 
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
-use fingertip::link::{Actions, Reply, Server, Snapshot};
+use fingertip::link::{Actions, Reply};
+use fingertip::shipped::{Server, Snapshot};
 use fingertip::state::Mode;
 use fingertip::store::Record;
 

@@ -14,8 +14,9 @@ use embassy_stm32::peripherals::{ADC1, ADC2, DMA2_CH0, DMA2_CH1, DMA2_CH2, TIM8}
 use embassy_stm32::{Peri, pac, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use fingertip::frame::{BANK_COLUMNS, BANKS, Frame, ROWS, SLOTS};
+use fingertip::frame::BANKS;
 use fingertip::scan::ScanTiming;
+use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 
 use super::{converter, guard, pins};
 use machine::*;
@@ -135,13 +136,12 @@ impl Scan {
 #[inline(never)]
 fn copy_slots(half: usize, slots: usize, frame: &mut Frame) {
     let banks = BUFFERS[0][half].iter().zip(&BUFFERS[1][half]);
-    for (pairs, (bank_a, bank_b)) in frame.pairs.iter_mut().zip(banks).take(slots) {
-        // Written out: the compiler would keep a loop of five.
-        let pair = |place: usize| {
-            let (low, high) = (bank_a[place].load(Ordering::Relaxed), bank_b[place].load(Ordering::Relaxed));
-            u32::from(low) | u32::from(high) << 16
-        };
-        *pairs = [pair(0), pair(1), pair(2), pair(3), pair(4)];
+    for (slot, (bank_a, bank_b)) in banks.enumerate().take(slots) {
+        let Some(codes) = frame.codes.slot_mut(slot) else { break };
+        lanes::each_pair::<COLUMNS>(|at| {
+            let pair = [bank_a[at].load(Ordering::Relaxed), bank_b[at].load(Ordering::Relaxed)];
+            (codes[2 * at], codes[2 * at + 1]) = pair.into();
+        });
     }
     fence(Ordering::Acquire);
 }

@@ -10,7 +10,6 @@
 //! where s is what is left between the plane and the hemisphere's centre, `1 - d`, and `L1 = sqrt(1 - r^2 - h^2/6 + h r)`
 //! and `L2 = sqrt(1 - r^2 - h^2/6 - h r)` are the columns' lengths at the near and the far end of the spread.
 
-use crate::frame::COLUMNS;
 use crate::params::Params;
 use crate::root::floor_sqrt;
 
@@ -43,8 +42,8 @@ pub(crate) struct Node {
 pub struct Geometry {
     /// h, Q28.
     pub(crate) pitch: i32,
-    /// Middles of the columns, and of the rows, Q15.
-    pub(crate) places: [i32; COLUMNS],
+    /// How far from the array's middle a contact's centre may lie: a radius beyond its edge along the columns and the rows, Q24.
+    pub(crate) reach: [i32; 2],
     /// 2/h, Q20.
     pub(crate) inverse_half_pitch: i32,
     /// 2^56 over the tip's radius in units of its last place.
@@ -57,15 +56,10 @@ pub struct Geometry {
 
 impl Geometry {
     /// The geometry that these parameters describe. In integers; they must have been checked.
-    pub(crate) fn new(params: &Params) -> Self {
+    pub(crate) fn new(params: &Params, rows: usize, columns: usize) -> Self {
         let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
         let pitch = ((pitch_um << SQUARE_BITS) / radius_um) as i32;
-        let half_pitches = |n: i64| (((n * pitch_um) << (PLACE_BITS - 1)) / radius_um) as i32;
         let units_q8 = i64::from(params.modulus_pa) * i64::from(params.codes_per_kpa_milli) * (16 << 8) / 1_000_000;
-        let mut places = [0; COLUMNS];
-        for (place, weight) in places.iter_mut().zip((1 - COLUMNS as i64..).step_by(2)) {
-            *place = half_pitches(weight);
-        }
         let mut nodes = [Node::default(); NODES];
         for (index, node) in nodes.iter_mut().enumerate().skip(1) {
             *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));
@@ -82,13 +76,23 @@ impl Geometry {
         };
         Self {
             pitch,
-            places,
+            reach: [columns, rows].map(|side| ((side as i32 * (pitch >> 4)) >> 1) + (1 << (SQUARE_BITS - 4))),
             inverse_half_pitch: ((radius_um << 21) / pitch_um.max(1)) as i32,
             inverse_radius: ((1_i64 << 32) * 1000 / radius_um) as i32,
             modulus_q8: units_q8.max(1).min(i64::from(u32::MAX)) as u32,
             nodes,
         }
     }
+}
+
+/// Middles of so many columns or rows from the array's middle in tip radii, Q15.
+pub(crate) fn places<const SIDE: usize>(params: &Params) -> [i32; SIDE] {
+    let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
+    let mut places = [0; SIDE];
+    for (place, half_pitches) in places.iter_mut().zip((1 - SIDE as i64..).step_by(2)) {
+        *place = (((half_pitches * pitch_um) << (PLACE_BITS - 1)) / radius_um) as i32;
+    }
+    places
 }
 
 impl Node {

@@ -22,12 +22,16 @@ pub(super) fn of_fit(ratio: i32, confidence: u8) -> u8 {
 }
 
 /// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on or where a bad taxel hides a part.
-pub(super) fn of_sums(sums: &Contact, picture: &Picture, config: &Config) -> u8 {
+pub(super) fn of_sums<const ROWS: usize, const COLUMNS: usize>(
+    sums: &Contact,
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> u8 {
     if hides(sums, picture, config) {
         return u8::MAX;
     }
     let half_pitch = config.half_pitch.to_bits() >> 4;
-    ramp(overhang(sums, config), [half_pitch, 3 * half_pitch])
+    ramp(overhang::<ROWS, COLUMNS>(sums, config), [half_pitch, 3 * half_pitch])
 }
 
 /// Q8: it comes within some 8 frames and goes within some 64.

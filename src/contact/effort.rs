@@ -1,11 +1,9 @@
 //! How much work the loop puts into the contact of each frame.
 
-use crate::frame::ROWS;
-
 /// How much work the loop puts into the contact of each frame. The numbers are stable: hosts store them.
 ///
-/// A refinement of the model takes each row of the array once, so many rows in a frame. Where it is spread over frames, it begins in
-/// one of its own.
+/// A refinement of the model takes each row of the array once, so many rows in a frame at most. Where it is spread over frames, it begins
+/// in one of its own. How often it comes is said for ten rows; an array with fewer rows than the effort takes has them all in every frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Effort {
@@ -50,14 +48,15 @@ impl Effort {
         Self::from_number(self as u8 + 1)
     }
 
-    /// Rows of the array that the model takes in a frame.
-    pub(super) const fn rows(self) -> usize {
-        match self {
+    /// Rows of an array of so many that the model takes in a frame at most.
+    pub(crate) const fn rows(self, all: usize) -> usize {
+        let rows = match self {
             Self::Sum | Self::Moments => 0,
             Self::OneRow => 1,
             Self::TwoRows => 2,
             Self::FiveRows => 5,
-            Self::AllRows => ROWS,
-        }
+            Self::AllRows => all,
+        };
+        if rows < all { rows } else { all }
     }
 }

@@ -21,7 +21,12 @@ pub(super) struct Fitted {
 
 impl Fitted {
     /// The contact, where the sum makes this force.
-    pub fn contact(self, force: Newtons, picture: &Picture, config: &Config) -> Contact {
+    pub fn contact<const ROWS: usize, const COLUMNS: usize>(
+        self,
+        force: Newtons,
+        picture: &Picture<ROWS, COLUMNS>,
+        config: &Config,
+    ) -> Contact {
         let wide = (i64::from(force.to_bits()) * i64::from(self.ratio)) >> RATIO_BITS;
         let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
         sums::of_force(force, self.centre, picture, config)

@@ -13,15 +13,28 @@ use super::step::{Bench, Equations};
 use super::sums::from_sums;
 use super::view::{Scale, View};
 use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
-use crate::config::Config;
+use crate::config::Shaped;
 use crate::config::geometry::ONE;
 use crate::contact::Contact;
-use crate::frame::ROWS;
+use crate::frame::Shape;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 
-/// A row a frame is taken in steps of this many rows, so that what changes meanwhile is not taken for a slope.
-const ROW_STEP: usize = 3;
+/// A row a frame is taken in steps of so many rows, so that what changes meanwhile is not taken for a slope: three, or the next number that
+/// shares no divisor with the number of rows, so that the steps come to each of them once.
+const fn row_step(rows: usize) -> usize {
+    let mut step = 3;
+    while divisor(step, rows) != 1 {
+        step += 1;
+    }
+    step
+}
+
+/// The largest divisor of both.
+const fn divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
 /// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be found.
 const ASTRAY_MAX: u8 = 12;
 /// Refinements after which a new start is near a solution: until then what was found before counts.
@@ -44,7 +57,7 @@ const FOLLOWS_MAX: i32 = ONE / 16;
 
 /// A contact's fit between frames.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     effort: Effort,
     at_work: bool,
     /// Whether a refinement has begun.
@@ -56,7 +69,7 @@ pub struct Fit {
     /// The contact supposed.
     guess: Guess,
     /// The same, worked out for the taxels.
-    pressed: Pressed,
+    pressed: Pressed<ROWS, COLUMNS>,
     /// By the peak at the beginning.
     scale: Scale,
     /// The sum's force at the beginning.
@@ -65,7 +78,7 @@ pub struct Fit {
     forces: i64,
     /// How far the indentation follows the sum's force: d over twice that force.
     follows: i32,
-    equations: Equations,
+    equations: Equations<ROWS, COLUMNS>,
     confidence: u8,
     /// See [`Contact::doubt`], Q8.
     doubt: u32,
@@ -79,15 +92,16 @@ pub struct Fit {
     fitted: Option<Fitted>,
 }
 
-impl Default for Fit {
+impl<const ROWS: usize, const COLUMNS: usize> Default for Fit<ROWS, COLUMNS> {
     fn default() -> Self {
         Self::new(Effort::default())
     }
 }
 
-impl Fit {
+impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     /// Nothing seen yet.
     pub const fn new(effort: Effort) -> Self {
+        const { Shape::<ROWS, COLUMNS>::CHECKED };
         Self {
             effort,
             at_work: false,
@@ -127,10 +141,10 @@ impl Fit {
     ///
     /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
     /// refinement, 255 before the first.
-    pub fn read(&mut self, picture: &Picture, config: &Config) -> Contact {
+    pub fn read(&mut self, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
         let force = picture.force(config);
         self.at_work = false;
-        if self.effort.rows() == 0 || force < config.contact_off {
+        if self.effort.rows(ROWS) == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);
             let doubt = if force < config.contact_off { 0 } else { doubt::of_sums(&sums, picture, config) };
@@ -149,9 +163,9 @@ impl Fit {
         }
         self.at_work = true;
         // The start has a frame of its own, where a refinement is spread over frames.
-        if !begins || self.effort.rows() == ROWS {
+        if !begins || self.effort.rows(ROWS) == ROWS {
             self.take(force, picture, config);
-            if usize::from(self.frames) * self.effort.rows() >= ROWS {
+            if usize::from(self.frames) * self.effort.rows(ROWS) >= ROWS {
                 self.refine(force, config);
             }
         }
@@ -166,7 +180,7 @@ impl Fit {
     }
 
     /// Begins a refinement. False where the peak is too low for the model.
-    fn start(&mut self, sums: &Contact, picture: &Picture, config: &Config) -> bool {
+    fn start(&mut self, sums: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> bool {
         let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
             return false;
         };
@@ -178,7 +192,7 @@ impl Fit {
         self.guess = self
             .next
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
-        self.pressed = Pressed::new(&self.guess, &scale, &config.geometry);
+        self.pressed = Pressed::new(&self.guess, &scale, config);
         self.scale = scale;
         (self.begun, self.frames) = (true, 0);
         (self.force, self.forces) = (sums.force, 0);
@@ -189,19 +203,20 @@ impl Fit {
     }
 
     /// Takes in the frame's share of the rows.
-    fn take(&mut self, force: Newtons, picture: &Picture, config: &Config) {
+    fn take(&mut self, force: Newtons, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
         let view = View { picture, scale: self.scale };
         self.pressed.rest = self.followed(&self.guess, force);
         let bench = Bench { pressed: &self.pressed, view: &view, geometry: &config.geometry };
-        let (rows, frame) = (self.effort.rows(), usize::from(self.frames));
-        let mut row = if rows == 1 { frame * ROW_STEP % ROWS } else { frame };
+        let (rows, frame) = (self.effort.rows(ROWS), usize::from(self.frames));
+        let mut row = if rows == 1 { frame * const { row_step(ROWS) } % ROWS } else { frame };
         while row < ROWS {
             if self.covered {
                 self.equations.misfit.compare_row(bench, row);
             } else {
                 self.equations.take_row(bench, row);
             }
-            row += ROWS / rows.max(1);
+            // As many frames as it takes: a row of every so many.
+            row += ROWS.div_ceil(rows.max(1));
         }
         self.forces += i64::from(force.to_bits());
         self.frames += 1;
@@ -215,9 +230,9 @@ impl Fit {
     }
 
     /// Ends a refinement.
-    fn refine(&mut self, force: Newtons, config: &Config) {
+    fn refine(&mut self, force: Newtons, config: &Shaped<ROWS, COLUMNS>) {
         self.begun = false;
-        self.confidence = confidence(&self.equations.misfit, &self.scale);
+        self.confidence = confidence::<ROWS, COLUMNS>(&self.equations.misfit, &self.scale);
         if self.covered {
             self.settle(1 << RATIO_BITS, None);
             return;
@@ -268,7 +283,7 @@ impl Fit {
     }
 
     /// How far the force is known only from below in this frame.
-    fn target_doubt(&self, contact: &Contact, picture: &Picture, config: &Config) -> u8 {
+    fn target_doubt(&self, contact: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> u8 {
         match self.fitted {
             _ if self.covered => 0,
             Some(fitted) => doubt::of_fit(fitted.ratio, self.confidence),
@@ -288,4 +303,27 @@ impl Fit {
     }
 }
 
-const _: () = assert!(ROWS == 10, "rows divide by 2, 5 and 10, and a step of 3 rows comes to each of them once");
+#[cfg(test)]
+mod tests {
+    use super::{Effort, divisor, row_step};
+
+    #[test]
+    fn every_row_comes_once() {
+        assert_eq!([3, 4, 8, 9, 10, 15, 16].map(row_step), [4, 3, 3, 4, 3, 4, 3]);
+        for rows in 3..=16 {
+            assert_eq!(divisor(row_step(rows), rows), 1);
+            let mut seen: std::vec::Vec<_> = (0..rows).map(|frame| frame * row_step(rows) % rows).collect();
+            seen.sort_unstable();
+            assert!(seen.into_iter().eq(0..rows));
+            for effort in [Effort::TwoRows, Effort::FiveRows, Effort::AllRows] {
+                let most = effort.rows(rows);
+                let frames = (1..).find(|frames| frames * most >= rows).unwrap();
+                let stride = rows.div_ceil(most);
+                assert_eq!(frames, stride);
+                let taken = |frame: usize| (frame..rows).step_by(stride);
+                assert!((0..frames).all(|frame| (1..=most).contains(&taken(frame).count())));
+                assert_eq!((0..frames).flat_map(taken).count(), rows);
+            }
+        }
+    }
+}

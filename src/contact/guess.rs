@@ -2,8 +2,8 @@
 
 use super::arith::{between, high, root, within};
 use super::view::Scale;
+use crate::config::Shaped;
 use crate::config::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
-use crate::frame::{COLUMNS, ROWS};
 use crate::model::Tip;
 use crate::units::Millimetres;
 
@@ -32,9 +32,9 @@ pub(super) struct Guess {
 impl Guess {
     /// The nearest that the fit covers: the centre within a radius of the array.
     pub fn new(rest: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
-        let limit = (5 * (geometry.pitch >> 4)) + (1 << CENTRE_BITS);
-        let centre = |value: i32| within(value.into(), limit);
-        Self { rest: rest.min(REST_MAX).max(REST_MIN), x: centre(x), y: centre(y) }
+        let [reach_x, reach_y] = geometry.reach;
+        let centre = |value: i32, reach: i32| within(value.into(), reach);
+        Self { rest: rest.min(REST_MAX).max(REST_MIN), x: centre(x, reach_x), y: centre(y, reach_y) }
     }
 
     /// From lengths.
@@ -85,7 +85,7 @@ pub(super) struct Felt {
 
 /// A guess worked out for all taxels.
 #[derive(Clone, Debug)]
-pub(super) struct Pressed {
+pub(super) struct Pressed<const ROWS: usize, const COLUMNS: usize> {
     pub rest: i32,
     /// s^3, Q27.
     rest_cube_q27: i32,
@@ -105,7 +105,7 @@ pub(super) struct Pressed {
     pub dy: [i32; ROWS],
 }
 
-impl Pressed {
+impl<const ROWS: usize, const COLUMNS: usize> Pressed<ROWS, COLUMNS> {
     /// Of nothing.
     pub const NONE: Self = Self {
         rest: 0,
@@ -120,14 +120,14 @@ impl Pressed {
         dy: [0; ROWS],
     };
 
-    pub fn new(guess: &Guess, scale: &Scale, geometry: &Geometry) -> Self {
+    pub fn new(guess: &Guess, scale: &Scale, config: &Shaped<ROWS, COLUMNS>) -> Self {
+        let geometry = &config.geometry;
         // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
         let widened = guess.rim_square() + high(geometry.pitch, geometry.pitch) / 12 * 16;
         let middle = root((widened as u32) << 2) as i32;
         let half = geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1);
         let square_of = |place: i32| square(place.max(0)).min(SQUARE_MAX);
-        let from = |centre: i32| geometry.places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)));
-        let dx = from(guess.x);
+        let dx = from(&config.columns, guess.x);
         Self {
             rest: guess.rest,
             rest_cube_q27: high(guess.rest_square(), guess.rest) << 3,
@@ -138,7 +138,7 @@ impl Pressed {
             modulus_shift: scale.modulus_shift,
             dx,
             dx_square: dx.map(square),
-            dy: from(guess.y),
+            dy: from(&config.rows, guess.y),
         }
     }
 
@@ -169,6 +169,12 @@ impl Pressed {
             by_square: slope,
         }
     }
+}
+
+/// Places from a centre, Q15.
+#[inline(always)]
+fn from<const SIDE: usize>(places: &[i32; SIDE], centre: i32) -> [i32; SIDE] {
+    places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)))
 }
 
 /// The nodes around a squared distance, and its share of the way between them in Q31.

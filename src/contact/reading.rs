@@ -21,6 +21,6 @@ pub struct Contact {
     pub confidence: u8,
     /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit says how much.
     pub doubt: u8,
-    /// Taxels left out because they are dead or saturated.
+    /// Taxels left out because they are dead or saturated; 255 stands for more.
     pub bad_taxels: u8,
 }

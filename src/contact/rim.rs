@@ -6,7 +6,7 @@
 
 use super::arith::{between, root};
 use super::guess::{Guess, interval};
-use super::view::View;
+use super::view::Scale;
 use crate::config::geometry::{Geometry, ONE, PLACE_BITS, SQUARE_BITS};
 
 /// 1/sqrt(3), Q15: Gauss points on -1 to 1.
@@ -31,7 +31,7 @@ pub(super) struct Rim<'a> {
 }
 
 impl<'a> Rim<'a> {
-    pub fn new(guess: &Guess, view: &View, geometry: &'a Geometry) -> Self {
+    pub fn new(guess: &Guess, scale: &Scale, geometry: &'a Geometry) -> Self {
         let half = (geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1)).max(1);
         let lift = (ONE - guess.rest).leading_zeros();
         Self {
@@ -41,8 +41,8 @@ impl<'a> Rim<'a> {
             half,
             line: (half * GAUSS) >> 15,
             lift,
-            scale: (view.scale.modulus.unsigned_abs() << view.scale.modulus_shift) / half.unsigned_abs(),
-            scale_shift: view.scale.modulus_shift,
+            scale: (scale.modulus.unsigned_abs() << scale.modulus_shift) / half.unsigned_abs(),
+            scale_shift: scale.modulus_shift,
         }
     }
 

@@ -11,7 +11,6 @@ use super::guess::{CENTRE_BITS, Guess};
 use super::step::Taxels;
 use super::view::{PEAK_BITS, View};
 use crate::config::geometry::{Geometry, ONE, SQUARE_BITS};
-use crate::frame::{COLUMNS, ROWS};
 
 /// Taxels below an eighth of the peak are left out: the rim crosses most of them.
 const SHARE_MIN: i32 = 1 << (PEAK_BITS - 3);
@@ -21,10 +20,20 @@ const WEIGHT_DROP: u32 = PEAK_BITS - 6;
 const STRAIN_MAX: i32 = 5 << 13;
 /// Fractional bits of a taxel's z.
 const Z_BITS: u32 = 14;
-/// Bits dropped from weighted z, so that their moments fit 32 bits.
-const Z_DROP: u32 = 2;
-/// Fractional bits of sums of z.
-const Z_SUM_BITS: u32 = Z_BITS - Z_DROP;
+/// Bits dropped from weighted z, so that their moments fit 32 bits: 2 of 10 x 10 and 16 x 16, 4 of 16 x 32.
+///
+/// A weighted z is at most 64 x 100,124 by [`STRAIN_MAX`]; what of a moment has one sign has the weights 1, 3, 5 .. of half of the places,
+/// which are a quarter of their number's square. Sums without z fit as they are: 64 x^3 over half of 16 x 32 taxels is 1.6e8. About the middle
+/// 64 bits are used.
+const fn z_drop(rows: usize, columns: usize) -> u32 {
+    let side = if rows > columns { rows } else { columns };
+    let mut drop = 2;
+    while (64 * 100_124_u64 >> drop) * (rows * columns * side / 4) as u64 >= 1 << 31 {
+        drop += 1;
+    }
+    drop
+}
+
 /// Fractional bits of means, slopes and the quadratic equation.
 const BITS: u32 = 20;
 /// Fractional bits of sums about the middle.
@@ -54,11 +63,12 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(view: &View, mut which: Taxels) -> Self {
+    fn of<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS>, mut which: Taxels) -> Self {
+        let z_drop = const { z_drop(ROWS, COLUMNS) };
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
         let inverse_modulus = (view.scale.inverse_modulus >> (24 - view.scale.modulus_shift)) as i32;
-        while let Some((row, mut column, stride)) = which.next_row() {
+        while let Some((row, mut column, stride)) = which.next_row(ROWS) {
             let taxels = &view.picture.taxels[row];
             let y = 2 * row as i32 + 1 - ROWS as i32;
             let (mut n, mut sx, mut sxx, mut sxxx, mut z, mut zx) = (0, 0, 0, 0, 0, 0);
@@ -78,8 +88,8 @@ impl Sums {
                 sx += wx;
                 sxx += wx * x;
                 sxxx += wx * x * x;
-                z += wz >> Z_DROP;
-                zx += (wz >> Z_DROP) * x;
+                z += wz >> z_drop;
+                zx += (wz >> z_drop) * x;
             }
             all.n += n;
             all.x += sx;
@@ -98,35 +108,39 @@ impl Sums {
 }
 
 /// The plane's guess; None where the taxels lie on one line, or fit no contact.
-pub(super) fn plane(view: &View, which: Taxels, geometry: &Geometry) -> Option<Guess> {
+pub(super) fn plane<const ROWS: usize, const COLUMNS: usize>(
+    view: &View<ROWS, COLUMNS>,
+    which: Taxels,
+    geometry: &Geometry,
+) -> Option<Guess> {
+    // Fractional bits of sums of z.
+    let z_sum_bits = const { Z_BITS - z_drop(ROWS, COLUMNS) };
     let sums = Sums::of(view, which);
     let by_n = Divisor::new(sums.n.unsigned_abs().into());
     let (x, y) = (by_n.divide(sums.x.into(), BITS), by_n.divide(sums.y.into(), BITS));
 
     // Sums about the middle, Q4.
-    let scaled = |mean: i32, other: i32| ((i64::from(mean) * i64::from(other)) >> (BITS - ABOUT_BITS)) as i32;
-    let about = |sum: i32, mean: i32, other: i32| (sum << ABOUT_BITS) - scaled(mean, other);
+    let about = |sum: i32, mean: i32, other: i32| {
+        (i64::from(sum) << ABOUT_BITS) - ((i64::from(mean) * i64::from(other)) >> (BITS - ABOUT_BITS))
+    };
     let xx = about(sums.xx, x, sums.x);
     let xy = about(sums.xy, x, sums.y);
     let yy = about(sums.yy, y, sums.y);
     let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
-    let determinant = product(xx, yy) - product(xy, xy);
+    let determinant = xx * yy - xy * xy;
     if determinant < DETERMINANT_MIN {
         return None;
     }
     let by_determinant = Divisor::new(determinant.unsigned_abs());
-    let slope = |with_x: i32, with_y: i32, bits: u32| {
-        [
-            by_determinant.divide(product(with_x, yy) - product(with_y, xy), bits),
-            by_determinant.divide(product(with_y, xx) - product(with_x, xy), bits),
-        ]
+    let slope = |with_x: i64, with_y: i64, bits: u32| {
+        [by_determinant.divide(with_x * yy - with_y * xy, bits), by_determinant.divide(with_y * xx - with_x * xy, bits)]
     };
-    let z_about = |sum: i32, mean: i32| sum - (product(mean, sums.z) >> BITS) as i32;
-    let z_slope = slope(z_about(sums.zx, x), z_about(sums.zy, y), BITS + ABOUT_BITS - Z_SUM_BITS);
+    let z_about = |sum: i32, mean: i32| i64::from(sum) - (product(mean, sums.z) >> BITS);
+    let z_slope = slope(z_about(sums.zx, x), z_about(sums.zy, y), BITS + ABOUT_BITS - z_sum_bits);
     // About the middle, the squared length's slope against x and y.
-    let cube_about = |cube: i32, mean: i32, along: i32, across: i32, other: i32| {
-        let twice = product(mean, along) + product(other, across);
-        about(cube, mean, sums.xx + sums.yy) - (twice >> (BITS - 1)) as i32
+    let cube_about = |cube: i32, mean: i32, along: i64, across: i64, other: i32| {
+        let twice = i64::from(mean) * along + i64::from(other) * across;
+        about(cube, mean, sums.xx + sums.yy) - (twice >> (BITS - 1))
     };
     let k = slope(cube_about(sums.x_cube, x, xx, xy, y), cube_about(sums.y_cube, y, yy, xy, x), BITS);
 
@@ -135,7 +149,7 @@ pub(super) fn plane(view: &View, which: Taxels, geometry: &Geometry) -> Option<G
     let g = z_slope.map(|slope| within(product(slope, geometry.inverse_half_pitch) >> 20, SLOPE_MAX));
     let k = k.map(|slope| within(to_radii(slope).into(), SKEW_MAX));
     let own = to_radii(2 << BITS) / 3;
-    let spread = to_radii(to_radii(by_n.divide((xx + yy).into(), BITS - ABOUT_BITS)) + own);
+    let spread = to_radii(to_radii(by_n.divide(xx + yy, BITS - ABOUT_BITS)) + own);
 
     // S^2 g^2/4 + S (m + g k/2) + k^2/4 + V - 1 = 0 for S = s^2.
     let dot = |a: [i32; 2], b: [i32; 2]| {
@@ -143,7 +157,7 @@ pub(super) fn plane(view: &View, which: Taxels, geometry: &Geometry) -> Option<G
         (product(ax, bx) + product(ay, by)) >> BITS
     };
     let quadratic = dot(g, g) >> 2;
-    let linear = i64::from(by_n.divide(sums.z.into(), BITS - Z_SUM_BITS)) + (1 << BITS) + (dot(g, k) >> 1);
+    let linear = i64::from(by_n.divide(sums.z.into(), BITS - z_sum_bits)) + (1 << BITS) + (dot(g, k) >> 1);
     let constant = (1 << BITS) - i64::from(spread) - (dot(k, k) >> 2);
     if constant <= 0 {
         return None;

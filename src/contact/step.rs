@@ -9,7 +9,6 @@ use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
 use super::rim::Rim;
 use super::view::{PEAK_BITS, Scale, View};
 use crate::config::geometry::{Geometry, PLACE_BITS};
-use crate::frame::{COLUMNS, ROWS};
 
 /// A residual stops at half of the peak.
 const RESIDUAL_LIMIT: i32 = 1 << (PEAK_BITS - 1);
@@ -22,7 +21,7 @@ const CENTRE_STEP: i32 = 1 << 21;
 /// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
-/// How far the model and the picture are apart; squares count 2^-24 of the peak's.
+/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less [`Bits::ALL`] bits: 2^-24 of ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Misfit {
     /// Sum of the squared residuals of live taxels within the model's contact.
@@ -42,7 +41,7 @@ impl Misfit {
 
 /// Sums over a row: rest is `a`, square times weight is `k`, of which the place makes the centre's slope.
 #[derive(Clone, Copy, Debug, Default)]
-struct Row {
+struct Row<const ROWS: usize, const COLUMNS: usize> {
     rest_rest: i32,
     rest_square: i32,
     rest_x: i32,
@@ -55,12 +54,36 @@ struct Row {
     misfit: Misfit,
 }
 
-/// Bits dropped from a row's sums, so that ten rows fit 32 bits.
-const ROW_DROP: u32 = 4;
+/// Bits dropped from sums over the taxels, so that they fit 32 bits.
+///
+/// A slope is at most 1.5, at the rim, and the squares of a row's slopes average 2 at most, in Q26. What all rows add up to has another
+/// bit to spare. A row loses four bits at least, so that its shifted place, up to two radii, fits too.
+pub(super) struct Bits<const ROWS: usize, const COLUMNS: usize>;
 
-/// The normal equations, Q22.
+impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
+    /// From a taxel's part of its row: none up to 15 columns, 2 of 32.
+    const TAXEL: u32 = {
+        let mut drop = 0;
+        while (COLUMNS as u64) << 27 >> drop >= 1 << 31 {
+            drop += 1;
+        }
+        drop
+    };
+    /// From a row's sums: 4 of 10 x 10, 5 of 16 x 16 and 16 x 32.
+    const ROW: u32 = {
+        let mut drop = 4;
+        while ((ROWS * COLUMNS) as u64) << 28 >> (Self::TAXEL + drop) >= 1 << 31 {
+            drop += 1;
+        }
+        drop
+    };
+    /// From both.
+    pub const ALL: u32 = Self::TAXEL + Self::ROW;
+}
+
+/// The normal equations, Q26 less [`Bits::ALL`]: Q22 of ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Equations {
+pub(super) struct Equations<const ROWS: usize, const COLUMNS: usize> {
     matrix: [i32; 6],
     right: [i32; 3],
     /// At the guess.
@@ -86,9 +109,9 @@ impl Taxels {
 
     /// The next row, its first column and the distance to the next column.
     #[inline(always)]
-    pub const fn next_row(&mut self) -> Option<(usize, usize, usize)> {
+    pub const fn next_row(&mut self, rows: usize) -> Option<(usize, usize, usize)> {
         let (row, first) = (self.row, self.first);
-        if row >= ROWS {
+        if row >= rows {
             return None;
         }
         self.row += 1;
@@ -99,35 +122,41 @@ impl Taxels {
 
 /// What a row's taxels are compared with.
 #[derive(Clone, Copy)]
-pub(super) struct Bench<'a> {
-    pub pressed: &'a Pressed,
-    pub view: &'a View<'a>,
+pub(super) struct Bench<'a, const ROWS: usize, const COLUMNS: usize> {
+    pub pressed: &'a Pressed<ROWS, COLUMNS>,
+    pub view: &'a View<'a, ROWS, COLUMNS>,
     pub geometry: &'a Geometry,
 }
 
 impl Misfit {
     /// How far the model and the picture are apart, where it is not to be refined.
-    pub fn compare(&mut self, bench: Bench, mut which: Taxels) {
-        while let Some((row, first, stride)) = which.next_row() {
+    pub fn compare<const ROWS: usize, const COLUMNS: usize>(&mut self, bench: Bench<ROWS, COLUMNS>, mut which: Taxels) {
+        while let Some((row, first, stride)) = which.next_row(ROWS) {
             self.add(bench, row, first, stride);
         }
     }
 
     /// The same of a row.
     #[inline(never)]
-    pub fn compare_row(&mut self, bench: Bench, row: usize) {
+    pub fn compare_row<const ROWS: usize, const COLUMNS: usize>(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize) {
         self.add(bench, row, 0, 1);
     }
 
     #[inline(always)]
-    fn add(&mut self, Bench { pressed, view, geometry }: Bench, row: usize, first: usize, stride: usize) {
+    fn add<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        Bench { pressed, view, geometry }: Bench<ROWS, COLUMNS>,
+        row: usize,
+        first: usize,
+        stride: usize,
+    ) {
         let (Some(taxels), Some(bad), Some(dy)) =
             (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
         else {
             return;
         };
         let dy_square = square(*dy);
-        let mut bad = u32::from(*bad) >> first;
+        let mut bad = *bad >> first;
         let mut row = Self::NONE;
         let mut column = first;
         while column < COLUMNS {
@@ -137,23 +166,23 @@ impl Misfit {
                 if at < pressed.outside {
                     row.taxels += 1;
                     let residual = residual(share - pressed.felt(at, &geometry.nodes).pressure);
-                    row.inside += residual * residual;
+                    row.inside += (residual * residual) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 } else {
                     row.others += 1;
-                    row.outside += residual(share) * residual(share);
+                    row.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
             column += stride;
             bad >>= stride;
         }
-        self.add_row(&row);
+        self.add_row::<ROWS, COLUMNS>(&row);
     }
 
-    fn add_row(&mut self, row: &Self) {
+    fn add_row<const ROWS: usize, const COLUMNS: usize>(&mut self, row: &Self) {
         self.taxels += row.taxels;
         self.others += row.others;
-        self.inside += row.inside >> ROW_DROP;
-        self.outside += row.outside >> ROW_DROP;
+        self.inside += row.inside >> Bits::<ROWS, COLUMNS>::ROW;
+        self.outside += row.outside >> Bits::<ROWS, COLUMNS>::ROW;
     }
 }
 
@@ -177,39 +206,40 @@ fn noise_weight(pressure: i32) -> i32 {
     (ratio * ratio) >> SLOPE_BITS
 }
 
-impl Row {
+impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
     #[inline(always)]
     fn add(&mut self, felt: &Felt, dx: i32, residual: i32, weight: i32) {
         let rest = (weight * felt.by_rest) >> SLOPE_BITS;
         let square = (weight * felt.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
         let x = (felt.by_square * dx) >> PLACE_BITS;
-        self.rest_rest += rest * felt.by_rest;
-        self.rest_square += rest * felt.by_square;
-        self.rest_x += rest * x;
-        self.square_square += square * felt.by_square;
-        self.square_x += square * x;
-        self.x_x += weighted_x * x;
-        self.rest += rest * residual;
-        self.square += square * residual;
-        self.x += weighted_x * residual;
-        self.misfit.inside += residual * residual;
+        let drop = Bits::<ROWS, COLUMNS>::TAXEL;
+        self.rest_rest += (rest * felt.by_rest) >> drop;
+        self.rest_square += (rest * felt.by_square) >> drop;
+        self.rest_x += (rest * x) >> drop;
+        self.square_square += (square * felt.by_square) >> drop;
+        self.square_x += (square * x) >> drop;
+        self.x_x += (weighted_x * x) >> drop;
+        self.rest += (rest * residual) >> drop;
+        self.square += (square * residual) >> drop;
+        self.x += (weighted_x * residual) >> drop;
+        self.misfit.inside += (residual * residual) >> drop;
     }
 }
 
-impl Equations {
+impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
     /// Without a taxel.
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
     /// Takes in taxels.
-    pub fn take(&mut self, bench: Bench, mut which: Taxels) {
-        while let Some((row, first, stride)) = which.next_row() {
+    pub fn take(&mut self, bench: Bench<ROWS, COLUMNS>, mut which: Taxels) {
+        while let Some((row, first, stride)) = which.next_row(ROWS) {
             self.take_part(bench, row, first, stride, None);
         }
     }
 
     /// Takes in all taxels, and works those under the rim out by it.
-    pub fn take_closely(&mut self, bench: Bench, rim: &Rim) {
+    pub fn take_closely(&mut self, bench: Bench<ROWS, COLUMNS>, rim: &Rim) {
         for row in 0..ROWS {
             self.take_part(bench, row, 0, 1, Some(rim));
         }
@@ -217,12 +247,12 @@ impl Equations {
 
     /// Takes in a row.
     #[inline(never)]
-    pub fn take_row(&mut self, bench: Bench, row: usize) {
+    pub fn take_row(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize) {
         self.take_part(bench, row, 0, 1, None);
     }
 
     #[inline(always)]
-    fn take_part(&mut self, bench: Bench, row: usize, first: usize, stride: usize, rim: Option<&Rim>) {
+    fn take_part(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize, first: usize, stride: usize, rim: Option<&Rim>) {
         let Bench { pressed, view, geometry } = bench;
         let (Some(taxels), Some(bad), Some(dy)) =
             (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
@@ -230,8 +260,8 @@ impl Equations {
             return;
         };
         let dy_square = square(*dy);
-        let mut bad = u32::from(*bad) >> first;
-        let mut sums = Row::default();
+        let mut bad = *bad >> first;
+        let mut sums = Row::<ROWS, COLUMNS>::default();
         let mut column = first;
         while column < COLUMNS {
             if bad & 1 == 0 {
@@ -248,7 +278,7 @@ impl Equations {
                     sums.add(&felt, dx, residual(share - felt.pressure), weight);
                 } else {
                     sums.misfit.others += 1;
-                    sums.misfit.outside += residual(share) * residual(share);
+                    sums.misfit.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
             column += stride;
@@ -257,21 +287,22 @@ impl Equations {
         self.add(&sums, *dy);
     }
 
-    fn add(&mut self, row: &Row, dy: i32) {
+    fn add(&mut self, row: &Row<ROWS, COLUMNS>, dy: i32) {
+        let drop = Bits::<ROWS, COLUMNS>::ROW;
         // A row within reach lies within two radii, so this fits; elsewhere the sums are 0.
-        let dy = dy << (32 - PLACE_BITS - ROW_DROP);
+        let dy = dy << (32 - PLACE_BITS - drop);
         let [ss, sx, sy, xx, xy, yy] = &mut self.matrix;
-        *ss += row.rest_rest >> ROW_DROP;
-        *sx -= row.rest_x >> ROW_DROP;
+        *ss += row.rest_rest >> drop;
+        *sx -= row.rest_x >> drop;
         *sy -= high(row.rest_square, dy);
-        *xx += row.x_x >> ROW_DROP;
+        *xx += row.x_x >> drop;
         *xy += high(row.square_x, dy);
-        *yy += high(high(row.square_square, dy), dy) << ROW_DROP;
+        *yy += high(high(row.square_square, dy), dy) << drop;
         let [s, x, y] = &mut self.right;
-        *s -= row.rest >> ROW_DROP;
-        *x += row.x >> ROW_DROP;
+        *s -= row.rest >> drop;
+        *x += row.x >> drop;
         *y += high(row.square, dy);
-        self.misfit.add_row(&row.misfit);
+        self.misfit.add_row::<ROWS, COLUMNS>(&row.misfit);
     }
 
     /// The next guess.

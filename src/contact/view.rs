@@ -16,8 +16,8 @@ const MODULUS_MAX: u32 = 1 << (PEAK_BITS + 9);
 const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 
 /// A picture and its scale.
-pub(super) struct View<'a> {
-    pub picture: &'a Picture,
+pub(super) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+    pub picture: &'a Picture<ROWS, COLUMNS>,
     pub scale: Scale,
 }
 
@@ -34,7 +34,7 @@ pub(super) struct Scale {
     pub inverse_modulus: u32,
 }
 
-impl View<'_> {
+impl<const ROWS: usize, const COLUMNS: usize> View<'_, ROWS, COLUMNS> {
     /// A taxel as a share of the peak, Q14; a taxel of less than -2^18 has no meaning.
     #[inline(always)]
     pub fn share(&self, taxel: i32) -> i32 {

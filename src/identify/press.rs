@@ -12,7 +12,6 @@ use crate::contact::Contact;
 use crate::control::SpeedLoop;
 use crate::control::goal::within_travel;
 use crate::control::profile::Reference;
-use crate::frame::COLUMNS;
 use crate::pressure::Picture;
 use crate::root::floor_sqrt;
 use crate::state::Limits;
@@ -56,9 +55,9 @@ enum Phase {
 }
 
 /// What a frame says to the press.
-pub struct View<'a> {
+pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
     /// The array.
-    pub picture: &'a Picture,
+    pub picture: &'a Picture<ROWS, COLUMNS>,
     /// The contact read off it.
     pub contact: &'a Contact,
     /// The encoder's count.
@@ -111,7 +110,7 @@ impl Press {
     }
 
     /// Takes a frame.
-    pub fn observe(&mut self, view: &View, config: &Config) {
+    pub fn observe<const ROWS: usize, const COLUMNS: usize>(&mut self, view: &View<ROWS, COLUMNS>, config: &Config) {
         if self.phase == Phase::Idle {
             return;
         }
@@ -145,7 +144,11 @@ impl Press {
         motion.towards(way, Millimetres::ZERO, speed, config).0
     }
 
-    fn stalled(&mut self, view: &View, config: &Config) -> bool {
+    fn stalled<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        config: &Config,
+    ) -> bool {
         let travel = view.motion.observer.travel;
         if travel.0.saturating_sub(self.moved_to.0).saturating_abs().to_bits() > STEP {
             self.moved_to = travel;
@@ -155,7 +158,7 @@ impl Press {
         self.still_ns > STALL_NS
     }
 
-    fn touch(&mut self, view: &View, config: &Config) {
+    fn touch<const ROWS: usize, const COLUMNS: usize>(&mut self, view: &View<ROWS, COLUMNS>, config: &Config) {
         let travel = view.motion.observer.travel;
         self.touch = Millimetres(travel.0.saturating_sub(config.tip.indentation(view.contact.force).0));
         self.from = travel;
@@ -164,7 +167,12 @@ impl Press {
         self.phase = Phase::Squeeze;
     }
 
-    fn squeeze(&mut self, view: &View, at_end: bool, config: &Config) {
+    fn squeeze<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        at_end: bool,
+        config: &Config,
+    ) {
         // The sum's reading, whatever the loop itself goes by: it does not depend on the modulus.
         let contact = contact::from_sums(view.picture, config);
         let speed = view.motion.observer.speed;
@@ -178,7 +186,7 @@ impl Press {
             self.fit.add(Millimetres(self.from.0.saturating_add(way.0)), force);
         }
         let depth = Millimetres(measured.0.saturating_sub(self.touch.0));
-        let at_edge = beyond_edge(&contact, depth, config);
+        let at_edge = beyond_edge::<ROWS, COLUMNS>(&contact, depth, config);
         if at_edge || at_end || depth >= depth_goal(config) || contact.force >= config.force_max {
             self.finish(if at_edge { Refusal::Edge } else { Refusal::Span });
         }
@@ -238,10 +246,16 @@ fn depth_goal(config: &Config) -> Millimetres {
 }
 
 /// Whether the rim of a contact this deep is beyond the array.
-fn beyond_edge(contact: &Contact, depth: Millimetres, config: &Config) -> bool {
-    let off_centre = contact.centre_x.0.saturating_abs().max(contact.centre_y.0.saturating_abs());
-    let half_array = i64::from(config.half_pitch.to_bits()) * COLUMNS as i64;
-    i64::from(off_centre.to_bits()) + i64::from(config.tip.contact_radius(depth).to_bits()) > half_array
+fn beyond_edge<const ROWS: usize, const COLUMNS: usize>(
+    contact: &Contact,
+    depth: Millimetres,
+    config: &Config,
+) -> bool {
+    let half_pitch = i64::from(config.half_pitch.to_bits());
+    let beyond =
+        |centre: Millimetres, side: usize| i64::from(centre.0.saturating_abs().to_bits()) - half_pitch * side as i64;
+    let furthest = beyond(contact.centre_x, COLUMNS).max(beyond(contact.centre_y, ROWS));
+    furthest + i64::from(config.tip.contact_radius(depth).to_bits()) > 0
 }
 
 /// The scatter's uncertainty and the readout's together.

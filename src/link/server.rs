@@ -55,7 +55,7 @@ struct Registered {
 
 /// What the device knows.
 #[derive(Clone, Debug)]
-pub(super) struct State {
+pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings,
     pub counters: Counters,
     registered: Option<Registered>,
@@ -69,7 +69,7 @@ pub(super) struct State {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{frame::{COLUMNS, Frame, ROWS}, link::{Reply, Server, Snapshot}, pipeline::Status, store::Record};
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{COLUMNS, Frame, ROWS, Server, Snapshot}, store::Record};
 /// let mut server = Server::new(Record::DEFAULT);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
@@ -90,12 +90,12 @@ pub(super) struct State {
 /// assert_eq!(reply[4..9], [1, 7, 0, 0x55, 0]);
 /// ```
 #[derive(Clone, Debug)]
-pub struct Server {
+pub struct Server<const ROWS: usize, const COLUMNS: usize> {
     receiver: Receiver,
-    state: State,
+    state: State<ROWS, COLUMNS>,
 }
 
-impl Server {
+impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// A device with these stored settings, torque off.
     pub fn new(record: Record) -> Self {
         let state = State {
@@ -115,7 +115,7 @@ impl Server {
     /// `reply` is cleared first. Where it is not empty afterwards, send it after [`Server::reply_delay_us`], then feed the
     /// rest.
     /// Do not feed what this device itself sends.
-    pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) -> usize {
+    pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) -> usize {
         reply.clear();
         self.observe(&snapshot.status);
         for (place, &byte) in bytes.iter().enumerate() {
@@ -184,7 +184,7 @@ impl Server {
     }
 }
 
-impl State {
+impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// Whether a Reg Write waits.
     pub fn registered(&self) -> bool {
         self.registered.is_some()

@@ -73,9 +73,12 @@ impl Settings {
     ///
     /// # Errors
     /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force.
-    pub(super) fn check(&self, params_changed: bool) -> Result<(), StatusError> {
+    pub(super) fn check<const ROWS: usize, const COLUMNS: usize>(
+        &self,
+        params_changed: bool,
+    ) -> Result<(), StatusError> {
         if params_changed {
-            Config::new(&self.record.params).map_err(|error| match error {
+            Config::new(&self.record.params, ROWS, COLUMNS).map_err(|error| match error {
                 ConfigError::Param(_) => StatusError::Range,
                 ConfigError::Scan(_) | ConfigError::Order(..) => StatusError::Limit,
             })?;

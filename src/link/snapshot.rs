@@ -1,13 +1,13 @@
 //! What the bus may read of the running controller, gathered by the firmware.
 
-use crate::frame::{COLUMNS, Frame, ROWS};
+use crate::frame::Frame;
 use crate::pipeline::Status;
 use crate::pressure::TARE_BITS;
 use crate::state::Fault;
 
 /// A picture of the controller at one moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Snapshot<'a> {
+pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     /// What the last step reported.
     pub status: Status,
     /// The bridge's supply.
@@ -23,7 +23,7 @@ pub struct Snapshot<'a> {
     /// The last crash on record.
     pub crash: Crash,
     /// The frame that the status was made from.
-    pub frame: &'a Frame,
+    pub frame: &'a Frame<ROWS, COLUMNS>,
     /// What its taxels read above tare, sixteenths of a corrected code.
     pub taxels: &'a [[i32; COLUMNS]; ROWS],
     /// Pressure in Pa for such a sixteenth, Q32.
@@ -32,7 +32,7 @@ pub struct Snapshot<'a> {
     pub tare: &'a [[i32; COLUMNS]; ROWS],
 }
 
-impl Snapshot<'_> {
+impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
     /// Pressure on a taxel, row by row, in units of 10 Pa.
     pub fn pressure_10pa(&self, place: usize) -> u16 {
         let pascals = i64::from(of(self.taxels, place)).saturating_mul(self.pascals_per_sum_q32) >> 32;
@@ -45,7 +45,7 @@ impl Snapshot<'_> {
     }
 }
 
-fn of(taxels: &[[i32; COLUMNS]; ROWS], place: usize) -> i32 {
+fn of<const COLUMNS: usize>(taxels: &[[i32; COLUMNS]], place: usize) -> i32 {
     taxels.as_flattened().get(place).copied().unwrap_or(0)
 }
 
@@ -128,7 +128,7 @@ mod tests {
 
     #[test]
     fn taxels_are_rounded_and_stay_within_their_registers() {
-        let (mut taxels, mut tare) = ([[0; COLUMNS]; ROWS], [[0; COLUMNS]; ROWS]);
+        let (mut taxels, mut tare) = ([[0; 10]; 10], [[0; 10]; 10]);
         // 8 Pa for a sixteenth of a code.
         (taxels[0][1], taxels[0][2], taxels[9][9]) = (-3, 1, i32::MAX);
         (tare[0][1], tare[0][2], tare[9][9]) = (-1 << TARE_BITS, (7 << TARE_BITS) + (1 << 15), i32::MAX);

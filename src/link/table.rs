@@ -1,11 +1,12 @@
 //! The control table: every register defined once, for the device and for its documentation.
 //!
 //! `table/registers.rs` holds the definition. From it come the addresses as constants ([`address`]), reading and writing here,
-//! and [`REGISTERS`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes straight into the
+//! and [`registers`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes straight into the
 //! reply.
 
 #[macro_use]
 mod define;
+mod pictures;
 mod registers;
 mod values;
 
@@ -20,7 +21,7 @@ use super::settings::{Actions, Settings};
 use super::snapshot::Snapshot;
 use super::stand::Stand;
 
-pub use registers::{REGISTERS, address};
+pub use registers::{COUNT, address, registers};
 
 /// The longest read.
 pub const READ_MAX: u16 = 256;
@@ -129,24 +130,25 @@ impl Cell {
     }
 
     /// The cell that a byte belongs to.
-    fn at(address: u16) -> Result<Self, StatusError> {
+    fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Result<Self, StatusError> {
         if let Some(param) = param_place(address) {
             let address = address::PARAMS + 4 * param as u16;
             return Ok(Self { address, count: 1, kind: Kind::I32, access: Access::Stored });
         }
         let holds = |cell: &&Self| address.checked_sub(cell.address).is_some_and(|offset| offset < cell.bytes());
-        registers::CELLS.iter().find(holds).copied().ok_or(StatusError::Access)
+        let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
+        registers::CELLS.iter().chain(pictures).find(holds).copied().ok_or(StatusError::Access)
     }
 }
 
 /// What a read sees.
 #[derive(Clone, Copy)]
-pub(super) struct View<'a> {
-    pub state: &'a State,
-    pub snapshot: &'a Snapshot<'a>,
+pub(super) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+    pub state: &'a State<ROWS, COLUMNS>,
+    pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
 }
 
-impl<'a> View<'a> {
+impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
     fn settings(&self) -> &'a Settings {
         &self.state.settings
     }
@@ -194,25 +196,33 @@ pub(super) struct Staged {
 }
 
 /// Refuses a read that is too long, or that touches a byte without a register.
-pub(super) fn check_read(address: u16, length: u16) -> Result<(), StatusError> {
+pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
+    address: u16,
+    length: u16,
+) -> Result<(), StatusError> {
     if !(1..=READ_MAX).contains(&length) {
         return Err(StatusError::Length);
     }
     let end = address.checked_add(length).ok_or(StatusError::Access)?;
     let mut at = address;
     while at < end {
-        let cell = Cell::at(at)?;
+        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
         at = cell.address + cell.bytes();
     }
     Ok(())
 }
 
 /// Sends the bytes of a read that [`check_read`] let through.
-pub(super) fn read(view: View<'_>, address: u16, length: u16, mut put: impl FnMut(u8)) {
+pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
+    view: View<'_, ROWS, COLUMNS>,
+    address: u16,
+    length: u16,
+    mut put: impl FnMut(u8),
+) {
     let end = address.saturating_add(length);
     let mut at = address;
     while at < end {
-        let Ok(cell) = Cell::at(at) else { return };
+        let Ok(cell) = Cell::at::<ROWS, COLUMNS>(at) else { return };
         let stop = end.min(cell.address + cell.bytes());
         let width = cell.kind.width();
         while at < stop {
@@ -240,7 +250,11 @@ pub(super) fn read(view: View<'_>, address: u16, length: u16, mut put: impl FnMu
 ///
 /// # Errors
 /// What is wrong with the first register that is refused; the copy is then of no use.
-pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<(), StatusError> {
+pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged,
+    address: u16,
+    data: &[u8],
+) -> Result<(), StatusError> {
     if data.is_empty() {
         return Err(StatusError::Length);
     }
@@ -250,7 +264,7 @@ pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<()
     let mut at = address;
     let mut rest = data;
     while !rest.is_empty() {
-        let cell = Cell::at(at)?;
+        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
         match cell.access {
             Access::ReadOnly => return Err(StatusError::Access),
             Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
@@ -267,7 +281,7 @@ pub(super) fn write(staged: &mut Staged, address: u16, data: &[u8]) -> Result<()
         rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
         at = at.saturating_add(cell.bytes());
     }
-    staged.settings.check(staged.settings.record.params != params)?;
+    staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 

@@ -14,7 +14,7 @@ pub const WAIT_MAX: u32 = 256;
 
 /// What is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Budget {
+pub struct Budget<const ROWS: usize, const COLUMNS: usize> {
     effort: Effort,
     /// What was asked for, and the deadline, when last looked at.
     asked: (Effort, u32),
@@ -30,7 +30,7 @@ pub struct Budget {
     wait_next: u32,
 }
 
-impl Budget {
+impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     /// Nothing measured yet: the least effort.
     pub const fn new() -> Self {
         Self {
@@ -48,16 +48,16 @@ impl Budget {
     /// What the dearest frame takes beyond one by the sums: its most and its least, cycles of the core.
     ///
     /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
-    /// (`cargo xtask timing`, `docs/study.md`): the start of a refinement 2,100 at most, its solution
-    /// 1,600, a row 1,000.
+    /// (`cargo xtask timing`, `docs/study.md`): of 10 x 10 the start of a refinement 2,100 at most, its solution
+    /// 1,600, a row 1,000. Of other shapes a row goes by its taxels, and the start by the places along both sides.
     pub const fn model_ticks(effort: Effort) -> [u32; 2] {
-        match effort {
-            Effort::Sum | Effort::Moments => [0, 0],
-            Effort::OneRow => [3_100, 1_500],
-            Effort::TwoRows => [4_100, 1_700],
-            Effort::FiveRows => [7_100, 2_300],
-            Effort::AllRows => [13_700, 3_600],
+        let rows = effort.rows(ROWS);
+        if rows == 0 {
+            return [0, 0];
         }
+        let (start, row) = (1_700 + 20 * (ROWS + COLUMNS), 100 * COLUMNS);
+        let [solution, more] = if rows == ROWS { [1_600, 300] } else { [0, 0] };
+        [(start + rows * row + solution) as u32, (1_300 + rows * row / 5 + more) as u32]
     }
 
     /// Of a time, what is to be used: an eighth is left for what was never measured.
@@ -128,7 +128,7 @@ impl Budget {
     }
 }
 
-impl Default for Budget {
+impl<const ROWS: usize, const COLUMNS: usize> Default for Budget<ROWS, COLUMNS> {
     fn default() -> Self {
         Self::new()
     }

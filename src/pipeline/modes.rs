@@ -5,7 +5,7 @@ use super::{Command, Contact, Pipeline};
 use crate::state::Mode;
 use crate::units::Newtons;
 
-impl Pipeline {
+impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// The mode table of [`crate::state`], with what each change of mode prepares.
     pub(super) fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };

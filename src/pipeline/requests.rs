@@ -18,7 +18,7 @@ pub(super) struct Asked {
     pub identify: bool,
 }
 
-impl Pipeline {
+impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// What is newly asked for. A tare and a clear count in the frame in which they come, whatever else that brings; a measurement of the
     /// modulus counts until [`Pipeline::note_requests`] has an answer to it.
     pub(super) fn take_requests(&mut self, command: &Command) -> Asked {

@@ -1,12 +1,13 @@
 //! What is known of each taxel beforehand: its gain, and whether to leave it out.
 
 use super::row::weight;
-use super::{GAIN_MAX, GAIN_ONE};
-use crate::frame::{BANK_COLUMNS, COLUMNS, ROWS};
-use lanes::Pairs;
+use super::{GAIN_BITS, GAIN_MAX, GAIN_ONE};
+use lanes::place;
 
 /// All columns of a row.
-const ALL: u16 = (1 << COLUMNS) - 1;
+pub(super) const fn all(columns: usize) -> u32 {
+    u32::MAX >> (u32::BITS - columns as u32)
+}
 
 /// A calibration that cannot be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,12 +21,14 @@ pub enum CalibrationError {
         /// What was asked for.
         value: u16,
     },
-    /// The mask of a row has bits beyond its ten columns.
+    /// The mask of a row has bits beyond its columns.
     Mask {
         /// The row.
         row: usize,
         /// What was asked for.
-        value: u16,
+        value: u32,
+        /// All that are allowed.
+        all: u32,
     },
 }
 
@@ -35,7 +38,7 @@ impl core::fmt::Display for CalibrationError {
             Self::Gain { row, column, value } => {
                 write!(f, "gain of {value}/{GAIN_ONE} for row {row}, column {column}: 1 to {GAIN_MAX} are allowed")
             }
-            Self::Mask { row, value } => write!(f, "mask of {value:#x} for row {row}: 0 to {ALL:#x} are allowed"),
+            Self::Mask { row, value, all } => write!(f, "mask of {value:#x} for row {row}: 0 to {all:#x} are allowed"),
         }
     }
 }
@@ -44,32 +47,32 @@ impl core::error::Error for CalibrationError {}
 
 /// Gains of all taxels, and a mask of those that are left out.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Calibration {
-    pub(super) weights: [Weights; ROWS],
+pub struct Calibration<const ROWS: usize, const COLUMNS: usize> {
+    pub(super) weights: [Weights<COLUMNS>; ROWS],
     /// A bit for each column that is left out.
-    pub(super) mask: [u16; ROWS],
+    pub(super) mask: [u32; ROWS],
 }
 
-/// The gains of a row in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9, in Q10: at most 18 in 16 bits.
-/// In pairs like the codes of a frame; zero where the taxel is left out.
-type Weights = [Pairs; 2];
+/// The gains of a row in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9 of ten, with
+/// [`lanes::moment_bits`]: in 16 bits. In the order of a frame's codes; zero where the taxel is left out.
+type Weights<const COLUMNS: usize> = [[i16; COLUMNS]; 2];
 
-const fn weights(gains: &[u16; COLUMNS]) -> Weights {
-    let mut weights = [[0; BANK_COLUMNS]; 2];
-    let mut place = 0;
-    while place < BANK_COLUMNS {
-        let (left, right) = (gains[place] as i32, gains[place + BANK_COLUMNS] as i32);
+const fn weights<const COLUMNS: usize>(gains: &[u16; COLUMNS]) -> Weights<COLUMNS> {
+    let drop = GAIN_BITS - lanes::moment_bits(COLUMNS);
+    let mut weights = [[0; COLUMNS]; 2];
+    let mut column = 0;
+    while column < COLUMNS {
+        let gain = gains[column] as i32;
+        weights[0][place(column, COLUMNS)] = gain as i16;
         // Rounded from Q14.
-        let weighted_left = (left * weight(place) + 8) >> 4;
-        let weighted_right = (right * weight(place + BANK_COLUMNS) + 8) >> 4;
-        weights[0][place] = lanes::pair(left as i16, right as i16);
-        weights[1][place] = lanes::pair(weighted_left as i16, weighted_right as i16);
-        place += 1;
+        let weighted = (gain * weight(column, COLUMNS) + (1 << (drop - 1))) >> drop;
+        weights[1][place(column, COLUMNS)] = weighted as i16;
+        column += 1;
     }
     weights
 }
 
-impl Calibration {
+impl<const ROWS: usize, const COLUMNS: usize> Calibration<ROWS, COLUMNS> {
     /// Gains of one, and every taxel counts.
     pub const NONE: Self = Self { weights: [weights(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
 
@@ -77,11 +80,11 @@ impl Calibration {
     ///
     /// # Errors
     /// Names the first taxel or row, its value and its range.
-    pub fn new(gains: &[[u16; COLUMNS]; ROWS], mask: &[u16; ROWS]) -> Result<Self, CalibrationError> {
+    pub fn new(gains: &[[u16; COLUMNS]; ROWS], mask: &[u32; ROWS]) -> Result<Self, CalibrationError> {
         let mut calibration = Self { mask: *mask, ..Self::NONE };
         for (row, (gains, mask)) in gains.iter().zip(mask).enumerate() {
-            if *mask > ALL {
-                return Err(CalibrationError::Mask { row, value: *mask });
+            if *mask > all(COLUMNS) {
+                return Err(CalibrationError::Mask { row, value: *mask, all: all(COLUMNS) });
             }
             for (column, value) in gains.iter().copied().enumerate() {
                 if !(1..=GAIN_MAX).contains(&value) {

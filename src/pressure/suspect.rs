@@ -1,23 +1,25 @@
 //! Which taxels of a row are dead or saturated.
 
-use super::each;
-use crate::frame::{BANK_COLUMNS, SATURATED};
-use lanes::{Pairs, SIGNS};
+use super::calibration::all;
+use crate::frame::SATURATED;
+use lanes::{SIGNS, codes_at, each_pair, pairs};
 
 /// A bit for each column of a row that is dead or saturated. Any codes and levels are taken.
 #[cold]
 #[inline(never)]
-pub(super) fn bad([codes, undriven]: [&Pairs; 2], dead_codes: u16) -> u16 {
+pub(super) fn bad<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], dead_codes: u16) -> u32 {
     let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
     let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
     let mut bad = 0;
-    each(|place| {
-        let net = lanes::sub(codes[place], undriven[place]);
+    each_pair::<COLUMNS>(|at| {
+        let (code, undriven) = (codes_at(codes, at), codes_at(undriven, at));
+        let net = lanes::sub(code, undriven);
         // The sign of each lane tells whether its taxel is bad; those of the first place are shifted most.
-        bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(sound, codes[place])) & SIGNS;
-        0
+        bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(sound, code)) & SIGNS;
     });
-    let first = bad >> (16 - BANK_COLUMNS) & ((1 << BANK_COLUMNS) - 1);
-    let second = bad >> (32 - BANK_COLUMNS);
-    (first | second << BANK_COLUMNS) as u16
+    let half = pairs(COLUMNS);
+    let first = bad >> (16 - half) & all(half);
+    let second = bad >> (32 - half);
+    // An odd row's last pair has one column only.
+    (first | second << half) & all(COLUMNS)
 }

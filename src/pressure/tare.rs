@@ -1,22 +1,22 @@
 //! The reading without contact: measured at once by a tare, followed slowly by the baseline.
 
 use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
-use crate::frame::{COLUMNS, ROWS};
 
-/// Frames of a tare, 16 ms at 10 kHz.
-///
-/// Each learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32 times: that leaves 0.18 of
-/// a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08.
-pub const TARE_FRAMES: u32 = 32 * TARE_STRIDE;
-/// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
-const TARE_STRIDE: u32 = ROWS as u32 / 2;
-/// Weight of a frame in the baseline, Q16; each row is visited every tenth frame, so the time constant is 10,240 frames.
+/// Weight of a frame in the baseline, Q16; of ten rows each is visited every tenth frame, so the time constant is 10,240 frames.
 const BASELINE_WEIGHT: i32 = 64;
 
 /// The first frames after a contact are weighed as if so many had come before.
 const CLEAR_ROUNDS_FIRST: i32 = 4;
 
-impl Array {
+impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
+    /// Frames of a tare: of ten rows 160, 16 ms at 10 kHz.
+    ///
+    /// Each learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32 times: that leaves 0.18 of
+    /// a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08 of ten rows.
+    pub const TARE_FRAMES: u32 = 32 * Self::TARE_STRIDE;
+    /// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
+    const TARE_STRIDE: u32 = ROWS.div_ceil(2) as u32;
+
     /// Forgets the tare and starts to measure it anew.
     pub fn start_tare(&mut self) {
         self.rows.iter_mut().for_each(|row| row.tare = [0; COLUMNS]);
@@ -27,8 +27,8 @@ impl Array {
 
     /// Takes the picture last read into the tare's running means; true when the tare is complete.
     pub fn continue_tare(&mut self) -> bool {
-        let (visits, first) = (self.tare_frames / TARE_STRIDE, self.tare_frames % TARE_STRIDE);
-        self.tare_frames = (self.tare_frames + 1).min(TARE_FRAMES);
+        let (visits, first) = (self.tare_frames / Self::TARE_STRIDE, self.tare_frames % Self::TARE_STRIDE);
+        self.tare_frames = (self.tare_frames + 1).min(Self::TARE_FRAMES);
         let weight = i64::from((1 << 16) / self.tare_frames.max(1));
         // The sums are not rounded taxel by taxel, so they have a mean of their own.
         let Picture { sum, moment_x, moment_y, .. } = self.picture;
@@ -36,11 +36,14 @@ impl Array {
         for (tare, value) in tare_sums.iter_mut().zip([sum, moment_x, moment_y]) {
             *tare = tare.wrapping_add(((i64::from(value) * weight + (1 << 15)) >> 16) as i32);
         }
-        for row in [first, first + TARE_STRIDE] {
-            self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
+        for row in [first, first + Self::TARE_STRIDE] {
+            // Of an odd number of rows the last frame of a round learns one.
+            if ROWS % 2 == 0 || row < ROWS as u32 {
+                self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
+            }
         }
         self.tare_sums = tare_sums;
-        self.tare_frames >= TARE_FRAMES
+        self.tare_frames >= Self::TARE_FRAMES
     }
 
     /// Lets the baseline follow the picture, one row a frame; call it only where there is no contact. Where the
@@ -69,14 +72,14 @@ impl Array {
             *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;
-            moment += tare * row::weight(column);
+            moment += tare * row::weight(column, COLUMNS);
         }
         let [line, line_x] = &mut self.tare_lines[row];
         let more = sum - *line;
         let [all, all_x, all_y] = &mut self.tare_sums;
         *all = all.wrapping_add(more);
         *all_x = all_x.wrapping_add(moment - *line_x);
-        *all_y = all_y.wrapping_add(more * row::weight(row));
+        *all_y = all_y.wrapping_add(more * row::weight(row, ROWS));
         (*line, *line_x) = (sum, moment);
     }
 }

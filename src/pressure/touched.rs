@@ -9,29 +9,28 @@
 
 use super::Array;
 use crate::config::Config;
-use crate::frame::{COLUMNS, ROWS};
-
-/// A row tells what a taxel usually carries where at least so many of its taxels are good.
-const ROW_LEAST: u32 = 5;
 
 /// What each row would carry if all of its taxels were good, in sixteenths of a corrected code; none where too few are.
-type Lines = [Option<i32>; ROWS];
+type Lines<const ROWS: usize> = [Option<i32>; ROWS];
 
 /// What a tare says of a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Touched {
+pub(super) struct Touched<const ROWS: usize> {
     /// Something touched during the last tare.
     pub flag: bool,
     /// The last tare without a contact.
-    clean: Option<Lines>,
+    clean: Option<Lines<ROWS>>,
 }
 
-impl Touched {
+impl<const ROWS: usize> Touched<ROWS> {
     /// Nothing known.
     pub const NONE: Self = Self { flag: false, clean: None };
 }
 
-impl Array {
+impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
+    /// A row tells what a taxel usually carries where at least so many of its taxels are good: half of them.
+    const ROW_LEAST: u32 = COLUMNS as u32 / 2;
+
     /// Whether something seems to have touched the tip during the last tare that was judged.
     pub fn tared_touching(&self) -> bool {
         self.touched.flag
@@ -40,10 +39,10 @@ impl Array {
     /// Judges the tare that was just completed.
     #[inline(never)]
     pub fn judge_tare(&mut self, config: &Config) {
-        let mut now: Lines = [None; ROWS];
+        let mut now: Lines<ROWS> = [None; ROWS];
         for ((now, [line, _]), bad) in now.iter_mut().zip(self.tare_lines).zip(self.picture.bad) {
             let good = (COLUMNS as u32).saturating_sub(bad.count_ones());
-            *now = (good >= ROW_LEAST).then(|| line.wrapping_mul(COLUMNS as i32) / good.max(1).cast_signed());
+            *now = (good >= Self::ROW_LEAST).then(|| line.wrapping_mul(COLUMNS as i32) / good.max(1).cast_signed());
         }
         let clean = self.touched.clean.unwrap_or([Some(0); ROWS]);
         let (mut most, mut least) = (i32::MIN, i32::MAX);

@@ -6,9 +6,10 @@ use crc::{CRC_64_XZ, Crc, Table};
 use fingertip::command::Command;
 use fingertip::contact::Contact;
 use fingertip::contact::Effort;
-use fingertip::frame::{COLUMNS, Frame, SLOTS, Sense};
+use fingertip::frame::Sense;
 use fingertip::identify::Modulus;
 use fingertip::pipeline::{Status, Taken};
+use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::units::{Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.

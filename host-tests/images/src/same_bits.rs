@@ -11,8 +11,9 @@ pub mod made;
 pub mod model;
 mod pictures;
 
-use fingertip::config::{Config, ConfigError};
+use fingertip::config::ConfigError;
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use machines::Machines;
 use model::Sample;
 

@@ -23,10 +23,8 @@ pub use clock::Clock;
 use core::ops::Range;
 use digest::Digest;
 use fingertip::command::Command;
-use fingertip::config::{Config, ConfigError, newtons};
-use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
-use fingertip::pipeline::Pipeline;
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::config::{ConfigError, newtons};
+use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use host_tests::native::bridge;
 use host_tests::plant::Bridge;
 use std::time::Instant;
@@ -245,8 +243,8 @@ impl<E: Set> Board<E> {
                 let kpa = places.get(slot).map_or([0.0; COLUMNS], |place| self.world.placed_kpa(finger, place, slot));
                 let time_s = self.clock.since(self.start);
                 let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
-                for (column, pair) in unit.frame.pairs[slot].iter_mut().enumerate() {
-                    *pair = u32::from(codes[column]) | u32::from(codes[column + BANK_COLUMNS]) << 16;
+                for (column, code) in codes.into_iter().enumerate() {
+                    unit.frame.set_code(slot, column, code);
                 }
             }
         }

@@ -1,9 +1,10 @@
 //! What a run shows of itself, a control step at a time.
 
 use fingertip::command::Command;
-use fingertip::frame::{COLUMNS, Frame, ROWS, Sense};
+use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use serde::{Deserialize, Serialize};
 
 /// What a finger's controller is set to when a run begins. With every [`Step`] after it, a replay needs nothing else.
@@ -15,13 +16,13 @@ pub struct Controller {
     pub calibration: Option<Gains>,
 }
 
-/// What a calibration is made of; see `fingertip::pressure::Calibration::new`.
+/// What a calibration is made of; see `fingertip::shipped::Calibration::new`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Gains {
     /// Gain of each taxel, Q14.
     pub gains_q14: [[u16; COLUMNS]; ROWS],
     /// A bit for each column that is left out, for each row.
-    pub masks: [u16; ROWS],
+    pub masks: [u32; ROWS],
 }
 
 /// One control step of one finger: what went in, what came out, and what was true.

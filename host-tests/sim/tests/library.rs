@@ -1,7 +1,7 @@
 //! The library of scenes: each is read, runs on the native board, and holds what it promises. The forces and pressures of the paper's
 //! compression test come out of its scene.
 
-use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::metrics::Verdict;
 use sim::native;
 use sim::registry;

@@ -5,9 +5,10 @@ use crate::heatmap::Pressures;
 use crate::metrics::Sample;
 use crate::native::Native;
 use crate::plant::{Bridge, Setup};
-use fingertip::config::{Config, newtons};
+use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Config;
 
 /// Plays the script.
 ///

@@ -1,15 +1,14 @@
 //! The machines: observer, drive, speed loop, baseline, tare, relaxation.
 
 use super::{Machine, Outcome};
-use fingertip::config::Config;
 use fingertip::config::gains::PACES;
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::observer::Observer;
-use fingertip::frame::{Frame, ROWS, SATURATED, SLOTS};
+use fingertip::frame::SATURATED;
 use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
-use fingertip::pressure::{Array, TARE_FRAMES};
+use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
 use fingertip::units::{Millimetres, Newtons, Ratio};
 use std::sync::Mutex;

@@ -2,11 +2,11 @@
 
 use super::{Cycle, Outcome};
 use fingertip::command::Command;
-use fingertip::config::{Config, newtons};
-use fingertip::frame::{Frame, ROWS, SLOTS, Sense};
+use fingertip::config::newtons;
+use fingertip::frame::Sense;
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 
 /// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat itself no sooner
 /// than after this many steps.

@@ -6,7 +6,7 @@
 
 use super::setup::{Setup, Tip};
 use super::tip::Flattened;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 
 /// Gauss-Legendre nodes and weights on -1..1, 3 points: 0 and sqrt(3/5); 5/9, 8/9, 5/9.
 const GAUSS3: [(f64, f64); 3] = [

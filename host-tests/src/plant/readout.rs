@@ -1,7 +1,7 @@
 //! From pressures to the columns' voltages and codes: zero-potential readout, its row sag, its settling and its defects.
 
 use super::setup::Array;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use serde::{Deserialize, Serialize};
 
 /// What can be wrong with a taxel.

@@ -4,9 +4,8 @@ use super::inputs::Frames;
 use super::judge::Errors;
 use super::output::Number;
 use crate::prove::reference::{Real, real};
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, Frame, ROWS};
 use fingertip::params::Params;
+use fingertip::shipped::{COLUMNS, Config, Frame, ROWS};
 
 /// Half of the pitch, mm.
 const HALF_PITCH_MM: f64 = 0.75;

@@ -7,8 +7,7 @@ use crate::fit_statistics::{FRAMES, GOOD, Series};
 use crate::plant::{Setup, World};
 use crate::stimulus;
 use fastrand::Rng;
-use fingertip::frame::{COLUMNS, Frame, ROWS};
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Frame, Picture, ROWS};
 use images::record::Record;
 
 const SEED: u64 = 2003;
@@ -123,7 +122,8 @@ impl Frames {
         let gains = self.gains.iter().flatten().map(|gain| u32::from(*gain));
         let frames = [&self.quiet].into_iter().chain(&self.contacts);
         let words = [self.contacts.len() as u32].into_iter().chain(gains);
-        words.chain(frames.flat_map(|frame| frame.pairs.into_iter().flatten())).flat_map(u32::to_le_bytes).collect()
+        let codes = frames.flat_map(|frame| frame.codes.rows.into_iter().chain([frame.codes.undriven]).flatten());
+        words.flat_map(u32::to_le_bytes).chain(codes.flat_map(u16::to_le_bytes)).collect()
     }
 }
 

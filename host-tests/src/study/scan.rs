@@ -4,8 +4,8 @@ use super::page::figure;
 use crate::plant::Setup;
 use crate::plant::readout::decay;
 use crate::plant::setup::Array;
-use fingertip::frame::TAXELS;
 use fingertip::scan::{ScanTiming, TICKS_PER_ADC_CYCLE, TIMER_HZ};
+use fingertip::shipped::{COLUMNS, ROWS, TAXELS};
 use std::fmt::Write as _;
 
 /// Noise of a conversion, codes: assumed, as the simulated converters have none.
@@ -46,7 +46,7 @@ struct Row {
 impl Row {
     fn of(setting: Setting, array: &Array) -> Option<Self> {
         let (settle_ns, sample_cycles, frames) = setting;
-        let timing = ScanTiming::new(settle_ns, sample_cycles).ok()?;
+        let timing = ScanTiming::new(settle_ns, sample_cycles, ROWS, COLUMNS).ok()?;
         let cycle_s = f64::from(TICKS_PER_ADC_CYCLE) / f64::from(TIMER_HZ);
         let sampling_s = (f64::from(sample_cycles) - 0.5) * cycle_s;
         Some(Self {

@@ -4,7 +4,7 @@ use super::page::figure;
 use crate::plant::cells::Cell;
 use crate::plant::{Bridge, Setup, World};
 use core::f64::consts::TAU;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use std::fmt::Write as _;
 use std::time::Instant;
 

@@ -2,6 +2,7 @@
 
 use fingertip::config::Config;
 use fingertip::params::Params;
+use fingertip::shipped;
 
 /// Of a pace: k_v, and all gains by it.
 fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
@@ -28,7 +29,7 @@ fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
 /// 1 / (5 T) where the encoder is fine, half of it at each calmer pace.
 #[test]
 fn a_fine_encoder_leaves_the_pace_to_the_time() {
-    let config = Config::new(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
+    let config = shipped::Config::new(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
     for pace in 0..config.paces.len() {
         is_made_for(0.2 / frame_s / f64::from(1 << pace), pace, &config);
@@ -38,7 +39,7 @@ fn a_fine_encoder_leaves_the_pace_to_the_time() {
 /// A count moves the voltage by three quarters of the largest at most: 5.8 k_v^2 q = 0.75 g V_max; no pace is slower than 60 /s.
 #[test]
 fn a_coarse_encoder_makes_a_slower_loop() {
-    let config = Config::new(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
+    let config = shipped::Config::new(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = (0.75 * f64::from(config.voltage_limit) / 256.0 / (5.8 * q_mm)).sqrt();
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
@@ -55,7 +56,7 @@ fn a_coarse_encoder_makes_a_slower_loop() {
 /// Nor is a count taken for more than 60 mm/s by an observer 2.5 times as quick: where the motor drives the tip almost directly.
 #[test]
 fn a_count_is_no_more_than_so_fast() {
-    let config = Config::new(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
+    let config = shipped::Config::new(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = 60.0 / (2.5 * q_mm);
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);

@@ -1,7 +1,8 @@
 //! What each mode asks of the speed loop: the way, the slack, and how fast.
 
 use crate::{config, mm};
-use fingertip::config::{Config, newtons};
+use fingertip::config::Config;
+use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;

@@ -10,11 +10,13 @@ mod release;
 
 use fingertip::config::Config;
 use fingertip::params::Params;
+use fingertip::shipped;
 use fingertip::units::Millimetres;
+use std::ops::Deref;
 
 /// The reference finger's.
 fn config() -> Config {
-    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+    shipped::Config::new(&Params::DEFAULT).expect("the defaults are allowed").deref().clone()
 }
 
 fn mm(value: f64) -> Millimetres {

@@ -2,7 +2,8 @@
 
 use crate::goal::{asked, at, contact, minus, over, pressing};
 use crate::{config, mm};
-use fingertip::config::{Config, newtons};
+use fingertip::config::Config;
+use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::goal::Goal;
 use fingertip::state::Mode;

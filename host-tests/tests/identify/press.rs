@@ -1,8 +1,8 @@
 //! The mode on the simulated finger: true modulus, friction, encoder and readout are the plant's.
 
-use fingertip::config::Config;
 use fingertip::identify::{Identification, Modulus, Refusal};
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use fingertip::state::Mode;
 use host_tests::native::Native;
 use host_tests::plant::{Setup, Taxel};

@@ -1,13 +1,13 @@
 //! A server with a made-up loop behind it, and a host's side of the talk.
 
 use fingertip::command::Command;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
-use fingertip::link::{Crash, CrashCause, Reply, ResetCause, Server, Snapshot};
+use fingertip::link::{Crash, CrashCause, Reply, ResetCause};
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
+use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::Record;
 

@@ -5,7 +5,7 @@
 use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::serial2::SerialPort;
 use dynamixel2::{Bus, MotorError, ReadError, TransferError};
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use fingertip::state::Fault;
 
 use crate::bench::{Bench, ID};

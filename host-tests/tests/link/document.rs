@@ -1,6 +1,6 @@
 //! The page of the control table.
 
-use fingertip::link::table::REGISTERS;
+use fingertip::shipped::REGISTERS;
 use host_tests::control_table::{COMMAND, markdown, step};
 
 #[test]

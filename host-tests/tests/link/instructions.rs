@@ -1,8 +1,8 @@
 //! What each instruction does, and when it is answered.
 
 use fingertip::contact::Effort;
-use fingertip::link::table::address;
 use fingertip::link::{Actions, Settings};
+use fingertip::shipped::address;
 use fingertip::store::Record;
 
 use crate::bench::{Answer, Bench, ID, hex, packet};

@@ -1,7 +1,7 @@
 //! Random and damaged bytes: nothing moves, nothing stops, and the next good packet is answered.
 
 use fingertip::link::Actions;
-use fingertip::link::table::REGISTERS;
+use fingertip::shipped::REGISTERS;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -111,7 +111,7 @@ proptest! {
         prop_assert_eq!(&replies, &in_slices);
         prop_assert_eq!(whole.server.settings(), sliced.server.settings());
         let settings = whole.server.settings();
-        prop_assert!(fingertip::config::Config::new(&settings.record.params).is_ok());
+        prop_assert!(fingertip::shipped::Config::new(&settings.record.params).is_ok());
         prop_assert!(settings.record.id <= 252 && settings.record.baud_code <= 5 && settings.status_return_level <= 2);
         prop_assert!(settings.command.bus_watchdog_ms <= 127 * 20);
         let goal = settings.command.goal;

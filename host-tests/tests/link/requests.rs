@@ -2,8 +2,8 @@
 
 use fingertip::command::Command;
 use fingertip::identify::{Identification, Refusal};
-use fingertip::link::table::address;
 use fingertip::pipeline::Taring;
+use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
 
 use crate::bench::{Bench, ID, packet};

@@ -1,6 +1,6 @@
 //! Faults and the bus watchdog as the host sees them.
 
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use fingertip::state::Fault;
 use fingertip::units::Newtons;
 

@@ -1,7 +1,7 @@
 //! Sync, Bulk and Fast Sync instructions: several devices on one bus, each hearing what the others send.
 
 use fingertip::link::crc;
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use fingertip::store::Record;
 
 use crate::bench::{Bench, answer, hex, packet};

@@ -1,9 +1,9 @@
 //! Reading the control table.
 
 use fingertip::contact::Effort;
-use fingertip::frame::TAXELS;
 use fingertip::link::packet::StatusError;
-use fingertip::link::table::{READ_MAX, REGISTERS, address};
+use fingertip::link::table::READ_MAX;
+use fingertip::shipped::{REGISTERS, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 

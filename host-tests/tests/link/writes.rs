@@ -2,8 +2,9 @@
 
 use fingertip::link::Actions;
 use fingertip::link::packet::StatusError;
-use fingertip::link::table::{Access, REGISTERS, Register, address};
+use fingertip::link::table::{Access, Register};
 use fingertip::params::Params;
+use fingertip::shipped::{REGISTERS, address};
 use fingertip::state::Fault;
 
 use crate::bench::Bench;

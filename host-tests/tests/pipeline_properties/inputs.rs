@@ -1,7 +1,8 @@
 //! What a step may be given: frames, senses and commands, likely ones and any others.
 
 use fingertip::command::Command;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::frame::Sense;
+use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use proptest::prelude::*;
 

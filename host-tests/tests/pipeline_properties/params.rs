@@ -1,8 +1,8 @@
 //! Parameters at and between the ends of their ranges, and the configurations they make.
 
-use fingertip::config::Config;
 use fingertip::config::gains::Gains;
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use proptest::prelude::*;
 
 /// The sampling times that the converter has.

@@ -3,8 +3,8 @@
 use crate::inputs::{Arguments, Input, any_inputs};
 use crate::params::{any_params, config};
 use fingertip::params::Params;
-use fingertip::pipeline::{Pipeline, Status, Taring};
-use fingertip::pressure::TARE_FRAMES;
+use fingertip::pipeline::{Status, Taring};
+use fingertip::shipped::{Pipeline, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::{Duty, Newtons};
 use images::record::Digest;

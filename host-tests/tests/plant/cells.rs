@@ -1,7 +1,7 @@
 //! Pressures: the paper's at a point, and their means on the taxels.
 
 use super::{free, pressed};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use host_tests::plant::cells::Cell;
 use host_tests::plant::setup::Tip;
 use host_tests::plant::{Setup, World};

@@ -1,7 +1,7 @@
 //! The readout: sag, settling, ghosting, defects, codes.
 
 use super::pressed;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use host_tests::plant::readout::decay;
 use host_tests::plant::{Row, Setup, Taxel, World};
 

@@ -1,7 +1,7 @@
 //! The converters' inputs: rows in, column voltages out.
 
 use crate::surroundings::Surroundings;
-use fingertip::frame::COLUMNS;
+use fingertip::shipped::COLUMNS;
 use host_tests::plant::{World, readout::decay};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;

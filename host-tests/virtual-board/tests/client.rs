@@ -5,7 +5,7 @@
 mod common;
 
 use common::{WAIT_NS, holding};
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use std::time::Duration;
 
 /// The board's thread does nothing for longer than the client would wait at any common baud rate.

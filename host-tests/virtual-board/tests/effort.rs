@@ -7,8 +7,8 @@ mod common;
 
 use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use fingertip::contact::Effort;
-use fingertip::link::table::address;
 use fingertip::params::Params;
+use fingertip::shipped::address;
 use fingertip::state::Limits;
 use host_tests::plant::{Setup, World};
 use virtual_board::{Options, Rig};

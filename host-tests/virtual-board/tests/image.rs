@@ -5,8 +5,8 @@
 mod common;
 
 use common::{WAIT_NS, holding, image, on_a_shared, scratch};
-use fingertip::link::table::{REGISTERS, address};
 use fingertip::params::Params;
+use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
 use std::sync::Mutex;
 use virtual_board::{Options, Rig};

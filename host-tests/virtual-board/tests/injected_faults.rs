@@ -5,8 +5,8 @@
 mod common;
 
 use common::{WAIT_NS, holding, holding_on_a_bus, image, read_u8, write_goal, write_u8};
-use fingertip::link::table::address;
 use fingertip::params::Params;
+use fingertip::shipped::address;
 use fingertip::state::Fault as Number;
 use host_tests::plant::{Bridge, Faults, Row, Setup, Taxel, World};
 use std::sync::Mutex;

@@ -7,7 +7,8 @@ mod common;
 use common::{WAIT_NS, holding_on_a_bus, read_u8, write_u8};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::packet::StatusError;
-use fingertip::link::table::{Access, Kind, REGISTERS, Register, address};
+use fingertip::link::table::{Access, Kind, Register};
+use fingertip::shipped::{REGISTERS, address};
 use virtual_board::Rig;
 use virtual_board::client::Client;
 

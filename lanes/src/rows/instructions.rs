@@ -1,21 +1,29 @@
 //! The pass by instructions: SSUB16, SMLAD, UQSUB16, SMMLA, SMULxy, SMMULR.
 
-use super::{BOOST_DROP, CODE_BITS, COLUMNS, Common, Pairs, Row, TARE_BITS, Total};
+use super::{BOOST_DROP, CODE_BITS, Codes, Common, Row, TARE_BITS, Total, portable_pass, sum_drop};
+
+/// Columns of a row that the instructions take.
+const WRITTEN_OUT: usize = 10;
+/// Pairs of such a row, in bytes.
+const PAIRS: usize = 2 * WRITTEN_OUT;
 
 /// [`super::portable_pass`].
 ///
-/// Written out, because the compiler has too few registers for any order of these instructions, and keeps loading and
-/// storing. It works through a row in about 170 cycles.
+/// For rows of ten columns it is written out, because the compiler has too few registers for any order of these instructions, and keeps
+/// loading and storing. It works through a row in about 170 cycles.
 #[inline(always)]
-pub fn pass<const ROWS: usize>(
-    codes: &[Pairs; ROWS],
-    rows: &mut [Row; ROWS],
-    common: &Common,
+pub fn pass<const ROWS: usize, const COLUMNS: usize>(
+    codes: &Codes<ROWS, COLUMNS>,
+    rows: &mut [Row<COLUMNS>; ROWS],
+    common: &Common<COLUMNS>,
     taxels: &mut [[i32; COLUMNS]; ROWS],
 ) -> Total {
     const { assert!(ROWS > 0) };
+    if COLUMNS != WRITTEN_OUT || const { sum_drop(ROWS, COLUMNS) } != 0 {
+        return portable_pass(codes, rows, common, taxels);
+    }
     let (first, second, running, largest, peak);
-    // SAFETY: reads the codes, the rows and what is common, writes each row's boost and the taxels; the types hold their
+    // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the codes, the rows and what is common, writes each row's boost and the taxels; the types hold their
     // lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
     // operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
@@ -123,20 +131,20 @@ pub fn pass<const ROWS: usize>(
             "ldr r0, [sp, #44]",
             "add sp, #48",
             "pop {{r6, r7, r9}}",
-            pairs = const size_of::<Pairs>(),
-            row = const size_of::<Row>(),
-            moments = const core::mem::offset_of!(Row, moments),
-            tare = const core::mem::offset_of!(Row, tare),
-            boost = const core::mem::offset_of!(Row, boost),
-            largest = const core::mem::offset_of!(Row, largest),
+            pairs = const PAIRS,
+            row = const size_of::<Row<WRITTEN_OUT>>(),
+            moments = const core::mem::offset_of!(Row<WRITTEN_OUT>, moments),
+            tare = const core::mem::offset_of!(Row<WRITTEN_OUT>, tare),
+            boost = const core::mem::offset_of!(Row<WRITTEN_OUT>, boost),
+            largest = const core::mem::offset_of!(Row<WRITTEN_OUT>, largest),
             tare_drop = const TARE_BITS - CODE_BITS,
             boost_drop = const BOOST_DROP,
-            inout("r0") codes.as_ptr() => largest,
+            inout("r0") codes.rows.as_ptr() => largest,
             inout("r1") rows.as_mut_ptr() => _,
             inout("r2") taxels.as_mut_ptr() => _,
             inout("r3") common => first,
             out("r4") second, out("r5") running,
-            out("r8") _, in("r9") codes.as_ptr_range().end,
+            out("r8") _, in("r9") codes.rows.as_ptr_range().end,
             out("r10") _, out("r11") _, out("r12") peak, out("lr") _,
         );
     }

@@ -9,8 +9,8 @@ use embassy_stm32::pac::adc::Adc;
 use embassy_stm32::pac::adc::vals::{Dds, Exten};
 use embassy_stm32::pac::dma::vals::{Dir, Pl, Size};
 use embassy_stm32::pac::timer::vals::Ocm;
-use fingertip::frame::{BANK_COLUMNS, ROWS, SLOTS};
 use fingertip::scan::ScanTiming;
+use fingertip::shipped::{BANK_COLUMNS, ROWS, SLOTS};
 
 /// TIM8's compare 1 in the converters' list of triggers.
 pub const TRIGGER_TIM8_CC1: u8 = 13;

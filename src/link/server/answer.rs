@@ -12,7 +12,7 @@ use super::State;
 // The largest part of a shared packet, its beginning included, fits into a reply.
 const _: () = assert!(8 + 2 + READ_MAX as usize + 2 <= REPLY_MAX);
 
-impl State {
+impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// Answers an instruction that returns no data, under the ID and the status return level that it found: it may have
     /// changed them.
     pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
@@ -26,10 +26,10 @@ impl State {
     pub(super) fn answer_read(
         &mut self,
         request: Result<Request, StatusError>,
-        snapshot: &Snapshot<'_>,
+        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
         reply: &mut Reply,
     ) {
-        let request = self.counted(request.and_then(checked));
+        let request = self.counted(request.and_then(checked::<ROWS, COLUMNS>));
         if self.settings.status_return_level == 0 {
             return;
         }
@@ -46,10 +46,10 @@ impl State {
         &mut self,
         shared: Shared,
         request: Request,
-        snapshot: &Snapshot<'_>,
+        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
         reply: &mut Reply,
     ) {
-        let readable = self.counted(checked(request));
+        let readable = self.counted(checked::<ROWS, COLUMNS>(request));
         if self.settings.status_return_level == 0 || request.length > READ_MAX {
             return;
         }
@@ -71,7 +71,7 @@ impl State {
     }
 
     /// Follows a packet that the devices share, and adds this one's part when all before it was heard.
-    pub(super) fn listen(&mut self, byte: u8, snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    pub(super) fn listen(&mut self, byte: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let Turn::Shared(mut shared, request) = self.turn else { return };
         self.turn = if !shared.hear(byte) {
             Turn::None
@@ -84,7 +84,7 @@ impl State {
     }
 
     /// Hears another device's status packet, which may be the one that this device waits for.
-    pub(super) fn hear_status(&mut self, id: u8, snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    pub(super) fn hear_status(&mut self, id: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         if let Turn::After(before, request) = self.turn
             && before == id
         {
@@ -107,6 +107,6 @@ impl State {
     }
 }
 
-fn checked(request: Request) -> Result<Request, StatusError> {
-    table::check_read(request.address, request.length).map(|()| request)
+fn checked<const ROWS: usize, const COLUMNS: usize>(request: Request) -> Result<Request, StatusError> {
+    table::check_read::<ROWS, COLUMNS>(request.address, request.length).map(|()| request)
 }

@@ -15,9 +15,9 @@ use super::{Registered, State};
 /// Bytes of the longest status packet to a Ping, 10 bits each: what a device with a higher ID waits for.
 const PING_SLOT_BITS: u32 = 14 * 10;
 
-impl State {
+impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// A whole packet with a good CRC.
-    pub(super) fn packet(&mut self, packet: Packet<'_>, snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    pub(super) fn packet(&mut self, packet: Packet<'_>, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         if packet.instruction == instruction::STATUS {
             return self.hear_status(packet.id, snapshot, reply);
         }
@@ -81,7 +81,7 @@ impl State {
     }
 
     /// Answers always, whatever the status return level; a broadcast after the devices with lower IDs.
-    fn ping(&mut self, to: u8, snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    fn ping(&mut self, to: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let id = self.settings.record.id;
         self.reply_delay_us = self.settings.return_delay_us();
         if to == BROADCAST {
@@ -97,7 +97,7 @@ impl State {
     /// Writes all or nothing.
     fn write(&mut self, address: u16, data: &[u8]) -> Result<(), StatusError> {
         let mut staged = self.staged();
-        table::write(&mut staged, address, data)?;
+        table::write::<ROWS, COLUMNS>(&mut staged, address, data)?;
         self.commit(staged);
         Ok(())
     }
@@ -120,7 +120,7 @@ impl State {
     /// Reg Write: checked now, written by Action.
     fn register(&mut self, params: &[u8]) -> Result<(), StatusError> {
         let (address, data) = word(params).ok_or(StatusError::Length)?;
-        table::write(&mut self.staged(), address, data)?;
+        table::write::<ROWS, COLUMNS>(&mut self.staged(), address, data)?;
         let data = Vec::from_slice(data).map_err(|_| StatusError::Length)?;
         self.registered = Some(Registered { address, data });
         Ok(())
@@ -142,7 +142,7 @@ impl State {
         }
         let mut staged = self.staged();
         staged.settings.record = record;
-        staged.settings.check(true)?;
+        staged.settings.check::<ROWS, COLUMNS>(true)?;
         staged.actions.save = true;
         staged.stand.check(&staged.settings.command, &staged.settings.command, staged.actions)?;
         self.commit(staged);
@@ -177,7 +177,7 @@ impl State {
         Ok(())
     }
 
-    fn sync_read(&mut self, params: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    fn sync_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let Ok((wanted, ids)) = self.counted(request(params).ok_or(StatusError::Length)) else { return };
         let mut before = None;
         for &id in ids {
@@ -188,7 +188,7 @@ impl State {
         }
     }
 
-    fn bulk_read(&mut self, params: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    fn bulk_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let (entries, rest) = params.as_chunks::<5>();
         if !rest.is_empty() {
             return self.counters.count(StatusError::Length);
@@ -204,14 +204,20 @@ impl State {
     }
 
     /// Answers now, or after the device before this one in the list.
-    fn take_turn(&mut self, before: Option<u8>, wanted: Request, snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    fn take_turn(
+        &mut self,
+        before: Option<u8>,
+        wanted: Request,
+        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
+        reply: &mut Reply,
+    ) {
         match before {
             None => self.answer_read(Ok(wanted), snapshot, reply),
             Some(id) => self.turn = Turn::After(id, wanted),
         }
     }
 
-    fn fast_sync_read(&mut self, params: &[u8], snapshot: &Snapshot<'_>, reply: &mut Reply) {
+    fn fast_sync_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let Ok((wanted, ids)) = self.counted(request(params).ok_or(StatusError::Length)) else { return };
         let Some(place) = ids.iter().position(|&id| id == self.settings.record.id) else { return };
         match Shared::new(place, ids.len(), wanted.length) {

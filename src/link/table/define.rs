@@ -48,13 +48,17 @@ macro_rules! control_table {
         ];
 
         /// The value of an element, as its low bytes; 0 where there is no such register.
-        pub(super) fn get(view: View<'_>, address: u16, element: usize) -> u32 {
+        pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
+            view: View<'_, ROWS, COLUMNS>,
+            address: u16,
+            element: usize,
+        ) -> u32 {
             match address {
                 $($address => {
-                    let get: fn(View<'_>, usize) -> u32 = $get;
+                    let get: fn(View<'_, ROWS, COLUMNS>, usize) -> u32 = $get;
                     get(view, element)
                 })*
-                _ => 0,
+                _ => super::pictures::get(view, address, element),
             }
         }
 

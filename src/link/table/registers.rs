@@ -1,18 +1,19 @@
 //! The definition itself: one entry for each register, in the order of the addresses.
 //!
 //! As [`control_table`](super::define) reads it: `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
-//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each.
+//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each; nor are the
+//! [pictures](super::pictures) of the array, which go by its shape.
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 
 use crate::contact::Effort;
-use crate::frame::{COLUMNS, ROWS, SLOTS, TAXELS};
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
 use crate::params::Params;
 use crate::store::Record;
 
+use super::pictures;
 use super::values::{bump, permille, set_goal, set_torque, set_watchdog, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
@@ -230,26 +231,21 @@ control_table! {
     /// cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
-    /// Pressure on each taxel, row by row.
-    768 PRESSURES: U16[TAXELS] ReadOnly, "Pa" * 10, 0 to 0xFFFF,
-        |view, place| view.snapshot.pressure_10pa(place).into();
-    /// Converter codes of the last frame, row by row; the last ten are the columns with no row driven.
-    1024 RAW_CODES: U16[SLOTS * COLUMNS] ReadOnly, "" * 1, 0 to 4095,
-        |view, place| u32::from(view.snapshot.frame.code(place / COLUMNS, place % COLUMNS));
-    /// Zero of each taxel in converter codes, row by row.
-    1280 TARE_CODES: U16[TAXELS] ReadOnly, "" * 1, 0 to 4095,
-        |view, place| view.snapshot.tare_codes(place).into();
 }
 
-/// Every register, in the order of the addresses.
-pub const REGISTERS: &[Register] = &all();
+/// How many registers there are.
+pub const COUNT: usize = FIXED.len() + Params::COUNT + 3;
 
-const fn all() -> [Register; FIXED.len() + Params::COUNT] {
-    let mut all = [FIXED[0]; FIXED.len() + Params::COUNT];
+/// Every register of an array of this shape, in the order of the addresses; the last three are the pressures, the raw codes and the tare's.
+pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
+    let mut all = [FIXED[0]; COUNT];
+    let pictures = pictures::registers::<ROWS, COLUMNS>();
     let (mut to, mut fixed, mut place) = (0, 0, 0);
     while to < all.len() {
-        let params_next = fixed == FIXED.len() || FIXED[fixed].address > address::PARAMS;
-        if params_next && place < Params::COUNT {
+        if fixed < FIXED.len() {
+            all[to] = FIXED[fixed];
+            fixed += 1;
+        } else if place < Params::COUNT {
             let (name, default, min, max) = Params::RANGES[place];
             all[to] = Register {
                 name,
@@ -266,13 +262,18 @@ const fn all() -> [Register; FIXED.len() + Params::COUNT] {
             };
             place += 1;
         } else {
-            all[to] = FIXED[fixed];
-            fixed += 1;
+            all[to] = pictures[to - FIXED.len() - Params::COUNT];
         }
         to += 1;
     }
     all
 }
+
+// The order of the addresses: what is listed, the parameters, the pictures.
+const _: () = assert!(
+    FIXED[FIXED.len() - 1].address < address::PARAMS
+        && address::PARAMS as usize + 4 * Params::COUNT <= pictures::FIRST as usize
+);
 
 /// A number of at most two digits.
 const fn number(digits: &str) -> u8 {

@@ -8,8 +8,8 @@
 
 use core::hint::black_box;
 use fingertip::command::Command;
-use fingertip::frame::{Frame, Sense};
-use fingertip::pipeline::Pipeline;
+use fingertip::frame::Sense;
+use fingertip::shipped::{Frame, Pipeline};
 use fingertip::units::Duty;
 
 /// The step, with a pipeline and arguments of which the compiler knows nothing.
@@ -17,7 +17,7 @@ use fingertip::units::Duty;
 #[inline(never)]
 fn control_step(pipeline: &mut Pipeline, frame: &Frame, sense: &Sense, command: &Command) -> Duty {
     if cfg!(feature = "proof-control-panic") {
-        let codes = frame.pairs.as_flattened();
+        let codes = frame.codes.rows.as_flattened();
         return Duty(codes[command.goal.to_bits() as usize] as i16);
     }
     if cfg!(feature = "proof-control-float") {

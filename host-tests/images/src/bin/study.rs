@@ -36,8 +36,8 @@ mod sparse;
 mod step;
 
 use cortex_m_semihosting::debug;
-use fingertip::config::Config;
 use fingertip::params::Params;
+use fingertip::shipped::Config;
 use host::{fail, say};
 use inputs::Inputs;
 use scalar::Tools;

@@ -2,8 +2,8 @@
 
 use super::Source;
 use super::model::Sample;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS};
-use fingertip::pressure::{Calibration, CalibrationError, GAIN_MAX};
+use fingertip::pressure::{CalibrationError, GAIN_MAX};
+use fingertip::shipped::{COLUMNS, Calibration, Frame, ROWS, SLOTS};
 
 /// What a column shows with no row driven.
 const LEVEL: u16 = 372;
@@ -32,7 +32,7 @@ pub fn calibration(source: &mut Source) -> Result<Calibration, CalibrationError>
     let mut gains = [[0; COLUMNS]; ROWS];
     gains.as_flattened_mut().iter_mut().for_each(|gain| *gain = source.within(1, GAIN_MAX.into()) as u16);
     let mut mask = [0; ROWS];
-    mask.iter_mut().for_each(|row| *row = (source.word() & source.word() & source.word() & 0x3ff) as u16);
+    mask.iter_mut().for_each(|row| *row = source.word() & source.word() & source.word() & 0x3ff);
     match source.up_to(15) {
         0 => mask[3] |= 0x400,
         1 => gains[7][2] = 0,

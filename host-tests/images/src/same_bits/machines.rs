@@ -4,22 +4,19 @@
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Effort, Fit, Refined};
+use fingertip::contact::{self, Effort, Refined};
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::goal::Goal;
 use fingertip::control::observer::Observer;
 use fingertip::control::profile::Reference;
-use fingertip::frame::{COLUMNS, Frame};
 use fingertip::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use fingertip::model::{Relaxation, RelaxationState, Tip};
-use fingertip::pipeline::budget::Budget;
-use fingertip::pressure::{Array, Picture};
+use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame, Picture};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
-use lanes::{Common, Row, Total};
+use lanes::{Codes, Common, Row, Total};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
@@ -156,10 +153,13 @@ pub const STEPS: [Step; 20] = [
         let gains = [s.share_q32, third, first, fourth, second];
         let moments = [fourth, first, s.share_q32, second, third];
         let tare = core::array::from_fn(|column| s.words[column % 4].wrapping_mul(column as i32));
-        let mut rows = [Row { gains, moments, tare, boost: 0, largest: 0 }; 2];
+        let [pairs, gains, moments] = [pairs, gains, moments].map(halves);
+        let codes = Codes { rows: [pairs, moments], undriven: [0; COLUMNS] };
+        let signed = |row: [u16; COLUMNS]| row.map(u16::cast_signed);
+        let mut rows = [Row { gains: signed(gains), moments: signed(moments), tare, boost: 0, largest: 0 }; 2];
         let common = Common { undriven: gains, dead: fourth, sag: second & 0x7fff_7fff };
         let mut taxels = [[0; COLUMNS]; 2];
-        let total = lanes::pass(&[pairs, moments], &mut rows, &common, &mut taxels);
+        let total = lanes::pass(&codes, &mut rows, &common, &mut taxels);
         let Total { first, second, running, largest, peak } = total;
         [first, second, running, peak, rows[0].boost, rows[1].boost].into_iter().for_each(|number| mix.add(number));
         taxels.into_iter().flatten().for_each(|taxel| mix.add(taxel));
@@ -255,11 +255,17 @@ fn add_reference(mix: &mut Mix, reference: Reference) {
     mix.add(reference.acceleration.to_bits());
 }
 
+/// Both halves of each word.
+fn halves(pairs: [u32; COLUMNS / 2]) -> [u16; COLUMNS] {
+    core::array::from_fn(|column| (pairs[column / 2] >> (16 * (column % 2))) as u16)
+}
+
 fn add_picture(mix: &mut Mix, picture: &Picture) {
     let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
         picture;
     taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
-    bad.iter().chain([undriven_max, peak_codes]).for_each(|number| mix.add(*number));
+    bad.iter().for_each(|row| mix.add(*row));
+    [undriven_max, peak_codes].into_iter().for_each(|number| mix.add(*number));
     mix.add(*bad_count);
     mix.add(*bad_again);
 }

@@ -3,11 +3,12 @@
 use super::machines::Machines;
 use super::{Mix, Source, frames};
 use fingertip::config::gains::Gains;
-use fingertip::config::{Config, ConfigError};
+use fingertip::config::{self, ConfigError};
 use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
 use fingertip::pressure::CalibrationError;
 use fingertip::scan::ScanTiming;
+use fingertip::shipped::Config;
 use fingertip::units::{Newtons, Ratio};
 
 /// A constructor's name, and one call of it with what that adds to its digest.
@@ -38,7 +39,7 @@ pub const MADE: [Make; 3] = [
             mix.add(column as u32);
             mix.add(value);
         }
-        Err(CalibrationError::Mask { row, value }) => {
+        Err(CalibrationError::Mask { row, value, .. }) => {
             mix.add(row as u32);
             mix.add(value);
         }
@@ -78,10 +79,10 @@ fn params(source: &mut Source) -> Params {
 /// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in the fit.
 fn add_config(mix: &mut Mix, config: &Config) {
     // Taken apart, so that a field cannot be forgotten.
-    let Config {
+    let config::Config {
         params: _,
         geometry: _,
-        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles, frame_ns },
+        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles, slots: _, frame_ns },
         tip,
         sag_q32,
         dead_codes,
@@ -116,7 +117,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         force_fault,
         force_max,
         force_seen,
-    } = config;
+    } = &**config;
     for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
         mix.add(*ticks);
     }

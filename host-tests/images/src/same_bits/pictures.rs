@@ -1,10 +1,8 @@
 //! Pictures for the fit: contacts by the model, on and beside the array, that spoil bit by bit.
 
 use super::model::Sample;
-use fingertip::config::Config;
-use fingertip::frame::{COLUMNS, ROWS, TAXELS};
-use fingertip::pressure::Picture;
 use fingertip::root::floor_sqrt;
+use fingertip::shipped::{COLUMNS, Config, Picture, ROWS, TAXELS};
 use fingertip::units::Millimetres;
 
 /// Pictures from one contact; each spoils up to two taxels more.
@@ -92,7 +90,7 @@ fn sum_up(picture: &mut Picture) {
             *peak = (*peak).max(*taxel);
         }
     }
-    *bad_count = bad.iter().map(|row| row.count_ones() as u8).sum();
+    *bad_count = bad.iter().map(|row| row.count_ones() as u16).sum();
 }
 
 #[cfg(test)]

@@ -3,12 +3,10 @@
 use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
-use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Effort, Fit, Refined};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::contact::{self, Effort, Refined};
 use fingertip::params::Params;
-use fingertip::pressure::Picture;
+use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 
 /// What the variants read and write.
 struct Bench<'a> {

@@ -5,9 +5,8 @@ use super::inputs::Inputs;
 use super::packed;
 use super::sparse::{self, Sparse};
 use crate::host::{fail, say};
-use fingertip::config::Config;
-use fingertip::frame::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SATURATED};
-use fingertip::pressure::{Array, Calibration, Picture, TARE_FRAMES};
+use fingertip::frame::SATURATED;
+use fingertip::shipped::{Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, Picture, ROWS, SLOTS, TARE_FRAMES};
 use fixed::types::I16F16;
 
 /// Sums in a format: of the taxels, weighted by -9, -7 .. 9 along the columns and along the rows, and the largest.
@@ -140,6 +139,13 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     }
 }
 
+/// The codes of a frame in words, as the two converters read them at the same instant.
+pub fn pairs(frame: &Frame) -> &[[u32; BANK_COLUMNS]; SLOTS] {
+    const { assert!(size_of_val(&Frame::EMPTY.codes) == 4 * BANK_COLUMNS * SLOTS) };
+    // SAFETY: the codes stand in the order of their fields without a gap, on a word's border, and any bits are a word.
+    unsafe { &*(&raw const frame.codes).cast() }
+}
+
 impl Bench {
     /// What the firmware's way left in the array.
     fn collect(&mut self, format: Format) {
@@ -153,9 +159,10 @@ impl Bench {
 
 fn read(inputs: &mut Inputs) -> Frame {
     let mut frame = Frame::EMPTY;
-    for pair in frame.pairs.iter_mut().flatten() {
+    for (slot, place) in (0..SLOTS).flat_map(|slot| (0..BANK_COLUMNS).map(move |place| (slot, place))) {
         let [word] = inputs.words();
-        *pair = word as u32;
+        frame.set_code(slot, place, word as u16);
+        frame.set_code(slot, place + BANK_COLUMNS, (word >> 16) as u16);
     }
     frame
 }

@@ -2,9 +2,10 @@
 //!
 //! A row's sag is common to its taxels, so it may be taken out of the row's sums instead of each taxel.
 
-use super::frame::{Bench, Sums};
+use super::frame::{Bench, Sums, pairs};
 use core::arch::asm;
-use fingertip::frame::{BANK_COLUMNS, ROWS, SATURATED};
+use fingertip::frame::SATURATED;
+use fingertip::shipped::{BANK_COLUMNS, ROWS};
 
 type Pairs = [u32; BANK_COLUMNS];
 
@@ -82,7 +83,7 @@ fn larger(a: u32, b: u32) -> u32 {
 fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
     let mut frame = Frame::new(bench);
     let mut out = Sums::default();
-    let [rows @ .., undriven] = &bench.frame.pairs;
+    let [rows @ .., undriven] = pairs(&bench.frame);
     let mut weight = 1 - ROWS as i32;
     for ((codes, gain), weighted) in rows.iter().zip(&bench.gain).zip(&bench.weighted) {
         let row = frame.row(codes, undriven, gain, weighted);
@@ -98,7 +99,7 @@ fn sums(bench: &mut Bench, bits: u32, read: impl Fn(&Row, u32) -> (i32, i32)) {
 
 /// Every taxel counts alike: the codes are added up column by column, and the levels taken off at the end.
 pub extern "C" fn plain(bench: &mut Bench) {
-    let [rows @ .., undriven] = &bench.frame.pairs;
+    let [rows @ .., undriven] = pairs(&bench.frame);
     let dead = lanes::pair(bench.config.dead_codes as i16, bench.config.dead_codes as i16);
     let halves = |pair: u32| [(pair & 0xffff) as i32, (pair >> 16) as i32];
     let (mut sum, mut moment_x, mut numbered) = (0, 0, 0);

@@ -3,8 +3,8 @@
 use super::call::{Registers, pass};
 use super::inputs::Inputs;
 use crate::host::say;
-use fingertip::config::Config;
 use fingertip::model::Tip;
+use fingertip::shipped::Config;
 use fixed::types::I16F16;
 
 /// Fractional bits of the inputs; they have at most 24 significant bits, so every format holds them exactly.

@@ -3,9 +3,9 @@
 //! The pass takes codes above floors, which a dead taxel falls short of: it then shows as a huge number. What the floors hold back of
 //! a row's sums these begin with.
 
-use super::frame::{Bench, Sums};
-use fingertip::config::Config;
-use fingertip::frame::{BANK_COLUMNS, COLUMNS, ROWS, SATURATED};
+use super::frame::{Bench, Sums, pairs};
+use fingertip::frame::SATURATED;
+use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Config, ROWS};
 use lanes::{BOOST_BITS, CODE_BITS, GAIN_BITS};
 
 type Pairs = [u32; BANK_COLUMNS];
@@ -69,8 +69,8 @@ pub extern "C" fn all_rows(bench: &mut Bench) {
 /// Sums and flags, and the taxels of some rows, a bit each.
 #[inline(always)]
 fn read(bench: &mut Bench, mut wanted: u16) {
-    let [codes @ .., undriven] = &bench.frame.pairs;
-    let Config { dead_codes, sag_q32, .. } = bench.config;
+    let [codes @ .., undriven] = pairs(&bench.frame);
+    let (dead_codes, sag_q32) = (bench.config.dead_codes, bench.config.sag_q32);
     let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
     let common = Common {
         floors: undriven.map(|level| level.wrapping_add(dead)),

@@ -21,7 +21,7 @@ mod temperature_drift;
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::Cost;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use host_tests::plant::setup::Array;
 
 /// The effects of this family, in the order in which they act within a stage.

@@ -5,7 +5,7 @@ use super::normal::Law;
 use super::pressures::{Between, Pressures};
 use super::shape;
 use crate::effects::contact::{Grip, Stages};
-use fingertip::frame::COLUMNS;
+use fingertip::shipped::COLUMNS;
 use host_tests::plant::Setup;
 
 /// A contact and its effects.

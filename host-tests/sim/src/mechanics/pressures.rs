@@ -6,7 +6,7 @@
 
 use super::shape;
 use crate::effects::contact::Stages;
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use host_tests::plant::cells::Cell;
 use host_tests::plant::setup::Tip;
 

@@ -2,9 +2,10 @@
 
 use fingertip::command::Command;
 use fingertip::contact::Contact;
-use fingertip::frame::{Frame, Sense};
+use fingertip::frame::Sense;
 use fingertip::identify::Modulus;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Frame;
 use fingertip::units::Duty;
 use twox_hash::xxhash3_128::Hasher;
 
@@ -24,7 +25,8 @@ impl Digest {
 
     /// Adds a step.
     pub fn add(&mut self, frame: &Frame, sense: &Sense, command: &Command, duty: Duty, status: &Status) {
-        self.0.write(frame.pairs.map(|pairs| pairs.map(u32::to_le_bytes)).as_flattened().as_flattened());
+        self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
+        self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
         self.0.write(taken(frame.sequence, sense, command).map(u32::to_le_bytes).as_flattened());
         self.0.write(given(duty, status).map(u32::to_le_bytes).as_flattened());
     }

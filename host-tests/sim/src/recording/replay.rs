@@ -3,9 +3,7 @@
 use super::{END, SETUP, WHOLE, controller_of, topic};
 use crate::run::RunError;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use fingertip::config::Config;
-use fingertip::pipeline::Pipeline;
-use fingertip::pressure::Calibration;
+use fingertip::shipped::{Calibration, Config, Pipeline};
 use images::record::{Digest, Record};
 use mcap::read::Options;
 use mcap::records::Metadata;

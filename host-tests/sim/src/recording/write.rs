@@ -5,7 +5,7 @@ use crate::run::RunError;
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Watch};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use fingertip::units::Duty;
 use images::record::{Digest, Record};
 use mcap::records::{MessageHeader, Metadata};

@@ -8,7 +8,7 @@ use super::{Bound, Event, Scene, controller};
 use crate::key::Values;
 use crate::metrics;
 use crate::registry::{self, Named};
-use fingertip::config::Config;
+use fingertip::shipped::Config;
 use std::ops::Range;
 use std::path::Path;
 use toml_edit::{Document, TableLike};

@@ -3,7 +3,7 @@
 use super::{World, surface_mm};
 use crate::effects::set::Set;
 use crate::mechanics::contact::Place;
-use fingertip::frame::COLUMNS;
+use fingertip::shipped::COLUMNS;
 
 impl<E: Set> World<E> {
     /// How a finger touches at a time within the last step. Several may be asked for before their rows: one then need not wait for

@@ -3,8 +3,9 @@
 use crate::wall;
 use fingertip::command::Command;
 use fingertip::config::newtons;
-use fingertip::frame::{Frame, Sense};
+use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Frame;
 use fingertip::state::Fault;
 use sim::metrics::{self, METRICS, Meter};
 use sim::run::run;

@@ -33,7 +33,7 @@ fn a_recording_replays_to_the_bit() {
     let replayed = replay(&record("replayed")).unwrap();
     assert_eq!(replayed.difference, None);
     // 50 ms at 10 kHz and the tare before.
-    let tare = u64::from(fingertip::pressure::TARE_FRAMES) + 2;
+    let tare = u64::from(fingertip::shipped::TARE_FRAMES) + 2;
     assert!((500..=504).contains(&(replayed.steps - tare)), "{}", replayed.steps);
 }
 

@@ -1,6 +1,6 @@
 //! Each effect of clock, bus and host against its closed form, and the host that repeats its command.
 
-use fingertip::frame::{COLUMNS, SLOTS};
+use fingertip::shipped::{COLUMNS, SLOTS};
 use sim::effects::link::{Named, Stages};
 use sim::effects::{Part, stream};
 use sim::host::Host;

@@ -2,9 +2,10 @@
 
 use fingertip::command::Command;
 use fingertip::config::newtons;
-use fingertip::frame::{Frame, Sense};
+use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
+use fingertip::shipped::Frame;
 use fingertip::state::Fault;
 use fingertip::units::Duty;
 use sim::metrics::Meter;

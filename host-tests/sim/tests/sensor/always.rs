@@ -1,6 +1,6 @@
 //! What holds of every sensor effect, alone and together, over any input.
 
-use fingertip::frame::{COLUMNS, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use host_tests::plant::setup::Array;
 use sim::effects::sensor::{self, Readout, Row};
 use sim::registry;

@@ -1,7 +1,7 @@
 //! Noise, offsets and the converter.
 
 use crate::{all, codes};
-use fingertip::frame::SLOTS;
+use fingertip::shipped::SLOTS;
 
 #[test]
 fn noise_has_its_deviation_and_no_bias() {

@@ -5,7 +5,7 @@ mod codes;
 mod network;
 mod pressure;
 
-use fingertip::frame::COLUMNS;
+use fingertip::shipped::COLUMNS;
 use sim::effects::Part;
 use sim::effects::sensor::{Codes, Conductance, Network, Pressure, Row, Volts};
 use sim::registry;

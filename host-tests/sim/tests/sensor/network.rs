@@ -1,7 +1,7 @@
 //! Ghosting and sag: what a column sees of the network. Settling and saturation: what its amplifier makes of it.
 
 use crate::{all, network, volts};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use sim::effects::sensor::Row;
 
 fn ghosted(hold: &str, row: usize, array: &[Row; ROWS]) -> Row {

@@ -1,7 +1,7 @@
 //! Hysteresis, creep, spread and temperature.
 
 use crate::{all, conductance, part, pressure};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use sim::effects::Part;
 use sim::effects::sensor::Pressure;
 

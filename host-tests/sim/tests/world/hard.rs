@@ -79,7 +79,7 @@ fn scenes_of_no_time_and_of_one_frame_end() {
         let mut last = Last::default();
         let text = format!("duration_s = {duration}\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n");
         let summary = sim::simulate(&scene(&text), &mut last).unwrap();
-        assert_eq!(last.steps, u64::from(fingertip::pressure::TARE_FRAMES) + 2 + frames, "{duration} s");
+        assert_eq!(last.steps, u64::from(fingertip::shipped::TARE_FRAMES) + 2 + frames, "{duration} s");
         assert_eq!(summary.digest.len(), 32);
     }
 }

@@ -1,6 +1,6 @@
 //! Taxel means from the table against the fine integral.
 
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use host_tests::plant::cells::Cell;
 use host_tests::plant::setup::Tip;
 use sim::mechanics::pressures::Pressures;

@@ -1,6 +1,6 @@
 //! `virtual-board serve`.
 
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use host_tests::plant::{Setup, World};
 use std::io::Write as _;
 use std::path::PathBuf;

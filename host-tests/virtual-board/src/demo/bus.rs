@@ -4,8 +4,7 @@ use super::DemoError;
 use crate::Rig;
 use crate::client::Client;
 use dynamixel2::{InvalidMessage, ReadError, TransferError};
-use fingertip::frame::{COLUMNS, ROWS};
-use fingertip::link::table::address;
+use fingertip::shipped::{COLUMNS, ROWS, address};
 use fingertip::state::Mode;
 use host_tests::heatmap::Pressures;
 

@@ -7,7 +7,7 @@ use crate::front_end::ScanCounts;
 use crate::gaps::Gap;
 use crate::measure::Latency;
 use crate::recorder::Recorder;
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use host_tests::demo::{self, Phase, Picture};
 use host_tests::heatmap::Pressures;

@@ -5,8 +5,8 @@ use fingertip::link::Reply;
 use fingertip::link::packet::instruction;
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
-use fingertip::link::table::address;
 use fingertip::pipeline::Status;
+use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond};
 

@@ -1,7 +1,8 @@
 //! The board's end of a scene: the world behind the pins, and what only it knows, frame by frame.
 
 use super::joint::Joint;
-use fingertip::frame::{COLUMNS, Frame, ROWS, SLOTS, Sense};
+use fingertip::frame::Sense;
+use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use host_tests::plant::Bridge;
 use host_tests::plant::setup::Array;
 use sim::SimError;

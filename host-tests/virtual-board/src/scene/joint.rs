@@ -6,7 +6,8 @@
 
 use super::finger::Clock;
 use crate::bench::STEP_NS;
-use fingertip::frame::{COLUMNS, Sense};
+use fingertip::frame::Sense;
+use fingertip::shipped::COLUMNS;
 use host_tests::plant::Bridge;
 use sim::SimError;
 use sim::effects::set::Named;

@@ -1,7 +1,7 @@
 //! What the tests of the flash image share.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
-use fingertip::link::table::address;
+use fingertip::shipped::address;
 use fingertip::store::{self, Record};
 use host_tests::plant::{Setup, World};
 use std::path::{Path, PathBuf};

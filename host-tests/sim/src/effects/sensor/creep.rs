@@ -5,7 +5,7 @@ use super::{Pressure, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 use host_tests::plant::readout::decay;
 
 /// What a scene names.

@@ -6,7 +6,7 @@ use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
 use fastrand::Rng;
-use fingertip::frame::ROWS;
+use fingertip::shipped::ROWS;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {

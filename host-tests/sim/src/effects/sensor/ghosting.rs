@@ -4,7 +4,7 @@ use super::{Network, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
-use fingertip::frame::{COLUMNS, ROWS};
+use fingertip::shipped::{COLUMNS, ROWS};
 
 /// What a scene names.
 pub const EFFECT: Description = Description {

@@ -1,6 +1,6 @@
 //! The true time between two samples.
 
-use fingertip::frame::ROWS;
+use fingertip::shipped::ROWS;
 
 /// When each row was sampled last.
 #[derive(Clone, Debug, Default)]

@@ -1,0 +1,149 @@
+//! A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end and motor.
+
+use fingertip::command::Command;
+use fingertip::config::{Shaped, newtons};
+use fingertip::contact::Effort;
+use fingertip::frame::{Frame, Sense, Shape};
+use fingertip::params::Params;
+use fingertip::pipeline::{Bridge, Pipeline, Status};
+use fingertip::scan::TIMER_HZ;
+use fingertip::state::Mode;
+use fingertip::units::Duty;
+use host_tests::plant::Setup;
+use host_tests::plant::cells::Cell;
+use host_tests::plant::drive::{Dynamics, Shaft, Source};
+use images::record::Digest;
+
+/// Slots from a frame's end to its duty at most.
+const DUTY_DELAY_SLOTS: usize = 3;
+
+/// The finger with its controller.
+pub struct Finger<const ROWS: usize, const COLUMNS: usize> {
+    pub setup: Setup,
+    pub pipeline: Pipeline<ROWS, COLUMNS>,
+    pub command: Command,
+    /// Of every step.
+    pub digest: Digest,
+    frame: Frame<ROWS, COLUMNS>,
+    shaft: Shaft,
+    slot_s: f64,
+    duty: Option<f64>,
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
+    /// With taxels so far apart, whose array meets the plane there.
+    pub fn new(pitch_um: i32, centre_mm: [f64; 2], effort: Effort) -> Self {
+        let params = Params { pitch_um, ..Params::DEFAULT };
+        let config = Shaped::<ROWS, COLUMNS>::new(&params).expect("a pitch that is allowed");
+        let mut setup = Setup::default();
+        setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;
+        [setup.wall.centre_x_mm, setup.wall.centre_y_mm] = centre_mm;
+        Self {
+            setup,
+            pipeline: Pipeline::new(&config),
+            command: Command { effort, ..Command::default() },
+            digest: Digest::new(),
+            frame: Frame::EMPTY,
+            shaft: Shaft::default(),
+            slot_s: f64::from(config.timing.slot_ticks) / f64::from(TIMER_HZ),
+            duty: None,
+        }
+    }
+
+    fn indentation_mm(&self) -> f64 {
+        let travel_mm = Dynamics::new(&self.setup).travel_mm(self.shaft.angle_rad);
+        (travel_mm - self.setup.wall.distance_mm).max(0.0)
+    }
+
+    /// The true contact force.
+    pub fn force_n(&self) -> f64 {
+        self.setup.tip.force_n(self.indentation_mm())
+    }
+
+    fn advance(&mut self) {
+        let supply = &self.setup.supply;
+        let source = self.duty.map_or(Source::OPEN, |duty| Source {
+            volts: duty * supply.source_v,
+            ohms: supply.circuit_ohm(&self.setup.motor, duty),
+            ..Source::OPEN
+        });
+        self.shaft = Dynamics::new(&self.setup).advance(self.shaft, self.slot_s, &source);
+    }
+
+    /// The codes of a row under the present load, or of the slot with none driven.
+    fn scan(&mut self, slot: usize) {
+        let array = self.setup.array;
+        let tip = self.setup.tip.flattened(self.indentation_mm());
+        let [centre_x, centre_y] = [self.setup.wall.centre_x_mm, self.setup.wall.centre_y_mm];
+        let side = |place: usize, of: usize, centre: f64| {
+            let low = (place as f64 - 0.5 * of as f64) * array.pitch_mm - centre;
+            [low, low + array.pitch_mm]
+        };
+        let siemens: [f64; COLUMNS] = core::array::from_fn(|column| {
+            let cell = Cell { x_mm: side(column, COLUMNS, centre_x), y_mm: side(slot, ROWS, centre_y) };
+            array.preload_siemens + array.siemens_per_kpa * cell.mean_kpa(&tip)
+        });
+        let driven = if slot < ROWS { array.feedback_ohm * array.drive_v } else { 0.0 };
+        let scale = driven / (1.0 + array.row_ohm * siemens.iter().sum::<f64>());
+        for (column, siemens) in siemens.into_iter().enumerate() {
+            let volts = (array.ground_v + siemens * scale).min(array.reference_v);
+            self.frame.set_code(slot, column, array.code(volts));
+        }
+    }
+
+    /// A frame, row by row while the finger moves on, and a control step.
+    pub fn step(&mut self) -> Status {
+        let slots = Shape::<ROWS, COLUMNS>::SLOTS;
+        for slot in 0..slots {
+            if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
+                self.duty = match self.pipeline.status().bridge() {
+                    Bridge::Asleep | Bridge::Open => None,
+                    Bridge::Brakes => Some(0.0),
+                    Bridge::Driven(duty) => Some(f64::from(duty.0) / f64::from(Duty::FULL)),
+                };
+            }
+            self.advance();
+            self.scan(slot);
+        }
+        self.frame.sequence = self.frame.sequence.wrapping_add(1);
+        let turns = self.shaft.angle_rad / core::f64::consts::TAU;
+        let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
+        let sense = Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, answer_ticks: 0 };
+        let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
+        let status = *status;
+        self.digest.add(duty, &status);
+        assert_eq!(status.fault, None, "at {} N", self.force_n());
+        status
+    }
+
+    /// So long, and the last status.
+    pub fn run(&mut self, seconds: f64) -> Status {
+        let frame_s = self.slot_s * Shape::<ROWS, COLUMNS>::SLOTS as f64;
+        (0..(seconds / frame_s) as u32).map(|_| self.step()).last().expect("a step")
+    }
+
+    /// Tares and enables torque with no goal.
+    pub fn start(&mut self) {
+        self.command.tare_request = self.command.tare_request.wrapping_add(1);
+        for _ in 0..fingertip::pressure::Array::<ROWS, COLUMNS>::TARE_FRAMES + 2 {
+            self.step();
+        }
+        self.command.torque = true;
+    }
+
+    /// Presses for so long, and gives the least and the largest true force of the last 50 ms with the last status.
+    pub fn hold(&mut self, goal_mn: i32, seconds: f64) -> ([f64; 2], Status) {
+        self.command.goal = newtons(goal_mn);
+        self.run(seconds - 0.05);
+        let end = 0.05 / self.slot_s / Shape::<ROWS, COLUMNS>::SLOTS as f64;
+        let mut forces = [f64::INFINITY, 0.0_f64];
+        for _ in 0..end as u32 {
+            self.step();
+            forces = [forces[0].min(self.force_n()), forces[1].max(self.force_n())];
+        }
+        let status = *self.pipeline.status();
+        assert_eq!(status.mode, Mode::Force);
+        (forces, status)
+    }
+}

@@ -1,0 +1,282 @@
+//! The worst that frames can bring: every code at the top, one corner, half of them, alternating ones, and any at all. Nothing may overflow,
+//! so these are worth most with overflow checks.
+
+use fingertip::command::Command;
+use fingertip::config::{Shaped, newtons};
+use fingertip::contact::{self, Effort, Fit, Refined};
+use fingertip::frame::{Frame, Sense, Shape};
+use fingertip::params::Params;
+use fingertip::pipeline::Pipeline;
+use fingertip::pressure::{Array, Calibration, GAIN_MAX};
+use proptest::prelude::*;
+use proptest::test_runner::{Config as Cases, RngSeed};
+
+/// The highest code that is not saturated.
+const TOP: u16 = 4_089;
+/// A code that shows no contact, above a level of 0.
+const QUIET: u16 = 40;
+
+/// The ends of what goes into the sums and the fit, with the largest sag that the shape allows.
+fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
+    let sag = (0..=7_600)
+        .rev()
+        .step_by(4)
+        .find(|sag| Shaped::<ROWS, COLUMNS>::new(&Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT }).is_ok());
+    let row_sag_ppb_per_code = sag.expect("a sag that is allowed");
+    let mut all = Vec::new();
+    for (pitch_um, tip_radius_um) in [(500, 16_000), (4_000, 4_000), (1_500, 10_000), (500, 4_000)] {
+        for (modulus_pa, codes_per_kpa_milli) in [(20_000, 200_000), (2_000_000, 1_000), (250_000, 24_000)] {
+            for row_sag_ppb_per_code in [0, row_sag_ppb_per_code] {
+                let params = Params { pitch_um, tip_radius_um, modulus_pa, codes_per_kpa_milli, ..Params::DEFAULT };
+                all.push(Params { row_sag_ppb_per_code, ..params });
+            }
+        }
+    }
+    all
+}
+
+/// A frame whose taxels show this above a level of 0.
+fn frame<const ROWS: usize, const COLUMNS: usize>(code: impl Fn(usize, usize) -> u16) -> Frame<ROWS, COLUMNS> {
+    let mut frame = Frame::EMPTY;
+    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+        frame.set_code(row, column, code(row, column));
+    }
+    frame
+}
+
+/// Every taxel at the top; a corner; halves; chessboards; a dome in the middle and one at a corner; nothing.
+fn frames<const ROWS: usize, const COLUMNS: usize>() -> Vec<Frame<ROWS, COLUMNS>> {
+    let top = |at: bool| if at { TOP } else { QUIET };
+    let dome = |row: i32, column: i32, flat: i32| {
+        (i32::from(TOP) - flat * (row * row + column * column)).max(QUIET.into()) as u16
+    };
+    let mut all = vec![
+        frame(|_, _| TOP),
+        frame(|row, column| top(row < 2 && column < 2)),
+        frame(|row, column| top(row + 2 >= ROWS && column + 2 >= COLUMNS)),
+        frame(|row, column| top(row == 0 && column + 1 == COLUMNS)),
+        frame(|row, _| top(row >= ROWS / 2)),
+        frame(|_, column| top(column < COLUMNS / 2)),
+        frame(|_, column| top(column >= COLUMNS.div_ceil(2))),
+        frame(|row, column| top((row + column) % 2 == 0)),
+        frame(|_, column| top(column % 2 == 0)),
+        frame(|row, _| top(row % 2 == 0)),
+        frame(|row, column| top(row >= ROWS / 2 && column >= COLUMNS / 2)),
+    ];
+    for flat in [2, 10, 60, 400] {
+        all.push(frame(|row, column| dome(row as i32 - ROWS as i32 / 2, column as i32 - COLUMNS as i32 / 2, flat)));
+        all.push(frame(|row, column| dome(row as i32, column as i32, flat)));
+        all.push(frame(|row, column| dome(row as i32 - ROWS as i32, column as i32 + 1, flat)));
+    }
+    all.push(frame(|_, _| QUIET));
+    all
+}
+
+/// What the sums should be, in sixteenths of a code.
+fn sums<const ROWS: usize, const COLUMNS: usize>(
+    frame: &Frame<ROWS, COLUMNS>,
+    gain: u16,
+    config: &Shaped<ROWS, COLUMNS>,
+) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    for row in 0..ROWS {
+        let net: [f64; COLUMNS] = core::array::from_fn(|column| f64::from(frame.code(row, column)));
+        let sag = f64::from(config.sag_q32) / 4_294_967_296.0 * net.iter().sum::<f64>();
+        for (column, net) in net.into_iter().enumerate() {
+            let reading = 16.0 * net * f64::from(gain) / 16_384.0 / (1.0 - sag);
+            sums[0] += reading;
+            sums[1] += reading * (2.0 * column as f64 + 1.0 - COLUMNS as f64);
+            sums[2] += reading * (2.0 * row as f64 + 1.0 - ROWS as f64);
+        }
+    }
+    sums
+}
+
+/// Every frame several times, through the array, all efforts of the fit and the readings of single pictures.
+fn survives<const ROWS: usize, const COLUMNS: usize>() {
+    let frames = frames::<ROWS, COLUMNS>();
+    for params in extremes::<ROWS, COLUMNS>() {
+        let config = Shaped::<ROWS, COLUMNS>::new(&params).expect("parameters within their ranges");
+        for gain in [GAIN_MAX, 1 << 14] {
+            let mut array = Array::new();
+            array.calibrate(&Calibration::new(&[[gain; COLUMNS]; ROWS], &[0; ROWS]).expect("gains within their range"));
+            let mut fits = Effort::ALL.map(Fit::<ROWS, COLUMNS>::new);
+            for frame in &frames {
+                let picture = *array.read(frame, &config);
+                let exact = sums(frame, gain, &config);
+                let found = [picture.sum, picture.moment_x, picture.moment_y].map(f64::from);
+                let off = exact.iter().zip(found).map(|(exact, found)| (exact - found).abs()).fold(0.0, f64::max);
+                // The boost's series is off by 2^-20 at its end.
+                assert!(off < 2e-5 * exact[0] * ROWS.max(COLUMNS) as f64 + 20.0, "{found:?}, not {exact:?}");
+                for refined in Refined::ALL {
+                    contact::read(&picture, refined, &config);
+                }
+                for fit in &mut fits {
+                    (0..2 * ROWS + 3).for_each(|_| _ = fit.read(&picture, &config));
+                }
+            }
+            // And tared by every frame, which the next is then read above.
+            for frame in &frames {
+                array.start_tare();
+                for _ in 0..Array::<ROWS, COLUMNS>::TARE_FRAMES {
+                    array.read(frame, &config);
+                    array.continue_tare();
+                }
+                array.judge_tare(&config);
+                let picture = *array.read(&frames[0], &config);
+                fits.iter_mut().for_each(|fit| _ = fit.read(&picture, &config));
+                array.follow_drift(true);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_worst_frames_overflow_nothing() {
+    survives::<3, 3>();
+    survives::<3, 5>();
+    survives::<4, 4>();
+    survives::<8, 8>();
+    survives::<10, 10>();
+    survives::<16, 16>();
+    survives::<3, 32>();
+    survives::<16, 32>();
+}
+
+/// A tare takes the same out of every taxel, also where the rows are odd.
+fn tares<const ROWS: usize, const COLUMNS: usize>() {
+    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+    let frame = frame::<ROWS, COLUMNS>(|row, column| 40 + 3 * row as u16 + 5 * column as u16);
+    let mut array = Array::new();
+    let done = (1..).find(|_| {
+        array.read(&frame, &config);
+        array.continue_tare()
+    });
+    assert_eq!(done, Some(32 * ROWS.div_ceil(2) as u32));
+    let picture = array.read(&frame, &config);
+    assert!(picture.taxels.iter().flatten().all(|taxel| taxel.abs() <= 1), "{:?}", picture.taxels);
+    assert!(picture.sum.abs() <= 2 && picture.moment_x.abs() <= 4 && picture.moment_y.abs() <= 4);
+}
+
+#[test]
+fn a_tare_zeroes_every_taxel() {
+    tares::<3, 3>();
+    tares::<3, 5>();
+    tares::<4, 4>();
+    tares::<9, 8>();
+    tares::<16, 16>();
+    tares::<15, 31>();
+    tares::<16, 32>();
+}
+
+/// A taxel that is dead or saturated is left out, whichever it is, and no other.
+fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
+    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+        for code in [0, 4_095] {
+            let spoilt = frame::<ROWS, COLUMNS>(|r, c| if (r, c) == (row, column) { code } else { 100 });
+            let mut array = Array::new();
+            let picture = *array.read(&spoilt, &config);
+            let mut bad = [0; ROWS];
+            bad[row] = 1 << column;
+            assert_eq!((picture.bad, picture.bad_count, array.bad_taxels(&spoilt, &config)), (bad, 1, 1));
+            assert_eq!(picture.taxels[row][column], 0);
+            assert!(
+                picture.peak > 0
+                    && picture.taxels.iter().flatten().filter(|taxel| **taxel > 0).count() + 1 == ROWS * COLUMNS
+            );
+        }
+    }
+}
+
+#[test]
+fn a_bad_taxel_is_left_out_wherever_it_is() {
+    leaves_out::<3, 3>();
+    leaves_out::<3, 5>();
+    leaves_out::<4, 4>();
+    leaves_out::<8, 8>();
+    leaves_out::<10, 10>();
+    leaves_out::<16, 16>();
+    leaves_out::<5, 31>();
+    leaves_out::<16, 32>();
+}
+
+#[test]
+fn an_array_that_is_all_bad_counts_every_taxel() {
+    let config = Shaped::<16, 32>::new(&Params::DEFAULT).expect("the defaults");
+    let frame = frame::<16, 32>(|_, _| 4_095);
+    let mut array = Array::new();
+    assert_eq!(array.read(&frame, &config).bad_count, 512);
+    assert_eq!(array.read(&frame, &config).bad_again, 512);
+    assert_eq!(contact::from_sums(array.picture(), &config).bad_taxels, 255);
+}
+
+/// Any codes: of a converter of 12 bits, or 16 at random.
+fn any_frame<const ROWS: usize, const COLUMNS: usize>() -> impl Strategy<Value = Frame<ROWS, COLUMNS>> {
+    let code = prop_oneof![8 => 0..4_096_u16, 2 => Just(TOP), 1 => Just(0), 1 => any::<u16>()];
+    let sound = 30..4_080_u16;
+    let count = Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS;
+    let codes = prop_oneof![
+        prop::collection::vec(sound, count),
+        prop::collection::vec(code, count),
+        prop::collection::vec(30..200_u16, count)
+    ];
+    (codes, prop::bool::ANY, any::<u32>()).prop_map(|(codes, level, sequence)| {
+        let mut frame = Frame { sequence, ..Frame::EMPTY };
+        for (place, code) in codes.into_iter().enumerate() {
+            let (slot, column) = (place / COLUMNS, place % COLUMNS);
+            frame.set_code(slot, column, if slot == ROWS && level { 20 } else { code });
+        }
+        frame
+    })
+}
+
+fn any_sense() -> impl Strategy<Value = Sense> {
+    let parts = (any::<i32>(), 5_000..7_000_u16, any::<u16>(), prop::bool::weighted(0.02), 0..20_000_u32);
+    parts.prop_map(|(encoder, supply_mv, bus_silent_ms, bridge_fault, answer_ticks)| Sense {
+        encoder: if encoder % 3 == 0 { encoder } else { encoder % 500 },
+        supply_mv,
+        bus_silent_ms,
+        bridge_fault,
+        answer_ticks,
+    })
+}
+
+/// Frames and senses to a pipeline that is tared and driven; a fault is cleared at once.
+fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
+    let cases = Cases { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Cases::default() };
+    let steps = prop::collection::vec((any_frame::<ROWS, COLUMNS>(), any_sense(), 0..6_u8), 1..8);
+    let test = |steps: Vec<(Frame<ROWS, COLUMNS>, Sense, u8)>| {
+        let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+        let mut pipeline = Pipeline::new(&config);
+        let mut command = Command { tare_request: 1, goal: newtons(2_000), ..Command::default() };
+        let quiet = frame::<ROWS, COLUMNS>(|_, _| QUIET);
+        let still = Sense { supply_mv: 6_000, ..Sense::default() };
+        for _ in 0..Array::<ROWS, COLUMNS>::TARE_FRAMES + 2 {
+            pipeline.step(&quiet, &still, &command);
+        }
+        for (frame, sense, effort) in &steps {
+            command.effort = Effort::from_number(*effort);
+            for _ in 0..ROWS + 2 {
+                pipeline.glance(frame);
+                let (duty, status) = pipeline.step(frame, sense, &command);
+                assert_eq!(duty, status.duty);
+                command.torque = status.fault.is_none();
+                command.clear_request += u8::from(status.fault.is_some());
+                command.identify_request = command.identify_request.wrapping_add(effort % 2);
+            }
+        }
+        Ok(())
+    };
+    proptest::test_runner::TestRunner::new(cases).run(&steps, test).expect("no panic");
+}
+
+#[test]
+fn any_frame_and_any_sense_is_taken() {
+    takes_anything::<3, 3>(200);
+    takes_anything::<3, 5>(200);
+    takes_anything::<4, 4>(200);
+    takes_anything::<8, 8>(60);
+    takes_anything::<16, 16>(30);
+    takes_anything::<16, 32>(30);
+}

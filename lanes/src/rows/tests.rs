@@ -1,0 +1,146 @@
+//! The pass against plain arithmetic.
+
+use super::super::pair;
+use super::{BOOST_BITS, Codes, Common, Row, boost, moment_bits, pairs, pass, place, portable_pass, sum_drop};
+
+const ONE: f64 = (1_u64 << 32) as f64;
+
+#[test]
+fn the_boost_takes_the_sag_out() {
+    let (mut ends, mut usual) = (0.0_f64, 0.0_f64);
+    for x in (-1_370_000_000..=1_370_000_000).step_by(100_003) {
+        let exact = f64::from(1 << BOOST_BITS) / (1.0 - f64::from(x) / ONE);
+        let error = (f64::from(boost(x)) - exact).abs() / exact;
+        ends = ends.max(error);
+        if x.abs() < 300_000_000 {
+            usual = usual.max(error);
+        }
+    }
+    let unit = 1.0 / f64::from(1 << BOOST_BITS);
+    assert!(ends < 1.2 / 1_048_576.0 && ends > 0.8 / 1_048_576.0, "{ends:e}");
+    assert!(usual < 4.0 * unit && usual > unit, "{usual:e}");
+}
+
+/// Numbers that look like chance.
+struct Mix(u32);
+
+impl Mix {
+    fn below(&mut self, limit: u32) -> u32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((u64::from(self.0) * u64::from(limit)) >> 32) as u32
+    }
+}
+
+/// Codes, gains and tares at random, up to the top where `all` is.
+fn bench<const ROWS: usize, const COLUMNS: usize>(
+    mix: &mut Mix,
+    top: bool,
+) -> (Codes<ROWS, COLUMNS>, [Row<COLUMNS>; ROWS], Common<COLUMNS>) {
+    let mut codes = Codes { rows: [[4_095; COLUMNS]; ROWS], undriven: [0; COLUMNS] };
+    let mut row = Row { gains: [32_767; COLUMNS], moments: [0; COLUMNS], tare: [0; COLUMNS], boost: 0, largest: 7 };
+    for column in 0..COLUMNS {
+        let weight = (2 * column as i32 + 1 - COLUMNS as i32) * 32_767;
+        row.moments[place(column, COLUMNS)] = (weight >> (14 - moment_bits(COLUMNS))) as i16;
+    }
+    let mut rows = [row; ROWS];
+    // The largest sag that keeps the boost's range.
+    let sag = (1_370_000_000 / (4_095 * COLUMNS as u32)).min(32_641);
+    if !top {
+        codes.rows.iter_mut().flatten().for_each(|code| *code = mix.below(4_096) as u16);
+        codes.undriven.iter_mut().for_each(|code| *code = mix.below(300) as u16);
+        for row in &mut rows {
+            row.gains.iter_mut().for_each(|gain| *gain = mix.below(32_768) as i16);
+            row.tare.iter_mut().for_each(|tare| *tare = mix.below(1 << 24) as i32 - (1 << 23));
+        }
+    }
+    (codes, rows, Common { undriven: codes.undriven, dead: 12 | 12 << 16, sag: sag | sag << 16 })
+}
+
+/// A pass against the same in wide integers, and against the portable one.
+fn is_what_its_parts_say<const ROWS: usize, const COLUMNS: usize>(mix: &mut Mix, top: bool) {
+    let (codes, mut rows, common) = bench::<ROWS, COLUMNS>(mix, top);
+    let mut taxels = [[0; COLUMNS]; ROWS];
+    let mut again = (rows, taxels);
+    let total = pass(&codes, &mut rows, &common, &mut taxels);
+    assert_eq!(portable_pass(&codes, &mut again.0, &common, &mut again.1), total);
+    assert_eq!(again, (rows, taxels));
+    let drop = sum_drop(ROWS, COLUMNS);
+    let (mut first, mut second, mut running, mut peak, mut all) = (0, 0, 0, 0, [0; 2]);
+    for ((codes, row), taxels) in codes.rows.iter().zip(&rows).zip(taxels) {
+        let net = |at: usize| i64::from(codes[at]) - i64::from(common.undriven[at]);
+        let sag = i64::from(common.sag & 0xffff) * (0..COLUMNS).map(net).sum::<i64>();
+        assert_eq!(row.boost, boost(i32::try_from(sag).expect("the sag fits")));
+        let (mut largest, mut peak_of) = ([0; 2], 0);
+        for (column, taxel) in taxels.into_iter().enumerate() {
+            let at = place(column, COLUMNS);
+            let exact = net(at) as f64 * f64::from(row.gains[at]) / 16_384.0 * f64::from(row.boost);
+            let exact = 16.0 * exact / f64::from(1 << BOOST_BITS) - f64::from(row.tare[column] >> 12);
+            assert!((f64::from(taxel) - exact).abs() <= 0.57, "{column}: {taxel}, not {exact}");
+            peak_of = taxel.max(peak_of);
+            let above = (net(at) - 12) as u16;
+            largest[at % 2] = above.max(largest[at % 2]);
+            if COLUMNS % 2 == 1 && at == COLUMNS - 1 {
+                largest[1] = above.max(largest[1]);
+            }
+        }
+        peak = peak_of.max(peak);
+        assert_eq!(row.largest, pair(largest[0] as i16, largest[1] as i16), "{:x}", row.largest);
+        all = [0, 1].map(|lane| largest[lane].max(all[lane]));
+        let sum = |weights: &[i16; COLUMNS]| (0..COLUMNS).map(|at| net(at) * i64::from(weights[at])).sum::<i64>();
+        // Eight pairs at a time lose the bits.
+        let rest = |part: usize| {
+            let places = 16 * part..COLUMNS.min(16 * part + 16);
+            places.map(|at| net(at) * i64::from(row.gains[at])).sum::<i64>() >> drop
+        };
+        let dropped: i64 = (0..pairs(COLUMNS).div_ceil(8)).map(rest).sum();
+        assert!((sum(&row.gains) >> drop).abs_diff(dropped) <= 1);
+        first += (dropped * i64::from(row.boost)) >> 32;
+        second += (sum(&row.moments) * i64::from(row.boost)) >> 32;
+        running += first >> 2;
+    }
+    // Exact, so nothing passed 32 bits; but the running sum may, what is made of it not.
+    assert_eq!([total.first, total.second].map(i64::from), [first, second]);
+    assert_eq!(total.running, running as i32);
+    i32::try_from((first >> 2) * (ROWS as i64 + 1) - 2 * running).expect("the moment fits");
+    assert_eq!(total.peak, peak);
+    assert_eq!(total.largest, pair(all[0] as i16, all[1] as i16), "{:x}", total.largest);
+}
+
+#[test]
+fn a_pass_is_what_its_parts_say() {
+    fn often<const ROWS: usize, const COLUMNS: usize>() {
+        let mut mix = Mix(2_003);
+        is_what_its_parts_say::<ROWS, COLUMNS>(&mut mix, true);
+        (0..100).for_each(|_| is_what_its_parts_say::<ROWS, COLUMNS>(&mut mix, false));
+    }
+    often::<3, 3>();
+    often::<3, 5>();
+    often::<4, 4>();
+    often::<8, 8>();
+    often::<10, 10>();
+    often::<16, 16>();
+    often::<16, 17>();
+    often::<3, 32>();
+    often::<16, 3>();
+    often::<16, 31>();
+    often::<16, 32>();
+    assert_eq!([(10, 10), (16, 16), (16, 32)].map(|(rows, columns)| sum_drop(rows, columns)), [0, 1, 2]);
+}
+
+#[test]
+fn a_half_of_the_array_at_the_top_fits() {
+    fn upper<const ROWS: usize, const COLUMNS: usize>() {
+        let (mut codes, mut rows, common) = bench::<ROWS, COLUMNS>(&mut Mix(1), true);
+        codes.rows.iter_mut().take(ROWS / 2).for_each(|row| *row = [0; COLUMNS]);
+        let total = pass(&codes, &mut rows, &common, &mut [[0; COLUMNS]; ROWS]);
+        let weighted = |row: usize| 2 * row as i64 + 1 - ROWS as i64;
+        let line = i64::from(total.first) / (ROWS - ROWS / 2) as i64;
+        let exact = (ROWS / 2..ROWS).map(|row| weighted(row) * line).sum::<i64>() / 4;
+        let moment = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
+        assert!(i64::from(moment).abs_diff(exact) < 4 * ROWS as u64 * ROWS as u64, "{moment}, not {exact}");
+    }
+    upper::<10, 10>();
+    upper::<16, 16>();
+    upper::<16, 32>();
+    upper::<15, 31>();
+}

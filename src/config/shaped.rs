@@ -1,0 +1,43 @@
+//! A configuration for an array of a certain shape.
+
+use super::geometry::places;
+use super::{Config, ConfigError};
+use crate::frame::Shape;
+use crate::params::Params;
+use core::ops::{Deref, DerefMut};
+
+/// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`] in it.
+#[derive(Clone, Debug)]
+pub struct Shaped<const ROWS: usize, const COLUMNS: usize> {
+    config: Config,
+    /// Middles of the columns in tip radii, Q15.
+    pub(crate) columns: [i32; COLUMNS],
+    /// Middles of the rows.
+    pub(crate) rows: [i32; ROWS],
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
+    /// Checks the parameters and derives the loop's constants.
+    ///
+    /// # Errors
+    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each other.
+    pub fn new(params: &Params) -> Result<Self, ConfigError> {
+        const { Shape::<ROWS, COLUMNS>::CHECKED };
+        let config = Config::new(params, ROWS, COLUMNS)?;
+        Ok(Self { config, columns: places(params), rows: places(params) })
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Deref for Shaped<ROWS, COLUMNS> {
+    type Target = Config;
+
+    fn deref(&self) -> &Config {
+        &self.config
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> DerefMut for Shaped<ROWS, COLUMNS> {
+    fn deref_mut(&mut self) -> &mut Config {
+        &mut self.config
+    }
+}

@@ -1,0 +1,83 @@
+//! The pictures of the array: registers whose number of values, and so their place, goes by its shape.
+//!
+//! The first one begins at [`FIRST`], and each of the others at the next multiple of 256.
+
+use crate::frame::Shape;
+
+use super::{Access, Cell, Kind, Register, View};
+
+/// Where the first picture begins, whatever the shape.
+pub(super) const FIRST: u16 = 768;
+/// Name, largest value, unit and resolution of each, and what it means.
+const PICTURES: [(&str, i64, &str, u16, &str); 3] = [
+    ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row."),
+    (
+        "RAW_CODES",
+        4095,
+        "",
+        1,
+        " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.",
+    ),
+    ("TARE_CODES", 4095, "", 1, " Zero of each taxel in converter codes, row by row."),
+];
+/// Where they are in an array's table.
+pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; 3] {
+    const { Shape::<ROWS, COLUMNS>::CHECKED };
+    let taxels = Shape::<ROWS, COLUMNS>::TAXELS as u16;
+    let codes = (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16;
+    let first = Cell { address: FIRST, count: taxels, kind: Kind::U16, access: Access::ReadOnly };
+    let second = Cell { address: after(&first), count: codes, ..first };
+    let third = Cell { address: after(&second), count: taxels, ..first };
+    [first, second, third]
+}
+
+/// The next multiple of 256.
+const fn after(cell: &Cell) -> u16 {
+    (cell.address + cell.kind.width() * cell.count).next_multiple_of(256)
+}
+
+/// As their documentation has them.
+pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; 3] {
+    let cells = cells::<ROWS, COLUMNS>();
+    [register(0, &cells), register(1, &cells), register(2, &cells)]
+}
+
+const fn register(picture: usize, cells: &[Cell; 3]) -> Register {
+    let (name, max, unit, scale, doc) = PICTURES[picture];
+    let Cell { address, count, kind, access } = cells[picture];
+    Register { name, address, kind, count, access, unit, scale, min: 0, max, default: None, doc }
+}
+
+/// The value of an element; 0 where there is no such picture.
+pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
+    view: View<'_, ROWS, COLUMNS>,
+    address: u16,
+    element: usize,
+) -> u32 {
+    let [pressures, codes, tare] = const { cells::<ROWS, COLUMNS>() };
+    let snapshot = view.snapshot;
+    let value = if address == pressures.address {
+        snapshot.pressure_10pa(element)
+    } else if address == codes.address {
+        snapshot.frame.code(element / COLUMNS, element % COLUMNS)
+    } else if address == tare.address {
+        snapshot.tare_codes(element)
+    } else {
+        0
+    };
+    value.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cells;
+
+    #[test]
+    fn pictures_stand_apart() {
+        let addresses = |cells: [super::Cell; 3]| cells.map(|cell| cell.address);
+        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280]);
+        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280]);
+        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048]);
+        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072]);
+    }
+}

@@ -1,0 +1,58 @@
+//! The array that this controller is built for, and everything that goes by its shape.
+//!
+//! The core takes any [`Shape`]; board and host code take it from here.
+
+use crate::frame::Shape;
+use crate::link::table;
+
+/// Driven rows of the array.
+pub const ROWS: usize = 10;
+/// Sensed columns of the array.
+pub const COLUMNS: usize = 10;
+/// Taxels in the array.
+pub const TAXELS: usize = Shape::<ROWS, COLUMNS>::TAXELS;
+/// Steps of a scan: the rows, and one with no row driven.
+pub const SLOTS: usize = Shape::<ROWS, COLUMNS>::SLOTS;
+/// Columns that each converter reads.
+pub const BANK_COLUMNS: usize = Shape::<ROWS, COLUMNS>::BANK_COLUMNS;
+/// Frames of a tare.
+pub const TARE_FRAMES: u32 = Array::TARE_FRAMES;
+
+/// See [`crate::frame::Frame`].
+pub type Frame = crate::frame::Frame<ROWS, COLUMNS>;
+/// See [`crate::config::Shaped`].
+pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
+/// See [`crate::pressure::Picture`].
+pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
+/// See [`crate::pressure::Calibration`].
+pub type Calibration = crate::pressure::Calibration<ROWS, COLUMNS>;
+/// See [`crate::pressure::Array`].
+pub type Array = crate::pressure::Array<ROWS, COLUMNS>;
+/// See [`crate::contact::Fit`].
+pub type Fit = crate::contact::Fit<ROWS, COLUMNS>;
+/// See [`crate::pipeline::budget::Budget`].
+pub type Budget = crate::pipeline::budget::Budget<ROWS, COLUMNS>;
+/// See [`crate::pipeline::Pipeline`].
+pub type Pipeline = crate::pipeline::Pipeline<ROWS, COLUMNS>;
+/// See [`crate::link::Snapshot`].
+pub type Snapshot<'a> = crate::link::Snapshot<'a, ROWS, COLUMNS>;
+/// See [`crate::link::Server`].
+pub type Server = crate::link::Server<ROWS, COLUMNS>;
+
+/// Every register of the control table, in the order of the addresses.
+pub const REGISTERS: &[table::Register] = &ALL;
+const ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>();
+
+/// Where each register begins.
+pub mod address {
+    use super::{ALL, table};
+
+    pub use table::address::*;
+
+    /// Pressure on each taxel, row by row.
+    pub const PRESSURES: u16 = ALL[table::COUNT - 3].address;
+    /// Converter codes of the last frame, row by row.
+    pub const RAW_CODES: u16 = ALL[table::COUNT - 2].address;
+    /// Zero of each taxel in converter codes, row by row.
+    pub const TARE_CODES: u16 = ALL[table::COUNT - 1].address;
+}

@@ -13,7 +13,7 @@ pub use shaped::Shaped;
 use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
-use crate::scan::{ScanError, ScanTiming};
+use crate::scan::{Clocks, ScanError, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use bounds::{Bounds, Drives};
 use fixed::types::{I8F24, I16F16};
@@ -157,7 +157,7 @@ impl Config {
     }
 
     /// See [`Shaped::new`].
-    pub(crate) fn new(params: &Params, rows: usize, columns: usize) -> Result<Self, ConfigError> {
+    pub(crate) fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
         // By how much the one must be below the other, the two, and their names.
@@ -172,8 +172,9 @@ impl Config {
                 return Err(ConfigError::Order([(names.0, low), (names.1, high)]));
             }
         }
-        let timing =
-            ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16, rows, columns).map_err(ConfigError::Scan)?;
+        let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16, shape, clocks);
+        let timing = timing.map_err(ConfigError::Scan)?;
+        let [rows, columns] = shape;
         if p.row_sag_ppb_per_code > sag_max(columns) {
             let (name, value, max) = ("row_sag_ppb_per_code", p.row_sag_ppb_per_code, sag_max(columns));
             return Err(ConfigError::Param(ParamError { name, value, min: 0, max }));

@@ -4,6 +4,7 @@
 //! A scan has a slot for each row and one with no row driven. That last one reads what the columns show with nothing
 //! selected: the amplifiers' offsets, and a row that is stuck in the driven state.
 
+use crate::units::CoreCycles;
 pub use lanes::Codes;
 
 /// Converters that work side by side.
@@ -70,6 +71,6 @@ pub struct Sense {
     pub bus_silent_ms: u16,
     /// The bridge's driver reports a fault (its nFAULT pin, which also broke the PWM in hardware).
     pub bridge_fault: bool,
-    /// From the last frame's end to its duty, ticks of [`crate::scan::TIMER_HZ`]; 0 where that was not measured.
-    pub answer_ticks: u32,
+    /// From the last frame's end to its duty; 0 where that was not measured.
+    pub answer: CoreCycles,
 }

@@ -134,6 +134,6 @@ fn load(store: &mut Store) -> (Record, bool) {
 /// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free again.
 #[inline(never)]
 fn make_pipeline(params: &Params) -> Result<&'static mut Pipeline, ConfigError> {
-    let config = Config::new(params)?;
+    let config = Config::shipped(params)?;
     Ok(PIPELINE.init_with(|| Pipeline::new(&config)))
 }

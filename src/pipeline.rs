@@ -18,7 +18,6 @@ use crate::identify::{Press, PressView, Refusal};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
-use crate::scan::deadline_ticks;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::Duty;
 use budget::Budget;
@@ -106,8 +105,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
-        let deadline = deadline_ticks(self.config.timing.frame_ticks());
-        let effort = self.budget.next(command.effort, sense.answer_ticks, deadline);
+        let effort = self.budget.next(command.effort, sense.answer, self.config.timing.deadline);
         self.fit.set_effort(effort);
         if effort < command.effort {
             limits.set(Limits::EFFORT);

@@ -1,60 +1,85 @@
 //! The frame budget: settle, sampling and conversion of every row, in one place.
 
-/// Ticks of the scan timer in a second (TIM8 at 168 MHz).
-pub const TIMER_HZ: u32 = 168_000_000;
-/// Scan timer ticks in a cycle of the converter's clock (21 MHz).
-pub const TICKS_PER_ADC_CYCLE: u32 = 8;
-/// The longest frame: 1/256 s, what the loop's 32 bits hold of a frame's time.
-pub const FRAME_TICKS_MAX: u32 = TIMER_HZ / 256;
-/// Converter cycles for a 12-bit conversion, after sampling.
-pub const CONVERSION_CYCLES: u32 = 12;
-/// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
-pub const TRIGGER_CYCLES: u32 = 5;
+use crate::units::{CoreCycles, ScanTicks};
 
-/// How a scan is timed. Row `n` is driven for [`ScanTiming::slot_ticks`]; its conversions start after
-/// [`ScanTiming::settle_ticks`] and end before the next row.
+/// What a board's clocks and converters make of a scan: a figure of the board, not of the core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Clocks {
+    /// Ticks of the scan's timer in a second; the timer counts a slot with 16 bits.
+    pub timer_hz: u32,
+    /// Cycles of the processor's core in a second.
+    pub core_hz: u32,
+    /// Ticks of the scan's timer in a cycle of the converters' clock.
+    pub ticks_per_converter_cycle: u32,
+    /// Sampling times that the converters have, in their cycles.
+    pub sample_cycles: &'static [u16],
+    /// Converter cycles of a conversion, after sampling.
+    pub conversion_cycles: u32,
+    /// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
+    pub trigger_cycles: u32,
+}
+
+impl Clocks {
+    /// What is longer than the loop's 32 bits hold of a frame's time: 1/256 s.
+    const fn frame_too_long(&self) -> ScanTicks {
+        ScanTicks(self.timer_hz / 256)
+    }
+}
+
+/// How a scan is timed. Row `n` is driven for [`ScanTiming::slot`]; its conversions start after [`ScanTiming::settle`] and end
+/// before the next row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanTiming {
-    /// From the row's edge to the trigger of its conversions, scan timer ticks.
-    pub settle_ticks: u16,
-    /// From row to row, scan timer ticks.
-    pub slot_ticks: u16,
+    /// From the row's edge to the trigger of its conversions; 16 bits.
+    pub settle: ScanTicks,
+    /// From row to row; 16 bits.
+    pub slot: ScanTicks,
     /// How long each column is sampled, converter cycles.
     pub sample_cycles: u16,
     /// Rows of the array, and one slot with no row driven.
     pub slots: u16,
     /// From frame to frame, ns, rounded.
     pub frame_ns: u32,
+    /// What control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left for the tasks
+    /// below it.
+    pub deadline: CoreCycles,
 }
 
 /// Why a scan cannot be timed so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScanError {
-    /// The converter has no such sampling time: 3, 15, 28, 56, 84, 112, 144 and 480 cycles are to be had.
-    SampleCycles(u16),
+    /// The converters have no such sampling time.
+    SampleCycles {
+        /// What was asked for.
+        cycles: u16,
+        /// What they have.
+        allowed: &'static [u16],
+    },
     /// The slot exceeds the timer's 16 bits: `ticks` of at most 65535.
     SlotTooLong {
         /// What the settle time and the conversions add up to.
         ticks: u32,
     },
-    /// The frame is longer than the loop's arithmetic holds: `ticks` of at most [`FRAME_TICKS_MAX`].
+    /// The frame is longer than the loop's arithmetic holds.
     FrameTooLong {
         /// What its slots add up to.
         ticks: u32,
+        /// It must be less than this.
+        end: u32,
     },
 }
 
 impl core::fmt::Display for ScanError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::SampleCycles(cycles) => {
-                write!(f, "sample_cycles of {cycles}: 3, 15, 28, 56, 84, 112, 144 and 480 are allowed")
+            Self::SampleCycles { cycles, allowed } => {
+                write!(f, "sample_cycles of {cycles}: {allowed:?} are allowed")
             }
             Self::SlotTooLong { ticks } => {
                 write!(f, "settle_ns and sample_cycles make a slot of {ticks} ticks: {} are allowed", u16::MAX)
             }
-            Self::FrameTooLong { ticks } => {
-                write!(f, "settle_ns and sample_cycles make a frame of {ticks} ticks: {FRAME_TICKS_MAX} are allowed")
+            Self::FrameTooLong { ticks, end } => {
+                write!(f, "settle_ns and sample_cycles make a frame of {ticks} ticks: less than {end} are allowed")
             }
         }
     }
@@ -62,71 +87,93 @@ impl core::fmt::Display for ScanError {
 
 impl core::error::Error for ScanError {}
 
-/// What control has from a frame's end to its new duty; the last quarter of the frame's time is left for the tasks below it.
-pub const fn deadline_ticks(frame_ticks: u32) -> u32 {
-    frame_ticks / 4 * 3
-}
-
 impl ScanTiming {
-    /// A settle time of 2.4 us and 15 cycles of sampling: 10 kHz.
-    pub const DEFAULT_SETTLE_NS: u32 = 2_400;
-    /// 15 cycles at 21 MHz settle a source of up to 10 kOhm to half a code (RM0390 and DS10693, table "ADC accuracy").
-    pub const DEFAULT_SAMPLE_CYCLES: u16 = 15;
-
     /// The tightest scan of so many rows and columns that gives each row `settle_ns` before its conversions.
     ///
     /// # Errors
-    /// A sampling time that the converter lacks, a slot beyond the timer's range, or a frame beyond the loop's.
-    pub const fn new(settle_ns: u32, sample_cycles: u16, rows: usize, columns: usize) -> Result<Self, ScanError> {
-        if !matches!(sample_cycles, 3 | 15 | 28 | 56 | 84 | 112 | 144 | 480) {
-            return Err(ScanError::SampleCycles(sample_cycles));
+    /// A sampling time that the converters lack, a slot beyond the timer's range, or a frame beyond the loop's.
+    pub fn new(
+        settle_ns: u32,
+        sample_cycles: u16,
+        [rows, columns]: [usize; 2],
+        clocks: &Clocks,
+    ) -> Result<Self, ScanError> {
+        let allowed = clocks.sample_cycles;
+        if !allowed.contains(&sample_cycles) {
+            return Err(ScanError::SampleCycles { cycles: sample_cycles, allowed });
         }
-        let settle = (settle_ns as u64 * TIMER_HZ as u64).div_ceil(1_000_000_000);
-        let cycles = lanes::pairs(columns) as u32 * (sample_cycles as u32 + CONVERSION_CYCLES) + TRIGGER_CYCLES;
-        let slot = settle + (cycles * TICKS_PER_ADC_CYCLE) as u64;
-        if slot > u16::MAX as u64 {
-            let ticks = if slot > u32::MAX as u64 { u32::MAX } else { slot as u32 };
-            return Err(ScanError::SlotTooLong { ticks });
+        let settle = (u64::from(settle_ns) * u64::from(clocks.timer_hz)).div_ceil(1_000_000_000);
+        let conversion = u32::from(sample_cycles) + clocks.conversion_cycles;
+        let cycles = lanes::pairs(columns) as u32 * conversion + clocks.trigger_cycles;
+        let slot = settle + u64::from(cycles * clocks.ticks_per_converter_cycle);
+        if slot > u64::from(u16::MAX) {
+            return Err(ScanError::SlotTooLong { ticks: u32::try_from(slot).unwrap_or(u32::MAX) });
         }
         let slots = rows as u16 + 1;
-        let mut timing =
-            Self { settle_ticks: settle as u16, slot_ticks: slot as u16, sample_cycles, slots, frame_ns: 0 };
-        if timing.frame_ticks() >= FRAME_TICKS_MAX {
-            return Err(ScanError::FrameTooLong { ticks: timing.frame_ticks() });
+        let frame = slot as u32 * u32::from(slots);
+        let end = clocks.frame_too_long().0;
+        if frame >= end {
+            return Err(ScanError::FrameTooLong { ticks: frame, end });
         }
-        let frame = timing.frame_ticks() as u64 * 1_000_000_000;
-        timing.frame_ns = ((frame + TIMER_HZ as u64 / 2) / TIMER_HZ as u64) as u32;
-        Ok(timing)
+        let [timer_hz, core_hz, wide] = [clocks.timer_hz, clocks.core_hz, frame].map(u64::from);
+        Ok(Self {
+            settle: ScanTicks(settle as u32),
+            slot: ScanTicks(slot as u32),
+            sample_cycles,
+            slots,
+            frame_ns: ((wide * 1_000_000_000 + timer_hz / 2) / timer_hz.max(1)) as u32,
+            deadline: CoreCycles((wide * core_hz / timer_hz.max(1) / 4 * 3) as u32),
+        })
     }
 
-    /// From frame to frame, scan timer ticks.
-    pub const fn frame_ticks(self) -> u32 {
-        self.slot_ticks as u32 * self.slots as u32
+    /// From frame to frame.
+    pub const fn frame(self) -> ScanTicks {
+        ScanTicks(self.slot.0 * self.slots as u32)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::params::Params;
+
+    const CLOCKS: Clocks = Clocks {
+        timer_hz: 168_000_000,
+        core_hz: 168_000_000,
+        ticks_per_converter_cycle: 8,
+        sample_cycles: &[3, 15, 28],
+        conversion_cycles: 12,
+        trigger_cycles: 5,
+    };
+
+    fn timing(settle_ns: u32, sample_cycles: u16, shape: [usize; 2]) -> Result<ScanTiming, ScanError> {
+        ScanTiming::new(settle_ns, sample_cycles, shape, &CLOCKS)
+    }
 
     #[test]
     fn the_default_scan_makes_ten_thousand_frames_a_second() {
-        let timing = ScanTiming::new(ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES, 10, 10).unwrap();
+        let Params { settle_ns, sample_cycles, .. } = Params::DEFAULT;
+        let timing = timing(settle_ns as u32, sample_cycles as u16, [10, 10]).unwrap();
         assert!((90_000..=100_000).contains(&timing.frame_ns), "{} ns", timing.frame_ns);
+        let nine_tenths = |share: u32| timing.frame_ns / 1_000 * share / 1_000 * 168;
+        assert!((nine_tenths(740)..nine_tenths(760)).contains(&timing.deadline.0), "{:?}", timing.deadline);
     }
 
     #[test]
     fn what_the_hardware_cannot_time_is_refused() {
-        assert_eq!(ScanTiming::new(2_000, 16, 10, 10), Err(ScanError::SampleCycles(16)));
-        assert!(matches!(ScanTiming::new(400_000, 15, 10, 10), Err(ScanError::SlotTooLong { .. })));
-        assert!(matches!(ScanTiming::new(u32::MAX, 15, 10, 10), Err(ScanError::SlotTooLong { .. })));
-        assert!(matches!(ScanTiming::new(300_000, 15, 16, 16), Err(ScanError::FrameTooLong { .. })));
+        assert!(matches!(timing(2_000, 16, [10, 10]), Err(ScanError::SampleCycles { cycles: 16, .. })));
+        assert!(matches!(timing(400_000, 15, [10, 10]), Err(ScanError::SlotTooLong { .. })));
+        assert!(matches!(timing(u32::MAX, 15, [10, 10]), Err(ScanError::SlotTooLong { .. })));
+        assert!(matches!(timing(300_000, 15, [16, 16]), Err(ScanError::FrameTooLong { .. })));
     }
 
     #[test]
-    fn each_row_and_each_pair_of_columns_takes_its_time() {
-        let frame_us = |rows, columns| ScanTiming::new(2_400, 15, rows, columns).unwrap().frame_ns / 1_000;
-        let shapes = [(3, 3), (3, 5), (4, 4), (8, 8), (16, 16), (16, 32)];
-        assert_eq!(shapes.map(|(rows, columns)| frame_us(rows, columns)), [20, 26, 26, 70, 219, 394]);
+    fn a_core_quicker_than_the_timer_has_more_cycles() {
+        let Params { settle_ns, sample_cycles, .. } = Params::DEFAULT;
+        let of = |core_hz: u32| {
+            let clocks = Clocks { core_hz, ..CLOCKS };
+            ScanTiming::new(settle_ns as u32, sample_cycles as u16, [10, 10], &clocks).unwrap().deadline.0
+        };
+        assert_eq!(of(2 * CLOCKS.core_hz) / 2, of(CLOCKS.core_hz));
     }
 }

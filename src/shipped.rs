@@ -2,8 +2,11 @@
 //!
 //! The core takes any [`Shape`]; board and host code take it from here.
 
+use crate::config::ConfigError;
 use crate::frame::Shape;
 use crate::link::table;
+use crate::params::Params;
+use crate::scan::Clocks;
 
 /// Driven rows of the array.
 pub const ROWS: usize = 10;
@@ -17,6 +20,26 @@ pub const SLOTS: usize = Shape::<ROWS, COLUMNS>::SLOTS;
 pub const BANK_COLUMNS: usize = Shape::<ROWS, COLUMNS>::BANK_COLUMNS;
 /// Frames of a tare.
 pub const TARE_FRAMES: u32 = Array::TARE_FRAMES;
+
+/// The STM32F446's clocks: core and TIM8 at 168 MHz, converters at 21 MHz with 12 bits (RM0390, 13).
+pub const CLOCKS: Clocks = Clocks {
+    timer_hz: 168_000_000,
+    core_hz: 168_000_000,
+    ticks_per_converter_cycle: 8,
+    sample_cycles: &[3, 15, 28, 56, 84, 112, 144, 480],
+    conversion_cycles: 12,
+    trigger_cycles: 5,
+};
+
+impl Config {
+    /// Of this array on this board.
+    ///
+    /// # Errors
+    /// See [`crate::config::Shaped::new`].
+    pub fn shipped(params: &Params) -> Result<Self, ConfigError> {
+        Self::new(params, &CLOCKS)
+    }
+}
 
 /// See [`crate::frame::Frame`].
 pub type Frame = crate::frame::Frame<ROWS, COLUMNS>;

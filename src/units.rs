@@ -59,6 +59,14 @@ quantities! {
     Amperes(I16F16);
 }
 
+/// A time in ticks of the scan's timer, [`crate::scan::Clocks::timer_hz`] a second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ScanTicks(pub u32);
+
+/// A time in cycles of the processor's core, [`crate::scan::Clocks::core_hz`] a second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CoreCycles(pub u32);
+
 /// The bridge's command as a signed share of the supply (Q15): -32767 to 32767 is -100 % to 100 %.
 ///
 /// Positive presses the tip into the object.

@@ -138,7 +138,7 @@ impl Scene {
     /// On a pitch outside the parameters' range.
     pub fn config(&self) -> Config {
         let pitch_um = (self.pitch_mm * 1e3).round() as i32;
-        Config::new(&Params { pitch_um, ..Params::DEFAULT }).expect("the pitch is in range")
+        Config::shipped(&Params { pitch_um, ..Params::DEFAULT }).expect("the pitch is in range")
     }
 
     /// Mean pressure on each taxel.

@@ -38,7 +38,7 @@ impl Native {
             command: Command::default(),
             frame: Frame::EMPTY,
             sense: Sense::default(),
-            slot_s: f64::from(config.timing.frame_ticks()) / f64::from(fingertip::scan::TIMER_HZ) / SLOTS as f64,
+            slot_s: f64::from(config.timing.frame().0) / f64::from(fingertip::shipped::CLOCKS.timer_hz) / SLOTS as f64,
             frames: 0,
             bridge: Bridge::Coast,
             next: Bridge::Coast,

@@ -32,7 +32,7 @@ const SEED: u64 = 2003;
 /// # Panics
 /// Never: the default parameters are sound, as the core's own tests show.
 pub fn records() -> Vec<Record> {
-    let config = Config::new(&Params::DEFAULT).expect("the default parameters are sound");
+    let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
     let mut board = Native::new(&Setup::default(), &config);
     let mut random = Rng::with_seed(SEED);
     let mut clears = 0;
@@ -79,7 +79,7 @@ pub fn to_bytes(records: &[Record]) -> Vec<u8> {
 /// # Panics
 /// Never: the default parameters are sound, as the core's own tests show.
 pub fn digest(records: &[Record]) -> u64 {
-    let config = Config::new(&Params::DEFAULT).expect("the default parameters are sound");
+    let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
     let mut pipeline = Pipeline::new(&config);
     let mut digest = Digest::new();
     for Record { frame, sense, command } in records {

@@ -4,11 +4,11 @@ use fingertip::config::ConfigError;
 use fingertip::model::{Relaxation, RelaxationError, RelaxationTerm, Tip};
 use fingertip::params::{ParamError, Params};
 use fingertip::scan::{ScanError, ScanTiming};
-use fingertip::shipped::Config;
+use fingertip::shipped::{CLOCKS, Config};
 use fingertip::units::{Kilopascals, Millimetres, Ratio};
 
 fn refused(params: &Params) -> ConfigError {
-    Config::new(params).map(drop).expect_err("refused")
+    Config::shipped(params).map(drop).expect_err("refused")
 }
 
 #[test]
@@ -48,17 +48,20 @@ fn two_parameters_that_contradict_each_other() {
         assert_eq!(refused(&params).to_string(), format!("{low}: below {high}, is allowed"));
     }
     let least = Params { contact_on_mn: 16, force_fault_mn: 7_001, supply_min_mv: 8_499, ..default };
-    assert!(Config::new(&least).is_ok());
+    assert!(Config::shipped(&least).is_ok());
     let nearest = Params { contact_on_mn: 499, force_max_mn: 500, speed_max_um_per_s: 30_000, ..default };
-    assert!(Config::new(&nearest).is_ok());
+    assert!(Config::shipped(&nearest).is_ok());
 }
 
 #[test]
 fn a_scan_that_the_hardware_cannot_time() {
     let params = Params { sample_cycles: 16, ..Params::DEFAULT };
-    assert_eq!(refused(&params), ConfigError::Scan(ScanError::SampleCycles(16)));
-    assert_eq!(refused(&params).to_string(), "sample_cycles of 16: 3, 15, 28, 56, 84, 112, 144 and 480 are allowed");
-    let error = ScanTiming::new(400_000, 15, 10, 10).unwrap_err();
+    assert_eq!(
+        refused(&params),
+        ConfigError::Scan(ScanError::SampleCycles { cycles: 16, allowed: CLOCKS.sample_cycles })
+    );
+    assert_eq!(refused(&params).to_string(), "sample_cycles of 16: [3, 15, 28, 56, 84, 112, 144, 480] are allowed");
+    let error = ScanTiming::new(400_000, 15, [10, 10], &CLOCKS).unwrap_err();
     assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68320 ticks: 65535 are allowed");
 }
 

@@ -11,7 +11,7 @@ use host_tests::plant::Setup;
 
 /// Holds 1 N, with the duty that this takes.
 fn holding() -> Native {
-    let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).expect("allowed"));
+    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("allowed"));
     board.tare_and_enable();
     board.command.goal = newtons(1_000);
     for _ in 0..5_000 {

@@ -3,6 +3,7 @@
 use fingertip::contact::Effort;
 use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
 use fingertip::shipped::Budget;
+use fingertip::units::CoreCycles;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -43,7 +44,7 @@ impl Loop {
 
     /// A frame: the effort and how long it took.
     fn frame(&mut self, asked: Effort, deadline: u32, with: &Stretch) -> (Effort, u32) {
-        let effort = self.budget.next(asked, self.taken, deadline);
+        let effort = self.budget.next(asked, CoreCycles(self.taken), CoreCycles(deadline));
         let [most, least] = Budget::model_ticks(effort);
         self.taken = with.rest + self.random.u32(0..=with.spread);
         if with.contact && most > 0 {
@@ -153,7 +154,7 @@ fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
 fn what_is_not_measured_is_not_held_back() {
     let mut budget = Budget::new();
     for effort in Effort::ALL.into_iter().chain(Effort::ALL.into_iter().rev()) {
-        assert_eq!(budget.next(effort, 0, DEADLINE), effort);
+        assert_eq!(budget.next(effort, CoreCycles(0), CoreCycles(DEADLINE)), effort);
     }
 }
 

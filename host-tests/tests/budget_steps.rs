@@ -3,6 +3,7 @@
 use fingertip::contact::Effort;
 use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
 use fingertip::shipped::Budget;
+use fingertip::units::CoreCycles;
 
 /// Ticks that are all to be used.
 const DEADLINE: u32 = 32_000;
@@ -13,7 +14,7 @@ const ROOM: u32 = USABLE / 32;
 /// At an effort, with nothing learnt yet.
 fn at(effort: Effort) -> Budget {
     let mut budget = Budget::new();
-    assert_eq!(budget.next(effort, 0, DEADLINE), effort);
+    assert_eq!(budget.next(effort, CoreCycles(0), CoreCycles(DEADLINE)), effort);
     budget
 }
 
@@ -23,9 +24,9 @@ fn most(effort: Effort) -> u32 {
 
 /// Frames until the effort is another, at most so many.
 fn frames_to_change(budget: &mut Budget, asked: Effort, taken: u32, at_most: u32) -> Option<(u32, Effort)> {
-    let before = budget.next(asked, taken, DEADLINE);
+    let before = budget.next(asked, CoreCycles(taken), CoreCycles(DEADLINE));
     (2..=at_most).find_map(|frame| {
-        let effort = budget.next(asked, taken, DEADLINE);
+        let effort = budget.next(asked, CoreCycles(taken), CoreCycles(DEADLINE));
         (effort != before).then_some((frame, effort))
     })
 }
@@ -40,11 +41,11 @@ fn quick_frames_let_it_rise_by_one_in_each_window_up_to_what_was_asked() {
     for asked in Effort::ALL {
         let mut budget = Budget::new();
         for frame in 1..=8 * WINDOW {
-            let effort = budget.next(asked, 10, DEADLINE);
+            let effort = budget.next(asked, CoreCycles(10), CoreCycles(DEADLINE));
             assert_eq!(effort, Effort::from_number((frame / WINDOW) as u8).min(asked), "frame {frame}, {asked:?}");
         }
         // What is asked less of is had at once.
-        assert_eq!(budget.next(Effort::Sum, 10, DEADLINE), Effort::Sum);
+        assert_eq!(budget.next(Effort::Sum, CoreCycles(10), CoreCycles(DEADLINE)), Effort::Sum);
     }
 }
 
@@ -55,12 +56,16 @@ fn it_falls_at_once_where_the_dearest_frame_would_not_fit() {
         for (modelled, longest) in [(false, USABLE - most(effort)), (true, USABLE)] {
             let mut budget = at(effort);
             budget.note(modelled);
-            assert_eq!(budget.next(effort, longest, DEADLINE), effort);
-            assert_eq!(budget.next(effort, longest + 1, DEADLINE), effort.lower(), "{effort:?}");
+            assert_eq!(budget.next(effort, CoreCycles(longest), CoreCycles(DEADLINE)), effort);
+            assert_eq!(
+                budget.next(effort, CoreCycles(longest + 1), CoreCycles(DEADLINE)),
+                effort.lower(),
+                "{effort:?}"
+            );
         }
     }
     // There is nothing below the sum.
-    assert_eq!(at(Effort::Sum).next(Effort::Sum, 2 * DEADLINE, DEADLINE), Effort::Sum);
+    assert_eq!(at(Effort::Sum).next(Effort::Sum, CoreCycles(2 * DEADLINE), CoreCycles(DEADLINE)), Effort::Sum);
 }
 
 #[test]
@@ -93,7 +98,11 @@ fn one_long_frame_holds_it_back_for_its_window() {
         let mut budget = at(Effort::FiveRows);
         let long = USABLE - most(Effort::FiveRows);
         for frame in 1..=2 * WINDOW {
-            let effort = budget.next(Effort::AllRows, if frame == long_frame { long } else { 10 }, DEADLINE);
+            let effort = budget.next(
+                Effort::AllRows,
+                CoreCycles(if frame == long_frame { long } else { 10 }),
+                CoreCycles(DEADLINE),
+            );
             let expected = if frame == 2 * WINDOW { Effort::AllRows } else { Effort::FiveRows };
             assert_eq!(effort, expected, "frame {frame}, long in {long_frame}");
         }
@@ -106,14 +115,14 @@ fn after_each_fall_it_waits_twice_as_long() {
     let mut budget = at(Effort::AllRows);
     let mut wait = 1;
     for _ in 0..11 {
-        assert_eq!(budget.next(Effort::AllRows, USABLE, DEADLINE), Effort::FiveRows);
+        assert_eq!(budget.next(Effort::AllRows, CoreCycles(USABLE), CoreCycles(DEADLINE)), Effort::FiveRows);
         let rises = frames_to_change(&mut budget, Effort::AllRows, 10, 2 * WAIT_MAX * WINDOW);
         assert_eq!(rises, Some((wait * WINDOW, Effort::AllRows)));
         wait = (2 * wait).min(WAIT_MAX);
     }
     assert_eq!(wait, WAIT_MAX);
     // Another wish, or another deadline, begins anew.
-    budget.next(Effort::AllRows, USABLE, DEADLINE);
+    budget.next(Effort::AllRows, CoreCycles(USABLE), CoreCycles(DEADLINE));
     let rises = frames_to_change(&mut budget, Effort::FiveRows, 10, 10 * WINDOW);
     assert_eq!(rises, None, "it has what it asks");
     let rises = frames_to_change(&mut budget, Effort::AllRows, 10, 10 * WINDOW);
@@ -126,7 +135,7 @@ fn a_contact_that_comes_or_goes_begins_the_window_anew() {
     for before in [1, 10, WINDOW - 1] {
         let mut budget = at(Effort::OneRow);
         for _ in 0..before {
-            assert_eq!(budget.next(Effort::AllRows, 2_000, DEADLINE), Effort::OneRow);
+            assert_eq!(budget.next(Effort::AllRows, CoreCycles(2_000), CoreCycles(DEADLINE)), Effort::OneRow);
             budget.note(false);
         }
         budget.note(true);
@@ -154,7 +163,7 @@ fn the_dearest_frame_is_the_start_and_the_rows_of_an_effort() {
 fn there_is_no_fall_below_the_sum() {
     let mut budget = at(Effort::Sum);
     for _ in 0..10 {
-        assert_eq!(budget.next(Effort::AllRows, DEADLINE, DEADLINE), Effort::Sum);
+        assert_eq!(budget.next(Effort::AllRows, CoreCycles(DEADLINE), CoreCycles(DEADLINE)), Effort::Sum);
     }
     // The window that they were in, and the next.
     let rises = frames_to_change(&mut budget, Effort::AllRows, 10, 10 * WINDOW);

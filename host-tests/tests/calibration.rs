@@ -32,7 +32,7 @@ fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
 #[test]
 fn a_gain_scales_its_taxel_and_no_other() {
     let [pressed, blank] = frames();
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let plain = *tared(&Calibration::NONE, &blank, &config).read(&pressed, &config);
     let mut gains = GAINS;
     gains[4][6] = GAIN_ONE / 2;
@@ -51,7 +51,7 @@ fn a_gain_scales_its_taxel_and_no_other() {
 #[test]
 fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
     let [mut pressed, blank] = frames();
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut mask = [0; ROWS];
     mask[4] = 1 << 5;
     mask[7] = 0x3ff;
@@ -91,7 +91,7 @@ fn what_cannot_be_is_refused_by_name() {
 #[test]
 fn a_new_calibration_needs_a_new_tare() {
     let [_, blank] = frames();
-    let mut pipeline = Pipeline::new(&Config::new(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
     let mut command = Command { torque: true, tare_request: 1, ..Command::default() };
     let step = |pipeline: &mut Pipeline, command: &Command| {
         let sense = fingertip::frame::Sense { supply_mv: 6_000, ..Default::default() };

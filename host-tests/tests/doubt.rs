@@ -13,7 +13,7 @@ const NONE: [u32; ROWS] = [0; ROWS];
 const PITCH_MM: f64 = 1.5;
 
 fn config() -> Config {
-    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
 }
 
 fn mm(length: Millimetres) -> f64 {

@@ -9,7 +9,7 @@ use host_tests::native::Native;
 use host_tests::plant::{Faults, Row, Setup, Taxel};
 
 fn holding(goal_mn: i32) -> Native {
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut board = Native::new(&Setup::default(), &config);
     board.tare_and_enable();
     board.command.goal = newtons(goal_mn);
@@ -105,7 +105,7 @@ fn an_encoder_that_stands_still() {
     expect(&mut board, Fault::EncoderFrozen, 200);
     assert!(board.world.force_n() < 9.0);
 
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut board = Native::new(&Setup::default(), &config);
     board.tare_and_enable();
     board.world.faults.encoder_frozen = true;
@@ -117,7 +117,7 @@ fn an_encoder_that_stands_still() {
 /// Noise at no force looks like an indentation that the encoder does not see: it is no fault, however long it lasts.
 #[test]
 fn noise_at_no_force_is_not_a_frozen_encoder() {
-    let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).unwrap());
+    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
     board.tare_and_enable();
     for number in 0..5_000 {
         let status = board.step_with(|record| {
@@ -135,7 +135,7 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
 fn a_motor_that_runs_the_wrong_way() {
     for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {
         for goal_mn in [100, 1_000, 7_000] {
-            let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).unwrap());
+            let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
             board.tare_and_enable();
             board.world.faults = Faults { encoder_reversed, leads_swapped, ..Faults::default() };
             board.command.goal = newtons(goal_mn);
@@ -153,7 +153,7 @@ fn a_motor_that_runs_the_wrong_way() {
 /// An end stop in front without a touch, and one behind on letting go: stopped, not pressed against for ever.
 #[test]
 fn an_end_stop_on_either_side_stops_the_motor() {
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut board = Native::new(&Setup::default(), &config);
     board.tare_and_enable();
     board.world.faults.end_stops_mm = Some([-1.0, 3.0]);
@@ -232,7 +232,7 @@ fn a_fault_stays_until_it_is_cleared_with_torque_off() {
 
 #[test]
 fn torque_waits_for_a_tare() {
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut board = Native::new(&Setup::default(), &config);
     board.command.torque = true;
     board.command.goal = newtons(1_000);

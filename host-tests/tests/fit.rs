@@ -19,7 +19,7 @@ const FIT: usize = WAYS - 1;
 type Taxels = [[i32; COLUMNS]; ROWS];
 
 fn reference() -> Config {
-    Config::new(&Params::DEFAULT).expect("the default parameters are in range")
+    Config::shipped(&Params::DEFAULT).expect("the default parameters are in range")
 }
 
 /// What a single look makes of a picture, and every effort that has seen it long enough: the sums first.

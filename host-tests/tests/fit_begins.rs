@@ -14,7 +14,7 @@ fn pressed(effort: Effort, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
     let mut setup = Setup::default();
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
     let mut world = World::new(&setup);
-    let mut pipeline = Pipeline::new(&Config::new(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let command = Command { tare_request: 1, effort, ..Command::default() };
     let mut frame = Frame::EMPTY;

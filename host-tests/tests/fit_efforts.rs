@@ -13,7 +13,7 @@ const BY_MODEL: [(Effort, usize); 4] =
     [(Effort::OneRow, 11), (Effort::TwoRows, 6), (Effort::FiveRows, 3), (Effort::AllRows, 1)];
 
 fn config() -> Config {
-    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
 }
 
 fn picture(scene: &Scene, noise: Noise, rng: &mut Rng) -> Picture {

@@ -8,7 +8,7 @@ use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 const NONE: [u32; ROWS] = [0; ROWS];
 
 fn config() -> Config {
-    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
 }
 
 /// A contact that reaches over the edge.

@@ -9,7 +9,7 @@ use host_tests::native::Native;
 use host_tests::plant::Setup;
 
 fn board() -> Native {
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let mut board = Native::new(&Setup::default(), &config);
     board.tare_and_enable();
     board

@@ -47,7 +47,7 @@ fn calibration() -> impl Strategy<Value = Calibration> {
 
 fn config(sag_ppb: i32, dead_codes: i32) -> Config {
     let params = Params { row_sag_ppb_per_code: sag_ppb, dead_codes, ..Params::DEFAULT };
-    Config::new(&params).unwrap()
+    Config::shipped(&params).unwrap()
 }
 
 fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {

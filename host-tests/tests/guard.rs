@@ -21,7 +21,7 @@ fn config(rng: &mut Rng) -> Config {
         inertia_ug_m2: rng.i32(40..120),
         ..Params::DEFAULT
     };
-    Config::new(&params).expect("allowed")
+    Config::shipped(&params).expect("allowed")
 }
 
 fn count_mm(config: &Config) -> f64 {
@@ -179,7 +179,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
 /// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a dead encoder too.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
-    let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
     for (turns, expected) in [(-1.0, Fault::Reversed), (0.0, Fault::EncoderFrozen)] {
         for duty in [Duty::FULL, -Duty::FULL] {
             let mut guard = Guard::start(0, &config);
@@ -209,7 +209,7 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
 /// host asks for none moves nothing.
 #[test]
 fn a_touch_bounds_the_retreat() {
-    let config = Config::new(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
+    let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
         let mut guard = Guard::start(0, &config);
         let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {

@@ -21,7 +21,7 @@ impl Finger {
     /// With counts so fine that they tell the speed.
     fn new() -> Self {
         let params = Params { encoder_counts_per_turn: 65_536, clearance_um: 10_000, ..Params::DEFAULT };
-        let config = Config::new(&params).expect("allowed");
+        let config = Config::shipped(&params).expect("allowed");
         let guard = Guard::start(0, &config);
         Self { guard, config, travel_mm: 0.0, speed_mm_per_s: 0.0, force: Newtons::ZERO, pressing: true }
     }

@@ -41,7 +41,7 @@ fn the_observer_recovers_from_anything() {
     {
         let approach_um_per_s = speed_max_um_per_s.min(Params::DEFAULT.approach_um_per_s);
         let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, approach_um_per_s, ..Params::DEFAULT };
-        let config = Config::new(&params).unwrap();
+        let config = Config::shipped(&params).unwrap();
         let mut rng = Rng::with_seed(11);
         for _ in 0..300 {
             let mut observer = Observer::new();

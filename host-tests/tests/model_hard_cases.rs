@@ -166,7 +166,7 @@ fn a_tip_outside_the_domain_is_refused_by_name_value_and_range() {
 /// A code more or less on one taxel, where there is no force: as documented, 10.9 um.
 #[test]
 fn noise_of_one_count_at_no_force() {
-    let config = Config::new(&Params::DEFAULT).unwrap();
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
     let newtons_of = |codes: i64| newtons(((16 * codes * config.newtons_per_sum_q48) >> 32) as i32);
     let d_of = |codes: i64| config.tip.indentation(newtons_of(codes)).0.to_num::<f64>();
     // 1/24 kPa on 1.5 mm by 1.5 mm are 93.75 uN, 6.14 units of the force.

@@ -46,7 +46,7 @@ impl Shown {
 }
 
 fn config() -> Config {
-    Config::new(&Params::DEFAULT).expect("the defaults are allowed")
+    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
 }
 
 #[test]

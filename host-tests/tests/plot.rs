@@ -10,7 +10,7 @@ use host_tests::plot::{self, Map, Panel};
 
 /// A touch and a step, natively, with the pressures at its end.
 fn run() -> (Vec<Sample>, [[f64; 10]; 10]) {
-    let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).unwrap());
+    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
     board.tare_and_enable();
     let mut trace = Vec::new();
     for (goal_mn, frames) in [(200, 4_000), (2_000, 1_000), (5_000, 1_000), (1_000, 1_000)] {

@@ -8,7 +8,7 @@ use host_tests::stimulus;
 use std::collections::BTreeSet;
 
 fn statuses() -> Vec<Status> {
-    let mut pipeline = Pipeline::new(&Config::new(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
     stimulus::records().iter().map(|record| *pipeline.step(&record.frame, &record.sense, &record.command).1).collect()
 }
 

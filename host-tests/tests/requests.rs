@@ -20,7 +20,7 @@ fn new() -> Native {
 fn at(distance_mm: f64) -> Native {
     let mut setup = Setup::default();
     setup.wall.distance_mm = distance_mm;
-    Native::new(&setup, &Config::new(&Params::DEFAULT).unwrap())
+    Native::new(&setup, &Config::shipped(&Params::DEFAULT).unwrap())
 }
 
 fn ready() -> Native {
@@ -161,7 +161,7 @@ fn new_parameters_during_a_tare_begin_it_anew() {
     for _ in 0..100 {
         board.step();
     }
-    board.pipeline.configure(&Config::new(&Params::DEFAULT).unwrap());
+    board.pipeline.configure(&Config::shipped(&Params::DEFAULT).unwrap());
     for _ in 1..TARE_FRAMES {
         assert_eq!(board.step().mode, Mode::Tare);
     }

@@ -15,7 +15,7 @@ struct Bench {
 
 impl Bench {
     fn new(setup: &Setup) -> Self {
-        let config = Config::new(&Params::DEFAULT).unwrap();
+        let config = Config::shipped(&Params::DEFAULT).unwrap();
         let mut bench = Self { world: World::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
         bench.tare();
         bench
@@ -176,7 +176,7 @@ fn the_force_that_is_seen_whole_leaves_the_converter_room() {
             modulus_pa: (modulus_kpa * 1e3) as i32,
             ..Params::DEFAULT
         };
-        let seen_n: f64 = Config::new(&params).unwrap().force_seen.0.to_num();
+        let seen_n: f64 = Config::shipped(&params).unwrap().force_seen.0.to_num();
         let mut world = World::new(&setup);
         let indentation_mm = setup.tip.indentation_mm(seen_n);
         world.place(setup.wall.distance_mm + indentation_mm);
@@ -198,7 +198,7 @@ fn the_force_that_is_seen_whole_is_one_of_the_tips() {
         for codes_per_kpa_milli in [1_000, 24_000, 200_000] {
             for modulus_pa in [20_000, 2_000_000] {
                 let params = Params { undriven_max_codes, codes_per_kpa_milli, modulus_pa, ..Params::DEFAULT };
-                let config = Config::new(&params).unwrap();
+                let config = Config::shipped(&params).unwrap();
                 assert!(config.force_seen.0 > 0 && config.force_seen <= config.tip.force_max(), "{params:?}");
             }
         }

@@ -46,7 +46,7 @@ impl Finger {
             bad_taxels_max: 20,
             ..Params::DEFAULT
         };
-        let mut pipeline = Pipeline::new(&Config::new(&params).unwrap());
+        let mut pipeline = Pipeline::new(&Config::shipped(&params).unwrap());
         let mut mask = [0u32; ROWS];
         for _ in 0..rng.usize(..4) {
             mask[rng.usize(..ROWS)] |= 1 << rng.usize(..COLUMNS);

@@ -8,14 +8,14 @@ use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Bridge as Wanted;
-use fingertip::scan::deadline_ticks;
 use fingertip::shipped::{Config, Frame, Pipeline};
 use fingertip::state::Fault;
+use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
 use super::exchange::{HEARD, Heard, PARAMS, PICTURE, REPORT, Report};
-use super::guard;
+use super::guard::{self, Stopwatch};
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
 
@@ -138,18 +138,18 @@ impl State {
             bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
             // Before the first frame nothing is known: not 0, which would let any effort in.
-            answer_ticks: self.report.loop_ticks.saturating_mul(guard::TICKS).max(1),
+            answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };
         let (_, status) = parts.pipeline.step(&self.frame, &sense, &command);
         parts.bridge.apply(status.bridge());
 
-        let frame_ticks = guard::frame_ticks(parts.pipeline.config().timing);
-        let loop_ticks = guard::now().wrapping_sub(completed.stamp);
+        let timing = parts.pipeline.config().timing;
+        let loop_time = Stopwatch::since(completed.stamp);
         self.report.supply_mv = sense.supply_mv;
-        self.report.loop_ticks = loop_ticks;
-        self.report.loop_ticks_max = self.report.loop_ticks_max.max(loop_ticks);
-        if loop_ticks <= deadline_ticks(frame_ticks) {
-            guard::restart(completed.stamp, frame_ticks);
+        self.report.loop_time = loop_time;
+        self.report.loop_time_max = self.report.loop_time_max.max(loop_time);
+        if loop_time.cycles() <= timing.deadline {
+            guard::restart(completed.stamp, 1, timing);
             parts.watchdog.pet();
         } else {
             self.stop(Fault::MissedDeadline);
@@ -185,7 +185,7 @@ impl State {
         self.lost = false;
         self.parts.scan.start(timing);
         self.seen = super::scan::newest().sequence;
-        guard::restart(guard::now(), FRAMES_TO_START * guard::frame_ticks(timing));
+        guard::restart(guard::now(), FRAMES_TO_START, timing);
     }
 
     fn publish(&mut self) {
@@ -219,7 +219,7 @@ impl State {
 /// A function of its own, because a configuration is large and takes stack only here.
 #[inline(never)]
 fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
-    Config::new(params).is_ok_and(|config| {
+    Config::shipped(params).is_ok_and(|config| {
         pipeline.configure(&config);
         true
     })

@@ -10,6 +10,8 @@ use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 
+use super::guard::Stopwatch;
+
 /// What control reports after every step, and after every trip of the guard.
 #[derive(Clone, Copy, Default)]
 pub struct Report {
@@ -17,10 +19,10 @@ pub struct Report {
     pub status: Status,
     /// The bridge's supply.
     pub supply_mv: u16,
-    /// From the frame's end to the new duty, stopwatch ticks.
-    pub loop_ticks: u32,
+    /// From the frame's end to the new duty.
+    pub loop_time: Stopwatch,
     /// The longest of those.
-    pub loop_ticks_max: u32,
+    pub loop_time_max: Stopwatch,
 }
 
 /// What the link heard from the host: as a whole, so that a bus watchdog never comes without the packet that set it.

@@ -12,25 +12,41 @@ use embassy_stm32::interrupt::InterruptExt;
 use embassy_stm32::pac::timer::regs::SrGp16;
 use embassy_stm32::peripherals::TIM5;
 use embassy_stm32::{Peri, pac, rcc};
-use fingertip::scan::{ScanTiming, TIMER_HZ, deadline_ticks};
+use fingertip::scan::ScanTiming;
+use fingertip::shipped::CLOCKS;
+use fingertip::units::CoreCycles;
 
 use super::{bridge, scan};
 
 /// Ticks of the stopwatch in a second.
 pub const HZ: u32 = 84_000_000;
 
-/// Ticks of the scan's timer in one of the stopwatch.
-pub const TICKS: u32 = TIMER_HZ / HZ;
+/// A time on the stopwatch: its ticks.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Stopwatch(pub u32);
+
+impl Stopwatch {
+    /// From an instant to now.
+    pub fn since(from: u32) -> Self {
+        Self(now().wrapping_sub(from))
+    }
+
+    /// From a frame's end to the end of the time in which the next one is to be answered.
+    const fn to_next_answer(timing: ScanTiming) -> Self {
+        let frame = timing.frame().0 / (CLOCKS.timer_hz / HZ);
+        Self(frame + timing.deadline.0 / (CLOCKS.core_hz / HZ))
+    }
+
+    /// The same time in cycles of the core.
+    pub const fn cycles(self) -> CoreCycles {
+        CoreCycles(self.0.saturating_mul(CLOCKS.core_hz / HZ))
+    }
+}
 
 const COMPARE_1: usize = 0;
 
 static TRIPPED: AtomicBool = AtomicBool::new(false);
 static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
-
-/// A frame's time in ticks of the stopwatch.
-pub const fn frame_ticks(timing: ScanTiming) -> u32 {
-    timing.frame_ticks() / TICKS
-}
 
 /// Starts the stopwatch; the guard waits for [`restart`].
 pub fn start(_timer: Peri<'static, TIM5>) {
@@ -47,9 +63,9 @@ pub fn now() -> u32 {
     pac::TIM5.cnt().read()
 }
 
-/// Lets a frame of `frame_ticks` and the time to answer it pass from the instant `from` before the guard trips.
-pub fn restart(from: u32, frame_ticks: u32) {
-    let period = frame_ticks + deadline_ticks(frame_ticks);
+/// Lets so many frames and the time to answer them pass from the instant `from` before the guard trips.
+pub fn restart(from: u32, frames: u32, timing: ScanTiming) {
+    let period = frames * Stopwatch::to_next_answer(timing).0;
     PERIOD.store(period, Ordering::Relaxed);
     pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
     if !pac::TIM5.dier().read().ccie(COMPARE_1) {

@@ -5,7 +5,7 @@
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply};
-use fingertip::shipped::{Server, Snapshot};
+use fingertip::shipped::{CLOCKS, Server, Snapshot};
 use fingertip::state::Mode;
 use fingertip::store::Record;
 
@@ -13,14 +13,14 @@ use super::bus::Bus;
 use super::crash::{self, Boot};
 use super::exchange::{HEARD, Heard, PARAMS, PICTURE, Picture, REPORT};
 use super::flash::Store;
-use super::guard;
+use super::guard::{self, Stopwatch};
 
 const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
 
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(bus: Bus, store: Store, record: Record, boot: Boot) {
-    let mut host = Host { bus, store, boot, server: Server::new(record), line_good: true };
+    let mut host = Host { bus, store, boot, server: Server::new(record, &CLOCKS), line_good: true };
     host.run().await;
 }
 
@@ -126,8 +126,8 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         status: report.status,
         supply_mv: report.supply_mv,
         tick_ms: Instant::now().as_millis() as u32,
-        loop_time_us: microseconds(report.loop_ticks),
-        loop_time_max_us: microseconds(report.loop_ticks_max),
+        loop_time_us: microseconds(report.loop_time),
+        loop_time_max_us: microseconds(report.loop_time_max),
         reset_cause: boot.reset,
         crash: boot.crash,
         frame,
@@ -138,6 +138,6 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
 }
 
 /// Rounded up: a high-water mark must not look better than it is.
-fn microseconds(ticks: u32) -> u16 {
-    u16::try_from(ticks.div_ceil(TICKS_PER_US)).unwrap_or(u16::MAX)
+fn microseconds(time: Stopwatch) -> u16 {
+    u16::try_from(time.0.div_ceil(TICKS_PER_US)).unwrap_or(u16::MAX)
 }

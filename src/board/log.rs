@@ -33,9 +33,13 @@ pub fn log_damage(error: StoreError) {
 pub fn log_refusal(error: ConfigError) {
     match error {
         ConfigError::Param(cause) => log_parameter(cause),
-        ConfigError::Scan(ScanError::SampleCycles(cycles)) => error!("no sampling time of {=u16} cycles", cycles),
+        ConfigError::Scan(ScanError::SampleCycles { cycles, .. }) => {
+            error!("no sampling time of {=u16} cycles", cycles)
+        }
         ConfigError::Scan(ScanError::SlotTooLong { ticks }) => error!("a slot of {=u32} ticks, 65535 at most", ticks),
-        ConfigError::Scan(ScanError::FrameTooLong { ticks }) => error!("a frame of {=u32} ticks is too long", ticks),
+        ConfigError::Scan(ScanError::FrameTooLong { ticks, .. }) => {
+            error!("a frame of {=u32} ticks is too long", ticks)
+        }
         ConfigError::Order([(low, low_value), (high, high_value)]) => {
             error!("{=str} of {=i32} is not below {=str} of {=i32}", low, low_value, high, high_value)
         }

@@ -4,6 +4,7 @@ use super::geometry::places;
 use super::{Config, ConfigError};
 use crate::frame::Shape;
 use crate::params::Params;
+use crate::scan::Clocks;
 use core::ops::{Deref, DerefMut};
 
 /// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`] in it.
@@ -17,13 +18,13 @@ pub struct Shaped<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
-    /// Checks the parameters and derives the loop's constants.
+    /// Checks the parameters and derives the loop's constants, with the clocks of a board.
     ///
     /// # Errors
     /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each other.
-    pub fn new(params: &Params) -> Result<Self, ConfigError> {
+    pub fn new(params: &Params, clocks: &Clocks) -> Result<Self, ConfigError> {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
-        let config = Config::new(params, ROWS, COLUMNS)?;
+        let config = Config::new(params, [ROWS, COLUMNS], clocks)?;
         Ok(Self { config, columns: places(params), rows: places(params) })
     }
 }

@@ -7,6 +7,7 @@ use heapless::Vec;
 
 use crate::command::Command;
 use crate::pipeline::Status;
+use crate::scan::Clocks;
 use crate::store::Record;
 use crate::units::Newtons;
 
@@ -64,13 +65,14 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     /// How the loop stood at the last snapshot.
     stand: Stand,
     reply_delay_us: u32,
+    clocks: &'static Clocks,
 }
 
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{link::Reply, pipeline::Status, shipped::{COLUMNS, Frame, ROWS, Server, Snapshot}, store::Record};
-/// let mut server = Server::new(Record::DEFAULT);
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Server, Snapshot}, store::Record};
+/// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
 ///     status: Status::default(), supply_mv: 6000, tick_ms: 0, loop_time_us: 0, loop_time_max_us: 0,
@@ -96,8 +98,8 @@ pub struct Server<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
-    /// A device with these stored settings, torque off.
-    pub fn new(record: Record) -> Self {
+    /// A device with these stored settings, torque off; it judges new ones by the board's clocks.
+    pub fn new(record: Record, clocks: &'static Clocks) -> Self {
         let state = State {
             settings: Settings::new(record),
             counters: Counters::default(),
@@ -106,6 +108,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             turn: Turn::None,
             stand: Stand::default(),
             reply_delay_us: 0,
+            clocks,
         };
         Self { receiver: Receiver::new(), state }
     }

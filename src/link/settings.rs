@@ -2,6 +2,7 @@
 
 use crate::command::Command;
 use crate::config::{Config, ConfigError};
+use crate::scan::Clocks;
 use crate::store::{BAUD_RATES, Record};
 use crate::units::Newtons;
 
@@ -76,9 +77,10 @@ impl Settings {
     pub(super) fn check<const ROWS: usize, const COLUMNS: usize>(
         &self,
         params_changed: bool,
+        clocks: &Clocks,
     ) -> Result<(), StatusError> {
         if params_changed {
-            Config::new(&self.record.params, ROWS, COLUMNS).map_err(|error| match error {
+            Config::new(&self.record.params, [ROWS, COLUMNS], clocks).map_err(|error| match error {
                 ConfigError::Param(_) => StatusError::Range,
                 ConfigError::Scan(_) | ConfigError::Order(..) => StatusError::Limit,
             })?;

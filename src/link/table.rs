@@ -14,6 +14,7 @@ use crate::contact::Contact;
 use crate::identify::{Identification, Modulus};
 use crate::params::Params;
 use crate::pipeline::Taring;
+use crate::scan::Clocks;
 
 use super::packet::StatusError;
 use super::server::{Counters, State};
@@ -193,6 +194,8 @@ pub(super) struct Staged {
     pub actions: Actions,
     /// How the loop stands.
     pub stand: Stand,
+    /// The board's.
+    pub clocks: &'static Clocks,
 }
 
 /// Refuses a read that is too long, or that touches a byte without a register.
@@ -281,7 +284,7 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
         at = at.saturating_add(cell.bytes());
     }
-    staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params)?;
+    staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params, staged.clocks)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 

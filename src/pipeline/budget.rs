@@ -6,6 +6,7 @@
 //! fall only later and later, so that it does not hunt. An effort that is not expected to fit is not tried.
 
 use crate::contact::Effort;
+use crate::units::CoreCycles;
 
 /// Frames over which the time is watched before the effort rises: two refinements at the least effort, and more.
 pub const WINDOW: u32 = 32;
@@ -65,9 +66,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         deadline - deadline / 8
     }
 
-    /// The effort for the next frame, where the last one took `taken` of its deadline, both in ticks of
-    /// [`crate::scan::TIMER_HZ`]. A time of 0 was not measured: then it is the effort asked for.
-    pub fn next(&mut self, asked: Effort, taken: u32, deadline: u32) -> Effort {
+    /// The effort for the next frame, where the last one took `taken` of its deadline. A time of 0 was not measured: then it is
+    /// the effort asked for.
+    pub fn next(&mut self, asked: Effort, taken: CoreCycles, deadline: CoreCycles) -> Effort {
+        let (CoreCycles(taken), CoreCycles(deadline)) = (taken, deadline);
         if self.asked != (asked, deadline) {
             self.asked = (asked, deadline);
             (self.wait, self.wait_next) = (0, 1);

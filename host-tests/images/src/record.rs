@@ -10,7 +10,7 @@ use fingertip::frame::Sense;
 use fingertip::identify::Modulus;
 use fingertip::pipeline::{Status, Taken};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
-use fingertip::units::{Duty, Newtons};
+use fingertip::units::{CoreCycles, Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
 pub const MAGIC: [u8; 8] = *b"fingert\x04";
@@ -43,12 +43,12 @@ impl Record {
         };
         places().for_each(|(slot, column)| put(&frame.code(slot, column).to_le_bytes()));
         put(&frame.sequence.to_le_bytes());
-        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer_ticks } = sense;
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = sense;
         put(&encoder.to_le_bytes());
         put(&supply_mv.to_le_bytes());
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
-        put(&answer_ticks.to_le_bytes());
+        put(&answer.0.to_le_bytes());
         let Command { torque, goal, bus_watchdog_ms, effort, tare_request, clear_request, identify_request } = command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
@@ -68,7 +68,7 @@ impl Record {
             supply_mv: u16::from_le_bytes(take(&mut rest)),
             bus_silent_ms: u16::from_le_bytes(take(&mut rest)),
             bridge_fault: take(&mut rest) != [0],
-            answer_ticks: u32::from_le_bytes(take(&mut rest)),
+            answer: CoreCycles(u32::from_le_bytes(take(&mut rest))),
         };
         let command = Command {
             torque: take(&mut rest) != [0],

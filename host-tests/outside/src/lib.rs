@@ -8,11 +8,12 @@ fn an_array_of_8_x_8_holds_1_n() -> Result<(), fingertip::config::ConfigError> {
     use fingertip::frame::{Frame, Sense};
     use fingertip::params::Params;
     use fingertip::pipeline::Pipeline;
+    use fingertip::shipped::CLOCKS;
     use fingertip::units::{Millimetres, Newtons};
 
     const ROWS: usize = 8;
     const COLUMNS: usize = 8;
-    let config = Shaped::<ROWS, COLUMNS>::new(&Params { pitch_um: 1_900, ..Params::DEFAULT })?;
+    let config = Shaped::<ROWS, COLUMNS>::new(&Params { pitch_um: 1_900, ..Params::DEFAULT }, &CLOCKS)?;
     let mut finger = Pipeline::new(&config);
     let mut command = Command { tare_request: 1, ..Command::default() };
     let (mut travel_mm, mut speed_mm_per_s) = (0.0, 0.0);

@@ -124,7 +124,7 @@ struct Board<E: Set> {
 impl<E: Set> Board<E> {
     fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
         let params = controller::params(scene);
-        let config = Config::new(&params).map_err(SimError::Controller)?;
+        let config = Config::shipped(&params).map_err(SimError::Controller)?;
         let setup = controller::setup(scene);
         let fingers = scene.table("hand").whole("fingers") as usize;
         let (mut units, mut effects) = (Vec::new(), Vec::new());
@@ -145,7 +145,7 @@ impl<E: Set> Board<E> {
         let world = World::<E>::new(&setup, &Surroundings::of(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
-        let slot_s = f64::from(config.timing.slot_ticks) / f64::from(fingertip::scan::TIMER_HZ);
+        let slot_s = f64::from(config.timing.slot.0) / f64::from(fingertip::shipped::CLOCKS.timer_hz);
         let bridges = vec![Bridge::Coast; units.len()];
         Ok(Self {
             world,

@@ -18,7 +18,7 @@ use fingertip::shipped::Config;
 /// # Panics
 /// The default parameters are refused.
 pub fn play(script: &Script) -> Result<Run, DemoError> {
-    let config = Config::new(&Params::DEFAULT).expect("the defaults are in their ranges");
+    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are in their ranges");
     let mut board = Native::new(&Setup::default(), &config);
     board.tare_and_enable();
     let mut run = Run { span_s: [board.time_s(); 2], ..Run::default() };

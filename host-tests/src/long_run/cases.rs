@@ -32,7 +32,7 @@ const DISTURBANCE_SWING: i64 = 1_024;
 pub fn all(whole: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {
-        let config = Config::new(&Params { settle_ns, sample_cycles, ..Params::DEFAULT }).expect("allowed");
+        let config = Config::shipped(&Params { settle_ns, sample_cycles, ..Params::DEFAULT }).expect("allowed");
         // The default scan is the one to take every step of.
         let whole = whole && scan == "default";
         queue(&mut runs, observers(scan, &config), whole);
@@ -189,7 +189,7 @@ fn baselines() -> Vec<Machine<Array>> {
         ("the extremes in turns", [12, most]),
     ];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
         let frames = pair.map(frame);
         let mut start = Array::new();
         tare(&mut start, &frame(40), &config);
@@ -222,7 +222,7 @@ fn tare(array: &mut Array, frame: &Frame, config: &Config) {
 fn tares() -> Vec<Machine<Array>> {
     let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, SATURATED - 372 - 1])];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::new(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
         let frames = pair.map(frame);
         Machine {
             name: format!("tare, {input}"),

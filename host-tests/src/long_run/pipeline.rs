@@ -29,7 +29,7 @@ fn frame(codes: u16) -> Frame {
 /// # Panics
 /// Something still changes after `most` steps.
 pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (Outcome, Status) {
-    let mut pipeline = Pipeline::new(&Config::new(&Params::DEFAULT).expect("the defaults are allowed"));
+    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).expect("the defaults are allowed"));
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let mut command = Command { tare_request: 1, ..Command::default() };
     let mut shown = frame(0);

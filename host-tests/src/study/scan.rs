@@ -4,8 +4,9 @@ use super::page::figure;
 use crate::plant::Setup;
 use crate::plant::readout::decay;
 use crate::plant::setup::Array;
-use fingertip::scan::{ScanTiming, TICKS_PER_ADC_CYCLE, TIMER_HZ};
-use fingertip::shipped::{COLUMNS, ROWS, TAXELS};
+use fingertip::params::Params;
+use fingertip::scan::ScanTiming;
+use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, TAXELS};
 use std::fmt::Write as _;
 
 /// Noise of a conversion, codes: assumed, as the simulated converters have none.
@@ -17,7 +18,7 @@ const MN_PER_CODE: f64 = 1.5 * 1.5 / 24.0;
 
 /// Settle time in ns, sampling time in converter cycles, frames averaged.
 type Setting = (u32, u16, u32);
-const DEFAULT: Setting = (ScanTiming::DEFAULT_SETTLE_NS, ScanTiming::DEFAULT_SAMPLE_CYCLES, 1);
+const DEFAULT: Setting = (Params::DEFAULT.settle_ns as u32, Params::DEFAULT.sample_cycles as u16, 1);
 const SETTINGS: [Setting; 14] = [
     (600, 3, 1),
     (600, 15, 1),
@@ -46,8 +47,8 @@ struct Row {
 impl Row {
     fn of(setting: Setting, array: &Array) -> Option<Self> {
         let (settle_ns, sample_cycles, frames) = setting;
-        let timing = ScanTiming::new(settle_ns, sample_cycles, ROWS, COLUMNS).ok()?;
-        let cycle_s = f64::from(TICKS_PER_ADC_CYCLE) / f64::from(TIMER_HZ);
+        let timing = ScanTiming::new(settle_ns, sample_cycles, [ROWS, COLUMNS], &CLOCKS).ok()?;
+        let cycle_s = f64::from(CLOCKS.ticks_per_converter_cycle) / f64::from(CLOCKS.timer_hz);
         let sampling_s = (f64::from(sample_cycles) - 0.5) * cycle_s;
         Some(Self {
             setting,

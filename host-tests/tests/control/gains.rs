@@ -29,7 +29,8 @@ fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
 /// 1 / (5 T) where the encoder is fine, half of it at each calmer pace.
 #[test]
 fn a_fine_encoder_leaves_the_pace_to_the_time() {
-    let config = shipped::Config::new(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
+    let config =
+        shipped::Config::shipped(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
     for pace in 0..config.paces.len() {
         is_made_for(0.2 / frame_s / f64::from(1 << pace), pace, &config);
@@ -39,7 +40,7 @@ fn a_fine_encoder_leaves_the_pace_to_the_time() {
 /// A count moves the voltage by three quarters of the largest at most: 5.8 k_v^2 q = 0.75 g V_max; no pace is slower than 60 /s.
 #[test]
 fn a_coarse_encoder_makes_a_slower_loop() {
-    let config = shipped::Config::new(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
+    let config = shipped::Config::shipped(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = (0.75 * f64::from(config.voltage_limit) / 256.0 / (5.8 * q_mm)).sqrt();
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
@@ -56,7 +57,7 @@ fn a_coarse_encoder_makes_a_slower_loop() {
 /// Nor is a count taken for more than 60 mm/s by an observer 2.5 times as quick: where the motor drives the tip almost directly.
 #[test]
 fn a_count_is_no_more_than_so_fast() {
-    let config = shipped::Config::new(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
+    let config = shipped::Config::shipped(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = 60.0 / (2.5 * q_mm);
     let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);

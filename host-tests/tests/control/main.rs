@@ -16,7 +16,7 @@ use std::ops::Deref;
 
 /// The reference finger's.
 fn config() -> Config {
-    shipped::Config::new(&Params::DEFAULT).expect("the defaults are allowed").deref().clone()
+    shipped::Config::shipped(&Params::DEFAULT).expect("the defaults are allowed").deref().clone()
 }
 
 fn mm(value: f64) -> Millimetres {

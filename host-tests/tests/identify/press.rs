@@ -11,7 +11,7 @@ use host_tests::plant::{Setup, Taxel};
 const FRAMES_MAX: u32 = 60_000;
 
 fn board(setup: &Setup) -> Native {
-    let mut board = Native::new(setup, &Config::new(&Params::DEFAULT).unwrap());
+    let mut board = Native::new(setup, &Config::shipped(&Params::DEFAULT).unwrap());
     board.tare_and_enable();
     board.step();
     board
@@ -136,7 +136,7 @@ fn an_edge_a_bad_taxel_and_nothing_to_touch_are_refused() {
 fn a_motor_too_weak_for_the_press_gives_what_its_points_support() {
     let weak = |current_max_ma| {
         let params = Params { current_max_ma, ..Params::DEFAULT };
-        let mut board = Native::new(&Setup::default(), &Config::new(&params).unwrap());
+        let mut board = Native::new(&Setup::default(), &Config::shipped(&params).unwrap());
         board.tare_and_enable();
         board.step();
         identify(&mut board)
@@ -167,13 +167,13 @@ fn torque_off_a_fault_and_new_parameters_interrupt_it() {
     let status = board.step();
     assert_eq!((status.mode, status.duty.0, status.identification), (Mode::Fault, 0, interrupted));
     let mut board = started();
-    board.pipeline.configure(&Config::new(&Params::DEFAULT).unwrap());
+    board.pipeline.configure(&Config::shipped(&Params::DEFAULT).unwrap());
     assert_eq!(board.step().identification, interrupted);
 }
 
 #[test]
 fn without_torque_it_is_refused() {
-    let mut board = Native::new(&Setup::default(), &Config::new(&Params::DEFAULT).unwrap());
+    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
     assert_eq!(board.step().identification, Identification::None);
     board.command.identify_request += 1;
     let status = board.step();

@@ -7,7 +7,7 @@ use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Reply, ResetCause};
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::Record;
 
@@ -48,7 +48,7 @@ impl Bench {
             frame.set_code(place / COLUMNS, place % COLUMNS, 1000 + place as u16);
         }
         Self {
-            server: Server::new(record),
+            server: Server::new(record, &CLOCKS),
             status: Status::default(),
             frame,
             taxels: by_place(|place| 20_000 + place),

@@ -111,7 +111,7 @@ proptest! {
         prop_assert_eq!(&replies, &in_slices);
         prop_assert_eq!(whole.server.settings(), sliced.server.settings());
         let settings = whole.server.settings();
-        prop_assert!(fingertip::shipped::Config::new(&settings.record.params).is_ok());
+        prop_assert!(fingertip::shipped::Config::shipped(&settings.record.params).is_ok());
         prop_assert!(settings.record.id <= 252 && settings.record.baud_code <= 5 && settings.status_return_level <= 2);
         prop_assert!(settings.command.bus_watchdog_ms <= 127 * 20);
         let goal = settings.command.goal;

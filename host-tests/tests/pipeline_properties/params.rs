@@ -66,7 +66,7 @@ pub fn any_params() -> impl Strategy<Value = Params> {
 
 /// The configuration, with what the loop's arithmetic relies on.
 pub fn config(params: &Params) -> Config {
-    let config = Config::new(params).expect("allowed");
+    let config = Config::shipped(params).expect("allowed");
     let positive = [config.mm_per_count_q40, config.newtons_per_sum_q48, config.pascals_per_sum_q32];
     assert!(positive.iter().all(|value| (1..1 << 61).contains(value)), "{config:?}");
     // Room for the rounding of its quotient; a motor too weak for the acceleration's resolution is not driven.

@@ -6,9 +6,9 @@ use fingertip::contact::Effort;
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Pipeline, Status};
-use fingertip::scan::TIMER_HZ;
+use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
-use fingertip::units::Duty;
+use fingertip::units::{CoreCycles, Duty};
 use host_tests::plant::Setup;
 use host_tests::plant::cells::Cell;
 use host_tests::plant::drive::{Dynamics, Shaft, Source};
@@ -34,7 +34,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     /// With taxels so far apart, whose array meets the plane there.
     pub fn new(pitch_um: i32, centre_mm: [f64; 2], effort: Effort) -> Self {
         let params = Params { pitch_um, ..Params::DEFAULT };
-        let config = Shaped::<ROWS, COLUMNS>::new(&params).expect("a pitch that is allowed");
+        let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).expect("a pitch that is allowed");
         let mut setup = Setup::default();
         setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;
         [setup.wall.centre_x_mm, setup.wall.centre_y_mm] = centre_mm;
@@ -45,7 +45,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             digest: Digest::new(),
             frame: Frame::EMPTY,
             shaft: Shaft::default(),
-            slot_s: f64::from(config.timing.slot_ticks) / f64::from(TIMER_HZ),
+            slot_s: f64::from(config.timing.slot.0) / f64::from(CLOCKS.timer_hz),
             duty: None,
         }
     }
@@ -109,7 +109,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let turns = self.shaft.angle_rad / core::f64::consts::TAU;
         let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
-        let sense = Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, answer_ticks: 0 };
+        let sense = Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, answer: CoreCycles(0) };
         let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
         let status = *status;
         self.digest.add(duty, &status);

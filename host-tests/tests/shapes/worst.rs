@@ -8,6 +8,7 @@ use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, GAIN_MAX};
+use fingertip::units::CoreCycles;
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed};
 
@@ -18,10 +19,13 @@ const QUIET: u16 = 40;
 
 /// The ends of what goes into the sums and the fit, with the largest sag that the shape allows.
 fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
-    let sag = (0..=7_600)
-        .rev()
-        .step_by(4)
-        .find(|sag| Shaped::<ROWS, COLUMNS>::new(&Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT }).is_ok());
+    let sag = (0..=7_600).rev().step_by(4).find(|sag| {
+        Shaped::<ROWS, COLUMNS>::new(
+            &Params { row_sag_ppb_per_code: *sag, ..Params::DEFAULT },
+            &fingertip::shipped::CLOCKS,
+        )
+        .is_ok()
+    });
     let row_sag_ppb_per_code = sag.expect("a sag that is allowed");
     let mut all = Vec::new();
     for (pitch_um, tip_radius_um) in [(500, 16_000), (4_000, 4_000), (1_500, 10_000), (500, 4_000)] {
@@ -96,7 +100,8 @@ fn sums<const ROWS: usize, const COLUMNS: usize>(
 fn survives<const ROWS: usize, const COLUMNS: usize>() {
     let frames = frames::<ROWS, COLUMNS>();
     for params in extremes::<ROWS, COLUMNS>() {
-        let config = Shaped::<ROWS, COLUMNS>::new(&params).expect("parameters within their ranges");
+        let config =
+            Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("parameters within their ranges");
         for gain in [GAIN_MAX, 1 << 14] {
             let mut array = Array::new();
             array.calibrate(&Calibration::new(&[[gain; COLUMNS]; ROWS], &[0; ROWS]).expect("gains within their range"));
@@ -145,7 +150,7 @@ fn the_worst_frames_overflow_nothing() {
 
 /// A tare takes the same out of every taxel, also where the rows are odd.
 fn tares<const ROWS: usize, const COLUMNS: usize>() {
-    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
     let frame = frame::<ROWS, COLUMNS>(|row, column| 40 + 3 * row as u16 + 5 * column as u16);
     let mut array = Array::new();
     let done = (1..).find(|_| {
@@ -171,7 +176,7 @@ fn a_tare_zeroes_every_taxel() {
 
 /// A taxel that is dead or saturated is left out, whichever it is, and no other.
 fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
-    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
     for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
         for code in [0, 4_095] {
             let spoilt = frame::<ROWS, COLUMNS>(|r, c| if (r, c) == (row, column) { code } else { 100 });
@@ -203,7 +208,7 @@ fn a_bad_taxel_is_left_out_wherever_it_is() {
 
 #[test]
 fn an_array_that_is_all_bad_counts_every_taxel() {
-    let config = Shaped::<16, 32>::new(&Params::DEFAULT).expect("the defaults");
+    let config = Shaped::<16, 32>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
     let frame = frame::<16, 32>(|_, _| 4_095);
     let mut array = Array::new();
     assert_eq!(array.read(&frame, &config).bad_count, 512);
@@ -233,12 +238,12 @@ fn any_frame<const ROWS: usize, const COLUMNS: usize>() -> impl Strategy<Value =
 
 fn any_sense() -> impl Strategy<Value = Sense> {
     let parts = (any::<i32>(), 5_000..7_000_u16, any::<u16>(), prop::bool::weighted(0.02), 0..20_000_u32);
-    parts.prop_map(|(encoder, supply_mv, bus_silent_ms, bridge_fault, answer_ticks)| Sense {
+    parts.prop_map(|(encoder, supply_mv, bus_silent_ms, bridge_fault, answer)| Sense {
         encoder: if encoder % 3 == 0 { encoder } else { encoder % 500 },
         supply_mv,
         bus_silent_ms,
         bridge_fault,
-        answer_ticks,
+        answer: CoreCycles(answer),
     })
 }
 
@@ -247,7 +252,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
     let cases = Cases { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Cases::default() };
     let steps = prop::collection::vec((any_frame::<ROWS, COLUMNS>(), any_sense(), 0..6_u8), 1..8);
     let test = |steps: Vec<(Frame<ROWS, COLUMNS>, Sense, u8)>| {
-        let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT).expect("the defaults");
+        let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
         let mut pipeline = Pipeline::new(&config);
         let mut command = Command { tare_request: 1, goal: newtons(2_000), ..Command::default() };
         let quiet = frame::<ROWS, COLUMNS>(|_, _| QUIET);

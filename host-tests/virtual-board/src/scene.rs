@@ -58,7 +58,7 @@ const WATCHDOG_MS: i64 = 20;
 pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
     let begun = Instant::now();
     let params = controller::params(scene);
-    let config = Config::new(&params).map_err(SimError::Controller)?;
+    let config = Config::shipped(&params).map_err(SimError::Controller)?;
     let frame_ns = u64::from(config.timing.frame_ns);
     let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
     let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);

@@ -121,8 +121,8 @@ pub fn start_rows() {
 /// The update moves the row; the compare's rising edge, a settle time later, triggers both converters.
 pub fn start_timer(timing: ScanTiming) {
     let timer = pac::TIM8;
-    timer.arr().write(|w| w.set_arr(timing.slot_ticks - 1));
-    timer.ccr(0).write(|w| w.set_ccr(timing.settle_ticks));
+    timer.arr().write(|w| w.set_arr((timing.slot.0 - 1) as u16));
+    timer.ccr(0).write(|w| w.set_ccr(timing.settle.0 as u16));
     timer.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
     timer.ccer().write(|w| w.set_cce(0, true));
     timer.bdtr().write(|w| w.set_moe(true));

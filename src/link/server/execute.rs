@@ -103,7 +103,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     }
 
     fn staged(&self) -> Staged {
-        Staged { settings: self.settings, actions: self.actions, stand: self.stand }
+        Staged { settings: self.settings, actions: self.actions, stand: self.stand, clocks: self.clocks }
     }
 
     fn commit(&mut self, mut staged: Staged) {
@@ -142,7 +142,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         }
         let mut staged = self.staged();
         staged.settings.record = record;
-        staged.settings.check::<ROWS, COLUMNS>(true)?;
+        staged.settings.check::<ROWS, COLUMNS>(true, staged.clocks)?;
         staged.actions.save = true;
         staged.stand.check(&staged.settings.command, &staged.settings.command, staged.actions)?;
         self.commit(staged);

@@ -51,7 +51,7 @@ extern "C" fn nothing(_: &mut ()) {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut inputs = Inputs::open();
-    let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
     let tools = Tools::new(&config);
     say(format_args!("region 0 nothing: an empty call"));
     for _ in 0..256 {

@@ -150,7 +150,7 @@ fn main() -> ! {
         fail("no recording of this version");
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
-    let Ok(config) = Config::new(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
     let mut bench = Bench {
         config: &config,
         record: Record::from_bytes(&[0; Record::BYTES]),

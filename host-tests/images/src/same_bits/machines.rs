@@ -15,7 +15,7 @@ use fingertip::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use fingertip::model::{Relaxation, RelaxationState, Tip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame, Picture};
 use fingertip::state::{Limits, Mode};
-use fingertip::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
+use fingertip::units::{CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Row, Total};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
@@ -176,7 +176,7 @@ pub const STEPS: [Step; 20] = [
         // A whole deadline is about 2^13 ticks; the model is now and then at work.
         let asked = Effort::from_number((s.share_q32 >> 29) as u8);
         let taken = s.words[0].unsigned_abs() >> 17;
-        mix.add(m.budget.next(asked, taken, 12_568) as u32);
+        mix.add(m.budget.next(asked, CoreCycles(taken), CoreCycles(12_568)) as u32);
         m.budget.note(s.words[1] > 0);
     }),
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),

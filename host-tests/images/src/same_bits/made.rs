@@ -22,7 +22,7 @@ const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
 
 /// What is made for every [`MADE_EVERY`]th input.
 pub const MADE: [Make; 3] = [
-    ("Config::new", |m, source, mix| match Config::new(&params(source)) {
+    ("Config::new", |m, source, mix| match Config::shipped(&params(source)) {
         Ok(config) => {
             m.config = config;
             add_config(mix, &m.config);
@@ -82,7 +82,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     let config::Config {
         params: _,
         geometry: _,
-        timing: ScanTiming { settle_ticks, slot_ticks, sample_cycles, slots: _, frame_ns },
+        timing: ScanTiming { settle, slot, sample_cycles, slots: _, frame_ns, deadline },
         tip,
         sag_q32,
         dead_codes,
@@ -118,8 +118,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
         force_max,
         force_seen,
     } = &**config;
-    for ticks in [settle_ticks, slot_ticks, sample_cycles, dead_codes] {
-        mix.add(*ticks);
+    for ticks in [settle.0, slot.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into()] {
+        mix.add(ticks);
     }
     mix.add(u32::from(*sag_q32));
     for force in [tip.force_max(), *contact_on, *contact_off, *force_fault, *force_max, *force_seen] {

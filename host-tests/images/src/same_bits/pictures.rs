@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn many_pictures_are_contacts_that_take_the_fit_and_many_are_not() {
-        let config = Config::new(&Params::DEFAULT).unwrap();
+        let config = Config::shipped(&Params::DEFAULT).unwrap();
         let (mut source, mut sample, mut pictures) = (Source::new(), Sample::new(config.tip), Pictures::new());
         let (mut good, mut fitted, mut spoilt) = (0, 0, 0);
         for _ in 0..20_000 {

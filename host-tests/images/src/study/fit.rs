@@ -60,7 +60,9 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
         while left > 0 {
             // Cases of a pitch follow each other: constants are made once for each, as two do not fit the stack.
             let [pitch_um, cases] = inputs.words();
-            let Ok(config) = Config::new(&Params { pitch_um, ..Params::DEFAULT }) else { fail("a pitch is refused") };
+            let Ok(config) = Config::shipped(&Params { pitch_um, ..Params::DEFAULT }) else {
+                fail("a pitch is refused")
+            };
             for _ in 0..cases {
                 one_case(*region, variant, effort, frames, &config, inputs);
             }

@@ -40,7 +40,7 @@ impl Digest {
 // Taken apart field by field, so that a field cannot be forgotten.
 
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
-    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer_ticks } = *sense;
+    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
     let Command { torque, goal, bus_watchdog_ms, effort, tare_request, clear_request, identify_request } = *command;
     [
         sequence,
@@ -48,7 +48,7 @@ fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
         supply_mv.into(),
         bus_silent_ms.into(),
         bridge_fault.into(),
-        answer_ticks,
+        answer.0,
         torque.into(),
         goal.to_bits() as u32,
         bus_watchdog_ms.into(),
@@ -113,6 +113,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use fingertip::units::CoreCycles;
     use fingertip::units::Newtons;
 
     /// What a step takes and gives.
@@ -134,7 +135,7 @@ mod tests {
             of(|step| step.0.set_code(10, 9, 1)),
             of(|step| step.0.sequence = 1),
             of(|step| step.1.encoder = 1),
-            of(|step| step.1.answer_ticks = 1),
+            of(|step| step.1.answer = CoreCycles(1)),
             of(|step| step.2.torque = !step.2.torque),
             of(|step| step.2.goal = Newtons::from_bits(1)),
             of(|step| step.2.identify_request = 1),

@@ -86,7 +86,7 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         let text = field(&setup, &format!("finger{number}"))?;
         let controller = controller_of(&serde_json::from_str(&text)?)
             .ok_or_else(|| format!("the parameters of finger {number} are not those of this version"))?;
-        let config = Config::new(&controller.params).map_err(|error| format!("finger {number}: {error}"))?;
+        let config = Config::shipped(&controller.params).map_err(|error| format!("finger {number}: {error}"))?;
         let mut pipeline = Pipeline::new(&config);
         if let Some(gains) = &controller.calibration {
             pipeline.calibrate(&Calibration::new(&gains.gains_q14, &gains.masks)?);

@@ -87,7 +87,7 @@ impl Reader<'_> {
             bounds,
         };
         if self.errors.is_empty()
-            && let Err(error) = Config::new(&controller::params(&scene))
+            && let Err(error) = Config::shipped(&controller::params(&scene))
         {
             let at = root.get("controller").map_or(0..0, |_| key_span(root, "controller"));
             self.error(at, format!("the controller refuses its parameters: {error}"), String::new());

@@ -4,6 +4,16 @@ use crate::contact::Effort;
 use crate::units::Newtons;
 
 /// What the host asks of the loop; a snapshot, replaced as a whole.
+///
+/// ```
+/// use fingertip::command::Command;
+/// use fingertip::config::newtons;
+///
+/// let mut command = Command::default(); // torque off, nothing to hold
+/// command.tare_request += 1; // a change asks for a tare
+/// let hold = Command { torque: true, goal: newtons(1_500), ..command };
+/// assert_eq!(hold.goal.0, 1.5);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Command {
     /// Whether the bridge may be driven.

@@ -44,6 +44,7 @@ const JUMP_MM: f32 = 0.5;
 
 /// Why parameters were refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// One is out of its range.
     Param(ParamError),

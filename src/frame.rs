@@ -33,6 +33,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
 }
 
 /// Codes of 12 bits, in pairs as the two converters read them at the same instant.
+///
+/// ```
+/// use fingertip::frame::Frame;
+///
+/// let mut frame = Frame::<3, 5>::EMPTY;
+/// frame.set_code(2, 4, 1_000); // the last row's last column
+/// frame.set_code(3, 4, 372); // the same column with no row driven
+/// assert_eq!((frame.code(2, 4), frame.code(3, 4), frame.code(0, 0)), (1_000, 372, 0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<const ROWS: usize, const COLUMNS: usize> {
     /// The first half of the columns in the low halves of words, the second in the high ones.

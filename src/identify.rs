@@ -54,6 +54,7 @@ pub struct Modulus {
 /// Why there is no modulus. The numbers are stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The points span less than [`SPAN_MIN`].
     Span = 1,

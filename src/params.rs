@@ -28,6 +28,15 @@ impl core::error::Error for ParamError {}
 macro_rules! params {
     ($($(#[doc = $doc:literal])+ $name:ident = $default:literal in $min:literal ..= $max:literal;)*) => {
         /// The stored parameters, in the units that their names end with.
+        ///
+        /// ```
+        /// use fingertip::params::Params;
+        ///
+        /// let harder = Params { modulus_pa: 400_000, ..Params::DEFAULT };
+        /// assert!(harder.check().is_ok());
+        /// let wrong = Params { modulus_pa: 4, ..Params::DEFAULT };
+        /// assert_eq!(wrong.check().unwrap_err().to_string(), "modulus_pa of 4: 20000 to 2000000 are allowed");
+        /// ```
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub struct Params { $($(#[doc = $doc])+ pub $name: i32,)* }
 

@@ -22,7 +22,7 @@ use crate::state::{Fault, Limits, Mode};
 use crate::units::Duty;
 use budget::Budget;
 
-/// The loop's state between frames.
+/// The loop's state between frames. The example at the crate's top closes a loop with it.
 #[derive(Clone, Debug)]
 pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     config: Shaped<ROWS, COLUMNS>,

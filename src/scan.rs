@@ -26,7 +26,7 @@ impl Clocks {
     }
 }
 
-/// How a scan is timed. Row `n` is driven for [`ScanTiming::slot`]; its conversions start after [`ScanTiming::settle`] and end
+/// How a scan is timed: [`crate::config::Shaped::new`] works it out. Row `n` is driven for [`ScanTiming::slot`]; its conversions start after [`ScanTiming::settle`] and end
 /// before the next row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanTiming {
@@ -47,6 +47,7 @@ pub struct ScanTiming {
 
 /// Why a scan cannot be timed so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ScanError {
     /// The converters have no such sampling time.
     SampleCycles {

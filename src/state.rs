@@ -40,6 +40,7 @@ pub enum Mode {
 /// Why the motor was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Fault {
     /// No frame within 1.75 frame times of the last one: the scan stands.
     LostFrames = 1,

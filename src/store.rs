@@ -48,6 +48,17 @@ const fn fingerprint() -> u32 {
 pub const SLOT_BYTES: usize = (CRC_PLACE + 4).next_multiple_of(16);
 
 /// What outlives a reset.
+///
+/// ```
+/// use fingertip::store::{Record, encode, latest, next_offset};
+///
+/// let mut sector = [0xff_u8; 1024]; // erased
+/// let record = Record { id: 7, ..Record::DEFAULT };
+/// let place = next_offset(&sector).expect("room");
+/// let bytes = encode(&record);
+/// sector[place..place + bytes.len()].copy_from_slice(&bytes);
+/// assert_eq!(latest(&sector), Ok(Some(record)));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     /// Address on the bus, 0 to 252.

@@ -43,6 +43,7 @@ pub fn log_refusal(error: ConfigError) {
         ConfigError::Order([(low, low_value), (high, high_value)]) => {
             error!("{=str} of {=i32} is not below {=str} of {=i32}", low, low_value, high, high_value)
         }
+        _ => error!("the scan cannot be timed so"),
     }
 }
 

@@ -8,6 +8,25 @@ use crate::scan::Clocks;
 use core::ops::{Deref, DerefMut};
 
 /// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`] in it.
+///
+/// ```
+/// use fingertip::config::Shaped;
+/// use fingertip::params::Params;
+/// use fingertip::scan::Clocks;
+///
+/// // Of a microcontroller with a timer and a core of 64 MHz, and converters of 16 MHz.
+/// let clocks = Clocks {
+///     timer_hz: 64_000_000,
+///     core_hz: 64_000_000,
+///     ticks_per_converter_cycle: 4,
+///     sample_cycles: &[4, 8, 16],
+///     conversion_cycles: 13,
+///     trigger_cycles: 4,
+/// };
+/// let config = Shaped::<4, 4>::new(&Params { sample_cycles: 8, ..Params::DEFAULT }, &clocks)?;
+/// assert_eq!(config.timing.frame_ns, 26_406); // five slots of 338 ticks
+/// # Ok::<(), fingertip::config::ConfigError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Shaped<const ROWS: usize, const COLUMNS: usize> {
     config: Config,

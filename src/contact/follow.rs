@@ -56,6 +56,18 @@ const FOLLOWS_BITS: u32 = 12;
 const FOLLOWS_MAX: i32 = ONE / 16;
 
 /// A contact's fit between frames.
+///
+/// ```
+/// use fingertip::contact::Fit;
+/// use fingertip::params::Params;
+/// use fingertip::shipped::{Array, Config, Frame};
+///
+/// let config = Config::shipped(&Params::DEFAULT)?;
+/// let (mut array, mut fit) = (Array::new(), Fit::default());
+/// let contact = fit.read(array.read(&Frame::EMPTY, &config), &config);
+/// assert_eq!(contact.force.0, 0.0);
+/// # Ok::<(), fingertip::config::ConfigError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     effort: Effort,

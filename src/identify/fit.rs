@@ -10,6 +10,21 @@ use crate::units::{Kilopascals, Millimetres, Newtons};
 const KPA_PER_SLOPE_Q22: i64 = 1_335_088_429;
 
 /// F against d^2 through the origin, for a known indentation.
+///
+/// ```
+/// use fingertip::identify::DepthFit;
+/// use fingertip::model::Tip;
+/// use fingertip::units::{Kilopascals, Millimetres};
+///
+/// let tip = Tip::new(Millimetres::from_bits(10 << 24), Kilopascals::from_bits(250 << 16)).unwrap();
+/// let mut fit = DepthFit::new(tip.depth_max(), tip.force_max());
+/// for hundredths in 1..=300 {
+///     let depth = Millimetres::from_bits(hundredths * ((1 << 24) / 100));
+///     fit.add(depth, tip.force(depth));
+/// }
+/// let modulus = fit.modulus().unwrap().modulus.0.to_num::<f64>();
+/// assert!((modulus - 250.0).abs() < 0.1, "{modulus} kPa");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DepthFit {
     sums: Sums,

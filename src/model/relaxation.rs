@@ -88,7 +88,21 @@ struct Coefficients {
     lead: u64,
 }
 
-/// What the tip remembers of its load.
+/// What the tip remembers of its load; see [`Relaxation::step`].
+///
+/// ```
+/// use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
+/// use fingertip::units::{Newtons, Ratio};
+///
+/// // A fifth of the force creeps away with a time constant of 0.3 s; frames of 100 us.
+/// let term = RelaxationTerm { share: Ratio::from_bits(13_107), time_constant_us: 300_000 };
+/// let filter = Relaxation::new(100, &[term]).unwrap();
+/// let mut state = RelaxationState::REST;
+/// let held = Newtons::from_bits(2 << 16);
+/// let first = filter.step(&mut state, held);
+/// let last = (0..30_000).map(|_| filter.step(&mut state, held)).last().unwrap();
+/// assert!(first.0 > 1.99 && (1.59..1.61).contains(&last.0.to_num::<f64>()), "{first:?} {last:?}");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RelaxationState<const N: usize> {
     elastic_q48: i64,

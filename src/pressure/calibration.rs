@@ -46,6 +46,16 @@ impl core::fmt::Display for CalibrationError {
 impl core::error::Error for CalibrationError {}
 
 /// Gains of all taxels, and a mask of those that are left out.
+///
+/// ```
+/// use fingertip::pressure::{Calibration, GAIN_ONE};
+///
+/// let mut gains = [[GAIN_ONE; 4]; 4];
+/// gains[1][2] = GAIN_ONE + GAIN_ONE / 10; // reads 10 % too little
+/// let calibration = Calibration::new(&gains, &[0, 0, 0, 0b1000]).unwrap(); // the last taxel is broken
+/// assert!(Calibration::new(&[[0; 4]; 4], &[0; 4]).is_err());
+/// # let _ = calibration;
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Calibration<const ROWS: usize, const COLUMNS: usize> {
     pub(super) weights: [Weights<COLUMNS>; ROWS],

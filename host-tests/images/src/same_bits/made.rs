@@ -28,8 +28,9 @@ pub const MADE: [Make; 3] = [
             add_config(mix, &m.config);
         }
         Err(ConfigError::Param(error)) => mix.add(error.value),
-        Err(ConfigError::Scan(_)) => mix.add(-1),
         Err(ConfigError::Order([(_, low), (_, high)])) => mix.add(low - high),
+        // The scan.
+        Err(_) => mix.add(-1),
     }),
     ("Calibration::new", |m, source, mix| match frames::calibration(source) {
         // The gains show in what the array reads.

@@ -2,7 +2,7 @@
 
 use super::{Population, read};
 use crate::scene::library;
-use crate::scene::tables::SCRIPT;
+use crate::scene::tables::{EXPECT, SCRIPT};
 use std::fs;
 use std::path::{Path, PathBuf};
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Table};
@@ -41,12 +41,15 @@ pub fn load(name: &str) -> Result<Population, String> {
     Ok(Population { name: stem(&file), ..population })
 }
 
-/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole.
+/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole. What is counted is added.
 fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {
             (Some(Item::Table(base)), Item::Table(over)) => overlay(base, over),
-            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name != SCRIPT.name => bounds(base, over),
+            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name == EXPECT.name => bounds(base, over),
+            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name != SCRIPT.name => {
+                over.iter().for_each(|table| base.push(table.clone()));
+            }
             (Some(known), item) => *known = item.clone(),
             (None, item) => {
                 base.insert(name, item.clone());

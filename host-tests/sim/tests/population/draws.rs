@@ -167,6 +167,22 @@ fn what_extends_another_says_only_what_is_other() {
 }
 
 #[test]
+fn what_is_counted_is_added_to_what_the_extended_one_counts() {
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("counting.toml");
+    let count = "[[count]]\nmetric = \"rest_duty_percent\"\nabove = 5.0\n";
+    std::fs::write(&path, format!("extends = \"ordinary\"\n{count}")).unwrap();
+    let above = |name: &str| {
+        let counted = load(name).unwrap().counted;
+        let of_duty = counted.into_iter().filter(|counted| counted.metric == "rest_duty_percent");
+        let mut above: Vec<f64> = of_duty.map(|counted| counted.above).collect();
+        above.sort_by(f64::total_cmp);
+        above
+    };
+    assert_eq!(above("ordinary"), [2.0]);
+    assert_eq!(above(path.to_str().unwrap()), [2.0, 5.0]);
+}
+
+#[test]
 fn the_pages_example_is_a_population() {
     let page = include_str!("../../../../docs/population.md");
     let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();

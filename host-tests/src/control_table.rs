@@ -1,5 +1,6 @@
 //! Renders the control table's definition as `docs/control-table.md`.
 
+use crate::units;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, Kind, READ_MAX, Register};
 use fingertip::params::Params;
@@ -101,37 +102,11 @@ fn access(access: Access) -> &'static str {
 /// What a step of the number means: as the definition has it, for a parameter as its name says.
 pub fn step(register: &Register) -> String {
     if param(register).is_some() {
-        return unit_of(register.name).into();
+        return units::of(register.name).map_or("1".into(), |unit| units::step(&unit));
     }
     match (register.unit, register.scale) {
         ("", _) => "1".into(),
         (unit, 1) if unit.starts_with("1/") => unit.into(),
         (unit, scale) => format!("{scale} {unit}"),
     }
-}
-
-/// The unit that a parameter's name ends with.
-fn unit_of(name: &str) -> &'static str {
-    const ENDINGS: [(&str, &str); 19] = [
-        ("codes_per_kpa_milli", "0.001 codes/kPa"),
-        ("_ppb_per_code", "1e-9 a code"),
-        ("_mrad_per_mm", "1 mrad/mm"),
-        ("_unm_per_a", "1 uN m/A"),
-        ("_um_per_s", "1 um/s"),
-        ("_mv_per_ms", "1 mV/ms"),
-        ("_counts_per_turn", "1 count"),
-        ("_ug_m2", "1 ug m^2"),
-        ("_unm", "1 uN m"),
-        ("_mohm", "1 mOhm"),
-        ("_codes", "1 code"),
-        ("_cycles", "1 cycle"),
-        ("_pa", "1 Pa"),
-        ("_mn", "1 mN"),
-        ("_mv", "1 mV"),
-        ("_ma", "1 mA"),
-        ("_um", "1 um"),
-        ("_ns", "1 ns"),
-        ("_us", "1 us"),
-    ];
-    ENDINGS.iter().find(|(ending, _)| name.ends_with(ending)).map_or("1", |(_, unit)| unit)
 }

@@ -22,3 +22,4 @@ pub mod prove;
 pub mod stimulus;
 #[cfg(feature = "judges")]
 pub mod study;
+pub mod units;

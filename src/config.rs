@@ -157,8 +157,9 @@ impl Config {
         Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
     }
 
-    /// See [`Shaped::new`].
-    pub(crate) fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {
+    /// See [`Shaped::new`], into which this goes: a configuration is large, and would be copied.
+    #[inline(always)]
+    fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
         // By how much the one must be below the other, the two, and their names.

@@ -137,7 +137,12 @@ fn misfit<const ROWS: usize, const COLUMNS: usize>(
 fn overhang<const ROWS: usize, const COLUMNS: usize>(contact: &Contact, config: &Config) -> i32 {
     let [x, y, radius, half_pitch] =
         [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
-    (x.abs() - COLUMNS as i32 * half_pitch).max(y.abs() - ROWS as i32 * half_pitch) + radius
+    let [x, y] = [x.abs(), y.abs()];
+    // The sides of a square are equally far: only for it the farther coordinate decides.
+    if ROWS == COLUMNS {
+        return x.max(y) + radius - COLUMNS as i32 * half_pitch;
+    }
+    (x - COLUMNS as i32 * half_pitch).max(y - ROWS as i32 * half_pitch) + radius
 }
 
 /// Whether the whole contact lies on good taxels of the array.

@@ -102,6 +102,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy it takes as long
     /// as the speed law.
+    // One function, however it is called: what it takes in turn has one caller each and goes into it.
+    #[inline(never)]
     pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);

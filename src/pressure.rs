@@ -89,8 +89,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot show becomes
     /// a bad taxel.
     pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &Picture<ROWS, COLUMNS> {
-        let before = self.picture.bad;
+        // Where none was bad, none is so again.
+        let mut before = None;
         if self.picture.bad_count != 0 {
+            before = Some(self.picture.bad);
             (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (self.mask, 0, 0);
         }
         let sound = Sound::new(&frame.codes.undriven, config);
@@ -118,7 +120,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         &mut self,
         frame: &Frame<ROWS, COLUMNS>,
         sound: &Sound<COLUMNS>,
-        before: &[u32; ROWS],
+        before: &Option<[u32; ROWS]>,
         config: &Config,
     ) {
         let Codes { rows, undriven } = &frame.codes;
@@ -133,7 +135,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             }
             // A masked taxel is no fault.
             let bad = bad & !mask;
-            self.picture.bad_again += (bad & before.get(number).copied().unwrap_or(0)).count_ones() as u16;
+            let before = before.as_ref().and_then(|before| before.get(number)).copied().unwrap_or(0);
+            self.picture.bad_again += (bad & before).count_ones() as u16;
             highest = self.picture.leave_out(number, bad, config).max(highest);
         }
         if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {

@@ -28,7 +28,7 @@ const Z_BITS: u32 = 14;
 const fn z_drop(rows: usize, columns: usize) -> u32 {
     let side = if rows > columns { rows } else { columns };
     let mut drop = 2;
-    while (64 * 100_124_u64 >> drop) * (rows * columns * side / 4) as u64 >= 1 << 31 {
+    while ((64 * 100_124_u64) >> drop) * (rows * columns * side / 4) as u64 >= 1 << 31 {
         drop += 1;
     }
     drop

@@ -1,7 +1,7 @@
 //! What the host may change, and what it may ask the firmware to do.
 
 use crate::command::Command;
-use crate::config::{Config, ConfigError};
+use crate::config::{ConfigError, Shaped};
 use crate::scan::Clocks;
 use crate::store::{BAUD_RATES, Record};
 use crate::units::Newtons;
@@ -80,7 +80,7 @@ impl Settings {
         clocks: &Clocks,
     ) -> Result<(), StatusError> {
         if params_changed {
-            Config::new(&self.record.params, [ROWS, COLUMNS], clocks).map_err(|error| match error {
+            Shaped::<ROWS, COLUMNS>::new(&self.record.params, clocks).map_err(|error| match error {
                 ConfigError::Param(_) => StatusError::Range,
                 ConfigError::Scan(_) | ConfigError::Order(..) => StatusError::Limit,
             })?;

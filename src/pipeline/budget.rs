@@ -52,6 +52,21 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     /// (`cargo xtask timing`, `docs/study.md`): of 10 x 10 the start of a refinement 2,100 at most, its solution
     /// 1,600, a row 1,000. Of other shapes a row goes by its taxels, and the start by the places along both sides.
     pub const fn model_ticks(effort: Effort) -> [u32; 2] {
+        // A table, worked out by the compiler.
+        Self::TICKS[effort as usize]
+    }
+
+    const TICKS: [[u32; 2]; Effort::ALL.len()] = {
+        let mut ticks = [[0; 2]; Effort::ALL.len()];
+        let mut effort = 0;
+        while effort < ticks.len() {
+            ticks[effort] = Self::ticks(Effort::ALL[effort]);
+            effort += 1;
+        }
+        ticks
+    };
+
+    const fn ticks(effort: Effort) -> [u32; 2] {
         let rows = effort.rows(ROWS);
         if rows == 0 {
             return [0, 0];

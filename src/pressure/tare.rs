@@ -38,7 +38,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
         for row in [first, first + Self::TARE_STRIDE] {
             // Of an odd number of rows the last frame of a round learns one.
-            if ROWS % 2 == 0 || row < ROWS as u32 {
+            if ROWS.is_multiple_of(2) || row < ROWS as u32 {
                 self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
             }
         }

@@ -68,8 +68,16 @@ impl Lock {
     ///
     /// # Errors
     /// It cannot be written; what was there before still is.
-    pub fn write(&self, bytes: &[u8]) -> io::Result<()> {
-        replace(&self.path, bytes)
+    pub fn write(&self, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+        self.write_with(&self.path, bytes)
+    }
+
+    /// Replaces a file that belongs to it, and that nobody writes without this lock.
+    ///
+    /// # Errors
+    /// As [`Lock::write`].
+    pub fn write_with(&self, path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
+        replace(path, bytes.as_ref())
     }
 }
 
@@ -158,9 +166,9 @@ impl Drop for Whole {
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
     // What stands behind a link is replaced, and not the link.
     match fs::canonicalize(path) {
-        Ok(known) if known.is_file() => Lock::wait(&known)?.write(bytes.as_ref()),
+        Ok(known) if known.is_file() => Lock::wait(&known)?.write(bytes),
         Ok(known) => OpenOptions::new().write(true).open(known)?.write_all(bytes.as_ref()),
-        Err(_) => Lock::wait(path)?.write(bytes.as_ref()),
+        Err(_) => Lock::wait(path)?.write(bytes),
     }
 }
 

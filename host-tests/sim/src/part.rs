@@ -59,7 +59,7 @@ impl Part {
         let whole: String = std::iter::once(head).chain(lines.iter().map(String::as_str)).map(line).collect();
         let failed = |error: io::Error| cannot_write(&path, &error);
         if fs::read(&path).ok().as_deref() != Some(whole.as_bytes()) {
-            kept::write(&path, &whole).map_err(failed)?;
+            lock.write_with(&path, &whole).map_err(failed)?;
         }
         let file = OpenOptions::new().append(true).open(&path).map_err(failed)?;
         Ok((Self { lock, path, file, length: whole.len() as u64 }, lines))
@@ -87,7 +87,12 @@ impl Part {
         let told = |error| {
             format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
         };
-        Ok(self.lock.write(bytes.as_ref()).map_err(told)?)
+        Ok(self.lock.write(bytes).map_err(told)?)
+    }
+
+    /// The lock, under which all that is made of the lines is written.
+    pub fn lock(&self) -> &Lock {
+        &self.lock
     }
 
     /// Removes the lines, once all that was made of them is written.

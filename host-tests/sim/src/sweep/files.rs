@@ -101,7 +101,7 @@ impl Rows {
         let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
         self.part.write(table.csv()?)?;
         if plan.shard.is_whole() {
-            table.write_rest(out)?;
+            table.write_rest(out, self.part.lock())?;
         }
         self.part.done()?;
         Ok(table)
@@ -138,7 +138,7 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let file = out.join("runs.csv");
     let lock = Lock::take(&file).map_err(|error| cannot_write(&file, &error))?;
     refuse_others(&file, &table.rows[0][0])?;
-    lock.write(&table.csv()?).map_err(|error| cannot_write(&file, &error))?;
-    table.write_rest(out)?;
+    lock.write(table.csv()?).map_err(|error| cannot_write(&file, &error))?;
+    table.write_rest(out, &lock)?;
     Ok(table)
 }

@@ -5,7 +5,7 @@ use super::{plots, summary};
 use crate::part::cannot_write;
 use crate::run::RunError;
 use csv::Writer;
-use host_tests::kept;
+use host_tests::kept::Lock;
 use std::path::Path;
 
 /// All rows of a sweep or of a shard, in order.
@@ -30,11 +30,11 @@ impl Table {
         csv(std::iter::once(&self.head).chain(&self.rows))
     }
 
-    /// Writes what is made of all runs: `summary.csv` and the pictures.
-    pub(super) fn write_rest(&self, out: &Path) -> Result<(), RunError> {
+    /// Writes what is made of all runs: `summary.csv` and the pictures, under the lock of `runs.csv`.
+    pub(super) fn write_rest(&self, out: &Path, lock: &Lock) -> Result<(), RunError> {
         let write = |name: &str, bytes: &[u8]| {
             let path = out.join(name);
-            kept::write(&path, bytes).map_err(|error| cannot_write(&path, &error))
+            lock.write_with(&path, bytes).map_err(|error| cannot_write(&path, &error))
         };
         write("summary.csv", &csv(&summary::rows(self))?)?;
         plots::all(self)?.iter().try_for_each(|(metric, svg)| write(&format!("{metric}.svg"), svg.as_bytes()))?;

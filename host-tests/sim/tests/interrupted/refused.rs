@@ -1,0 +1,1 @@
+//! What is told where something stands in the way, and what is not taken up.

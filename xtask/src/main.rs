@@ -59,7 +59,7 @@ enum Command {
     /// Run a scene many times: over values of its keys, over seeds, on all cores and machines
     #[command(
         disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask sweep wall --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
+        after_help = "Examples:\n  cargo xtask sweep raspberry --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
     )]
     Sweep(sim::Args),
     /// Run fingers that are drawn as a usual build brings them about, and judge each by what it must never do

@@ -124,12 +124,15 @@ fn found(path: &Path, head: &str) -> io::Result<Found> {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
         bytes => bytes?,
     };
+    if line(head).as_bytes().starts_with(&bytes) {
+        // No more than its own head, or the beginning of that.
+        return Ok(Found::Nothing);
+    }
     let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').map(whole);
     Ok(match lines.next() {
-        None => Found::Nothing,
         Some(Some(found)) if found == head => Found::Lines(lines.flatten().map(str::to_owned).collect()),
         Some(Some(others)) => Found::Others(others.to_owned()),
-        Some(None) => Found::Others("something that cannot be read".into()),
+        Some(None) | None => Found::Others("something that cannot be read".into()),
     })
 }
 

@@ -22,3 +22,23 @@ fn draws(named: &Named) -> bool {
             _ => effect.zero.is_empty() || !idle(effect.zero),
         }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry;
+    use std::fs;
+
+    /// What an effect's file takes its random numbers from.
+    const DRAWN_FROM: &str = "build.seed";
+
+    #[test]
+    fn those_that_draw_are_listed() {
+        for effect in registry::all() {
+            let folder = concat!(env!("FINGERTIP_ROOT"), "/host-tests/sim/src/effects");
+            let file = format!("{folder}/{}/{}.rs", effect.family.name(), effect.name);
+            let text = fs::read_to_string(&file).unwrap_or_else(|error| panic!("{file}: {error}"));
+            assert_eq!(text.contains(DRAWN_FROM), EFFECTS.contains(&effect.name), "{}", effect.name);
+        }
+    }
+}

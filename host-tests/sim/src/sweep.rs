@@ -63,8 +63,8 @@ struct Task<'a> {
 /// The scene is none at a point, a run fails, a file cannot be written, or another process writes it.
 pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
-    let counts = plan.vary.iter().map(|vary| vary.values.len());
-    let all = counts.fold(Some(seeds), |all, count| all?.checked_mul(count)).filter(|all| *all <= MOST);
+    let mut counts = plan.vary.iter().map(|vary| vary.values.len());
+    let all = counts.try_fold(seeds, usize::checked_mul).filter(|all| *all <= MOST);
     let all = all.ok_or_else(|| format!("more than {MOST} runs: vary fewer keys, or give fewer values or seeds"))?;
     let points = points(plan)?;
     let first = &points.first().ok_or("there is nothing to run")?.1;

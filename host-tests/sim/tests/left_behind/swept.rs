@@ -6,7 +6,6 @@ use sim::{cli, native};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Short, near, and with noise.
 const SET: [&str; 3] = ["duration_s=0.04", "object.distance_mm=0.5", "effects.noise.rms_codes=1.5"];

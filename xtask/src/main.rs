@@ -29,6 +29,7 @@ mod tools;
 
 use clap::{Parser, Subcommand};
 use console::Console;
+use std::io::Write as _;
 use std::process::ExitCode;
 use toolchain::Choice;
 
@@ -107,7 +108,7 @@ fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
     }

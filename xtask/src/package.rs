@@ -39,7 +39,11 @@ pub fn run(console: &mut Console) -> Result<()> {
     let outside = paths::root().join("host-tests").join("outside");
     // The same versions of all else, so that it works offline.
     let lock = outside.join("Cargo.lock");
-    fs::copy(paths::root().join("Cargo.lock"), &lock).with_context(|| format!("cannot write {}", paths::shown(&lock)))?;
-    test.arg("--manifest-path").arg(outside.join("Cargo.toml")).arg("--target-dir").arg(paths::target().join("outside"));
+    fs::copy(paths::root().join("Cargo.lock"), &lock)
+        .with_context(|| format!("cannot write {}", paths::shown(&lock)))?;
+    test.arg("--manifest-path")
+        .arg(outside.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(paths::target().join("outside"));
     console.run(&mut test)
 }

@@ -130,17 +130,28 @@ fn closed_pipe(job: &Job, at: u64) -> bool {
     told.contains("went away")
 }
 
+/// Ends with the test, also where that fails while it is stopped.
+struct Ends(Child);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// The first is stopped while it holds the lock, so that the second comes meanwhile on any machine.
 fn two(job: &Job, kill: bool) -> bool {
-    let mut first = quiet(job.command()).spawn().unwrap();
+    let mut first = Ends(quiet(job.command()).spawn().unwrap());
+    let first = &mut first.0;
     // The lock is there before the first byte.
-    if !reached(&mut first, job, 1) {
+    if !reached(first, job, 1) {
         return false;
     }
-    signal(&first, "-STOP");
+    signal(first, "-STOP");
     if !job.growing.exists() {
         // It had come to its end meanwhile.
-        signal(&first, "-CONT");
+        signal(first, "-CONT");
         first.wait().unwrap();
         return false;
     }
@@ -153,7 +164,7 @@ fn two(job: &Job, kill: bool) -> bool {
         first.wait().unwrap();
         job.check_parts("the first was killed");
     } else {
-        signal(&first, "-CONT");
+        signal(first, "-CONT");
         assert!(first.wait().unwrap().code().is_some_and(|code| code < 2));
         job.check_left("a second was refused");
     }

@@ -11,6 +11,7 @@ pub mod fit_statistics;
 pub mod fit_tables;
 pub mod heatmap;
 pub mod imports;
+pub mod kept;
 pub mod long_run;
 pub mod metrics;
 pub mod native;
@@ -19,6 +20,7 @@ pub mod plant;
 pub mod plot;
 #[cfg(feature = "judges")]
 pub mod prove;
+pub mod say;
 pub mod stimulus;
 #[cfg(feature = "judges")]
 pub mod study;

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail};
 use std::{
     env,
     ffi::OsStr,
-    fmt::Write as _,
+    fmt::{Arguments, Write as _},
     fs,
     io::{self, BufReader, IsTerminal, Read, Write as _},
     process::{Child, Command, Stdio},
@@ -39,7 +39,7 @@ impl Console {
     pub fn say(&self, text: &str) {
         clear_line();
         for line in text.lines() {
-            println!("{}{line}", if self.captured.is_some() { "    " } else { "" });
+            say_line(format_args!("{}{line}", if self.captured.is_some() { "    " } else { "" }));
         }
     }
 
@@ -51,7 +51,7 @@ impl Console {
         command.current_dir(paths::root());
         let shown = show(command);
         let Some(text) = &mut self.captured else {
-            eprintln!("$ {shown}");
+            let _ = writeln!(io::stderr(), "$ {shown}");
             let status = command.status().with_context(|| missing(command))?;
             return if status.success() { Ok(()) } else { bail!("{status}: {shown}") };
         };
@@ -97,7 +97,7 @@ impl Console {
         self.built_s += cpu_s() - before_s;
         match &mut self.captured {
             Some(captured) => captured.push_str(&said),
-            None if !status.success() => eprint!("{said}"),
+            None if !status.success() => drop(io::stderr().write_all(said.as_bytes())),
             None => {}
         }
         if status.success() { Ok(()) } else { bail!("{status}: {shown}") }
@@ -214,6 +214,11 @@ fn show_line(line: &str) {
         print!("\r\x1b[2K    {short}");
         let _ = io::stdout().flush();
     }
+}
+
+/// A line of output. Where its reader went away (`| head`), what is asked for is done all the same.
+pub fn say_line(line: Arguments) {
+    let _ = writeln!(io::stdout(), "{line}");
 }
 
 /// Takes the line of progress away.

@@ -29,6 +29,7 @@ mod tools;
 
 use clap::{Parser, Subcommand};
 use console::Console;
+use std::io::Write as _;
 use std::process::ExitCode;
 use toolchain::Choice;
 
@@ -59,7 +60,7 @@ enum Command {
     /// Run a scene many times: over values of its keys, over seeds, on all cores and machines
     #[command(
         disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask sweep wall --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
+        after_help = "Examples:\n  cargo xtask sweep raspberry --seeds 1000\n  cargo xtask sweep --help    (all that it takes)"
     )]
     Sweep(sim::Args),
     /// Run fingers that are drawn as a usual build brings them about, and judge each by what it must never do
@@ -107,7 +108,7 @@ fn main() -> ExitCode {
     match run(&Cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
             ExitCode::FAILURE
         }
     }

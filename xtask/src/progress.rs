@@ -1,5 +1,6 @@
 //! How far a build is: crates done, and about how many minutes are left. In a terminal one line that changes; in a log a line a minute.
 
+use crate::console::say_line;
 use std::{
     collections::BTreeMap,
     io::{self, IsTerminal, Write as _},
@@ -79,7 +80,8 @@ impl Progress {
     pub fn finish(&self) {
         if self.compiled > 0.0 && self.total > 0 {
             let seconds = self.begun.elapsed().as_secs();
-            println!("built    {}: {} crates in {} min {:02} s", self.what, self.total, seconds / 60, seconds % 60);
+            let (crates, minutes, seconds) = (self.total, seconds / 60, seconds % 60);
+            say_line(format_args!("built    {}: {crates} crates in {minutes} min {seconds:02} s", self.what));
         }
     }
 
@@ -90,7 +92,7 @@ impl Progress {
             let _ = io::stdout().flush();
         } else if self.said.elapsed() >= LOG_EVERY {
             self.said = Instant::now();
-            println!("building {line}");
+            say_line(format_args!("building {line}"));
         }
     }
 

@@ -6,6 +6,7 @@ use crate::run::{Run, RunError};
 use crate::scene::{Scene, library, read, text};
 use crate::session;
 use clap::{Parser, ValueEnum};
+use host_tests::say;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -109,12 +110,12 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
 /// done.
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
-        explain::list().map(|text| print!("{text}")).map(|()| true)
+        explain::list().map(say::text).map(|()| true)
     } else if args.keys {
-        print!("{}", explain::keys());
+        say::text(explain::keys());
         Ok(true)
     } else if args.explain {
-        args.scene().map(|scene| print!("{}", explain::scene(&scene))).map(|()| true).map_err(Into::into)
+        args.scene().map(|scene| say::text(explain::scene(&scene))).map(|()| true).map_err(Into::into)
     } else if let Some(path) = &args.replay {
         session::replay_file(path)
     } else {
@@ -123,13 +124,14 @@ pub fn answer(args: &Args, board: Run) -> ExitCode {
     verdict(done)
 }
 
-/// The exit code of what was done.
+/// The exit code of what was done, and said: nothing is said behind it.
 pub fn verdict(done: Result<bool, RunError>) -> ExitCode {
-    match done {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::FAILURE,
-        Err(error) => {
-            eprintln!("{error}");
+    match (done, say::end()) {
+        (Ok(true), true) => ExitCode::SUCCESS,
+        (Ok(false), true) => ExitCode::FAILURE,
+        (Ok(_), false) => ExitCode::from(2),
+        (Err(error), _) => {
+            say::aside(error);
             ExitCode::from(2)
         }
     }

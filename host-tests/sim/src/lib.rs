@@ -19,6 +19,7 @@ pub mod ledger;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
+pub mod part;
 pub mod population;
 pub mod recording;
 pub mod registry;

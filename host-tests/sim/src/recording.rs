@@ -10,10 +10,12 @@
 //! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file. A
 //! recording of the emulated board holds what is seen of it from outside, a step each millisecond: it cannot be replayed, and says so.
 
+mod check;
 mod replay;
 mod schemas;
 mod write;
 
+pub use check::check;
 pub use replay::{Difference, Replay, replay};
 pub use write::Recorder;
 
@@ -28,6 +30,10 @@ const END: &str = "fingertip.end";
 
 /// Its entry that says whether a replay is possible.
 const WHOLE: &str = "whole";
+
+/// Entries of what closes it: digests of the record that holds the controllers, and of the scene's text.
+const OF_SETUP: &str = "setup";
+const OF_SCENE: &str = "scene";
 
 fn topic(finger: usize, what: &str) -> String {
     format!("/finger{finger}/{what}")

@@ -4,11 +4,13 @@ use crate::agreement::{Agreement, Path};
 use crate::cli::{Args, Board};
 use crate::ledger;
 use crate::native;
+use crate::part::cannot_write;
 use crate::recording::{Recorder, replay};
 use crate::report::{Report, Trace, page};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::watch::Watch;
+use host_tests::{kept, say};
 use std::fs;
 use std::path;
 
@@ -32,7 +34,7 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     }
     let mut recorder = match &args.out {
         Some(out) => {
-            fs::create_dir_all(out).map_err(|error| cannot_write(out, &error))?;
+            fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
             let path = out.join("run.mcap");
             Some(match args.board {
                 Board::Native => Recorder::new(&path, scene, args.every)?,
@@ -49,28 +51,38 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     if let Some(agreement) = &mut agreement {
         watchers.push(agreement);
     }
-    println!("{}: {} (seed {}, board {name}; simulated)\n", scene.name, scene.about, scene.seed);
+    say::line(format_args!("{}: {} (seed {}, board {name}; simulated)\n", scene.name, scene.about, scene.seed));
     let outcome = run(scene, board, &mut watchers)?;
-    print!("{}", outcome.text());
+    // What was seen is kept before anything else is done.
+    let recorded = recorder.map_or(Ok(()), |recorder| recorder.finish(&outcome.summary.digest));
+    say::text(outcome.text());
     if let Some(agreement) = &agreement {
-        println!("{agreement}");
+        say::line(agreement);
     }
     let ablated = if args.ablate { ledger::ablate(scene, board)? } else { Vec::new() };
     if args.ablate {
-        println!("\nWhat each effect adds:\n{}", ledger::ablation_text(&outcome.measured, &ablated));
+        let text = ledger::ablation_text(&outcome.measured, &ablated);
+        say::line(format_args!("\nWhat each effect adds:\n{text}"));
     }
-    if let Some(path) = &args.json {
-        let text = format!("{:#}\n", outcome.json(scene, name, &ablated));
-        fs::write(path, text).map_err(|error| cannot_write(path, &error))?;
+    let json = || format!("{:#}\n", outcome.json(scene, name, &ablated));
+    let json = args.json.as_ref().map_or(Ok(()), |path| write(path, &json()));
+    let report = Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated };
+    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), &page(&report)?));
+    // One that cannot be written leaves the others there.
+    let failed: Vec<String> =
+        [recorded, json, reported].into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();
+    if !failed.is_empty() {
+        return Err(failed.join("\n").into());
     }
-    if let (Some(out), Some(recorder)) = (&args.out, recorder) {
-        recorder.finish(&outcome.summary.digest)?;
-        let path = out.join("report.html");
-        let report = Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated };
-        fs::write(&path, page(&report)?).map_err(|error| cannot_write(&path, &error))?;
-        println!("wrote {} and {}", path.display(), out.join("run.mcap").display());
+    if let Some(out) = &args.out {
+        let [report, recording] = ["report.html", "run.mcap"].map(|name| out.join(name));
+        say::line(format_args!("wrote {} and {}", report.display(), recording.display()));
     }
     Ok(outcome.passed() && agreement.is_none_or(|agreement| agreement.held()))
+}
+
+fn write(path: &path::Path, text: &str) -> Result<(), RunError> {
+    Ok(kept::write(path, text).map_err(|error| cannot_write(path, &error))?)
 }
 
 /// Replays a recording, and says how it went. Returns whether every bit is the same.
@@ -80,12 +92,8 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
 pub fn replay_file(path: &path::Path) -> Result<bool, RunError> {
     let replayed = replay(path)?;
     match &replayed.difference {
-        Some(difference) => println!("{}: {difference}", path.display()),
-        None => println!("{}: {} steps, the same to the bit", path.display(), replayed.steps),
+        Some(difference) => say::line(format_args!("{}: {difference}", path.display())),
+        None => say::line(format_args!("{}: {} steps, the same to the bit", path.display(), replayed.steps)),
     }
     Ok(replayed.difference.is_none())
-}
-
-fn cannot_write(path: &path::Path, error: &std::io::Error) -> String {
-    format!("cannot write {}: {error}", path.display())
 }

@@ -5,22 +5,27 @@
 
 pub mod cores;
 pub mod files;
+mod merge;
 mod plots;
+mod random;
 mod shard;
 mod summary;
+mod table;
 mod vary;
 
-pub use files::{Table, merge};
+pub use files::merge;
 pub use shard::Shard;
+pub use table::Table;
 pub use vary::Vary;
 
 use crate::cli;
 use crate::metrics::METRICS;
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
-use files::Part;
+use files::Rows;
+use host_tests::say;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -35,9 +40,14 @@ pub struct Plan {
     pub seeds: u64,
     /// Which of the runs.
     pub shard: Shard,
-    /// Where the results go.
-    pub out: PathBuf,
+    /// Where the results go; none: a folder of its own in [`FOLDER`].
+    pub out: Option<PathBuf>,
 }
+
+/// Where sweeps lie that are not told where to go, each in a folder named by its scene and a digest of all that makes it what it is.
+pub const FOLDER: &str = "target/sweep";
+/// More points or runs than this are a slip of the keyboard: they would take weeks, and more memory than there is.
+const MOST: usize = 1_000_000;
 
 /// A run of the sweep.
 struct Task<'a> {
@@ -47,30 +57,46 @@ struct Task<'a> {
     seed: u64,
 }
 
-/// Runs the sweep, or the shard, and writes its files. A sweep that was stopped goes on where it stood.
+/// Runs the sweep, or the shard, and writes its files; also tells their folder. A sweep that was stopped goes on where it stood.
 ///
 /// # Errors
-/// The scene is none at a point, a run fails, or a file cannot be written.
-pub fn sweep(plan: &Plan, board: Run) -> Result<Table, RunError> {
+/// The scene is none at a point, a run fails, a file cannot be written, or another process writes it.
+pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
+    let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
+    let mut counts = plan.vary.iter().map(|vary| vary.values.len());
+    let all = counts.try_fold(seeds, usize::checked_mul).filter(|all| *all <= MOST);
+    let all = all.ok_or_else(|| format!("more than {MOST} runs: vary fewer keys, or give fewer values or seeds"))?;
     let points = points(plan)?;
-    let all = points.len() * plan.seeds as usize;
     let first = &points.first().ok_or("there is nothing to run")?.1;
+    if seeds > 1 && !points.iter().any(|(_, scene)| random::is(scene)) {
+        return Err(format!(
+            "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
+            first.name,
+            random::EFFECTS.join(", ")
+        )
+        .into());
+    }
     let head = files::head(plan, first, all);
-    let mut part = Part::open(plan, head)?;
+    let out = plan.out.clone().unwrap_or_else(|| Path::new(FOLDER).join(&head.id));
+    let mut rows = Rows::open(plan, &out, head)?;
+    say::aside(match rows.count() {
+        0 => format!("the runs go to {}", out.display()),
+        count => format!("goes on in {}, where {count} runs are done", out.display()),
+    });
     let task = |number: usize| {
-        let (values, scene) = &points[number / plan.seeds as usize];
-        Task { number, values, scene, seed: scene.seed + (number % plan.seeds as usize) as u64 }
+        let (values, scene) = &points[number / seeds];
+        Task { number, values, scene, seed: scene.seed + (number % seeds) as u64 }
     };
     let mine = (0..all).filter(|number| plan.shard.has(*number));
-    let tasks: Vec<Task> = mine.filter(|number| !part.has(number + 1)).map(task).collect();
-    let progress = progress(tasks.len() + part.rows(), "runs")?.with_position(part.rows() as u64);
+    let tasks: Vec<Task> = mine.filter(|number| !rows.has(number + 1)).map(task).collect();
+    let progress = progress(tasks.len() + rows.count(), "runs")?.with_position(rows.count() as u64);
     let done = |task: &Task, row| {
         progress.inc(1);
-        part.add(task.number + 1, row)
+        rows.add(task.number + 1, row)
     };
     cores::each(&tasks, |task| row(task, board), done)?;
     progress.finish_and_clear();
-    part.finish(plan)
+    Ok((rows.finish(plan, &out)?, out))
 }
 
 /// A bar on the terminal.
@@ -89,7 +115,9 @@ fn row(task: &Task, board: Run) -> Result<Vec<String>, RunError> {
         .map_err(|error| format!("run {} (seed {}, {:?}): {error}", task.number + 1, task.seed, task.values))?;
     let mut row = task.values.to_vec();
     row.extend([task.seed.to_string(), u8::from(outcome.passed()).to_string(), outcome.summary.digest.clone()]);
-    row.extend(METRICS.iter().map(|metric| outcome.measured.get(metric.name).map_or(String::new(), |v| v.to_string())));
+    // As in JSON, what is no number is left out.
+    let value = |name| outcome.measured.get(name).filter(|value| value.is_finite());
+    row.extend(METRICS.iter().map(|metric| value(metric.name).map_or(String::new(), |value| value.to_string())));
     Ok(row)
 }
 

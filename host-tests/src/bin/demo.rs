@@ -3,6 +3,7 @@
 //! The same script, plant and figures as on the flash image, without a microcontroller in between.
 
 use host_tests::demo::{DemoError, Forces, Script, figures::missed, native, pictures, table};
+use host_tests::say;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -14,19 +15,25 @@ fn main() -> ExitCode {
             (Some("--quick"), _) => script = Script::quick(),
             (Some("--out"), 1..) => out = arguments.next().unwrap_or_default().into(),
             _ => {
-                eprintln!("demo: {} is not understood; usage: demo [--quick] [--out DIR]", argument.display());
+                say::aside(format_args!(
+                    "demo: {} is not understood; usage: demo [--quick] [--out DIR]",
+                    argument.display()
+                ));
                 return ExitCode::from(2);
             }
         }
     }
-    match run(&script, &out) {
-        Ok(0) => ExitCode::SUCCESS,
+    let missed = run(&script, &out);
+    let shown = say::end();
+    match missed {
+        Ok(0) if shown => ExitCode::SUCCESS,
+        Ok(0) => ExitCode::FAILURE,
         Ok(missed) => {
-            eprintln!("demo: {missed} of the bounds missed; see the table");
+            say::aside(format_args!("demo: {missed} of the bounds missed; see the table"));
             ExitCode::FAILURE
         }
         Err(error) => {
-            eprintln!("demo: {error}");
+            say::aside(format_args!("demo: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -37,9 +44,8 @@ fn run(script: &Script, out: &std::path::Path) -> Result<usize, DemoError> {
     let run = native::play(script)?;
     let forces = Forces::of(&run)?;
     let checks = forces.checks();
-    print!("{}", table::table(&checks, &forces));
-    for path in pictures::draw(&run, &forces, out)? {
-        println!("picture  {}", path.display());
-    }
+    let drawn = pictures::draw(&run, &forces, out);
+    say::text(table::table(&checks, &forces));
+    drawn?.iter().for_each(|path| say::line(format_args!("picture  {}", path.display())));
     Ok(missed(&checks))
 }

@@ -41,10 +41,12 @@ fn main() -> ExitCode {
         #[cfg(feature = "scenes")]
         Command::Population(arguments) => return commands::population::run(&arguments),
     };
+    let shown = host_tests::say::end();
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) if shown => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("virtual-board: {error}");
+            host_tests::say::aside(format_args!("virtual-board: {error}"));
             ExitCode::FAILURE
         }
     }

@@ -8,7 +8,9 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let args = Args::parse();
     if args.board != Board::Native {
-        eprintln!("this program is the native board: `cargo xtask population --board virtual` runs the flash image");
+        host_tests::say::aside(
+            "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
+        );
         return ExitCode::from(2);
     }
     cli::answer(&args, &native::board)

@@ -1,6 +1,7 @@
 //! `sweep`: many runs of a scene on the native board, over keys, seeds, cores and machines.
 
 use clap::{Parser, Subcommand};
+use host_tests::say;
 use sim::cli::verdict;
 use sim::native;
 use sim::sweep::{Plan, Shard, Vary, merge, sweep};
@@ -17,9 +18,9 @@ use std::time::Instant;
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
-        sweep wall --seeds 1000\n  \
-        sweep wall --vary tip.modulus_kpa=200..300:5 --vary tip.radius_mm=8..12:3 --seeds 20\n  \
-        sweep wall --seeds 1000 --shard 2/4 --out DIR    (on the second of four machines)\n  \
+        sweep raspberry --seeds 1000\n  \
+        sweep wall --vary tip.modulus_kpa=200..300:5 --vary tip.radius_mm=8..12:3\n  \
+        sweep raspberry --seeds 1000 --shard 2/4 --out DIR    (on the second of four machines)\n  \
         sweep merge DIR/runs-*-of-4.csv --out DIR    (the same, byte for byte, as without --shard)"
 )]
 struct Args {
@@ -40,9 +41,9 @@ struct Args {
     /// Runs only the I-th of N shares, for merging
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
-    /// Where the results go
-    #[arg(long, value_name = "DIR", default_value = "target/sweep")]
-    out: PathBuf,
+    /// Where the results go; a folder of the sweep's own in target/sweep where it is not given
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 #[derive(Subcommand)]
@@ -61,19 +62,20 @@ enum Merge {
 fn main() -> ExitCode {
     let Args { merge: merged, scene, vary, set, seeds, shard, out } = Args::parse();
     let started = Instant::now();
-    let (table, out, whole) = match merged {
-        Some(Merge::Merge { files, out }) => (merge(&files, &out), out, true),
+    let (done, whole) = match merged {
+        Some(Merge::Merge { files, out }) => (merge(&files, &out).map(|table| (table, out)), true),
         None => {
             let plan =
                 Plan { scene: scene.unwrap_or_default(), set, vary, seeds, shard: shard.unwrap_or(Shard::WHOLE), out };
-            (sweep(&plan, &native::board), plan.out.clone(), plan.shard.is_whole())
+            (sweep(&plan, &native::board), plan.shard.is_whole())
         }
     };
-    verdict(table.map(|table| {
+    verdict(done.map(|(table, out)| {
         if whole {
-            print!("{}", table.text());
+            say::text(table.text());
         }
-        println!("{} runs in {:.1} s, written to {}", table.rows.len(), started.elapsed().as_secs_f64(), out.display());
+        let (runs, s, out) = (table.rows.len(), started.elapsed().as_secs_f64(), out.display());
+        say::line(format_args!("{runs} runs in {s:.1} s, written to {out}"));
         table.passed()
     }))
 }

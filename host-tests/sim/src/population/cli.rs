@@ -1,12 +1,15 @@
 //! The command line of `population`, the same for both boards.
 
-use super::run;
+use super::report::{self, Ran, Report};
 use super::text::text;
-use super::{Report, load, worst};
+use super::{load, run, worst};
 use crate::cli::verdict;
+use crate::part::Part;
 use crate::run::{Run, RunError};
 use crate::sweep::Shard;
 use clap::{Parser, Subcommand, ValueEnum};
+use host_tests::say;
+use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -79,8 +82,8 @@ enum Merge {
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     verdict(match &args.merge {
         Some(Merge::Merge { files, json }) => Report::merge(files).and_then(|report| {
-            print!("{}", text(&report));
             report.write(json)?;
+            say::text(text(&report));
             Ok(report.inside() == report.fingers.len())
         }),
         None => population(args, board),
@@ -95,17 +98,39 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
         Board::Native => "native",
         Board::Virtual => "virtual",
     };
-    let fingers = run::fingers(&population, args.seed, args.fingers as usize, shard, board)?;
-    let report = Report::new(&population, board_name, args.seed, args.fingers as usize, fingers);
-    print!("{}", text(&report));
-    if let Some(path) = &args.json {
-        report.write(path)?;
+    let all = args.fingers as usize;
+    let numbers = (0..all).filter(|number| shard.has(*number));
+    // A file that is to come has what is done so far beside it; into a terminal or a pipe all goes at the end.
+    let into_file = |path: &&PathBuf| fs::metadata(path).is_ok_and(|known| known.is_file()) || !path.exists();
+    let mut part = None;
+    let mut done = Vec::new();
+    if let Some(path) = args.json.as_ref().filter(into_file) {
+        let id = report::id(&population, board_name, args.seed, all);
+        let (opened, lines) = Part::open(path, &format!("the population {id}, fingers {shard}"))?;
+        done = lines.iter().map(|line| serde_json::from_str(line)).collect::<Result<Vec<Ran>, _>>()?;
+        if !done.is_empty() {
+            say::aside(format_args!("goes on behind {} fingers that are done", done.len()));
+        }
+        part = Some(opened);
     }
+    let keep = |ran: &Ran| part.as_mut().map_or(Ok(()), |part| part.add(&serde_json::to_string(ran)?));
+    let fingers = run::go_on(&population, args.seed, numbers, done, board, keep)?;
+    let report = Report::new(&population, board_name, args.seed, all, fingers);
+    match (part, &args.json) {
+        (Some(part), _) => {
+            part.write(report.json()?)?;
+            part.done()?;
+        }
+        (None, Some(path)) => report.write(path)?,
+        (None, None) => {}
+    }
+    say::text(text(&report));
     if let (Some(count), Some(out)) = (args.worst, &args.out) {
         for path in worst::write(&population, &report, count, out)? {
-            println!("wrote {}", path.display());
+            say::line(format_args!("wrote {}", path.display()));
         }
     }
-    println!("{} fingers in {:.1} s", report.fingers.len(), started.elapsed().as_secs_f64());
+    let (count, s) = (report.fingers.len(), started.elapsed().as_secs_f64());
+    say::line(format_args!("{count} fingers in {s:.1} s"));
     Ok(report.inside() == report.fingers.len())
 }

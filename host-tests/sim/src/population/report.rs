@@ -3,7 +3,9 @@
 use super::spread::Spread;
 use super::{Counted, Finger, Population};
 use crate::metrics::Hold;
+use crate::part::cannot_write;
 use crate::run::{Outcome, RunError};
+use host_tests::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -118,12 +120,16 @@ impl Ran {
     }
 }
 
+/// Of all that makes a population's fingers what they are.
+pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: usize) -> String {
+    let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
+    format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()))
+}
+
 impl Report {
     /// Of these fingers, in any order.
     pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
-        let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
-        let id =
-            format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()));
+        let id = id(population, board, seed, of_fingers);
         let mut report = Self {
             population: population.name.clone(),
             about: population.about.clone(),
@@ -164,12 +170,19 @@ impl Report {
             }
         }
         let mut whole = whole.ok_or("there are no files to put together")?;
-        let missing: Vec<usize> = (1..=whole.of_fingers).filter(|number| !fingers.contains_key(number)).collect();
-        if let Some(first) = missing.first() {
-            let (count, all) = (missing.len(), whole.of_fingers);
-            return Err(
-                format!("{count} of {all} fingers are missing, finger {first} the first: is a shard missing?").into()
-            );
+        let all = whole.of_fingers;
+        if let Some(number) = fingers.keys().find(|number| !(1..=all).contains(*number)) {
+            return Err(format!("there is a finger {number}, where there are {all} in all").into());
+        }
+        let missing = all - fingers.len();
+        if missing > 0 {
+            // In order: the first whose number is not its place.
+            let places = fingers.keys().zip(1..);
+            let first = places.clone().find(|(number, place)| *number != place).map_or(fingers.len() + 1, |(_, at)| at);
+            return Err(format!(
+                "{missing} of {all} fingers are missing, finger {first} the first: is a shard missing?"
+            )
+            .into());
         }
         whole.fingers = fingers.into_values().collect();
         whole.finish();
@@ -234,13 +247,20 @@ impl Report {
         outside
     }
 
+    /// For scripts.
+    ///
+    /// # Errors
+    /// None: it is JSON.
+    pub fn json(&self) -> Result<String, RunError> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
     /// Writes it for scripts.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// The file cannot be written; what was there before still is.
     pub fn write(&self, path: &Path) -> Result<(), RunError> {
-        let text = serde_json::to_string_pretty(self)? + "\n";
-        fs::write(path, text).map_err(|error| format!("cannot write {}: {error}", path.display()).into())
+        Ok(kept::write(path, self.json()?).map_err(|error| cannot_write(path, &error))?)
     }
 }
 

@@ -2,8 +2,10 @@
 
 use super::text::broken;
 use super::{Population, Report};
+use crate::part::cannot_write;
 use crate::run::RunError;
 use crate::scene::text::set;
+use host_tests::kept;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -29,8 +31,7 @@ pub fn write(population: &Population, report: &Report, count: usize, out: &Path)
             text = text.replace("\n\n\n", "\n\n");
         }
         let path = out.join(format!("{}-{}-{}.toml", population.name, report.seed, ran.finger));
-        fs::write(&path, head + text.trim_start())
-            .map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        kept::write(&path, head + text.trim_start()).map_err(|error| cannot_write(&path, &error))?;
         paths.push(path);
     }
     Ok(paths)

@@ -1,13 +1,13 @@
 //! Feeds a recording through the core again; the answers must be the same to the bit.
 
-use super::{END, SETUP, WHOLE, controller_of, topic};
+use super::{END, OF_SCENE, OF_SETUP, SETUP, WHOLE, check, controller_of, topic};
 use crate::run::RunError;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::{Calibration, Config, Pipeline};
 use images::record::{Digest, Record};
 use mcap::read::Options;
 use mcap::records::Metadata;
-use mcap::{McapResult, MessageStream};
+use mcap::{Attachment, McapResult, MessageStream};
 use serde::Deserialize;
 use std::fmt;
 use std::fs;
@@ -65,6 +65,7 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 }
 
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
+    check::check(bytes)?;
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
         return Err(
@@ -80,6 +81,13 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
             .cloned()
             .ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
     };
+    // The file is whole, but a program may have written it anew with other contents.
+    if field(&end, OF_SETUP)? != check::digest(&setup.metadata) {
+        return Err(format!("its {SETUP}, how the controllers were set, was changed after the run").into());
+    }
+    if field(&end, OF_SCENE)? != check::texts(scene(bytes)?.iter().map(|scene| &scene.data[..])) {
+        return Err("the attached scene was changed after the run, or is missing".into());
+    }
     let fingers: usize = field(&setup, "fingers")?.parse()?;
     let mut cores = Vec::new();
     for number in 0..fingers {
@@ -93,8 +101,6 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
         }
         cores.push((topic(number, "core"), pipeline, 0));
     }
-    // The checksum of a chunk is checked at its end: damage is told before its frames are blamed.
-    messages(bytes)?.try_for_each(|message| message.map(drop))?;
     let mut steps = 0;
     for message in messages(bytes)? {
         let message = message?;
@@ -127,6 +133,16 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
 
 fn messages(bytes: &[u8]) -> McapResult<MessageStream<'_>> {
     MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())
+}
+
+/// What is attached.
+fn scene(bytes: &[u8]) -> Result<Vec<Attachment<'_>>, RunError> {
+    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary")?;
+    Ok(summary
+        .attachment_indexes
+        .iter()
+        .map(|index| mcap::read::attachment(bytes, index))
+        .collect::<McapResult<_>>()?)
 }
 
 fn metadata(bytes: &[u8], name: &str) -> Result<Metadata, RunError> {

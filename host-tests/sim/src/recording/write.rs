@@ -1,20 +1,21 @@
 //! Writes a recording while the run goes on.
 
-use super::{END, SETUP, WHOLE, controller_json, schemas, topic};
+use super::{END, OF_SCENE, OF_SETUP, SETUP, WHOLE, check, controller_json, schemas, topic};
+use crate::part::cannot_write;
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Watch};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use fingertip::units::Duty;
+use host_tests::kept::Whole;
 use images::record::{Digest, Record};
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapResult, WriteOptions, Writer};
+use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
-use std::path::Path;
+use std::io::{self, BufWriter, ErrorKind};
+use std::path::{Path, PathBuf};
 
 /// Between two frames as arrays and pictures.
 const FRAME_S: f64 = 0.01;
@@ -23,12 +24,15 @@ const CODES_PER_GREY: u16 = 8;
 
 /// Records a run.
 pub struct Recorder {
-    out: Writer<BufWriter<File>>,
+    path: PathBuf,
+    out: Writer<BufWriter<Whole>>,
     scene: Scene,
     every: u64,
     whole: bool,
     fingers: Vec<Finger>,
     begun: bool,
+    /// The digest of what was said about the controllers.
+    setup: String,
     start_s: Option<f64>,
     /// The first failure; nothing is written after it.
     failed: McapResult<()>,
@@ -43,20 +47,25 @@ struct Finger {
 }
 
 impl Recorder {
-    /// Into a new file; the scalars of each `every`-th step.
+    /// Into a new file, which is in its place once it is finished; the scalars of each `every`-th step.
     ///
     /// # Errors
-    /// The file cannot be made.
+    /// The file cannot be made, or another process is recording there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
-        let file = File::create(path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
+        let file = Whole::create(path).map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => error.to_string(),
+            _ => cannot_write(path, &error),
+        })?;
         let options = WriteOptions::new().profile("").library(concat!("fingertip-sim/", env!("CARGO_PKG_VERSION")));
         Ok(Self {
+            path: path.into(),
             out: options.create(BufWriter::new(file))?,
             scene: scene.clone(),
             every: every.max(1),
             whole: true,
             fingers: Vec::new(),
             begun: false,
+            setup: String::new(),
             start_s: None,
             failed: Ok(()),
         })
@@ -68,21 +77,32 @@ impl Recorder {
         self
     }
 
-    /// Closes the file after the run.
+    /// Closes the file after the run, and puts it in its place.
     ///
     /// # Errors
-    /// Something could not be written.
+    /// Something could not be written: what was there before still is.
     pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
-        self.failed?;
+        let path = std::mem::take(&mut self.path);
         if !self.begun {
             return Err("the board did not say how its controllers are set: nothing to replay".into());
         }
+        Ok(self.close(digest).map_err(|error| match error {
+            McapError::Io(error) => cannot_write(&path, &error),
+            error => format!("cannot write {}: {error}", path.display()),
+        })?)
+    }
+
+    fn close(mut self, digest: &str) -> McapResult<()> {
+        self.failed?;
         let steps =
             self.fingers.iter().enumerate().map(|(n, finger)| (format!("finger{n}.steps"), finger.steps.to_string()));
-        let metadata = steps.chain([("digest".to_owned(), digest.to_owned())]).collect();
+        let scene = check::texts([self.scene.text.as_bytes()]);
+        let digests = [("digest", digest.into()), (OF_SETUP, self.setup.clone()), (OF_SCENE, scene)];
+        let metadata = steps.chain(digests.map(|(name, digest)| (name.to_owned(), digest))).collect();
         self.out.write_metadata(&Metadata { name: END.into(), metadata })?;
         self.out.finish()?;
-        Ok(())
+        let file = self.out.into_inner().into_inner().map_err(io::IntoInnerError::into_error)?;
+        Ok(file.finish()?)
     }
 
     fn write_head(&mut self, controllers: &[Controller]) -> McapResult<()> {
@@ -104,6 +124,7 @@ impl Recorder {
         for (number, controller) in controllers.iter().enumerate() {
             metadata.insert(format!("finger{number}"), controller_json(controller).to_string());
         }
+        self.setup = check::digest(&metadata);
         out.write_metadata(&Metadata { name: SETUP.into(), metadata })?;
         let schemas = schemas::all();
         let mut ids = [0; 4];

@@ -88,7 +88,8 @@ pub fn around(low: f64, high: f64) -> [f64; 2] {
     let low = if low > 0.0 && near_zero(low) { 0.0 } else { low };
     let high = if high < 0.0 && near_zero(high) { 0.0 } else { high };
     let air = 0.06 * (high - low);
-    let air = if air > 0.0 { air } else { (0.1 * high.abs()).max(0.1) };
+    // Of less than its numbers can tell apart an axis would have marks without end.
+    let air = if air > 1e-9 * low.abs().max(high.abs()) { air } else { (0.1 * high.abs()).max(0.1) };
     [if low == 0.0 { 0.0 } else { low - air }, if high == 0.0 { air } else { high + air }]
 }
 

@@ -2,38 +2,33 @@
 //!
 //! A shard writes `runs-1-of-4.csv` alone; merging makes the rest. Each row says to which sweep it belongs and of how many runs.
 
-use super::{Plan, Shard, plots, summary};
+use super::table::{self, Table};
+use super::{Plan, Shard};
 use crate::metrics::METRICS;
+use crate::part::{self, cannot_write};
 use crate::run::RunError;
 use crate::scene::Scene;
-use csv::{Reader, StringRecord, Writer};
+use csv::ReaderBuilder;
+use host_tests::kept::Lock;
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Columns before the varied keys.
-const ID: &str = "sweep";
-const RUN: &str = "run";
-const RUNS: &str = "of_runs";
+pub(super) const ID: &str = "sweep";
+pub(super) const RUN: &str = "run";
+pub(super) const RUNS: &str = "of_runs";
 /// The first column after the varied keys; then the verdict, the digest, the metrics, and what is expected.
-const SEED: &str = "seed";
-const PASSED: &str = "passed";
-const DIGEST: &str = "digest";
-const EXPECT: &str = "expect ";
-
-/// All rows of a sweep or of a shard, in order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Table {
-    /// The columns' names.
-    pub head: Vec<String>,
-    /// A row for each run.
-    pub rows: Vec<Vec<String>>,
-}
+pub(super) const SEED: &str = "seed";
+pub(super) const PASSED: &str = "passed";
+pub(super) const DIGEST: &str = "digest";
+pub(super) const EXPECT: &str = "expect ";
 
 /// The head, and what stands at the beginning and the end of every row.
 pub(super) struct Head {
     columns: Vec<String>,
-    id: String,
+    /// Of all that makes the sweep what it is; its folder's name where none is given.
+    pub id: String,
     runs: usize,
     expected: Vec<String>,
 }
@@ -53,37 +48,31 @@ pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
 }
 
 /// The rows so far, also on disk, so that a sweep that is stopped can go on.
-pub(super) struct Part {
+pub(super) struct Rows {
     head: Head,
-    path: PathBuf,
     rows: BTreeMap<usize, Vec<String>>,
-    out: Writer<File>,
+    part: part::Part,
 }
 
-impl Part {
+impl Rows {
     /// Takes up what an earlier try of the same sweep left.
-    pub fn open(plan: &Plan, head: Head) -> Result<Self, RunError> {
-        fs::create_dir_all(&plan.out).map_err(|error| format!("cannot make {}: {error}", plan.out.display()))?;
-        let path = plan.out.join(format!("{}.part", runs_name(plan)));
-        let mut rows = BTreeMap::new();
-        if let Ok(mut reader) = Reader::from_path(&path)
-            && reader.headers().is_ok_and(|found| found == head.columns)
-        {
-            // The last row may be cut off: it is run again.
-            for row in reader.records().map_while(Result::ok).filter(|row| row.get(0) == Some(&head.id)) {
-                let number = row.get(1).and_then(|number| number.parse().ok());
-                rows.extend(number.map(|number: usize| (number, words(&row))));
-            }
+    pub fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
+        let file = out.join(runs_name(plan));
+        let name = format!("the sweep {} of {} runs", head.id, head.runs);
+        let (part, lines) = part::Part::open(&file, &name)?;
+        refuse_others(&file, &head.id)?;
+        let (mut rows, width) = (BTreeMap::new(), head.columns.len());
+        for line in lines {
+            let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
+            let row: Vec<String> = reader.deserialize().next().ok_or("an empty row")??;
+            let number = row.get(1).and_then(|number| number.parse().ok());
+            // Each line is whole; of another form it is of another version.
+            let number = number.filter(|number| row.len() == width && (1..=head.runs).contains(number));
+            let number =
+                number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
+            rows.insert(number, row);
         }
-        let file = OpenOptions::new().create(true).write(true).truncate(true).open(&path);
-        let file = file.map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-        let mut part = Self { path, rows, out: Writer::from_writer(file), head };
-        part.out.write_record(&part.head.columns)?;
-        for row in part.rows.values() {
-            part.out.write_record(row)?;
-        }
-        part.out.flush()?;
-        Ok(part)
+        Ok(Self { rows, part, head })
     }
 
     /// Whether a run is done; numbers count from 1.
@@ -92,7 +81,7 @@ impl Part {
     }
 
     /// How many are done.
-    pub fn rows(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.rows.len()
     }
 
@@ -101,22 +90,20 @@ impl Part {
         let Head { id, runs, expected, .. } = &self.head;
         let first = [id.clone(), number.to_string(), runs.to_string()];
         let row: Vec<String> = first.into_iter().chain(values).chain(expected.iter().cloned()).collect();
-        self.out.write_record(&row)?;
-        self.out.flush()?;
+        let line = table::csv([&row])?;
+        self.part.add(String::from_utf8(line)?.trim_end())?;
         self.rows.insert(number, row);
         Ok(())
     }
 
-    /// Writes the files.
-    pub fn finish(self, plan: &Plan) -> Result<Table, RunError> {
+    /// Writes the files. The rows so far go last.
+    pub fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
         let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
+        self.part.write(table.csv()?)?;
         if plan.shard.is_whole() {
-            table.write(&plan.out)?;
-        } else {
-            table.write_runs(&plan.out.join(runs_name(plan)))?;
+            table.write_rest(out, self.part.lock())?;
         }
-        drop(self.out);
-        fs::remove_file(&self.path)?;
+        self.part.done()?;
         Ok(table)
     }
 }
@@ -126,8 +113,19 @@ fn runs_name(plan: &Plan) -> String {
     if plan.shard.is_whole() { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") }
 }
 
-fn words(row: &StringRecord) -> Vec<String> {
-    row.iter().map(str::to_owned).collect()
+/// A file of runs may be replaced by those of the same sweep only.
+fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
+    let Ok(bytes) = fs::read(file) else { return Ok(()) };
+    let mut reader = ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
+    let first = reader.records().next().and_then(Result::ok);
+    match first.as_ref().and_then(|row| row.get(0)) {
+        Some(found) if found == id => Ok(()),
+        found => {
+            let whose = found.map_or("something else".into(), |found| format!("the sweep {found}"));
+            Err(format!("{} holds {whose}, not {id}: move it away, or name another folder with --out", file.display())
+                .into())
+        }
+    }
 }
 
 /// Puts shards together.
@@ -135,98 +133,12 @@ fn words(row: &StringRecord) -> Vec<String> {
 /// # Errors
 /// They are not of one sweep, a run is missing or there twice, or a file cannot be read or written.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
-    let mut head: Option<Vec<String>> = None;
-    let mut rows = BTreeMap::new();
-    let mut sweep: Option<[String; 2]> = None;
-    for file in files {
-        let name = file.display();
-        let mut reader = Reader::from_path(file).map_err(|error| format!("cannot read {name}: {error}"))?;
-        let found = words(reader.headers().map_err(|error| format!("{name}: {error}"))?);
-        if *head.get_or_insert_with(|| found.clone()) != found || found.first().is_none_or(|first| first != ID) {
-            return Err(format!("{name} is no shard of the same sweep: its columns are others").into());
-        }
-        for row in reader.records() {
-            let row = words(&row.map_err(|error| format!("{name}: {error}"))?);
-            let of = [row[0].clone(), row[2].clone()];
-            let known = sweep.get_or_insert_with(|| of.clone());
-            if *known != of {
-                return Err(format!("{name} is of the sweep {} and not of {}", of[0], known[0]).into());
-            }
-            let number: usize = row[1].parse().map_err(|_| format!("{name}: `{}` is no run's number", row[1]))?;
-            if rows.insert(number, row).is_some() {
-                return Err(format!("run {number} is there twice: in {name} again").into());
-            }
-        }
-    }
-    let all: usize = sweep.ok_or("there are no runs in these files")?[1].parse()?;
-    let missing: Vec<usize> = (1..=all).filter(|number| !rows.contains_key(number)).collect();
-    if let Some(first) = missing.first() {
-        return Err(
-            format!("{} of {all} runs are missing, run {first} the first: is a shard missing?", missing.len()).into()
-        );
-    }
-    let table = Table { head: head.unwrap_or_default(), rows: rows.into_values().collect() };
+    let table = super::merge::table(files)?;
     fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
-    table.write(out)?;
+    let file = out.join("runs.csv");
+    let lock = Lock::take(&file).map_err(|error| cannot_write(&file, &error))?;
+    refuse_others(&file, &table.rows[0][0])?;
+    lock.write(table.csv()?).map_err(|error| cannot_write(&file, &error))?;
+    table.write_rest(out, &lock)?;
     Ok(table)
-}
-
-impl Table {
-    fn write_runs(&self, path: &Path) -> Result<(), RunError> {
-        let mut writer =
-            Writer::from_path(path).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
-        writer.write_record(&self.head)?;
-        self.rows.iter().try_for_each(|row| writer.write_record(row))?;
-        Ok(writer.flush()?)
-    }
-
-    fn write(&self, out: &Path) -> Result<(), RunError> {
-        self.write_runs(&out.join("runs.csv"))?;
-        let mut writer = Writer::from_path(out.join("summary.csv"))?;
-        summary::rows(self).iter().try_for_each(|row| writer.write_record(row))?;
-        writer.flush()?;
-        for (metric, svg) in plots::all(self)? {
-            fs::write(out.join(format!("{metric}.svg")), svg)?;
-        }
-        Ok(())
-    }
-
-    /// For people.
-    pub fn text(&self) -> String {
-        summary::text(self)
-    }
-
-    /// Whether every run held its bounds.
-    pub fn passed(&self) -> bool {
-        let passed = self.place(PASSED);
-        self.rows.iter().all(|row| row[passed] == "1")
-    }
-
-    pub(super) fn place(&self, column: &str) -> usize {
-        self.head.iter().position(|name| name == column).unwrap_or(0)
-    }
-
-    /// The varied keys' columns.
-    pub(super) fn varied(&self) -> core::ops::Range<usize> {
-        3..self.place(SEED)
-    }
-
-    /// The metrics' columns.
-    pub(super) fn metrics(&self) -> core::ops::Range<usize> {
-        let end = self.head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(self.head.len());
-        self.place(DIGEST) + 1..end
-    }
-
-    /// The least and the largest that is expected of a metric.
-    pub(super) fn expected(&self, metric: &str) -> Option<[Option<f64>; 2]> {
-        let place = self.head.iter().position(|name| name.strip_prefix(EXPECT) == Some(metric))?;
-        let (min, max) = self.rows.first()?[place].split_once("..")?;
-        Some([min.parse().ok(), max.parse().ok()])
-    }
-
-    /// How many of these rows held their bounds.
-    pub(super) fn passes<'a>(&self, rows: impl Iterator<Item = &'a Vec<String>>) -> usize {
-        let passed = self.place(PASSED);
-        rows.filter(|row| row[passed] == "1").count()
-    }
 }

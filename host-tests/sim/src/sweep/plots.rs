@@ -1,7 +1,7 @@
 //! A sweep's pictures: a metric over each varied key, or how its values are spread over the seeds.
 
-use super::files::Table;
 use super::summary::{points, spread, values};
+use super::table::Table;
 use crate::report::around;
 use host_tests::plot::{Curve, Curves, PlotError, curves};
 

@@ -1,5 +1,6 @@
 //! A share of many runs, for array jobs and several machines.
 
+use std::fmt;
 use std::str::FromStr;
 
 /// Every so-manieth of the runs.
@@ -23,6 +24,12 @@ impl Shard {
     /// Whether it is all of them.
     pub const fn is_whole(self) -> bool {
         self.of == 1
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Least, median and largest of every metric, point by point and over all.
 
-use super::files::Table;
+use super::table::Table;
 use crate::metrics::shown;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -16,7 +16,7 @@ pub fn spread(mut values: Vec<f64>) -> Option<[f64; 3]> {
 
 /// The values of a column in rows.
 pub fn values<'a>(rows: impl Iterator<Item = &'a Vec<String>>, column: usize) -> Vec<f64> {
-    rows.filter_map(|row| row[column].parse().ok()).collect()
+    rows.filter_map(|row| row[column].parse().ok()).filter(|value: &f64| value.is_finite()).collect()
 }
 
 /// The points, in order: the varied keys' values, and their rows.

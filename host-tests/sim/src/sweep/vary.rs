@@ -11,6 +11,8 @@ pub struct Vary {
 
 /// Values where none are asked for.
 const VALUES: usize = 5;
+/// More are a slip of the keyboard.
+const MOST: usize = 100_000;
 
 impl std::str::FromStr for Vary {
     type Err = String;
@@ -26,6 +28,9 @@ impl std::str::FromStr for Vary {
         let (low, high) = range.split_once("..").ok_or_else(wrong)?;
         let end = |text: &str| text.trim().parse::<f64>().ok().filter(|end| end.is_finite()).ok_or_else(wrong);
         let (low_end, high_end) = (end(low)?, end(high)?);
+        if count > MOST {
+            return Err(format!("--vary {text}: {count} values, at most {MOST} are allowed"));
+        }
         if key.trim().is_empty() || count == 0 || (count == 1 && low_end != high_end) {
             return Err(wrong());
         }
@@ -53,7 +58,9 @@ mod tests {
         assert_eq!(values("tip.radius_mm=1..2:3"), Ok("1 1.5 2".into()));
         assert_eq!(values("a.b=-1..1:2"), Ok("-1 1".into()));
         assert_eq!(values("a.b=7..7:1"), Ok("7".into()));
-        for wrong in ["a.b", "a.b=1", "a.b=1..x", "=1..2", "a.b=1..2:0", "a.b=1..2:1", "a.b=1..inf"] {
+        for wrong in
+            ["a.b", "a.b=1", "a.b=1..x", "=1..2", "a.b=1..2:0", "a.b=1..2:1", "a.b=1..inf", "a.b=1..2:1000000000000"]
+        {
             assert!(values(wrong).is_err(), "{wrong}");
         }
     }

@@ -2,9 +2,10 @@
 
 use crate::wall;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
+use mcap::records::Metadata;
 use mcap::{MessageStream, Writer};
 use sim::metrics::shown;
-use sim::recording::{Recorder, replay};
+use sim::recording::{Recorder, check, replay};
 use sim::report::{Report, Trace, page};
 use sim::run::run;
 use sim::{cli, native};
@@ -116,10 +117,27 @@ fn a_recording_holds_what_viewers_look_for() {
 
 /// The recording with a message of the core changed, whole and with valid checksums otherwise.
 fn rewritten(bytes: &[u8], change: impl Fn(u32, &mut serde_json::Value)) -> Vec<u8> {
+    written_anew(bytes, |_| (), |_| (), change)
+}
+
+/// The same, with other metadata and another scene.
+fn written_anew(
+    bytes: &[u8],
+    change_metadata: impl Fn(&mut Metadata),
+    change_scene: impl Fn(&mut Vec<u8>),
+    change: impl Fn(u32, &mut serde_json::Value),
+) -> Vec<u8> {
     let summary = mcap::Summary::read(bytes).unwrap().unwrap();
     let mut out = Writer::new(Cursor::new(Vec::new())).unwrap();
+    for index in &summary.attachment_indexes {
+        let mut scene = mcap::read::attachment(bytes, index).unwrap();
+        change_scene(scene.data.to_mut());
+        out.attach(&scene).unwrap();
+    }
     for index in &summary.metadata_indexes {
-        out.write_metadata(&mcap::read::metadata(bytes, index).unwrap()).unwrap();
+        let mut metadata = mcap::read::metadata(bytes, index).unwrap();
+        change_metadata(&mut metadata);
+        out.write_metadata(&metadata).unwrap();
     }
     for message in MessageStream::new(bytes).unwrap() {
         let mut message = message.unwrap();
@@ -165,13 +183,60 @@ fn one_flipped_bit_is_found_at_its_frame() {
 }
 
 #[test]
+fn what_was_changed_after_the_run_is_named_and_not_the_core() {
+    let path = record("changed");
+    let bytes = fs::read(&path).unwrap();
+    let told = |changed: Vec<u8>| {
+        fs::write(&path, changed).unwrap();
+        replay(&path).unwrap_err().to_string()
+    };
+    let other = |metadata: &mut Metadata| {
+        if let Some(finger) = metadata.metadata.get_mut("finger0") {
+            *finger = finger.replacen("\"params\":{", "\"params\":{\"more\":1,", 1);
+        }
+    };
+    let error = told(written_anew(&bytes, other, |_| (), |_, _| ()));
+    assert!(error.contains("fingertip.setup") && error.contains("was changed"), "{error}");
+    let error = told(written_anew(&bytes, |_| (), |scene| scene.push(b'#'), |_, _| ()));
+    assert!(error.contains("the attached scene was changed"), "{error}");
+}
+
+#[test]
+fn every_changed_byte_is_found_before_the_replay() {
+    let bytes = fs::read(record("every_byte")).unwrap();
+    check(&bytes).unwrap();
+    let told = |at: usize, bit: usize| {
+        let mut damaged = bytes.clone();
+        damaged[at] ^= 1 << bit;
+        check(&damaged).map_err(|error| error.to_string())
+    };
+    // All that is in front of the first chunk and behind the last one by elevens, both ends whole, and some of the messages.
+    let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let first = chunks.iter().map(|chunk| chunk.chunk_start_offset as usize).min().unwrap();
+    let last = chunks.iter().map(|chunk| (chunk.chunk_start_offset + chunk.chunk_length) as usize).max().unwrap();
+    let places = (0..first).step_by(11).chain((first..last).step_by(9973)).chain((last..bytes.len()).step_by(11));
+    for at in places.chain(0..9).chain(bytes.len() - 60..bytes.len()) {
+        assert!(told(at, at % 8).is_err(), "byte {at} was changed");
+    }
+    let contains = |at: usize, what: &str| {
+        let error = told(at, 0).unwrap_err();
+        assert!(error.contains(what), "{error}");
+    };
+    let find = |text: &str| bytes.windows(text.len()).position(|window| window == text.as_bytes()).unwrap();
+    contains(find("about ="), "in the attached scene");
+    contains(find("modulus_pa") + 13, "in its metadata");
+    contains(first + 100, "in its messages");
+    contains(bytes.len() - 100, "in its summary");
+}
+
+#[test]
 fn damaged_files_are_told() {
     let path = record("damaged");
     let bytes = fs::read(&path).unwrap();
     let mut damaged = bytes.clone();
     damaged[bytes.len() / 2] ^= 1;
     fs::write(&path, damaged).unwrap();
-    assert!(replay(&path).unwrap_err().to_string().contains("CRC"));
+    assert!(replay(&path).unwrap_err().to_string().contains("CRC is another"));
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     assert!(replay(&path).is_err());
     fs::write(&path, "no recording").unwrap();

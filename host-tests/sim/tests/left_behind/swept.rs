@@ -6,7 +6,9 @@ use sim::{cli, native};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Short, near, and with noise.
+const SET: [&str; 3] = ["duration_s=0.04", "object.distance_mm=0.5", "effects.noise.rms_codes=1.5"];
 
 fn folder(name: &str) -> PathBuf {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("swept").join(name);
@@ -18,11 +20,11 @@ fn folder(name: &str) -> PathBuf {
 fn plan(out: &Path, shard: Shard) -> Plan {
     Plan {
         scene: SCENE.into(),
-        set: vec!["duration_s=0.04".into(), "object.distance_mm=0.5".into()],
+        set: SET.map(String::from).into(),
         vary: vec!["tip.modulus_kpa=240..260:3".parse().unwrap(), "tip.radius_mm=9.5..10.5:2".parse().unwrap()],
         seeds: 2,
         shard,
-        out: out.into(),
+        out: Some(out.into()),
     }
 }
 
@@ -33,7 +35,8 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 fn whole(name: &str) -> (PathBuf, Table) {
     let out = folder(name);
-    let table = sweep(&plan(&out, Shard::WHOLE), &native::board).unwrap();
+    let (table, told) = sweep(&plan(&out, Shard::WHOLE), &native::board).unwrap();
+    assert_eq!(told, out);
     (out, table)
 }
 
@@ -84,42 +87,10 @@ fn runs_are_numbered_point_by_point_and_seed_by_seed() {
     assert_eq!(rows, expected);
     // And what a row says is what was run.
     let row = &table.rows[7];
-    let set = ["duration_s=0.04", "object.distance_mm=0.5", "tip.modulus_kpa=250", "tip.radius_mm=10.5"];
-    let scene = cli::load(SCENE, &set.map(String::from), Some(2)).unwrap();
+    let set = [&SET[..], &["tip.modulus_kpa=250", "tip.radius_mm=10.5"]].concat();
+    let scene = cli::load(SCENE, &set.into_iter().map(String::from).collect::<Vec<_>>(), Some(2)).unwrap();
     let mut last = sim::metrics::Meter::default();
     assert_eq!(row[column("digest")], native::board(&scene, &mut last).unwrap().digest);
-}
-
-#[test]
-fn a_stopped_sweep_goes_on_where_it_stood() {
-    let (out, table) = whole("stopped");
-    let expected = files(&out);
-    // Six rows are left, and a cut one.
-    let runs = String::from_utf8(expected["runs.csv"].clone()).unwrap();
-    let kept: String = runs.split_inclusive('\n').take(7).collect();
-    let cut = runs.lines().nth(7).unwrap();
-    let part = out.join("runs.csv.part");
-    fs::write(&part, kept.clone() + &cut[..cut.len() / 2]).unwrap();
-    // A try that gets no farther leaves the six.
-    sweep(&plan(&out, Shard::WHOLE), &|_, _| Err("stopped".into())).unwrap_err();
-    assert_eq!(fs::read_to_string(&part).unwrap(), kept);
-    let ran = AtomicUsize::new(0);
-    let again = sweep(&plan(&out, Shard::WHOLE), &|scene, watch| {
-        ran.fetch_add(1, Ordering::Relaxed);
-        native::board(scene, watch)
-    });
-    assert_eq!(again.unwrap(), table);
-    assert_eq!(ran.into_inner(), 6);
-    assert_eq!(files(&out), expected);
-    // What another sweep of the same columns left is not taken up.
-    fs::write(&part, kept).unwrap();
-    let ran = AtomicUsize::new(0);
-    let other = Plan { seeds: 1, ..plan(&out, Shard::WHOLE) };
-    let other = sweep(&other, &|scene, watch| {
-        ran.fetch_add(1, Ordering::Relaxed);
-        native::board(scene, watch)
-    });
-    assert_eq!((other.unwrap().rows.len(), ran.into_inner()), (6, 6));
 }
 
 #[test]

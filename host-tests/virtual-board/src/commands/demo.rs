@@ -1,6 +1,7 @@
 //! `virtual-board demo`.
 
 use host_tests::demo::{figures, pictures, table};
+use host_tests::{kept, say};
 use std::path::PathBuf;
 use virtual_board::demo::{self, DemoError, Plan};
 
@@ -24,21 +25,24 @@ pub struct Arguments {
 /// Runs it, prints the table, writes figures and pictures.
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
-    println!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes);
-    print!("{}", table::table(&figures.checks, &figures.forces));
-    println!("\ntrace    {}", figures.trace_sha256);
-    if let Some(repeated) = &figures.repeated_trace_sha256 {
-        println!("repeated {repeated}");
-    }
-    println!("time     {:.1} s of virtual time in {:.1} s", figures.virtual_time_s, figures.wall_time_s);
-    for path in pictures::draw(&run.seen, &figures.forces, &arguments.out)? {
-        println!("picture  {}", path.display());
-    }
+    // The files first: who reads the output may go away.
+    let drawn = pictures::draw(&run.seen, &figures.forces, &arguments.out);
     if let Some(path) = &arguments.json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
-        let written = written.and_then(|text| std::fs::write(path, text + "\n"));
+        let written = written.and_then(|text| kept::write(path, text + "\n"));
         written.map_err(|source| DemoError::Write { path: path.clone(), source })?;
-        println!("figures  {}", path.display());
+    }
+    say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
+    say::text(table::table(&figures.checks, &figures.forces));
+    say::line(format_args!("\ntrace    {}", figures.trace_sha256));
+    if let Some(repeated) = &figures.repeated_trace_sha256 {
+        say::line(format_args!("repeated {repeated}"));
+    }
+    let (virtual_s, wall_s) = (figures.virtual_time_s, figures.wall_time_s);
+    say::line(format_args!("time     {virtual_s:.1} s of virtual time in {wall_s:.1} s"));
+    drawn?.iter().for_each(|path| say::line(format_args!("picture  {}", path.display())));
+    if let Some(path) = &arguments.json {
+        say::line(format_args!("figures  {}", path.display()));
     }
     match figures::missed(&figures.checks) {
         0 => Ok(()),

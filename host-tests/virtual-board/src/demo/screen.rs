@@ -4,6 +4,7 @@ use super::bus::Poll;
 use super::play::Watch;
 use host_tests::demo::Phase;
 use host_tests::heatmap::{self, Pressures};
+use host_tests::say;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 
@@ -37,7 +38,7 @@ impl Screen {
     pub fn waiting(&self, what: &str) {
         match &self.bar {
             Some(bar) => bar.println(format!("waiting for {what}")),
-            None => println!("waiting for {what}"),
+            None => say::line(format_args!("waiting for {what}")),
         }
     }
 
@@ -54,7 +55,7 @@ impl Watch for Screen {
         let line = format!("{:7.3} s  goal: {}", at_ms as f64 * 1e-3, phase.what());
         match &self.bar {
             Some(bar) => bar.println(line),
-            None => println!("{line}"),
+            None => say::line(line),
         }
     }
 

@@ -1,0 +1,144 @@
+//! What a long piece of work has done so far, a line each, so that it can go on where it was stopped.
+//!
+//! A line is `<CRC-64 of the text, 16 hexadecimal digits> <text>`. The first says what work it is. A line that was cut off, or that is
+//! damaged otherwise, is not taken up: what it stood for is done again.
+
+use crate::run::RunError;
+use host_tests::kept::{self, Lock};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Write as _};
+use std::path::{Path, PathBuf};
+
+const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+
+/// The lines so far of what becomes a file NAME: they stand in NAME.part, and NAME is this process's to write.
+#[derive(Debug)]
+pub struct Part {
+    lock: Lock,
+    path: PathBuf,
+    file: File,
+    /// Up to the end of the last whole line.
+    length: u64,
+}
+
+/// Whose lines a file has.
+enum Found {
+    Nothing,
+    Lines(Vec<String>),
+    Others(String),
+}
+
+impl Part {
+    /// Takes up the lines that an earlier try of the same work left, or begins. The folder is made.
+    ///
+    /// # Errors
+    /// Another process is at it, other work left its lines there, or the file cannot be written.
+    pub fn open(of: &Path, head: &str) -> Result<(Self, Vec<String>), RunError> {
+        if let Some(folder) = of.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+        }
+        // What stands behind a link is written, and not the link.
+        let of = &fs::canonicalize(of).unwrap_or(of.into());
+        let lock = Lock::take(of).map_err(|error| match error.kind() {
+            ErrorKind::WouldBlock => error.to_string(),
+            _ => cannot_write(of, &error),
+        })?;
+        let path = kept::beside(of, "part");
+        let lines = match found(&path, head).map_err(|error| format!("cannot read {}: {error}", path.display()))? {
+            Found::Lines(lines) => lines,
+            Found::Nothing => Vec::new(),
+            Found::Others(whose) => {
+                return Err(format!(
+                    "{} holds what is done of {whose}, not of {head}: finish that, move the file away, or name another place",
+                    path.display()
+                )
+                .into());
+            }
+        };
+        // Written anew, so that nothing stands there but whole lines.
+        let whole: String = std::iter::once(head).chain(lines.iter().map(String::as_str)).map(line).collect();
+        let failed = |error: io::Error| cannot_write(&path, &error);
+        if fs::read(&path).ok().as_deref() != Some(whole.as_bytes()) {
+            lock.write_with(&path, &whole).map_err(failed)?;
+        }
+        let file = OpenOptions::new().append(true).open(&path).map_err(failed)?;
+        Ok((Self { lock, path, file, length: whole.len() as u64 }, lines))
+    }
+
+    /// Adds a line.
+    ///
+    /// # Errors
+    /// It cannot be written; those before it are there.
+    pub fn add(&mut self, text: &str) -> Result<(), RunError> {
+        let line = line(text);
+        if let Err(error) = self.file.write_all(line.as_bytes()) {
+            let _ = self.file.set_len(self.length);
+            return Err(format!("{}; what was done before is kept there", cannot_write(&self.path, &error)).into());
+        }
+        self.length += line.len() as u64;
+        Ok(())
+    }
+
+    /// Writes the file itself, whole.
+    ///
+    /// # Errors
+    /// It cannot be written; the lines are still there.
+    pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
+        let told = |error| {
+            format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
+        };
+        Ok(self.lock.write(bytes).map_err(told)?)
+    }
+
+    /// The lock, under which all that is made of the lines is written.
+    pub fn lock(&self) -> &Lock {
+        &self.lock
+    }
+
+    /// Removes the lines, once all that was made of them is written.
+    ///
+    /// # Errors
+    /// They cannot be removed.
+    pub fn done(self) -> Result<(), RunError> {
+        Ok(fs::remove_file(&self.path).map_err(|error| format!("cannot remove {}: {error}", self.path.display()))?)
+    }
+}
+
+/// For people: a file that cannot be written, and what to do.
+pub fn cannot_write(path: &Path, error: &io::Error) -> String {
+    let advice = match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            ": make room and give the same command again"
+        }
+        _ => "",
+    };
+    format!("cannot write {}: {error}{advice}", path.display())
+}
+
+fn line(text: &str) -> String {
+    format!("{:016x} {text}\n", CRC.checksum(text.as_bytes()))
+}
+
+fn found(path: &Path, head: &str) -> io::Result<Found> {
+    let bytes = match fs::read(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Found::Nothing),
+        bytes => bytes?,
+    };
+    if line(head).as_bytes().starts_with(&bytes) {
+        // No more than its own head, or the beginning of that.
+        return Ok(Found::Nothing);
+    }
+    let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').map(whole);
+    Ok(match lines.next() {
+        Some(Some(found)) if found == head => Found::Lines(lines.flatten().map(str::to_owned).collect()),
+        Some(Some(others)) => Found::Others(others.to_owned()),
+        Some(None) | None => Found::Others("something that cannot be read".into()),
+    })
+}
+
+/// A line's text; none where it is cut off or damaged.
+fn whole(line: &[u8]) -> Option<&str> {
+    let text = str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
+    let (check, text) = text.split_once(' ')?;
+    (check == format!("{:016x}", CRC.checksum(text.as_bytes()))).then_some(text)
+}

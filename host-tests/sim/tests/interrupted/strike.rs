@@ -1,0 +1,172 @@
+//! Ways to interrupt a command. Each strikes at a number of bytes, never after a time.
+
+use crate::jobs::Job;
+use std::fs::{self, File};
+use std::io::Read;
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, Stdio};
+use std::thread;
+use std::time::Duration;
+
+const SIGINT: i32 = 2;
+const SIGKILL: i32 = 9;
+const SIGXFSZ: i32 = 25;
+
+/// What happens to a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The system kills it within a write, to the byte.
+    CutWrite,
+    /// A write fails from a byte on, as on a full disk.
+    FullDisk,
+    /// It is killed once a file has so many bytes.
+    Killed,
+    /// The same by Ctrl-C.
+    CtrlC,
+    /// Who reads its output goes away after some bytes.
+    ClosedPipe,
+    /// Its output goes to a full disk.
+    FullOutput,
+    /// A second one is started beside it, and refused.
+    TwoAtOnce,
+    /// The first of two is killed, and the second takes over.
+    TakenOver,
+}
+
+impl Kind {
+    pub const ALL: [Self; 8] = [
+        Self::CutWrite,
+        Self::FullDisk,
+        Self::Killed,
+        Self::CtrlC,
+        Self::ClosedPipe,
+        Self::FullOutput,
+        Self::TwoAtOnce,
+        Self::TakenOver,
+    ];
+}
+
+/// Interrupts a job at so many bytes, and checks how it ends. Returns whether it was interrupted: a command may be done before.
+pub fn strike(job: &Job, kind: Kind, at: u64) -> bool {
+    match kind {
+        Kind::CutWrite => {
+            let status = quiet(job.limited(at, false)).status().unwrap();
+            status.signal() == Some(SIGXFSZ)
+        }
+        Kind::FullDisk => {
+            let output = job.limited(at, true).output().unwrap();
+            let told = String::from_utf8_lossy(&output.stderr);
+            match output.status.code() {
+                Some(0 | 1) => false,
+                Some(2) => {
+                    assert!(told.contains("cannot write") || told.contains("cannot make"), "{}: {told}", job.name);
+                    true
+                }
+                code => panic!("{} ended with {code:?}: {told}", job.name),
+            }
+        }
+        Kind::Killed => signalled(job, at, SIGKILL),
+        Kind::CtrlC => signalled(job, at, SIGINT),
+        Kind::ClosedPipe => closed_pipe(job, at),
+        Kind::FullOutput => {
+            let full = File::options().write(true).open("/dev/full").unwrap();
+            let output = job.command().stdout(full).stderr(Stdio::piped()).output().unwrap();
+            let told = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{told}");
+            assert!(told.contains("cannot write to the standard output"), "{told}");
+            job.check_left("a full output");
+            true
+        }
+        Kind::TwoAtOnce | Kind::TakenOver => two(job, kind == Kind::TakenOver),
+    }
+}
+
+fn quiet(mut command: Command) -> Command {
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    command
+}
+
+/// Waits until a file of the command has so many bytes; false where it ends before.
+fn reached(child: &mut Child, job: &Job, bytes: u64) -> bool {
+    loop {
+        if fs::metadata(&job.growing).is_ok_and(|file| file.len() >= bytes) {
+            return true;
+        }
+        if child.try_wait().unwrap().is_some() {
+            return false;
+        }
+        // Only leaves the core to others: how long it is decides nothing.
+        thread::sleep(Duration::from_micros(100));
+    }
+}
+
+fn signal(child: &Child, name: &str) {
+    let id = child.id().to_string();
+    assert!(quiet(Command::new("kill")).args([name, &id]).status().unwrap().success() || name == "-INT");
+}
+
+fn signalled(job: &Job, at: u64, number: i32) -> bool {
+    let mut child = quiet(job.command()).spawn().unwrap();
+    if reached(&mut child, job, at) {
+        match number {
+            SIGKILL => child.kill().unwrap(),
+            _ => signal(&child, "-INT"),
+        }
+    }
+    child.wait().unwrap().signal() == Some(number)
+}
+
+fn closed_pipe(job: &Job, at: u64) -> bool {
+    let mut child = job.command().stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut pipe = child.stdout.take().unwrap();
+    let mut bytes = vec![0; (at % 40) as usize];
+    // Fewer bytes than the command says: the pipe is closed within its text.
+    let _ = pipe.read(&mut bytes);
+    drop(pipe);
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code().is_some_and(|code| code < 2), "{}: {told}", job.name);
+    job.check_left("a closed pipe");
+    told.contains("went away")
+}
+
+/// Ends with the test, also where that fails while it is stopped.
+struct Ends(Child);
+
+impl Drop for Ends {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The first is stopped while it holds the lock, so that the second comes meanwhile on any machine.
+fn two(job: &Job, kill: bool) -> bool {
+    let mut first = Ends(quiet(job.command()).spawn().unwrap());
+    let first = &mut first.0;
+    // The lock is there before the first byte.
+    if !reached(first, job, 1) {
+        return false;
+    }
+    signal(first, "-STOP");
+    if !job.growing.exists() {
+        // It had come to its end meanwhile.
+        signal(first, "-CONT");
+        first.wait().unwrap();
+        return false;
+    }
+    let second = job.command().output().unwrap();
+    let told = String::from_utf8_lossy(&second.stderr);
+    assert_eq!(second.status.code(), Some(2), "{}: {told}", job.name);
+    assert!(told.contains(&format!("process {}", first.id())), "{}: {told}", job.name);
+    if kill {
+        first.kill().unwrap();
+        first.wait().unwrap();
+        job.check_parts("the first was killed");
+    } else {
+        signal(first, "-CONT");
+        assert!(first.wait().unwrap().code().is_some_and(|code| code < 2));
+        job.check_left("a second was refused");
+    }
+    true
+}

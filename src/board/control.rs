@@ -221,6 +221,7 @@ impl State {
 
     /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so the scan
     /// is stopped and starts anew, and the bridge stays as it is.
+    #[inline(never)]
     fn save(&mut self) {
         let Some(record) = SAVE.take(|record| *record) else { return };
         if !matches!(self.parts.pipeline.status().mode, Mode::Off | Mode::Fault) {

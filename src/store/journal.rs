@@ -94,6 +94,7 @@ impl Journal {
     }
 
     /// The newest whole record, as far as this firmware can take it. `tell` hears what it cannot.
+    #[inline(never)]
     pub fn load(&self, flash: &impl Flash, mut tell: impl FnMut(Remark)) -> Loaded {
         let [own, other] = self.stands;
         let bytes = flash.bytes(self.current);
@@ -140,6 +141,7 @@ impl Journal {
     ///
     /// # Errors
     /// There is no room, or the flash does not hold the record afterwards.
+    #[inline(never)]
     pub fn save<F: Flash>(
         &mut self,
         flash: &mut F,

@@ -28,6 +28,7 @@ pub enum Remark {
 }
 
 /// The values that this firmware knows, and whether all of those were taken.
+#[inline(never)]
 pub fn take(found: &Found<'_>, mut tell: impl FnMut(Remark)) -> (Record, bool) {
     let mut values = Record::DEFAULT.values();
     let mut sound = true;
@@ -72,6 +73,7 @@ pub fn settle<T>(
 }
 
 /// Puts what the error names back to its default, and everything where that is no change.
+#[inline(never)]
 fn give_up(params: &mut Params, error: ConfigError) {
     let names = match error {
         ConfigError::Param(error) => [error.name; 2],

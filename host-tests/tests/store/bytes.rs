@@ -2,7 +2,7 @@
 
 use crate::fleet::{crc32, named, of_before, of_values};
 use crate::nor::{Nor, bits, record};
-use fingertip::store::{Flash as _, Journal, Loaded, Record, Remark, SLOT_BYTES, Sector, encode};
+use fingertip::store::{Flash as _, Journal, Loaded, Record, Remark, SLOT_BYTES, SaveError, Sector, encode};
 
 const SIZE: usize = 8 * SLOT_BYTES;
 
@@ -128,4 +128,30 @@ fn a_count_that_no_record_has_is_none() {
         bytes[8..12].copy_from_slice(&count.to_le_bytes());
         assert_eq!(start(&bytes), Loaded { record: Record::DEFAULT, sound: false });
     }
+}
+
+#[test]
+fn a_sector_with_older_records_is_not_written_before_it_is_erased() {
+    let mut nor = Nor::blank(SIZE);
+    for number in 0..7 {
+        let place = number as usize * SLOT_BYTES;
+        nor.sector(Sector::A)[place..place + SLOT_BYTES].copy_from_slice(&encode(&record(number), 9 + number as u32));
+    }
+    // What an erase that was cut short may leave: behind it some bits are weak.
+    nor.sector(Sector::B)[..SLOT_BYTES].copy_from_slice(&encode(&record(100), 1));
+    let mut journal = Journal::new(&nor);
+    assert_eq!(journal.save(&mut nor, &record(7), || ()), Ok(()));
+    assert_eq!(journal.save(&mut nor, &record(8), || ()), Err(SaveError::Full));
+    let mut journal = Journal::new(&nor);
+    assert_eq!(journal.make_room(&mut nor), Ok(true));
+    assert_eq!(journal.save(&mut nor, &record(8), || ()), Ok(()));
+    assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(8), sound: true });
+}
+
+#[test]
+fn something_happens_before_each_word_of_a_save() {
+    let mut nor = Nor::blank(SIZE);
+    let mut fed = 0;
+    assert_eq!(Journal::new(&nor).save(&mut nor, &record(1), || fed += 1), Ok(()));
+    assert_eq!(fed, SLOT_BYTES / 4);
 }

@@ -15,8 +15,9 @@ const SECTOR_BYTES: usize = 128 << 10;
 const SLOTS: usize = SECTOR_BYTES / SLOT_BYTES;
 /// What a board with this much to read needs to start.
 const START_MS: u64 = 100;
-/// The longest that a word and an erase may take (DS10693), ns and ms.
+/// The longest that a word may take (DS10693).
 const WORD_MAX_NS: u64 = 100_000;
+/// What an erase at 8 bits takes on the emulated part.
 const ERASE_MS: u64 = 2_000;
 
 fn record(pitch_um: i32) -> Record {
@@ -94,7 +95,12 @@ fn nearly_full_sectors_take_turns() {
     let first = filled(SLOTS - 1, 10_000);
     let mut rig = start(vec![(SECTOR.start, first), (OTHER_SECTOR.start, filled(SLOTS, 10_000 - SLOTS as u32))]);
     // The start erases the sector with the older ones, at 32 bits: half of the time that it takes at 8.
-    rig.run_ms(ERASE_MS / 2 + START_MS).expect("it runs");
+    let mut frames_at = |ms: u64| {
+        rig.run_until_ns(ms * 1_000_000).expect("it runs");
+        rig.scan_counts().expect("it runs").frames
+    };
+    assert_eq!(frames_at(ERASE_MS / 2 - 100), 0, "no scan while it is erased");
+    assert!(frames_at(ERASE_MS / 2 + START_MS) > 0);
     assert_eq!(words_and_erases(&mut rig).1, 1);
     let newest = 1_000 + SLOTS as u32 - 2;
     assert_eq!((pitch_um(&mut rig), read_u8(&mut rig, address::FAULT)), (newest, 0));

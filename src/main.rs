@@ -8,11 +8,11 @@ use board::bridge::Bridge;
 use board::control::{self, Control};
 use board::encoder::Encoder;
 use board::flash::Store;
-use board::log::{log_boot, log_damage, log_refusal};
+use board::log::{log_boot, log_refusal, log_remark, log_save_error};
 use board::scan::Scan;
 use board::supply::Supply;
 use board::{bus, clocks, crash, guard, host, watch};
-use defmt::{error, info, unwrap};
+use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
@@ -23,7 +23,7 @@ use fingertip::link::Settings;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Pipeline};
 use fingertip::state::Fault;
-use fingertip::store::Record;
+use fingertip::store::{Loaded, Record, Remark, settle};
 use static_cell::StaticCell;
 
 /// Runs control above everything but the scan and the guard.
@@ -49,13 +49,11 @@ async fn main(spawner: Spawner) {
 
     let mut store = Store::new(p.FLASH);
     let (mut record, mut sound) = load(&mut store);
-    let made = make_pipeline(&record.params).or_else(|cause| {
+    let made = settle(&mut record.params, make_pipeline, |cause| {
         log_refusal(cause);
         sound = false;
-        record.params = Params::DEFAULT;
-        make_pipeline(&record.params)
     });
-    let pipeline = unwrap!(made.ok(), "the default parameters make a configuration: a test of the core holds that");
+    let pipeline = unwrap!(made, "the default parameters make a configuration: a test of the core holds that");
     if !sound {
         pipeline.stop(Fault::BrokenParameters);
     }
@@ -94,6 +92,7 @@ async fn main(spawner: Spawner) {
         encoder: Encoder::new(p.TIM3, p.PC6, p.PC7),
         supply: Supply::new(p.ADC3, p.PA0),
         watchdog: IndependentWatchdog::new(p.IWDG, control::WATCHDOG_US),
+        store,
         pipeline,
     };
     let bus_parts = bus::Parts {
@@ -107,28 +106,27 @@ async fn main(spawner: Spawner) {
     let bus = unwrap!(bus::Bus::new(bus_parts, Settings::new(record).baud()));
     let led = Output::new(p.PA5, Level::Low, Speed::Low);
 
-    spawner.spawn(unwrap!(host::run(bus, store, record, boot).ok()));
+    spawner.spawn(unwrap!(host::run(bus, record, boot).ok()));
     spawner.spawn(unwrap!(watch::run(led).ok()));
     CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
 
-/// What the flash holds. Where that is damaged: the ID and the bus speed of an older record, so that the fault can be read on
-/// the bus, the default parameters, and false.
+/// What the flash holds, and whether all of it could be taken. Then makes room for the next records.
 fn load(store: &mut Store) -> (Record, bool) {
-    let record = match store.latest() {
-        Ok(record) => record.unwrap_or_default(),
-        Err(cause) => {
-            log_damage(cause);
-            let record = store.newest_whole().unwrap_or_default();
-            return (Record { params: Params::DEFAULT, ..record }, false);
-        }
-    };
-    match store.make_room(&record) {
-        Ok(false) => {}
-        Ok(true) => info!("parameter sector was full: erased, newest record kept"),
-        Err(cause) => error!("parameter sector: {}", cause),
+    let mut unknown = 0;
+    let Loaded { record, sound } = store.load(|remark| {
+        unknown += u32::from(matches!(remark, Remark::Unknown { .. }));
+        log_remark(remark);
+    });
+    if unknown > 0 {
+        warn!("stored parameters: {=u32} that this firmware does not know", unknown);
     }
-    (record, true)
+    match store.make_room() {
+        Ok(false) => {}
+        Ok(true) => info!("the older parameter sector is erased"),
+        Err(cause) => log_save_error(cause),
+    }
+    (record, sound)
 }
 
 /// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free again.

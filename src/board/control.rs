@@ -9,12 +9,13 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Bridge as Wanted;
 use fingertip::shipped::{Config, Frame, Pipeline};
-use fingertip::state::Fault;
+use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{HEARD, Heard, PARAMS, PICTURE, REPORT, Report};
+use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
+use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
@@ -37,6 +38,8 @@ pub struct Control {
     pub supply: Supply,
     /// Fed here and nowhere else.
     pub watchdog: IndependentWatchdog<'static, IWDG>,
+    /// The parameters in flash.
+    pub store: Store,
     /// The core.
     pub pipeline: &'static mut Pipeline,
 }
@@ -91,6 +94,7 @@ impl State {
         self.take_frame();
         self.glance();
         self.configure();
+        self.save();
     }
 
     /// Starts the scan anew when its fault is to be cleared, with torque off. The next frame clears it.
@@ -213,6 +217,22 @@ impl State {
             self.stop(Fault::BrokenParameters);
         }
         self.restart_scan();
+    }
+
+    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so the scan
+    /// is stopped and starts anew, and the bridge stays as it is.
+    #[inline(never)]
+    fn save(&mut self) {
+        let Some(record) = SAVE.take(|record| *record) else { return };
+        if !matches!(self.parts.pipeline.status().mode, Mode::Off | Mode::Fault) {
+            return SAVED.signal(Err(NotSaved::Busy));
+        }
+        self.parts.scan.stop();
+        guard::rest();
+        let Control { store, watchdog, .. } = &mut self.parts;
+        let saved = store.save(&record, || watchdog.pet());
+        self.restart_scan();
+        SAVED.signal(saved.map_err(NotSaved::Failed));
     }
 }
 

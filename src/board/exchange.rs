@@ -5,11 +5,14 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
+use fingertip::store::Record;
 
+use super::flash::SaveError;
 use super::guard::Stopwatch;
 
 /// What control reports after every step, and after every trip of the guard.
@@ -23,6 +26,15 @@ pub struct Report {
     pub loop_time: Stopwatch,
     /// The longest of those.
     pub loop_time_max: Stopwatch,
+}
+
+/// Why a record was not saved.
+#[derive(Clone, Copy)]
+pub enum NotSaved {
+    /// The motor is driven or a tare is under way.
+    Busy,
+    /// The flash did not take it.
+    Failed(SaveError),
 }
 
 /// What the link heard from the host: as a whole, so that a bus watchdog never comes without the packet that set it.
@@ -54,6 +66,10 @@ pub static REPORT: Shared<Report> = Shared::new();
 pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
+/// A record for control to save, and how that went.
+pub static SAVE: Mailbox<Record> = Mailbox::new(Record::DEFAULT);
+/// See [`SAVE`].
+pub static SAVED: Signal<CriticalSectionRawMutex, Result<(), NotSaved>> = Signal::new();
 /// The newest picture; control leaves it as it is while the link answers from it.
 pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     report: None,

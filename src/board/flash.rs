@@ -1,80 +1,94 @@
-//! The stored parameters: flash sector 7, above the image.
+//! The stored parameters: flash sectors 6 and 7, above the image.
 
 use embassy_stm32::Peri;
-use embassy_stm32::flash::{Blocking, Flash};
+use embassy_stm32::flash::{Blocking, Error, Flash};
 use embassy_stm32::pac;
+use embassy_stm32::pac::flash::vals::Psize;
 use embassy_stm32::peripherals::FLASH;
-use fingertip::store::{self, Record, StoreError};
+use fingertip::store::{self, Journal, Loaded, Record, Remark, Sector};
+
+const FLASH_START: u32 = 0x0800_0000;
+const SECTOR_BYTES: u32 = 128 * 1024;
 
 /// From the start of the flash.
-const SECTOR_OFFSET: u32 = 0x6_0000;
-const SECTOR_BYTES: u32 = 128 * 1024;
-const FLASH_START: u32 = 0x0800_0000;
+const fn offset(sector: Sector) -> u32 {
+    match sector {
+        // Sector 7, and sector 6 below it.
+        Sector::A => 0x6_0000,
+        Sector::B => 0x4_0000,
+    }
+}
 
-/// The sector that holds the records.
+/// The sectors that hold the records.
 pub struct Store {
-    flash: Flash<'static, Blocking>,
+    chip: Chip,
+    journal: Journal,
 }
 
-/// Why a record was not saved.
-#[derive(Clone, Copy, PartialEq, Eq, defmt::Format)]
-pub enum SaveError {
-    /// The sector is full; the next start erases it.
-    Full,
-    /// The flash refused the write.
-    Write(embassy_stm32::flash::Error),
-    /// The flash reads back something else.
-    Verify,
-}
+/// Why a record was not saved, or no room made.
+pub type SaveError = store::SaveError<Error>;
 
 impl Store {
-    /// Takes the flash.
+    /// Takes the flash, and looks at what it holds.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
-        Self { flash: Flash::new_blocking(flash) }
+        let chip = Chip(Flash::new_blocking(flash));
+        let journal = Journal::new(&chip);
+        Self { chip, journal }
     }
 
-    /// The newest record, or none where the sector is blank.
+    /// The newest whole record; see [`Journal::load`].
+    pub fn load(&self, tell: impl FnMut(Remark)) -> Loaded {
+        self.journal.load(&self.chip, tell)
+    }
+
+    /// See [`Journal::make_room`]. Takes up to 2 s in which the core stands, so call it before the watchdog and the scan start.
+    pub fn make_room(&mut self) -> Result<bool, SaveError> {
+        self.journal.make_room(&mut self.chip)
+    }
+
+    /// Appends a record. The core stands while each of its 72 words is written, 16 us and at most 100 us: the motor must be off,
+    /// the scan stopped, and `between` them the watchdog fed.
     ///
     /// # Errors
-    /// The newest record is damaged.
-    pub fn latest(&self) -> Result<Option<Record>, StoreError> {
-        store::latest(self.sector())
+    /// There is no room, or the flash does not hold the record afterwards.
+    pub fn save(&mut self, record: &Record, between: impl FnMut()) -> Result<(), SaveError> {
+        self.journal.save(&mut self.chip, record, between)
+    }
+}
+
+struct Chip(Flash<'static, Blocking>);
+
+impl store::Flash for Chip {
+    type Error = Error;
+
+    fn bytes(&self, sector: Sector) -> &[u8] {
+        // SAFETY: the sector is flash that is always readable, and the image ends below it (memory.x). Only `program` and
+        // `erase` change it, and they borrow `self` exclusively.
+        unsafe { core::slice::from_raw_parts((FLASH_START + offset(sector)) as *const u8, SECTOR_BYTES as usize) }
     }
 
-    /// The newest record that is whole.
-    pub fn newest_whole(&self) -> Option<Record> {
-        store::newest_whole(self.sector())
-    }
-
-    /// Makes room where there is none left, and writes `keep` again. Takes up to 2 s in which the core stands, so call it
-    /// before the watchdog and the scan start.
-    pub fn make_room(&mut self, keep: &Record) -> Result<bool, SaveError> {
-        if store::next_offset(self.sector()).is_some() {
-            return Ok(false);
-        }
-        self.flash.blocking_erase(SECTOR_OFFSET, SECTOR_OFFSET + SECTOR_BYTES).map_err(SaveError::Write)?;
+    fn program(&mut self, sector: Sector, place: usize, word: u32) -> Result<(), Error> {
+        let result = self.0.blocking_write(offset(sector) + place as u32, &word.to_le_bytes());
         drop_cached_data();
-        self.save(keep).map(|()| true)
+        result
     }
 
-    /// Appends a record. The core stands while each word is written, 16 us, so the motor must be off.
-    ///
-    /// # Errors
-    /// The sector is full, or the flash does not hold the record afterwards.
-    pub fn save(&mut self, record: &Record) -> Result<(), SaveError> {
-        let offset = store::next_offset(self.sector()).ok_or(SaveError::Full)?;
-        let slot = store::encode(record);
-        self.flash.blocking_write(SECTOR_OFFSET + offset as u32, &slot).map_err(SaveError::Write)?;
+    fn erase(&mut self, sector: Sector) -> Result<(), Error> {
+        set_width();
+        let result = self.0.blocking_erase(offset(sector), offset(sector) + SECTOR_BYTES);
         drop_cached_data();
-        let written = self.sector().get(offset..offset + slot.len());
-        if written == Some(&slot[..]) { Ok(()) } else { Err(SaveError::Verify) }
+        result
     }
+}
 
-    fn sector(&self) -> &[u8] {
-        // SAFETY: the sector is flash that is always readable, and the image ends below it (memory.x). Only `save` and
-        // `make_room` change it, and they borrow `self` exclusively.
-        unsafe { core::slice::from_raw_parts((FLASH_START + SECTOR_OFFSET) as *const u8, SECTOR_BYTES as usize) }
+/// Lets the next erase take 32 bits at a time. The driver sets that for a write and clears it after; an erase it leaves at the
+/// 8 bits of the reset, which takes twice as long, up to 4 s. The driver locks the registers again.
+fn set_width() {
+    if pac::FLASH.cr().read().lock() {
+        pac::FLASH.keyr().write_value(0x4567_0123);
+        pac::FLASH.keyr().write_value(0xCDEF_89AB);
     }
+    pac::FLASH.cr().modify(|w| w.set_psize(Psize::PSIZE32));
 }
 
 /// The data cache may still hold what the flash was before.

@@ -6,27 +6,26 @@ use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply};
 use fingertip::shipped::{CLOCKS, Server, Snapshot};
-use fingertip::state::Mode;
 use fingertip::store::Record;
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{HEARD, Heard, PARAMS, PICTURE, Picture, REPORT};
-use super::flash::Store;
+use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
+use super::log::log_save_error;
+use super::scan::WAKE;
 
 const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
 
 /// Runs for ever.
 #[embassy_executor::task]
-pub async fn run(bus: Bus, store: Store, record: Record, boot: Boot) {
-    let mut host = Host { bus, store, boot, server: Server::new(record, &CLOCKS), line_good: true };
+pub async fn run(bus: Bus, record: Record, boot: Boot) {
+    let mut host = Host { bus, boot, server: Server::new(record, &CLOCKS), line_good: true };
     host.run().await;
 }
 
 struct Host {
     bus: Bus,
-    store: Store,
     boot: Boot,
     server: Server,
     line_good: bool,
@@ -69,7 +68,7 @@ impl Host {
                 }
             }
             let actions = self.server.take_actions();
-            self.carry_out(actions);
+            self.carry_out(actions).await;
         }
     }
 
@@ -77,7 +76,7 @@ impl Host {
         HEARD.set(Heard { command: self.server.command(), packets: self.server.good_packets() });
     }
 
-    fn carry_out(&mut self, actions: Actions) {
+    async fn carry_out(&mut self, actions: Actions) {
         let settings = *self.server.settings();
         if actions.configure {
             // The newest count where control has not yet taken those before.
@@ -85,7 +84,7 @@ impl Host {
             PARAMS.fill(|params| *params = settings.record.params);
         }
         if actions.save {
-            let saved = self.save(&settings.record);
+            let saved = self.save(&settings.record).await;
             self.server.note_saved(saved);
         }
         if actions.baud {
@@ -99,22 +98,20 @@ impl Host {
         }
     }
 
-    /// Writes to flash, which makes the core wait: never while the motor is driven.
-    fn save(&mut self, record: &Record) -> bool {
-        if !matches!(REPORT.get().status.mode, Mode::Off | Mode::Fault) {
-            warn!("parameters not saved: the motor is driven or a tare is under way");
-            return false;
+    /// Has control write to flash, which makes the core wait: never while the motor is driven.
+    async fn save(&mut self, record: &Record) -> bool {
+        // What an earlier save left is void.
+        SAVE.take(|_| ());
+        SAVED.reset();
+        SAVE.fill(|place| *place = *record);
+        WAKE.signal(());
+        let saved = SAVED.wait().await;
+        match saved {
+            Ok(()) => info!("parameters saved"),
+            Err(NotSaved::Busy) => warn!("parameters not saved: the motor is driven or a tare is under way"),
+            Err(NotSaved::Failed(cause)) => log_save_error(cause),
         }
-        match self.store.save(record) {
-            Ok(()) => {
-                info!("parameters saved");
-                true
-            }
-            Err(cause) => {
-                error!("parameters not saved: {}", cause);
-                false
-            }
-        }
+        saved.is_ok()
     }
 }
 

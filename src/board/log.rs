@@ -6,9 +6,10 @@ use defmt::{error, info, warn};
 use fingertip::config::ConfigError;
 use fingertip::params::ParamError;
 use fingertip::scan::ScanError;
-use fingertip::store::{Damage, StoreError};
+use fingertip::store::Remark;
 
 use super::crash::Boot;
+use super::flash::SaveError;
 
 /// Why this run began.
 pub fn log_boot(boot: Boot) {
@@ -19,13 +20,25 @@ pub fn log_boot(boot: Boot) {
     }
 }
 
-/// Why the newest stored record was not taken.
-pub fn log_damage(error: StoreError) {
-    error!("stored parameters: the record at {=usize:#x} is damaged", error.offset);
-    match error.damage {
-        Damage::Unreadable => error!("cut short, damaged, or written by another firmware"),
-        Damage::Head => error!("ID, baud code, return delay or effort out of range"),
-        Damage::Param(cause) => log_parameter(cause),
+/// What a start could not take of the stored parameters as it is.
+pub fn log_remark(remark: Remark) {
+    match remark {
+        Remark::NoneWhole => error!("stored parameters: no whole record, defaults"),
+        Remark::Torn => {
+            error!("stored parameters: the newest record was cut short or damaged, the one before it counts")
+        }
+        Remark::Refused(cause) => log_parameter(cause),
+        Remark::Unknown { number, value } => warn!("stored parameter {=u32:#x} = {=i32} is unknown", number, value),
+        Remark::New(name) => info!("{=str} is new: its default", name),
+    }
+}
+
+/// Why parameters were not saved, or no room made for them.
+pub fn log_save_error(error: SaveError) {
+    match error {
+        SaveError::Full => error!("parameter sectors full until the next start"),
+        SaveError::Flash(cause) => error!("parameter sector: {}", cause),
+        SaveError::Verify => error!("parameter sector reads back something else"),
     }
 }
 

@@ -1,4 +1,4 @@
-//! The bus: packets, control table, server, parameter record, and a client that nobody here wrote.
+//! The bus: packets, control table, server, and a client that nobody here wrote.
 
 mod bench;
 mod client;
@@ -9,6 +9,5 @@ mod packets;
 mod requests;
 mod safety;
 mod several;
-mod store;
 mod table;
 mod writes;

@@ -1,7 +1,7 @@
 //! Where the emulated part differs from the real one and the run noticed: only what stands here with a reason may be.
 
 use crate::error::Error;
-use crate::flash::SECTOR;
+use crate::flash::SECTORS;
 use crate::rig::Rig;
 
 /// A gap that was touched.
@@ -19,7 +19,7 @@ impl Gap {
     /// Why it does no harm; none when it is not on the allow-list.
     pub fn reason(&self) -> Option<&'static str> {
         let address = self.place.strip_prefix("0x").and_then(|digits| u64::from_str_radix(digits, 16).ok());
-        if self.kind == "unmapped" && address.is_some_and(|address| SECTOR.contains(&address)) {
+        if self.kind == "unmapped" && address.is_some_and(|address| SECTORS.contains(&address)) {
             return Some("the flash interface keeps nothing that is programmed; this crate does, in `flash`");
         }
         ALLOWED.iter().find(|(kind, place, _)| *kind == self.kind && *place == self.place).map(|(_, _, why)| *why)

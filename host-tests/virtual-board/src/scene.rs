@@ -65,7 +65,7 @@ pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Su
     let moves_from_s = -(MS as f64) * 1e-9;
     let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
     let options =
-        Options { presets: vec![(flash::SECTOR.start, store::encode(&record).to_vec())], ..Options::default() };
+        Options { presets: vec![(flash::SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() };
     let mut rigs = Vec::new();
     // As on the native board, all boards have the first one's clock.
     let mut clock = Clock::new(start_ns);

@@ -102,6 +102,11 @@ impl Hall {
 
 impl Driver<FingerBoard> for Hall {
     fn on_settled(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, settled: Settled) {
+        if let Settled::Stop(stop) = &settled
+            && self.bench.flash.word_done(stop.at.0)
+        {
+            host.hold(self.bench.core_held);
+        }
         match settled {
             Settled::Access { access, .. } => {
                 self.bench.accessed(session.board_mut(), &access);

@@ -91,5 +91,5 @@ pub fn holding() -> Rig {
 /// The same on a bus of another speed, by its code, or with another pause before an answer: for what has much to say.
 pub fn holding_on_a_bus(baud_code: u8, return_delay_2us: u8) -> Rig {
     let record = Record { baud_code, return_delay_2us, ..Record::DEFAULT };
-    hold(&Options { presets: vec![(SECTOR.start, store::encode(&record).to_vec())], ..Options::default() })
+    hold(&Options { presets: vec![(SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() })
 }

@@ -1,0 +1,202 @@
+//! Power lost at every word of a save and of an erase, twice in a row, from every state that the sectors may be in.
+
+use crate::fleet::{OTHERS, Other};
+use crate::nor::{Board, Cut, Done, Nor, RESTS, Rest, bits, record};
+use fingertip::store::{Record, SLOT_BYTES, Sector, encode};
+
+/// Slots of a small sector.
+const SLOTS: usize = 5;
+const SIZE: usize = SLOTS * SLOT_BYTES;
+
+/// A sector with records of another firmware, or of this one.
+fn sector(size: usize, count: usize, first: i32, other: Other) -> (Vec<u8>, Option<Record>) {
+    let (mut bytes, mut newest) = (Vec::new(), None);
+    for number in first..first + count as i32 {
+        let (record, expected) = other.record(number, number as u32);
+        if bytes.len() + record.len() > size {
+            break;
+        }
+        bytes.extend(record);
+        newest = Some(expected);
+    }
+    bytes.resize(size, 0xFF);
+    (bytes, newest)
+}
+
+/// Every way in which an operation can be cut: `few` takes one in so many words of an erase.
+fn cuts(done: &[Done], words: usize, few: usize, thorough: bool) -> Vec<Cut> {
+    let mut cuts = Vec::new();
+    for (after, kind) in done.iter().enumerate() {
+        let seed = after as u64;
+        let cut = Cut { after, undone: 0, words: 0, rest: Rest::Old, seed };
+        match kind {
+            Done::Word => {
+                let all = [u32::MAX, 0, bits(seed), bits(seed + 999)];
+                let some = if thorough { &all[..] } else { &all[1..3] };
+                cuts.extend(some.iter().map(|&undone| Cut { undone, ..cut }));
+            }
+            Done::Erase => {
+                let rests = if thorough { &RESTS[..] } else { &RESTS[2..] };
+                for (place, &rest) in
+                    (0..=words).step_by(few).flat_map(|place| rests.iter().map(move |rest| (place, rest)))
+                {
+                    cuts.push(Cut { words: place, rest, ..cut });
+                }
+            }
+        }
+    }
+    cuts
+}
+
+/// Starts and saves; the numbers of the records are of no other.
+fn go(board: &mut Board, cut: Option<Cut>, number: i32) {
+    board.start(cut);
+    let _ = board.save(record(number));
+}
+
+/// What a whole run of `go` does.
+fn ops(board: &Board) -> Vec<Done> {
+    let mut board = board.clone();
+    go(&mut board, None, 100);
+    board.nor.done
+}
+
+/// Two cuts in a row: the first at all places, the second at one place in `few` of what the start after it does and of the save
+/// after that, others each time.
+fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
+    let (mut cases, mut alarms) = (0, 0);
+    for first in cuts(&ops(board), words, 1, true) {
+        let mut torn = board.clone();
+        go(&mut torn, Some(first), 100);
+        let second = cuts(&ops(&torn), words, 5, false);
+        for second in second.into_iter().skip(first.after % few).step_by(few) {
+            let mut twice = torn.clone();
+            go(&mut twice, Some(second), 101);
+            twice.start(None);
+            twice.start(None);
+            if twice.save(record(102)).is_ok() {
+                assert_eq!(twice.kept, Some(record(102)));
+            }
+            twice.start(None);
+            cases += 1;
+            alarms += twice.false_alarms;
+        }
+    }
+    [cases, alarms]
+}
+
+#[test]
+fn a_save_torn_twice_leaves_the_old_or_the_new_values() {
+    let mut sum = 0;
+    for count in 0..=SLOTS {
+        let (a, newest) = sector(SIZE, count, 1, Other::None);
+        // The other sector is blank.
+        let [cases, alarms] = tear_twice(&Board::new(Nor::new([a, vec![0xFF; SIZE]]), newest), SIZE / 4, 4);
+        assert_eq!(alarms, 0, "no erase, no false alarm");
+        sum += cases;
+    }
+    println!("{sum} cases of a save torn twice");
+    assert!(sum > 20_000);
+}
+
+#[test]
+fn an_erase_torn_twice_leaves_the_old_or_the_new_values() {
+    let (mut sum, mut alarms) = (0, 0);
+    for swapped in [false, true] {
+        // The newest sector is nearly full: the start erases the older one.
+        let (older, _) = sector(SIZE, SLOTS, 1, Other::None);
+        for count in [SLOTS - 1, SLOTS] {
+            let (newer, newest) = sector(SIZE, count, 50, Other::None);
+            let sectors = if swapped { [older.clone(), newer] } else { [newer, older.clone()] };
+            let board = Board::new(Nor::new(sectors), newest);
+            assert!(ops(&board).contains(&Done::Erase), "{count} records");
+            let [cases, more] = tear_twice(&board, SIZE / 4, 40);
+            sum += cases;
+            alarms += more;
+        }
+    }
+    println!("{sum} cases of an erase and a save torn twice; {alarms} faults with nothing lost");
+    assert!(sum > 20_000);
+}
+
+#[test]
+fn a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
+    let mut sum = 0;
+    for other in OTHERS {
+        let mut cases_of = 0;
+        for count in [1, SLOTS] {
+            let (a, newest) = sector(SIZE, count, 1, other);
+            let board = Board::new(Nor::new([a, vec![0xFF; SIZE]]), newest);
+            cases_of += tear_twice(&board, SIZE / 4, 12)[0];
+        }
+        // Both sectors full: only firmware with this format has that.
+        if !matches!(other, Other::Before) {
+            let (a, _) = sector(SIZE, 2 * SLOTS, 1, other);
+            let (b, newest) = sector(SIZE, 2 * SLOTS, 50, other);
+            let mut board = Board::new(Nor::new([a, b]), newest);
+            for cut in cuts(&ops(&board), SIZE / 4, 1, true) {
+                let mut torn = board.clone();
+                go(&mut torn, Some(cut), 100);
+                torn.start(None);
+                cases_of += 1;
+            }
+            go(&mut board, None, 100);
+            assert_eq!(board.kept, Some(record(100)));
+        }
+        println!("{cases_of} cases of {other:?}");
+        sum += cases_of;
+    }
+    println!("{sum} cases of a changed layout");
+    assert!(sum > 20_000);
+}
+
+#[test]
+fn sectors_of_the_real_size_are_torn_too() {
+    const SIZE: usize = 128 << 10;
+    let slots = SIZE / SLOT_BYTES;
+    let fill = |count: usize, first: u32| {
+        let mut bytes: Vec<u8> =
+            (0..count as u32).flat_map(|place| encode(&record((first + place) as i32), first + place)).collect();
+        bytes.resize(SIZE, 0xFF);
+        bytes
+    };
+    let mut cases = 0;
+    // The newest is nearly full, then full, with the other one older.
+    for count in [slots - 1, slots] {
+        let first = 1_000;
+        let board = Board::new(
+            Nor::new([fill(slots, first - slots as u32), fill(count, first)]),
+            Some(record((first as usize + count - 1) as i32)),
+        );
+        let ops = ops(&board);
+        assert!(ops.contains(&Done::Erase), "room for less than a quarter is made");
+        for cut in cuts(&ops, SIZE / 4, 501, true) {
+            let mut torn = board.clone();
+            go(&mut torn, Some(cut), 3_000);
+            torn.start(None);
+            assert_eq!(torn.save(record(3_001)), Ok(()));
+            torn.start(None);
+            cases += 1;
+        }
+    }
+    println!("{cases} cases with sectors of 128 KiB");
+    assert!(cases > 1_000);
+}
+
+#[test]
+fn nobody_erases_the_newest_record_while_a_board_lives() {
+    let mut board = Board::new(Nor::blank(SIZE), None);
+    let mut erases = 0;
+    for number in 0..200 {
+        board.start(None);
+        erases += board.nor.done.iter().filter(|done| **done == Done::Erase).count();
+        assert_eq!(board.save(record(number)), Ok(()));
+        let newest = encode(&record(number), number as u32 + 1);
+        let held = [Sector::A, Sector::B]
+            .iter()
+            .any(|&sector| board.nor.sector(sector).windows(SLOT_BYTES).step_by(16).any(|place| place == newest));
+        assert!(held);
+    }
+    println!("{erases} erases in 200 saves");
+    assert!((30..=45).contains(&erases), "one in {SLOTS} saves");
+}

@@ -1,0 +1,226 @@
+//! Where records are written and what is erased when, so that at every instant one sector holds the newest whole record.
+//!
+//! - A save appends to the sector of the newest record; where that is full, to the other one, once that was erased.
+//! - A start whose sector is nearly full erases the other one where that has older records. Never the one with the newest whole
+//!   record.
+//! - What is damaged behind the newest whole record was written after it, and so was what is damaged in the other sector where
+//!   the newest one's is full: each start says so until the next save, which goes behind that. An erase that was cut short
+//!   at such a time looks the same, and is told too.
+
+use super::format::{self, Found, GRID, SLOT_BYTES, encode};
+use super::{Record, Remark, taken};
+
+/// One of the two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sector {
+    /// The first that a new board uses.
+    A,
+    /// The other.
+    B,
+}
+
+impl Sector {
+    /// The other one.
+    pub const fn other(self) -> Self {
+        match self {
+            Self::A => Self::B,
+            Self::B => Self::A,
+        }
+    }
+}
+
+/// Two sectors of flash: programming clears bits, erasing sets all bits of a sector.
+pub trait Flash {
+    /// Why it failed.
+    type Error;
+
+    /// The bytes of a sector, a multiple of 16.
+    fn bytes(&self, sector: Sector) -> &[u8];
+
+    /// Programs a blank word.
+    ///
+    /// # Errors
+    /// The flash refuses.
+    fn program(&mut self, sector: Sector, offset: usize, word: u32) -> Result<(), Self::Error>;
+
+    /// Erases a sector.
+    ///
+    /// # Errors
+    /// The flash refuses.
+    fn erase(&mut self, sector: Sector) -> Result<(), Self::Error>;
+}
+
+/// Why a record was not saved, or no room made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SaveError<E> {
+    /// Both sectors are full; the next start erases one.
+    Full,
+    /// The flash refuses.
+    Flash(E),
+    /// The flash reads back something else.
+    Verify,
+}
+
+/// What a start has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Loaded {
+    /// The newest whole record, or the defaults.
+    pub record: Record,
+    /// Whether nothing was lost or refused.
+    pub sound: bool,
+}
+
+/// Where the records are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Journal {
+    /// The sector that saves go to: that of the newest whole record.
+    current: Sector,
+    sequence: u32,
+    /// The current sector, and the other.
+    stands: [Stand; 2],
+}
+
+impl Journal {
+    /// Looks at what the flash holds.
+    pub fn new(flash: &impl Flash) -> Self {
+        let [a, b] = [Sector::A, Sector::B].map(|sector| Stand::of(flash.bytes(sector)));
+        let b_is_newer = match (a.newest, b.newest) {
+            (Some(a), Some(b)) => newer(b.sequence, a.sequence),
+            (a, b) => a.is_none() && b.is_some(),
+        };
+        let (current, stands) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
+        let sequence = stands[0].newest.and_then(|newest| newest.sequence).unwrap_or(0);
+        Self { current, sequence, stands }
+    }
+
+    /// The newest whole record, as far as this firmware can take it. `tell` hears what it cannot.
+    #[inline(never)]
+    pub fn load(&self, flash: &impl Flash, mut tell: impl FnMut(Remark)) -> Loaded {
+        let [own, other] = self.stands;
+        let bytes = flash.bytes(self.current);
+        let found = own.newest.and_then(|whole| Some((whole, format::read(bytes.get(whole.start..)?)?)));
+        let Some((whole, found)) = found else {
+            let blank = own.end == 0 && other.end == 0;
+            if !blank {
+                tell(Remark::NoneWhole);
+            }
+            return Loaded { record: Record::DEFAULT, sound: blank };
+        };
+        // A save goes to the other sector only where there is no room behind the newest, and the other one was erased.
+        let room = bytes.len().saturating_sub(whole.end) >= SLOT_BYTES;
+        let torn = own.end > whole.end || (!room && other.newest.is_none() && other.end > 0);
+        if torn {
+            tell(Remark::Torn);
+        }
+        let (record, taken) = taken::take(&found, tell);
+        Loaded { record, sound: taken && !torn }
+    }
+
+    /// Erases the sector without the newest whole record where both are nearly full; says whether it did. For the start:
+    /// the core may stand for seconds.
+    ///
+    /// # Errors
+    /// The flash refuses, or is not blank afterwards.
+    pub fn make_room<F: Flash>(&mut self, flash: &mut F) -> Result<bool, SaveError<F::Error>> {
+        let [own, other] = self.stands;
+        let low = |sector, stand: Stand| {
+            let size = flash.bytes(sector).len();
+            size.saturating_sub(stand.end) < (size / 4).max(SLOT_BYTES)
+        };
+        let erased = self.current.other();
+        if !low(self.current, own) || (other.newest.is_none() && !low(erased, other)) {
+            return Ok(false);
+        }
+        flash.erase(erased).map_err(SaveError::Flash)?;
+        let stand = Stand::of(flash.bytes(erased));
+        self.stands = [own, stand];
+        if stand.end == 0 { Ok(true) } else { Err(SaveError::Verify) }
+    }
+
+    /// Appends a record, a word at a time; `between` is called before each, to feed a watchdog for example.
+    ///
+    /// # Errors
+    /// There is no room, or the flash does not hold the record afterwards.
+    #[inline(never)]
+    pub fn save<F: Flash>(
+        &mut self,
+        flash: &mut F,
+        record: &Record,
+        between: impl FnMut(),
+    ) -> Result<(), SaveError<F::Error>> {
+        let [own, other] = self.stands;
+        let room = |sector, stand: Stand| flash.bytes(sector).len().saturating_sub(stand.end) >= SLOT_BYTES;
+        if !room(self.current, own) {
+            if other.newest.is_some() || !room(self.current.other(), other) {
+                return Err(SaveError::Full);
+            }
+            self.current = self.current.other();
+            self.stands = [other, own];
+        }
+        let start = self.stands[0].end;
+        let sequence = self.sequence.wrapping_add(1);
+        let written = write(flash, self.current, start, &encode(record, sequence), between);
+        if written.is_ok() {
+            let end = start + SLOT_BYTES;
+            self.sequence = sequence;
+            self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence: Some(sequence) }) };
+        } else {
+            // Whatever became of it, the next goes behind it.
+            *self = Self::new(flash);
+        }
+        written
+    }
+}
+
+fn write<F: Flash>(
+    flash: &mut F,
+    sector: Sector,
+    start: usize,
+    slot: &[u8; SLOT_BYTES],
+    mut between: impl FnMut(),
+) -> Result<(), SaveError<F::Error>> {
+    for (place, word) in slot.as_chunks().0.iter().enumerate() {
+        between();
+        if *word != [format::BLANK; 4] {
+            flash.program(sector, start + 4 * place, u32::from_le_bytes(*word)).map_err(SaveError::Flash)?;
+        }
+    }
+    let held = flash.bytes(sector).get(start..start + SLOT_BYTES);
+    if held == Some(slot) { Ok(()) } else { Err(SaveError::Verify) }
+}
+
+/// How a sector stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stand {
+    /// All behind this is blank.
+    end: usize,
+    /// Its last whole record.
+    newest: Option<Whole>,
+}
+
+/// A whole record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Whole {
+    start: usize,
+    end: usize,
+    sequence: Option<u32>,
+}
+
+impl Stand {
+    fn of(sector: &[u8]) -> Self {
+        let end = format::end(sector);
+        let newest = (0..end / GRID).rev().map(|place| place * GRID).find_map(|start| {
+            let Found { sequence, bytes, .. } = format::read(sector.get(start..)?)?;
+            Some(Whole { start, end: start + bytes, sequence })
+        });
+        Self { end: newest.map_or(end, |newest| newest.end.max(end)), newest }
+    }
+}
+
+/// None is the sequence of an old record.
+fn newer(one: Option<u32>, other: Option<u32>) -> bool {
+    match (one, other) {
+        (Some(one), Some(other)) => one.wrapping_sub(other).cast_signed() > 0,
+        (one, other) => one.is_some() && other.is_none(),
+    }
+}

@@ -1,0 +1,91 @@
+//! From stored values to a record: what this firmware knows is taken, and what it cannot take is told.
+
+use super::Record;
+use super::format::Found;
+use super::names::{NUMBERS, ranges};
+use crate::config::ConfigError;
+use crate::params::{ParamError, Params};
+
+/// What is to be told of a start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Remark {
+    /// There is no whole record, but the flash is not blank: the defaults count. It is a fault.
+    NoneWhole,
+    /// What was written after the newest whole record is damaged, most likely cut short: the values before it count. It is a
+    /// fault.
+    Torn,
+    /// A value is out of its range: its default counts. It is a fault.
+    Refused(ParamError),
+    /// Another firmware had a value whose name this one does not know.
+    Unknown {
+        /// The number of its name.
+        number: u32,
+        /// The value.
+        value: i32,
+    },
+    /// The record has no such value: its default counts.
+    New(&'static str),
+}
+
+/// The values that this firmware knows, and whether all of those were taken.
+#[inline(never)]
+pub fn take(found: &Found<'_>, mut tell: impl FnMut(Remark)) -> (Record, bool) {
+    let mut values = Record::DEFAULT.values();
+    let mut sound = true;
+    for (number, value) in found.values() {
+        let mut known = values.iter_mut().zip(ranges()).zip(&NUMBERS);
+        match known.find(|(_, own)| **own == number) {
+            None => tell(Remark::Unknown { number, value }),
+            Some(((place, (_, min, max)), _)) if (min..=max).contains(&value) => *place = value,
+            Some(((_, (name, min, max)), _)) => {
+                sound = false;
+                tell(Remark::Refused(ParamError { name, value, min, max }));
+            }
+        }
+    }
+    for ((name, ..), own) in ranges().zip(&NUMBERS) {
+        if !found.values().any(|(number, _)| number == *own) {
+            tell(Remark::New(name));
+        }
+    }
+    (Record::from_values(&values), sound)
+}
+
+/// Makes something of the parameters; those that contradict each other go back to their defaults, and `tell` hears why.
+///
+/// None where even the defaults make nothing.
+pub fn settle<T>(
+    params: &mut Params,
+    mut make: impl FnMut(&Params) -> Result<T, ConfigError>,
+    mut tell: impl FnMut(ConfigError),
+) -> Option<T> {
+    // Each round but the last puts one back at the least.
+    for _ in 0..=Params::COUNT {
+        match make(params) {
+            Ok(made) => return Some(made),
+            Err(error) => {
+                tell(error);
+                give_up(params, error);
+            }
+        }
+    }
+    None
+}
+
+/// Puts what the error names back to its default, and everything where that is no change.
+#[inline(never)]
+fn give_up(params: &mut Params, error: ConfigError) {
+    let names = match error {
+        ConfigError::Param(error) => [error.name; 2],
+        ConfigError::Scan(_) => ["settle_ns", "sample_cycles"],
+        ConfigError::Order([(low, _), (high, _)]) => [low, high],
+    };
+    let mut values = params.to_array();
+    for (value, (name, default, ..)) in values.iter_mut().zip(&Params::RANGES) {
+        if names.contains(name) {
+            *value = *default;
+        }
+    }
+    let changed = Params::from_array(&values);
+    *params = if changed == *params { Params::DEFAULT } else { changed };
+}

@@ -1,6 +1,6 @@
 //! What the host asks of the loop.
 
-use crate::contact::Effort;
+use crate::contact::FitLevel;
 use crate::units::Newtons;
 
 /// What the host asks of the loop; a snapshot, replaced as a whole.
@@ -23,7 +23,7 @@ pub struct Command {
     /// Bus watchdog in ms; 0 is off.
     pub bus_watchdog_ms: u16,
     /// How much work may be put into the contact.
-    pub effort: Effort,
+    pub fit_level: FitLevel,
     /// A change of this number asks for a tare.
     pub tare_request: u8,
     /// A change of this number clears a fault.

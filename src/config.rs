@@ -1,7 +1,8 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This file and those below it, each for a stage of the loop, are the only places with floating point: single precision, and only + - * /, so the host and the target agree to
-//! the bit. The formulas and their reasons stand in `docs/control.md`.
+//! This file and those below it, each for a stage of the loop, are the only places with floating point: single
+//! precision, and only + - * /, so the host and the target agree to the bit. The formulas and their reasons stand in
+//! `docs/control.md`.
 
 pub mod bounds;
 pub mod gains;
@@ -31,7 +32,8 @@ const CALM_TIME_CONSTANTS: f32 = 4.0;
 
 /// Share of the converter's range up to saturation that a peak may use,
 const SEEN: f32 = 0.95;
-/// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not as more than this.
+/// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not
+/// as more than this.
 const LEVEL_MAX: i32 = 1_024;
 /// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
 pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
@@ -253,8 +255,8 @@ impl Config {
     }
 }
 
-/// The largest [`Params::row_sag_ppb_per_code`] that leaves a row of so many columns, all at the converter's top, a sag of 0.32: what the
-/// boost's series and 32 bits hold. Up to ten columns that is more than the parameter's own range.
+/// The largest [`Params::row_sag_ppb_per_code`] that leaves a row of so many columns, all at the converter's top, a sag
+/// of 0.32: what the boost's series and 32 bits hold. Up to ten columns that is more than the parameter's own range.
 const fn sag_max(columns: usize) -> i32 {
     (320_000_000 / (4_095 * columns)) as i32
 }
@@ -294,8 +296,8 @@ pub(crate) fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
 }
 
-/// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a quarter and
-/// twice of that.
+/// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a
+/// quarter and twice of that.
 fn brake(motor: i32) -> [i32; 3] {
     let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
     [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]

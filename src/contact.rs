@@ -1,13 +1,13 @@
 //! The picture to a contact: total force, centre, indentation and radius, and how far the picture is a contact at all.
 //!
-//! Where the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. Where it
-//! does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to the
-//! taxels that do see it: by [`Fit`] from frame to frame, by [`read`] from one picture. `docs/contact.md` gives the method and
-//! the measured errors.
+//! Where the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. Where
+//! it does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to
+//! the taxels that do see it: by [`Fit`] from frame to frame, by [`read`] from one picture. `docs/contact.md` gives the
+//! method and the measured errors.
 
 mod arith;
 mod doubt;
-mod effort;
+mod fit_level;
 mod fitted;
 mod follow;
 mod guess;
@@ -18,7 +18,7 @@ mod step;
 mod sums;
 mod view;
 
-pub use effort::Effort;
+pub use fit_level::FitLevel;
 pub use follow::Fit;
 pub use reading::Contact;
 pub use sums::from_sums;
@@ -26,12 +26,12 @@ pub use sums::from_sums;
 use crate::config::geometry::SQUARE_BITS;
 use crate::config::{Config, Shaped};
 use crate::pressure::Picture;
-use guess::{CENTRE_BITS, Guess, Pressed};
+use guess::{CENTRE_BITS, Guess, Prediction};
 use rim::Rim;
-use step::{Bench, Bits, Equations, Misfit, Taxels};
+use step::{Bits, Comparison, Equations, Misfit, Taxels};
 use view::{Scale, View};
 
-/// How often the reading of a single picture is refined. What the loop does from frame to frame is its [`Effort`].
+/// How often the reading of a single picture is refined. What the loop does from frame to frame is its [`FitLevel`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refined {
     /// Once.
@@ -73,9 +73,9 @@ const TAXELS_MIN: i32 = 5;
 
 /// Reads the contact of a single picture. Any picture is taken.
 ///
-/// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps the
-/// sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with no
-/// confidence at all.
+/// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps
+/// the sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with
+/// no confidence at all.
 pub fn read<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     refined: Refined,
@@ -127,13 +127,15 @@ fn misfit<const ROWS: usize, const COLUMNS: usize>(
     config: &Shaped<ROWS, COLUMNS>,
 ) -> Misfit {
     let mut misfit = Misfit::NONE;
-    misfit
-        .compare(Bench { pressed: &Pressed::new(guess, &view.scale, config), view, geometry: &config.geometry }, which);
+    misfit.compare(
+        Comparison { prediction: &Prediction::new(guess, &view.scale, config), view, geometry: &config.geometry },
+        which,
+    );
     misfit
 }
 
-/// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a unit of these is
-/// 8 nm, and nothing overflows.
+/// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a
+/// unit of these is 8 nm, and nothing overflows.
 fn overhang<const ROWS: usize, const COLUMNS: usize>(contact: &Contact, config: &Config) -> i32 {
     let [x, y, radius, half_pitch] =
         [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
@@ -194,12 +196,12 @@ fn refine<const ROWS: usize, const COLUMNS: usize>(
     let mut guess = start;
     let mut again = true;
     while quick + close > 0 {
-        let bench = Bench { pressed: &Pressed::new(&guess, &view.scale, config), view, geometry };
+        let comparison = Comparison { prediction: &Prediction::new(&guess, &view.scale, config), view, geometry };
         let mut equations = Equations::<ROWS, COLUMNS>::NONE;
         if quick > 0 {
-            equations.take(bench, which);
+            equations.take(comparison, which);
         } else {
-            equations.take_closely(bench, &Rim::new(&guess, &view.scale, geometry));
+            equations.take_closely(comparison, &Rim::new(&guess, &view.scale, geometry));
         }
         let next = equations.solve(&guess, &view.scale, geometry);
         let moved = distance(&guess, &next);
@@ -223,8 +225,8 @@ fn refine<const ROWS: usize, const COLUMNS: usize>(
 
 /// The largest change of a coordinate, Q24.
 fn distance(from: &Guess, to: &Guess) -> u32 {
-    let rest = (from.rest >> (SQUARE_BITS - CENTRE_BITS)).abs_diff(to.rest >> (SQUARE_BITS - CENTRE_BITS));
-    rest.max(from.x.abs_diff(to.x)).max(from.y.abs_diff(to.y))
+    let height = (from.height >> (SQUARE_BITS - CENTRE_BITS)).abs_diff(to.height >> (SQUARE_BITS - CENTRE_BITS));
+    height.max(from.x.abs_diff(to.x)).max(from.y.abs_diff(to.y))
 }
 
 /// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.

@@ -7,19 +7,20 @@
 //! x' = v,   v' = g V - c v + w
 //! ```
 //!
-//! with the tip's travel x, the voltage V, g = k_t N / (R m), c = k_t^2 N^2 / (R m), m = J N^2 (N the motor's angle for a
-//! travel of the tip) and everything else, the contact force and friction among it, in the disturbance w.
+//! with the tip's travel x, the voltage V, g = k_t N / (R m), c = k_t^2 N^2 / (R m), m = J N^2 (N the motor's angle for
+//! a travel of the tip) and everything else, the contact force and friction among it, in the disturbance w.
 //!
-//! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still stop there;
-//! [`pace`] says how quick the loop is, by the [`gains`](crate::config::gains) of the paces; [`observer`] estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits.
-//! The law that joins them is
+//! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still
+//! stop there; [`pace`] says how quick the loop is, by the [`gains`](crate::config::gains) of the paces; [`observer`]
+//! estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits. The law that
+//! joins them is
 //!
 //! ```text
 //! g V = k_v (v_ref - v) + a_ref + c v - w
 //! ```
 //!
-//! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so a
-//! change of mode is bumpless.
+//! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so
+//! a change of mode is bumpless.
 
 mod arith;
 pub mod drive;
@@ -31,7 +32,7 @@ pub mod profile;
 use crate::config::{BRAKE_SHARE_Q8, Config};
 use crate::state::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
-use arith::{held, high, product};
+use arith::{clamp_bits, high, product};
 use drive::Drive;
 use observer::Observer;
 use pace::Pace;
@@ -64,17 +65,17 @@ impl SpeedLoop {
     /// The law, and the limits of what it asks for: the voltage.
     #[inline(always)]
     pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
-        // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted: so
-        // no product here leaves 32 bits. Accelerations are Q4, of which 28 bits are Q8's 32.
-        let speed = held(self.observer.speed.to_bits(), 28);
-        let behind = held(reference.speed.to_bits().saturating_sub(speed), 30);
+        // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted:
+        // so no product here leaves 32 bits. Accelerations are Q4, of which 28 bits are Q8's 32.
+        let speed = clamp_bits(self.observer.speed.to_bits(), 28);
+        let behind = clamp_bits(reference.speed.to_bits().saturating_sub(speed), 30);
         // c v, the acceleration that the back-EMF takes away.
         let back_emf = high(speed << 3, config.damping_q17_per_s);
         let wanted = high(behind << 2, self.pace.gains(config).speed_q18_per_s)
             + (reference.acceleration.to_bits() >> 4)
             + back_emf
             - (self.observer.disturbance.to_bits() >> 4);
-        let [wanted, back_emf] = [held(wanted, 28) << 4, held(back_emf, 28) << 4];
+        let [wanted, back_emf] = [clamp_bits(wanted, 28) << 4, clamp_bits(back_emf, 28) << 4];
         self.drive.apply(wanted, back_emf, supply_mv, config, limits);
     }
 
@@ -86,7 +87,8 @@ impl SpeedLoop {
 
     /// The speed to follow over a way still to go, at most `limit`; whether it was held to that.
     ///
-    /// Once the loop is calm, a way within `slack` is none: a tip that sticks would else be driven from count to count for ever.
+    /// Once the loop is calm, a way within `slack` is none: a tip that sticks would else be driven from count to count
+    /// for ever.
     #[inline(always)]
     pub fn towards(
         &mut self,

@@ -1,8 +1,8 @@
 //! One scan of the array, as the converters leave it in memory.
 //!
-//! Everything that goes by the array has its rows and columns as parameters: `ROWS` driven rows and `COLUMNS` sensed columns, a [`Shape`].
-//! A scan has a slot for each row and one with no row driven. That last one reads what the columns show with nothing
-//! selected: the amplifiers' offsets, and a row that is stuck in the driven state.
+//! Everything that goes by the array has its rows and columns as parameters: `ROWS` driven rows and `COLUMNS` sensed
+//! columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. That last one reads what the
+//! columns show with nothing selected: the amplifiers' offsets, and a row that is stuck in the driven state.
 
 use crate::units::CoreCycles;
 pub use lanes::Codes;
@@ -25,8 +25,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
     pub const TAXELS: usize = ROWS * COLUMNS;
     /// Steps of a scan.
     pub const SLOTS: usize = ROWS + 1;
-    /// Columns that the first converter reads: the pairs of codes that come at the same instant. Of an odd number the second one reads one
-    /// fewer.
+    /// Columns that the first converter reads: the pairs of codes that come at the same instant. Of an odd number the
+    /// second one reads one fewer.
     pub const BANK_COLUMNS: usize = lanes::pairs(COLUMNS);
     /// The larger of both.
     pub(crate) const SIDE: usize = if ROWS > COLUMNS { ROWS } else { COLUMNS };

@@ -1,18 +1,20 @@
 //! Young's modulus from a press: the slope of the force against the square of the indentation.
 //!
-//! The model says `F = pi Y d^2` (eq. 14), so Y is the slope of F against d^2, over pi (figure 11 of the paper). Two fits find it,
-//! both with sums that take a point in constant time and forget it: what a batch gives and what a recursion gives is the same
-//! number to the bit, in any order of the points.
+//! The model says `F = pi Y d^2` (eq. 14), so Y is the slope of F against d^2, over pi (figure 11 of the paper). Two
+//! fits find it, both with sums that take a point in constant time and forget it: what a batch gives and what a
+//! recursion gives is the same number to the bit, in any order of the points.
 //!
 //! - [`DepthFit`], where the indentation is known: F against d^2, through the origin.
-//! - [`TravelFit`], where only the travel x of the tip is known, and not where it touched: sqrt(F) against x, a straight line
-//!   `sqrt(pi Y) (x - x_c)` that gives the contact point x_c along with the slope. To first order this is F against (x - x_c)^2 with the
-//!   weights 1/(4 F).
+//! - [`TravelFit`], where only the travel x of the tip is known, and not where it touched: sqrt(F) against x, a
+//!   straight line `sqrt(pi Y) (x - x_c)` that gives the contact point x_c along with the slope. To first order this is
+//!   F against (x - x_c)^2 with the weights 1/(4 F).
 //!
-//! Both work in shares of the largest values that they are told to expect, so these should be of the size of the points.
+//! Both work in shares of the largest values that they are told to expect, so these should be of the size of the
+//! points.
 //!
-//! The uncertainty does not suppose that all points scatter alike: it takes each squared residual by its own lever (a sandwich
-//! estimate), so that it is right for noise in proportion to the force too. `docs/identify.md` has the formulas and what was measured.
+//! The uncertainty does not suppose that all points scatter alike: it takes each squared residual by its own lever (a
+//! sandwich estimate), so that it is right for noise in proportion to the force too. `docs/identify.md` has the
+//! formulas and what was measured.
 //!
 //! [`Press`] is the mode of the controller that collects the points.
 

@@ -3,7 +3,8 @@
 //! # Reading on
 //!
 //! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
-//! Nothing here uses floating point after configuration but the first guess of a [`root`], which is then set right in integers.
+//! Nothing here uses floating point after configuration but the first guess of a [`root`], which is then set right in
+//! integers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

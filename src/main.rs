@@ -11,7 +11,7 @@ use board::flash::Store;
 use board::log::{log_boot, log_refusal, log_remark, log_save_error};
 use board::scan::Scan;
 use board::supply::Supply;
-use board::{bus, clocks, crash, guard, host, watch};
+use board::{bus, clocks, crash, guard, link_task, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -106,7 +106,7 @@ async fn main(spawner: Spawner) {
     let bus = unwrap!(bus::Bus::new(bus_parts, Settings::new(record).baud()));
     let led = Output::new(p.PA5, Level::Low, Speed::Low);
 
-    spawner.spawn(unwrap!(host::run(bus, record, boot).ok()));
+    spawner.spawn(unwrap!(link_task::run(bus, record, boot).ok()));
     spawner.spawn(unwrap!(watch::run(led).ok()));
     CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
@@ -129,7 +129,8 @@ fn load(store: &mut Store) -> (Record, bool) {
     (record, sound)
 }
 
-/// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free again.
+/// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free
+/// again.
 #[inline(never)]
 fn make_pipeline(params: &Params) -> Result<&'static mut Pipeline, ConfigError> {
     let config = Config::shipped(params)?;

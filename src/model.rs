@@ -5,8 +5,8 @@
 //! a bundle of independent columns along the normal; the equation numbers in this module are theirs. `docs/model.md`
 //! says how each formula is arranged so that no digits are lost, and how far each result can be off.
 //!
-//! A [`Tip`] is made once, with a typed error for a radius or a modulus out of range. Everything after that is total: an
-//! input outside the domain counts as the nearest one inside.
+//! A [`Tip`] is made once, with a typed error for a radius or a modulus out of range. Everything after that is total:
+//! an input outside the domain counts as the nearest one inside.
 //!
 //! ```
 //! use fingertip::model::Tip;
@@ -158,8 +158,9 @@ impl Tip {
 
     /// Indentation at a total force, `d = sqrt(F/(pi Y))`.
     ///
-    /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of force
-    /// there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by more.
+    /// Non-decreasing in `F`, which counts as within 0 to [`Tip::force_max`]. The slope is infinite at 0: one unit of
+    /// force there is `sqrt(2^-16 N / (pi Y))`, 4.4 um for Y = 250 kPa, and no unit of force anywhere moves `d` by
+    /// more.
     #[inline(always)]
     pub fn indentation(&self, force: Newtons) -> Millimetres {
         if force >= self.force_max {

@@ -90,16 +90,18 @@ params! {
     sample_cycles = 15 in 3..=480;
     /// Converter codes for each kPa on a taxel, thousandths.
     codes_per_kpa_milli = 24_000 in 1_000..=200_000;
-    /// Share of the row's voltage lost to the row driver's resistance for each code in the row's sum, parts per billion:
-    /// R_on / (R_f V_drive 4096 / V_ref).
+    /// Share of the row's voltage lost to the row driver's resistance for each code in the row's sum, parts per
+    /// billion: R_on / (R_f V_drive 4096 / V_ref).
     row_sag_ppb_per_code = 1_667 in 0..=7_600;
-    /// A taxel that reads fewer codes than this above its column's undriven level is dead: the sensor's preload is gone.
+    /// A taxel that reads fewer codes than this above its column's undriven level is dead: the sensor's preload is
+    /// gone.
     dead_codes = 12 in 1..=1_000;
     /// A column that reads more codes than this with no row driven shows a row that is stuck on.
     undriven_max_codes = 700 in 0..=4_000;
     /// More dead or saturated taxels than this are a fault.
     bad_taxels_max = 5 in 0..=100;
-    /// Contact begins above this force; goals below it are held as this. Must be above contact_off_mn and below force_max_mn.
+    /// Contact begins above this force; goals below it are held as this. Must be above contact_off_mn and below
+    /// force_max_mn.
     contact_on_mn = 40 in 5..=2_000;
     /// Contact ends below this force. Must be below contact_on_mn.
     contact_off_mn = 15 in 1..=2_000;

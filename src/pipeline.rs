@@ -57,14 +57,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins anew.
+    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins
+    /// anew.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
         self.leave();
     }
 
-    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one under way
-    /// begins anew.
+    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one
+    /// under way begins anew.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
         self.tared = false;
@@ -100,21 +101,21 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         &self.config
     }
 
-    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy it takes as long
-    /// as the speed law.
+    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy
+    /// it takes as long as the speed law.
     // One function, however it is called: what it takes in turn has one caller each and goes into it.
     #[inline(never)]
     pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
         let asked = self.take_requests(command);
-        let effort = self.budget.next(command.effort, sense.answer, self.config.timing.deadline);
-        self.fit.set_effort(effort);
-        if effort < command.effort {
-            limits.set(Limits::EFFORT);
+        let fit_level = self.budget.next(command.fit_level, sense.answer, self.config.timing.deadline);
+        self.fit.set_fit_level(fit_level);
+        if fit_level < command.fit_level {
+            limits.set(Limits::FIT_LEVEL);
         }
 
-        // What the array feels, where it can be trusted: the bridge does not wait for the rest. The frame that turns torque on drives
-        // already, so it is judged like all after it.
+        // What the array feels, where it can be trusted: the bridge does not wait for the rest. The frame that turns
+        // torque on drives already, so it is judged like all after it.
         let starting = self.status.mode == Mode::Off && command.torque && self.tared && !asked.tare;
         let watched = self.watched() || starting;
         let picture = self.array.read(frame, &self.config);
@@ -125,8 +126,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.refuse(asked, command);
             return (Duty::ZERO, &self.status);
         }
-        // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything to fit to
-        // in a broken array. Where a frame shows nothing while the bridge is driven, the contact is the last one's.
+        // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything
+        // to fit to in a broken array. Where a frame shows nothing while the bridge is driven, the contact is the last
+        // one's.
         let sound = monitor::array_sound(picture, &self.config);
         let fits = sound && self.status.mode != Mode::Identify;
         let contact = if fits {
@@ -209,7 +211,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
         self.status.identification = self.press.outcome();
         self.status.limits = limits;
-        self.status.effort = effort;
+        self.status.fit_level = fit_level;
         self.status.contact = contact;
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;
@@ -217,10 +219,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (duty, &self.status)
     }
 
-    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array seems broken,
-    /// and tells whether. A taxel that fails just after it was read is seen a frame later; without this look the motor would be driven
-    /// until that frame's end. Whether it is a fault is for the step to say.
-    pub fn glance(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
+    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array
+    /// seems broken, and tells whether. A taxel that fails just after it was read is seen a frame later; without this
+    /// look the motor would be driven until that frame's end. Whether it is a fault is for the step to say.
+    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
         let broken = self.watched()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
         if broken {

@@ -5,8 +5,8 @@
 //! tells the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
 //! taxel would show behind a perfect row driver, and m times the taxel's gain, less its tare, is its pressure.
 //!
-//! [`Array::read`] makes all of it in one pass over the frame ([`lanes::portable_pass`] is the arithmetic): every taxel's pressure,
-//! what they add up to, the highest of them, and whether any may be dead or saturated.
+//! [`Array::read`] makes all of it in one pass over the frame ([`lanes::portable_pass`] is the arithmetic): every
+//! taxel's pressure, what they add up to, the highest of them, and whether any may be dead or saturated.
 
 mod calibration;
 mod picture;
@@ -86,8 +86,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.rows.iter().map(|row| &row.tare)
     }
 
-    /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot show becomes
-    /// a bad taxel.
+    /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot
+    /// show becomes a bad taxel.
     pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &Picture<ROWS, COLUMNS> {
         // Where none was bad, none is so again.
         let mut before = None;
@@ -112,8 +112,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         &self.picture
     }
 
-    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are. An array that is broken anyhow must
-    /// not take long: its taxels are all zero, and its sums mean nothing.
+    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are. An array that is
+    /// broken anyhow must not take long: its taxels are all zero, and its sums mean nothing.
     #[cold]
     #[inline(never)]
     fn leave_out(
@@ -147,7 +147,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
     }
 
-    /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and quicker.
+    /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and
+    /// quicker.
     pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> u32 {
         let Codes { rows, undriven } = &frame.codes;
         let sound = Sound::new(undriven, config);

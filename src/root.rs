@@ -1,10 +1,9 @@
 //! The square roots of the loop: by the FPU's estimate, made exact by corrections in integers.
 //!
-//! [`floor_sqrt`] takes any 64 bits.
-//! The estimate is single precision: within 2^9 units. Newton's correction, the remainder over twice the root,
-//! brings it to within one unit, and a second remainder sets that right. So the result is the same whatever
-//! the estimate's last bits are. The library's `isqrt` divides 64 bits by 64, which a Cortex-M4 does in software; a table and
-//! two Newton steps in integers take twice as long as this.
+//! [`floor_sqrt`] takes any 64 bits. The estimate is single precision: within 2^9 units. Newton's correction, the
+//! remainder over twice the root, brings it to within one unit, and a second remainder sets that right. So the result
+//! is the same whatever the estimate's last bits are. The library's `isqrt` divides 64 bits by 64, which a Cortex-M4
+//! does in software; a table and two Newton steps in integers take twice as long as this.
 
 /// More than the estimate can be wrong by: 1.5 x 2^-24 of at most 2^32, and a unit.
 const ESTIMATE_ERROR: u32 = 512;
@@ -37,7 +36,8 @@ pub fn floor_sqrt(x: u64) -> u32 {
     root >> (shift / 2)
 }
 
-/// A quarter of the root, sqrt(x y), too small by less than 7 x 2^-24 of itself and a unit, for a `y` from 2^24; and x times the gain.
+/// A quarter of the root, sqrt(x y), too small by less than 7 x 2^-24 of itself and a unit, for a `y` from 2^24; and x
+/// times the gain.
 #[inline(always)]
 pub(crate) fn root_below(x: u32, y: u32, gain: u64) -> (u32, u64) {
     // The estimate is within 2.5 x 2^-24; a factor less 2^-21 of itself puts it below the exact one.
@@ -46,15 +46,17 @@ pub(crate) fn root_below(x: u32, y: u32, gain: u64) -> (u32, u64) {
 
 /// The nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`].
 ///
-/// `sixteenth` is the square without its last four bits, `fourfold` four times the square, both rounded down and modulo 2^32:
-/// remainders fit 32 bits, so only the last bits of squares are computed. That makes it twice as quick as [`floor_sqrt`].
+/// `sixteenth` is the square without its last four bits, `fourfold` four times the square, both rounded down and modulo
+/// 2^32: remainders fit 32 bits, so only the last bits of squares are computed. That makes it twice as quick as
+/// [`floor_sqrt`].
 #[inline(always)]
 pub(crate) fn nearest_root(quarter: u32, sixteenth: u32, fourfold: u32) -> u32 {
     // The quarter is too small by less than 28, so the remainder is positive and below 2^32.
     let rest = sixteenth.wrapping_sub(quarter.wrapping_mul(quarter));
     // Twice the remainder over the quarter: right to a small part of a unit, then rounded down.
     let near = 4 * quarter + rest / (quarter >> 1 | 1);
-    // So it is the nearest integer or the one below: the next one is nearer where four squares are above (2 near + 1)^2.
+    // So it is the nearest integer or the one below: the next one is nearer where four squares are above (2 near +
+    // 1)^2.
     let beyond = near.wrapping_mul(near + 1).wrapping_mul(4).wrapping_sub(fourfold);
     near + (beyond >> 31)
 }

@@ -26,8 +26,8 @@ impl Clocks {
     }
 }
 
-/// How a scan is timed: [`crate::config::Shaped::new`] works it out. Row `n` is driven for [`ScanTiming::slot`]; its conversions start after [`ScanTiming::settle`] and end
-/// before the next row.
+/// How a scan is timed: [`crate::config::Shaped::new`] works it out. Row `n` is driven for [`ScanTiming::slot`]; its
+/// conversions start after [`ScanTiming::settle`] and end before the next row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanTiming {
     /// From the row's edge to the trigger of its conversions; 16 bits.
@@ -40,8 +40,8 @@ pub struct ScanTiming {
     pub slots: u16,
     /// From frame to frame, ns, rounded.
     pub frame_ns: u32,
-    /// What control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left for the tasks
-    /// below it.
+    /// What control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left for
+    /// the tasks below it.
     pub deadline: CoreCycles,
 }
 

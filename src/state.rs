@@ -12,9 +12,9 @@
 //!
 //! Identify, which measures Young's modulus, is asked for in approach, force or release.
 //!
-//! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault, and from a fault
-//! that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what holds the loop back just now)
-//! comes and goes by itself. The numbers are stable: hosts may store them.
+//! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault,
+//! and from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what
+//! holds the loop back just now) comes and goes by itself. The numbers are stable: hosts may store them.
 
 /// What the controller is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -99,11 +99,12 @@ impl Limits {
     pub const FRAME_MISSED: u16 = 1 << 7;
     /// The voltage's slew limit holds it back.
     pub const SLEW: u16 = 1 << 8;
-    /// There is no time for the effort that was asked for; see [`crate::pipeline::budget`].
-    pub const EFFORT: u16 = 1 << 9;
+    /// There is no time for the fit level that was asked for; see [`crate::pipeline::budget`].
+    pub const FIT_LEVEL: u16 = 1 << 9;
     /// Something touched the tip during the last tare: what the array shows is less by that.
     pub const TARED_TOUCHING: u16 = 1 << 10;
-    /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds it from above.
+    /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds
+    /// it from above.
     pub const FROM_BELOW: u16 = 1 << 11;
     /// The guard holds the duty back, see [`crate::safety::guard`].
     pub const GUARD: u16 = 1 << 12;

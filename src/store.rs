@@ -8,11 +8,11 @@
 //! | 12 to 12 + 8 n | n times the number of a value's name, and the value, 32 bits each |
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
-//! All little-endian; FF up to the next multiple of 16. The number of a name is its CRC-32, so a firmware with other values
-//! takes those that it knows. A record before these, "FTIP", is read too, where its values are this firmware's.
+//! All little-endian; FF up to the next multiple of 16. The number of a name is its CRC-32, so a firmware with other
+//! values takes those that it knows. A record before these, "FTIP", is read too, where its values are this firmware's.
 //!
-//! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So a
-//! loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
+//! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So
+//! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
 //! counts, and [`Loaded::sound`] says that something was lost.
 
 mod format;
@@ -23,7 +23,7 @@ mod taken;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
-use crate::contact::Effort;
+use crate::contact::FitLevel;
 use crate::params::Params;
 
 pub use format::{SLOT_BYTES, encode};
@@ -59,7 +59,7 @@ pub struct Record {
     /// Pause before a reply, in units of 2 us.
     pub return_delay_2us: u8,
     /// How much work the loop may put into a contact.
-    pub effort: Effort,
+    pub fit_level: FitLevel,
     /// The parameters.
     pub params: Params,
 }
@@ -67,7 +67,7 @@ pub struct Record {
 impl Record {
     /// What a blank flash stands for: ID 1, 1 Mbaud, 500 us.
     pub const DEFAULT: Self =
-        Self { id: 1, baud_code: 3, return_delay_2us: 250, effort: Effort::OneRow, params: Params::DEFAULT };
+        Self { id: 1, baud_code: 3, return_delay_2us: 250, fit_level: FitLevel::OneRow, params: Params::DEFAULT };
 }
 
 impl Default for Record {

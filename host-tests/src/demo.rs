@@ -1,7 +1,7 @@
 //! The demonstration: a touch, four force steps and letting go, judged by the true force.
 //!
-//! The same script runs on the native core ([`native`]) and, in the package `virtual-board`, on the flash image. Both leave a
-//! [`Run`] behind, and the same figures, table and pictures come of it.
+//! The same script runs on the native core ([`native`]) and, in the package `virtual-board`, on the flash image. Both
+//! leave a [`Run`] behind, and the same figures, table and pictures come of it.
 
 pub mod figures;
 pub mod native;

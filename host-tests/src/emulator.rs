@@ -10,8 +10,8 @@ use std::thread;
 use std::time::Duration;
 
 const PROGRAM: &str = "qemu-system-arm";
-/// The image's own watchdog ends a hang in virtual time. This one, by the clock on the wall, is for an image that cannot even do that:
-/// the slowest machine takes a small part of it.
+/// The image's own watchdog ends a hang in virtual time. This one, by the clock on the wall, is for an image that
+/// cannot even do that: the slowest machine takes a small part of it.
 const HUNG: Duration = Duration::from_secs(7200);
 
 /// Runs an image in a folder with the words of its command line to its end, and returns what it wrote.

@@ -76,8 +76,8 @@ pub fn contact_radius_mm(d_mm: f64) -> f64 {
 }
 
 impl Scene {
-    /// A plane contact: pitch 1.27, 1.5 or 2 mm, d 0.3 to 5 mm, centre on the array or up to half a contact radius beyond
-    /// its edge on each axis.
+    /// A plane contact: pitch 1.27, 1.5 or 2 mm, d 0.3 to 5 mm, centre on the array or up to half a contact radius
+    /// beyond its edge on each axis.
     pub fn good(rng: &mut Rng) -> Self {
         let mut scene = Self::on_array(rng, 0.3, 5.0);
         let reach = 0.5 * COLUMNS as f64 * scene.pitch_mm + 0.5 * contact_radius_mm(scene.d_mm);
@@ -93,8 +93,8 @@ impl Scene {
         scene
     }
 
-    /// Two contacts, both centred on the array: d 0.5 to 3 mm, the second's 0.5 to 1 times that, centres farther apart than
-    /// half the sum of their contact radii.
+    /// Two contacts, both centred on the array: d 0.5 to 3 mm, the second's 0.5 to 1 times that, centres farther apart
+    /// than half the sum of their contact radii.
     pub fn two(rng: &mut Rng) -> Self {
         loop {
             let mut scene = Self::on_array(rng, 0.5, 3.0);
@@ -260,8 +260,8 @@ impl Reading {
         bad
     }
 
-    /// The picture of pressures on the taxels that are not bad, and how many of these see the contact: those with pressure
-    /// before noise.
+    /// The picture of pressures on the taxels that are not bad, and how many of these see the contact: those with
+    /// pressure before noise.
     pub fn picture(&self, pressures: &Pressures, bad: [u32; ROWS], rng: &mut Rng) -> (Picture, usize) {
         let peak = pressures.iter().flatten().fold(0.0, |peak: f64, kpa| peak.max(*kpa));
         let mut seen = 0;

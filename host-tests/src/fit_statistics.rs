@@ -1,12 +1,12 @@
 //! The fit judged over many pictures with a known contact: how far off it is, and whom its confidence flags.
 //!
-//! Case number n of a series is drawn from n alone, so every effort sees the very same pictures and the figures do not
-//! depend on the number of threads.
+//! Case number n of a series is drawn from n alone, so every fit level sees the very same pictures and the figures do
+//! not depend on the number of threads.
 
 use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, CONFIDENCE_LEAST, Effort, Refined};
+use fingertip::contact::{self, CONFIDENCE_LEAST, FitLevel, Refined};
 use fingertip::shipped::{Config, Fit, Picture};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -14,11 +14,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub const TAXELS_MIN: usize = 12;
 /// An edge that takes a smaller share of the force that the live taxels would see without it is not judged.
 ///
-/// One reading's noise: whoever looks at the taxels with 1 % of noise cannot tell a smaller change of the seen force, spread
-/// over the taxels, from noise.
+/// One reading's noise: whoever looks at the taxels with 1 % of noise cannot tell a smaller change of the seen force,
+/// spread over the taxels, from noise.
 pub const CUT_MIN: f64 = 0.01;
-/// Ways to read a contact: the plain sum with the moments' centre, one picture refined so often as [`Refined::ALL`] says, and
-/// [`Fit`] over [`FRAMES`] pictures.
+/// Ways to read a contact: the plain sum with the moments' centre, one picture refined so often as [`Refined::ALL`]
+/// says, and [`Fit`] over [`FRAMES`] pictures.
 pub const WAYS: usize = 1 + Refined::ALL.len() + 1;
 /// Frames, each with its own noise, that [`Fit`] sees of a case.
 pub const FRAMES: usize = 90;
@@ -175,13 +175,13 @@ pub struct Verdict {
 pub type Judged = Vec<Verdict>;
 
 impl Verdict {
-    /// Judges the case of this number, with this effort of [`Fit`].
-    pub fn of(series: &Series, number: usize, effort: Effort, configs: &Configs) -> Self {
+    /// Judges the case of this number, with this fit level of [`Fit`].
+    pub fn of(series: &Series, number: usize, fit_level: FitLevel, configs: &Configs) -> Self {
         let case = series.case(number);
         let config = configs.of(&case.scene);
         let noisy = series.reading.noise != Noise::None;
         let mut rng = Rng::with_seed(0xf7a3_0000_0000 + number as u64);
-        let mut fit = Fit::new(effort);
+        let mut fit = Fit::new(fit_level);
         let sums = Outcome::of(&contact::from_sums(&case.picture, config), &case.scene, noisy);
         let mut last = sums;
         let mut earlier = [last; EARLIER.len()];
@@ -198,14 +198,14 @@ impl Verdict {
     }
 }
 
-/// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error of the
-/// force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
-pub fn pressed(number: usize, um_per_frame: f64, effort: Effort, configs: &Configs) -> Outcome {
+/// The tip pressed in at `um_per_frame` to the indentation of a good case, on an array without noise: the largest error
+/// of the force that [`Fit`] makes once enough taxels see the contact, in units of its bound, and that of the centre.
+pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel, configs: &Configs) -> Outcome {
     let [clean, ..] = GOOD;
     let mut scene = clean.case(number).scene;
     let (config, end) = (configs.of(&scene), scene.d_mm);
     let mut rng = Rng::with_seed(number as u64);
-    let mut fit = Fit::new(effort);
+    let mut fit = Fit::new(fit_level);
     let mut worst = Outcome { force: 0.0, centre: 0.0, flagged: false };
     let mut settled = 0;
     scene.d_mm = 0.1;
@@ -223,14 +223,14 @@ pub fn pressed(number: usize, um_per_frame: f64, effort: Effort, configs: &Confi
     worst
 }
 
-/// Judges `cases` cases of a series on all threads, with this effort of [`Fit`]; `progress` hears how many are done.
-pub fn judge(series: &Series, cases: usize, effort: Effort, progress: &(impl Fn(usize) + Sync)) -> Judged {
+/// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]; `progress` hears how many are done.
+pub fn judge(series: &Series, cases: usize, fit_level: FitLevel, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let configs = Configs::default();
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get()).min(cases.max(1));
     let done = AtomicUsize::new(0);
     let part = |range: std::ops::Range<usize>| -> Judged {
         let one = |number| {
-            let verdict = Verdict::of(series, number, effort, &configs);
+            let verdict = Verdict::of(series, number, fit_level, &configs);
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
             verdict
         };

@@ -3,7 +3,7 @@
 use crate::fit_statistics::{
     BAD, Configs, EARLIER, FRAMES, GOOD, Judged, Outcome, Series, Verdict, WAYS, judge, pressed, quantile,
 };
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use std::fmt::Write as _;
 
 /// Where the tables begin in `docs/contact.md`.
@@ -15,17 +15,17 @@ pub const CASES: usize = 10_000;
 /// Classes of edges by the share of the seen force that they take: the ends of each.
 const CUTS: [(f64, f64); 4] = [(0.01, 0.03), (0.03, 0.1), (0.1, 0.3), (0.3, 1.0)];
 
-/// All tables, with this effort of `Fit`; `progress` hears a series' name and how many of its cases are done.
-pub fn markdown(cases: usize, effort: Effort, progress: &(impl Fn(&str, usize) + Sync)) -> String {
-    let judged = |series: &Series| judge(series, cases, effort, &|done| progress(series.name, done));
+/// All tables, with this fit level of `Fit`; `progress` hears a series' name and how many of its cases are done.
+pub fn markdown(cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) -> String {
+    let judged = |series: &Series| judge(series, cases, fit_level, &|done| progress(series.name, done));
     let good: Vec<_> = GOOD.iter().map(|series| (series, judged(series))).collect();
     let bad: Vec<_> = BAD.iter().map(|series| (series, judged(series))).collect();
-    let mut page = format!("{cases} cases a series, `Fit` with effort {}.\n\n", effort as u8);
+    let mut page = format!("{cases} cases a series, `Fit` with fit level {}.\n\n", fit_level as u8);
     errors(&mut page, &good);
     alarms(&mut page, &good, &bad);
     edges(&mut page, &bad);
     settling(&mut page, &good);
-    motion(&mut page, cases, effort, progress);
+    motion(&mut page, cases, fit_level, progress);
     page
 }
 
@@ -110,7 +110,7 @@ fn settling(page: &mut String, good: &[(&Series, Judged)]) {
     }
 }
 
-fn motion(page: &mut String, cases: usize, effort: Effort, progress: &(impl Fn(&str, usize) + Sync)) {
+fn motion(page: &mut String, cases: usize, fit_level: FitLevel, progress: &(impl Fn(&str, usize) + Sync)) {
     let (cases, configs) = ((cases / 100).max(1), Configs::default());
     let _ = write!(
         page,
@@ -121,7 +121,7 @@ fn motion(page: &mut String, cases: usize, effort: Effort, progress: &(impl Fn(&
         let outcomes: Vec<_> = (0..cases)
             .map(|number| {
                 progress("pressed in", number);
-                pressed(number, um_per_frame, effort, &configs)
+                pressed(number, um_per_frame, fit_level, &configs)
             })
             .collect();
         let values = |of: fn(&Outcome) -> f64| outcomes.iter().map(of);

@@ -1,8 +1,8 @@
 //! Files that are there whole or not at all, and that one process writes at a time.
 //!
-//! A file NAME is written as NAME.new beside it, brought to the disk and then renamed: whoever reads NAME finds what was there before
-//! or all that is new, whatever ends the writer. Meanwhile NAME.lock is locked. The system unlocks it when its process ends, however
-//! that is, so what a killed process left behind stands in nobody's way.
+//! A file NAME is written as NAME.new beside it, brought to the disk and then renamed: whoever reads NAME finds what
+//! was there before or all that is new, whatever ends the writer. Meanwhile NAME.lock is locked. The system unlocks it
+//! when its process ends, however that is, so what a killed process left behind stands in nobody's way.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -48,7 +48,8 @@ impl Lock {
         loop {
             let mut file = OpenOptions::new().create(true).truncate(false).read(true).write(true).open(&lock)?;
             lock_file(&mut file, &lock)?;
-            // Who had it may have removed the file before this process had locked it: then the name is another's by now.
+            // Who had it may have removed the file before this process had locked it: then the name is another's by
+            // now.
             let mine = format!("{} {}\n", process::id(), LOCKS.fetch_add(1, Ordering::Relaxed));
             file.set_len(0)?;
             file.seek(SeekFrom::Start(0))?;

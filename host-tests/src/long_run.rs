@@ -1,8 +1,9 @@
 //! Filters and integrators over 10^9 steps.
 //!
-//! Each is a machine with finitely many states. Under an input that repeats it must come to a state that it was in before, and from
-//! then on it repeats itself for ever: finding that cycle proves what any number of steps would show. A cycle of length 1 is
-//! rest. What is left to measure is how far the outputs swing within the cycle, which is the limit cycle, and where they stand.
+//! Each is a machine with finitely many states. Under an input that repeats it must come to a state that it was in
+//! before, and from then on it repeats itself for ever: finding that cycle proves what any number of steps would show.
+//! A cycle of length 1 is rest. What is left to measure is how far the outputs swing within the cycle, which is the
+//! limit cycle, and where they stand.
 
 mod cases;
 mod pipeline;
@@ -50,7 +51,8 @@ pub struct Outcome {
     pub cycle: Cycle,
     /// Inputs that were taken one by one.
     pub taken: u64,
-    /// The name of each output, its swing within the cycle and the swing that is documented, in units of the last place.
+    /// The name of each output, its swing within the cycle and the swing that is documented, in units of the last
+    /// place.
     pub swings: Vec<(&'static str, i64, i64)>,
 }
 

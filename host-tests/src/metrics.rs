@@ -1,4 +1,5 @@
-//! The figures of a run: how a touch and a force step are judged, from a trace of what the world and the controller did.
+//! The figures of a run: how a touch and a force step are judged, from a trace of what the world and the controller
+//! did.
 //!
 //! Every figure is of the true contact force, which only the simulated world knows; the sensed one is kept beside it.
 

@@ -8,7 +8,8 @@ use fingertip::shipped::{Config, Frame, Pipeline, SLOTS};
 use fingertip::units::Duty;
 use images::record::Record;
 
-/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded up.
+/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
+/// up.
 const DUTY_DELAY_SLOTS: usize = 3;
 
 /// A board with the core running on it.

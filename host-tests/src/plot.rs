@@ -1,4 +1,5 @@
-//! Pictures of a run as SVG: charts over time, curves over a quantity and pressure maps. Readable in grey, and the same bytes for the same run.
+//! Pictures of a run as SVG: charts over time, curves over a quantity and pressure maps. Readable in grey, and the same
+//! bytes for the same run.
 
 mod charts;
 mod curves;

@@ -1,8 +1,8 @@
 //! The proof of the model's error bounds: every result against its exact value.
 //!
-//! Two judges that share no code with the model: [`exact`] compares integers with integers (squares and rational bounds of
-//! pi), so that whole input ranges can be walked in seconds; [`mod@reference`] computes in arbitrary precision with a crate and
-//! covers what has no such form. `cargo xtask prove` runs all of it; the tests run a part.
+//! Two judges that share no code with the model: [`exact`] compares integers with integers (squares and rational bounds
+//! of pi), so that whole input ranges can be walked in seconds; [`mod@reference`] computes in arbitrary precision with
+//! a crate and covers what has no such form. `cargo xtask prove` runs all of it; the tests run a part.
 
 pub mod beyond;
 pub mod domain;

@@ -1,4 +1,5 @@
-//! What a program says. A reader that goes away, such as `head`, or a full disk behind the output ends what is said, not the run.
+//! What a program says. A reader that goes away, such as `head`, or a full disk behind the output ends what is said,
+//! not the run.
 
 use std::fmt::{Arguments, Display};
 use std::io::{self, ErrorKind, Write as _};
@@ -29,8 +30,8 @@ pub fn aside(text: impl Display) {
     let _ = io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
-/// Ends what is said, and tells whether all of it was: of a reader that went away, or of a full disk. Returns whether the program may
-/// end well: who closed the output wanted no more of it.
+/// Ends what is said, and tells whether all of it was: of a reader that went away, or of a full disk. Returns whether
+/// the program may end well: who closed the output wanted no more of it.
 pub fn end() -> bool {
     keep(io::stdout().flush());
     match LOST.get() {

@@ -1,4 +1,5 @@
-//! A recording of 10,000 frames for the core on another processor: the closed loop first, then everything that can break.
+//! A recording of 10,000 frames for the core on another processor: the closed loop first, then everything that can
+//! break.
 //!
 //! Made anew where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
 //! seed.

@@ -1,6 +1,7 @@
 //! The unit of a quantity by the end of its name: `torque_constant_unm_per_a` is in uN m/A.
 //!
-//! A name ends with its unit word by word, `per` standing for what it is divided by. So a unit that is made of others needs no entry.
+//! A name ends with its unit word by word, `per` standing for what it is divided by. So a unit that is made of others
+//! needs no entry.
 
 /// Words that a unit is made of, and how they are shown.
 const WORDS: [(&str, &str); 38] = [

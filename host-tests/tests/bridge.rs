@@ -35,7 +35,7 @@ fn a_sound_frame_changes_nothing() {
     let before = *board.pipeline.status();
     let allowed = board.pipeline.config().params.bad_taxels_max as usize;
     for frame in [board.frame, dead(&board.frame, allowed)] {
-        assert!(!board.pipeline.glance(&frame));
+        assert!(!board.pipeline.check_part(&frame));
         assert_eq!(*board.pipeline.status(), before);
     }
 }
@@ -45,7 +45,7 @@ fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
     let mut board = holding();
     let before = *board.pipeline.status();
     let frame = dead(&board.frame, board.pipeline.config().params.bad_taxels_max as usize + 1);
-    assert!(board.pipeline.glance(&frame));
+    assert!(board.pipeline.check_part(&frame));
     let after = *board.pipeline.status();
     assert_eq!((after.mode, after.fault, after.duty.0), (Mode::Force, None, 0));
     assert!(before.duty.0 > 0);
@@ -57,7 +57,7 @@ fn nothing_is_looked_at_while_the_bridge_is_off() {
     board.command.torque = false;
     assert_eq!(board.step().mode, Mode::Off);
     let frame = dead(&board.frame, 10);
-    assert!(!board.pipeline.glance(&frame));
+    assert!(!board.pipeline.check_part(&frame));
 }
 
 /// A fault brakes, that of the bridge itself puts it to sleep; off and tare let the motor coast.

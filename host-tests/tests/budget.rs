@@ -1,6 +1,6 @@
 //! The budget of the loop's time, against any way in which frames may take time.
 
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::pipeline::budget::{WAIT_MAX, WINDOW};
 use fingertip::shipped::Budget;
 use fingertip::units::CoreCycles;
@@ -13,8 +13,8 @@ const DEADLINE: u32 = 12_568;
 /// Frames of the longest refinement, of which only one is the dearest, and one more.
 const REFINEMENT: u32 = 12;
 
-/// How long frames take: `rest`, up to `spread` more, and with a contact what the effort takes, from its least at a `model_q8` of 0
-/// to its most at 256.
+/// How long frames take: `rest`, up to `spread` more, and with a contact what the fit level takes, from its least at a
+/// `model_q8` of 0 to its most at 256.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     frames: u32,
@@ -42,10 +42,10 @@ impl Loop {
         Self { budget: Budget::new(), taken: 1, turn: 0, random: fastrand::Rng::with_seed(2003) }
     }
 
-    /// A frame: the effort and how long it took.
-    fn frame(&mut self, asked: Effort, deadline: u32, with: &Stretch) -> (Effort, u32) {
-        let effort = self.budget.next(asked, CoreCycles(self.taken), CoreCycles(deadline));
-        let [most, least] = Budget::model_ticks(effort);
+    /// A frame: the fit level and how long it took.
+    fn frame(&mut self, asked: FitLevel, deadline: u32, with: &Stretch) -> (FitLevel, u32) {
+        let fit_level = self.budget.next(asked, CoreCycles(self.taken), CoreCycles(deadline));
+        let [most, least] = Budget::model_ticks(fit_level);
         self.taken = with.rest + self.random.u32(0..=with.spread);
         if with.contact && most > 0 {
             // The dearest frame is one of several, which come in turn; the others take a part.
@@ -54,14 +54,14 @@ impl Loop {
                 (least + (((most - least) * with.model_q8) >> 8)) * (REFINEMENT - 1 - self.turn) / (REFINEMENT - 1);
         }
         self.budget.note(with.contact && most > 0);
-        (effort, self.taken)
+        (fit_level, self.taken)
     }
 }
 
 /// What a loop can be sure to keep: the frame by the sums, the model's most, and the margin for what jumps.
-fn fits(effort: Effort, rest: u32) -> bool {
+fn fits(fit_level: FitLevel, rest: u32) -> bool {
     let usable = Budget::usable(DEADLINE);
-    rest + Budget::model_ticks(effort)[0] <= usable - usable / 32
+    rest + Budget::model_ticks(fit_level)[0] <= usable - usable / 32
 }
 
 proptest! {
@@ -78,13 +78,13 @@ proptest! {
         stretches in proptest::collection::vec(stretch(), 1..12),
     ) {
         let mut running = Loop::new();
-        let asked = Effort::from_number(asked);
+        let asked = FitLevel::from_number(asked);
         let margin = DEADLINE - Budget::usable(DEADLINE);
         let mut before = None;
         for stretch in &stretches {
             for frame in 0..stretch.frames {
-                let (effort, taken) = running.frame(asked, DEADLINE, stretch);
-                prop_assert!(effort <= asked);
+                let (fit_level, taken) = running.frame(asked, DEADLINE, stretch);
+                prop_assert!(fit_level <= asked);
                 // What was measured last tells all but a jump of the rest and of the contact.
                 let jumped = before.is_none_or(|before: Stretch| stretch.rest + stretch.spread > before.rest + margin);
                 if taken > DEADLINE {
@@ -103,7 +103,7 @@ proptest! {
         contact in prop::bool::ANY,
     ) {
         let mut running = Loop::new();
-        let asked = Effort::from_number(asked);
+        let asked = FitLevel::from_number(asked);
         for stretch in &stretches {
             for _ in 0..stretch.frames {
                 running.frame(asked, DEADLINE, stretch);
@@ -114,20 +114,21 @@ proptest! {
         let mut changes = 0;
         let mut last = None;
         for frame in 0..2 * calm.frames {
-            let (effort, taken) = running.frame(asked, DEADLINE, &calm);
-            changes += u32::from(frame >= calm.frames && last.is_some_and(|last| last != effort));
-            last = Some(effort);
+            let (fit_level, taken) = running.frame(asked, DEADLINE, &calm);
+            changes += u32::from(frame >= calm.frames && last.is_some_and(|last| last != fit_level));
+            last = Some(fit_level);
             prop_assert!(frame < REFINEMENT || taken <= DEADLINE, "{taken} in frame {frame}");
         }
         prop_assert_eq!(changes, 0, "it hunts");
         let last = last.expect("there were frames");
-        // With a contact the rest is known less well: by what a window's dearest frame may take for the model more than its least.
-        let sure = |effort: Effort| {
-            let blur = if contact { Budget::model_ticks(effort.lower()) } else { [0, 0] };
-            fits(effort, rest + 100 + blur[0] - blur[1])
+        // With a contact the rest is known less well: by what a window's dearest frame may take for the model more than
+        // its least.
+        let sure = |fit_level: FitLevel| {
+            let blur = if contact { Budget::model_ticks(fit_level.lower()) } else { [0, 0] };
+            fits(fit_level, rest + 100 + blur[0] - blur[1])
         };
-        let reached = (1..=asked as u8).map(Effort::from_number).take_while(|effort| sure(*effort)).last();
-        prop_assert!(last >= reached.unwrap_or(Effort::Sum), "{last:?}, but {reached:?} fits");
+        let reached = (1..=asked as u8).map(FitLevel::from_number).take_while(|fit_level| sure(*fit_level)).last();
+        prop_assert!(last >= reached.unwrap_or(FitLevel::Sum), "{last:?}, but {reached:?} fits");
     }
 }
 
@@ -137,13 +138,13 @@ fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
     let dear = Stretch { frames: 0, rest: 6_000, spread: 0, contact: true, model_q8: 384 };
     let mut running = Loop::new();
     let mut rises = [0; 2];
-    let mut last = Effort::Sum;
+    let mut last = FitLevel::Sum;
     for rises in &mut rises {
         for _ in 0..20 * WAIT_MAX * WINDOW {
-            let (effort, taken) = running.frame(Effort::AllRows, DEADLINE, &dear);
-            assert!(taken <= DEADLINE, "{taken} with {effort:?}");
-            *rises += u32::from(effort > last);
-            last = effort;
+            let (fit_level, taken) = running.frame(FitLevel::AllRows, DEADLINE, &dear);
+            assert!(taken <= DEADLINE, "{taken} with {fit_level:?}");
+            *rises += u32::from(fit_level > last);
+            last = fit_level;
         }
     }
     // Once in the longest wait at most.
@@ -153,23 +154,23 @@ fn a_model_dearer_than_estimated_is_tried_ever_less_often() {
 #[test]
 fn what_is_not_measured_is_not_held_back() {
     let mut budget = Budget::new();
-    for effort in Effort::ALL.into_iter().chain(Effort::ALL.into_iter().rev()) {
-        assert_eq!(budget.next(effort, CoreCycles(0), CoreCycles(DEADLINE)), effort);
+    for fit_level in FitLevel::ALL.into_iter().chain(FitLevel::ALL.into_iter().rev()) {
+        assert_eq!(budget.next(fit_level, CoreCycles(0), CoreCycles(DEADLINE)), fit_level);
     }
 }
 
 #[test]
 fn a_contact_out_of_nothing_finds_an_effort_that_fits() {
-    // Without a contact every effort is cheap; the first frame with one must fit all the same.
+    // Without a contact every fit level is cheap; the first frame with one must fit all the same.
     for rest in (1_000..9_000).step_by(250) {
         let mut running = Loop::new();
         let still = Stretch { frames: 0, rest, spread: 0, contact: false, model_q8: 256 };
         for _ in 0..100 * WINDOW {
-            running.frame(Effort::AllRows, DEADLINE, &still);
+            running.frame(FitLevel::AllRows, DEADLINE, &still);
         }
         for _ in 0..1_000 {
-            let (effort, taken) = running.frame(Effort::AllRows, DEADLINE, &Stretch { contact: true, ..still });
-            assert!(taken <= DEADLINE, "{taken} with {effort:?}");
+            let (fit_level, taken) = running.frame(FitLevel::AllRows, DEADLINE, &Stretch { contact: true, ..still });
+            assert!(taken <= DEADLINE, "{taken} with {fit_level:?}");
         }
     }
 }

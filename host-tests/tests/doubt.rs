@@ -2,7 +2,7 @@
 
 use fastrand::Rng;
 use fingertip::contact::Contact;
-use fingertip::contact::{Effort, from_sums};
+use fingertip::contact::{FitLevel, from_sums};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Fit, Picture, ROWS};
 use fingertip::units::Millimetres;
@@ -41,8 +41,8 @@ fn nearest_bad_mm(contact: &Contact, bad: &[u32; ROWS]) -> f64 {
     apart.fold(f64::INFINITY, f64::min)
 }
 
-/// None while the sums' rim is within half a pitch beyond the edge, all from a pitch and a half on; and where a bad taxel lies nearer to
-/// the centre than the rim and three quarters of a pitch.
+/// None while the sums' rim is within half a pitch beyond the edge, all from a pitch and a half on; and where a bad
+/// taxel lies nearer to the centre than the rim and three quarters of a pitch.
 #[test]
 fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     let config = config();
@@ -55,9 +55,9 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
         }
         let centre = [rng.f64() * 14.0 - 7.0, rng.f64() * 14.0 - 7.0];
         let picture = plane(0.1 + 2.0 * rng.f64(), centre, 0.0, bad, &mut rng);
-        let contact = Fit::new(Effort::Moments).read(&picture, &config);
+        let contact = Fit::new(FitLevel::Moments).read(&picture, &config);
         assert_eq!(Contact { doubt: 0, ..contact }, from_sums(&picture, &config));
-        let sum = Fit::new(Effort::Sum).read(&picture, &config);
+        let sum = Fit::new(FitLevel::Sum).read(&picture, &config);
         assert_eq!((sum.doubt, sum.centre_x, sum.centre_y), (contact.doubt, Millimetres::ZERO, Millimetres::ZERO));
         let reach_mm = mm(contact.centre_x).abs().max(mm(contact.centre_y).abs()) + mm(contact.radius);
         let doubt = f64::from(contact.doubt);
@@ -76,7 +76,8 @@ fn sums_are_doubted_by_what_reaches_over_the_edge_or_is_hidden() {
     assert!(kinds.iter().all(|kind| *kind > 100), "{kinds:?}");
 }
 
-/// A fit at rest is doubted for how much is hidden, from a ratio of 5/4 to 7/4, times how little it is like, from a confidence of 160 to
+/// A fit at rest is doubted for how much is hidden, from a ratio of 5/4 to 7/4, times how little it is like, from a
+/// confidence of 160 to
 /// 96. Its own doubt then stands still to the last bit.
 #[test]
 fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
@@ -87,7 +88,7 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
         let along = 4.0 + 5.0 * rng.f64();
         let spread = 0.06 * rng.f64();
         let picture = plane(1.0 + 2.0 * rng.f64(), [along, rng.f64() * 2.0], spread, NONE, &mut rng);
-        let mut fit = Fit::new(Effort::AllRows);
+        let mut fit = Fit::new(FitLevel::AllRows);
         let mut contact = Contact::default();
         for _ in 0..700 {
             contact = fit.read(&picture, &config);
@@ -119,7 +120,7 @@ fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
     (hidden[4], hidden[5]) = (0b11_1111, 0b11_1111);
     // Until the first refinement it goes by the sums: of these, a bad taxel hides a part.
     let doubtful = plane(1.5, [0.0, 0.0], 0.0, hidden, &mut rng);
-    let mut fit = Fit::new(Effort::OneRow);
+    let mut fit = Fit::new(FitLevel::OneRow);
     let mut doubt = 0.0;
     for frame in 0..10 {
         doubt += (255.0 - doubt) / 8.0;

@@ -66,8 +66,8 @@ fn twelve_taxels_dead_or_shorted() {
     }
 }
 
-/// What interference makes of single frames: the motor is shorted for as long, and the contact stays what it was. The same taxels twice
-/// are a fault, and so is half of the array at once.
+/// What interference makes of single frames: the motor is shorted for as long, and the contact stays what it was. The
+/// same taxels twice are a fault, and so is half of the array at once.
 #[test]
 fn taxels_that_are_bad_for_one_frame_are_no_fault() {
     let mut board = holding(1_000);
@@ -130,7 +130,8 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
     }
 }
 
-/// Swapped encoder channels or motor leads: stopped within 5 ms of the first drive, 0.5 mm on. (It pressed to 8.6 N, and then flew back.)
+/// Swapped encoder channels or motor leads: stopped within 5 ms of the first drive, 0.5 mm on. (It pressed to 8.6 N,
+/// and then flew back.)
 #[test]
 fn a_motor_that_runs_the_wrong_way() {
     for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {

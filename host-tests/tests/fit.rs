@@ -1,7 +1,7 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
 use fingertip::contact::Contact;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort, Refined, from_sums, read};
+use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, Refined, from_sums, read};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use fingertip::units::{Millimetres, Newtons};
@@ -22,18 +22,18 @@ fn reference() -> Config {
     Config::shipped(&Params::DEFAULT).expect("the default parameters are in range")
 }
 
-/// What a single look makes of a picture, and every effort that has seen it long enough: the sums first.
+/// What a single look makes of a picture, and every fit level that has seen it long enough: the sums first.
 fn all_ways(picture: &Picture, config: &Config) -> Vec<Contact> {
-    let followed = |effort| {
-        let mut fit = Fit::new(effort);
+    let followed = |fit_level| {
+        let mut fit = Fit::new(fit_level);
         (0..FRAMES).map(|_| fit.read(picture, config)).last().expect("there are frames")
     };
     let looks = Refined::ALL.map(|refined| read(picture, refined, config));
-    Effort::ALL.map(followed).into_iter().chain(looks).collect()
+    FitLevel::ALL.map(followed).into_iter().chain(looks).collect()
 }
 
 /// The ways that use the model, of [`all_ways`].
-const BY_MODEL: usize = Effort::OneRow as usize;
+const BY_MODEL: usize = FitLevel::OneRow as usize;
 
 fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
@@ -49,18 +49,19 @@ fn still(scene: &Scene, bad: [u32; ROWS]) -> (Picture, usize) {
     reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
 }
 
-/// Two refinements of one picture, and a fit of any effort after many frames, keep force and centre within their bounds.
+/// Two refinements of one picture, and a fit of any fit level after many frames, keep force and centre within their
+/// bounds.
 fn holds(scene: &Scene, bad: [u32; ROWS]) {
     let (picture, seen) = still(scene, bad);
     assert!(seen >= 12, "{seen} taxels see {scene:?}");
     let config = scene.config();
     let ways = all_ways(&picture, &config);
-    let one = Effort::ALL.len() + Refined::One as usize;
+    let one = FitLevel::ALL.len() + Refined::One as usize;
     for (way, contact) in ways.iter().enumerate().skip(BY_MODEL).filter(|(way, _)| *way != one) {
         let outcome = Outcome::of(contact, scene, false);
         assert!(outcome.force <= 1.0 && outcome.centre <= 1.0 && !outcome.flagged, "way {way}, {scene:?}: {outcome:?}");
     }
-    let sum = Outcome::of(&ways[Effort::Sum as usize], scene, false);
+    let sum = Outcome::of(&ways[FitLevel::Sum as usize], scene, false);
     assert!(sum.force > 5.0, "the sum alone is right as well: {scene:?}");
 }
 
@@ -228,7 +229,7 @@ fn one_code_near_no_force_moves_the_indentation_by_what_is_documented() {
 const CASES: usize = 200;
 
 fn judged(series: &Series) -> Judged {
-    judge(series, CASES, Effort::default(), &|_| {})
+    judge(series, CASES, FitLevel::default(), &|_| {})
 }
 
 fn values(judged: &Judged, way: usize, of: fn(&Outcome) -> f64) -> impl Iterator<Item = f64> {

@@ -1,7 +1,7 @@
 //! Any picture that the array's reading can make, under any finger's parameters: the fit ends, within its range.
 
 use fingertip::contact::Contact;
-use fingertip::contact::{Effort, Refined, read};
+use fingertip::contact::{FitLevel, Refined, read};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::picture;
@@ -65,7 +65,7 @@ proptest! {
 
     #[test]
     fn any_pictures_are_read(config in any_config(), pictures in proptest::collection::vec(any_picture(), 1..4)) {
-        let mut fits = Effort::ALL.map(Fit::new);
+        let mut fits = FitLevel::ALL.map(Fit::new);
         for picture in &pictures {
             for refined in Refined::ALL {
                 in_range(&read(picture, refined, &config), &config);

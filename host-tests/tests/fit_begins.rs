@@ -1,22 +1,22 @@
 //! A contact that is there from one frame to the next is fitted, wherever on the array it lies.
 
 use fingertip::command::Command;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort};
+use fingertip::contact::{CONFIDENCE_LEAST, FitLevel};
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
 use host_tests::plant::{Setup, World};
 
-/// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames: the true force
-/// and the last status.
-fn pressed(effort: Effort, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
+/// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames:
+/// the true force and the last status.
+fn pressed(fit_level: FitLevel, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
     let mut setup = Setup::default();
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
     let mut world = World::new(&setup);
     let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
-    let command = Command { tare_request: 1, effort, ..Command::default() };
+    let command = Command { tare_request: 1, fit_level, ..Command::default() };
     let mut frame = Frame::EMPTY;
     let mut status = Status::default();
     world.fill_frame(&mut frame);
@@ -33,13 +33,13 @@ fn pressed(effort: Effort, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
 
 #[test]
 fn a_contact_that_appears_is_fitted_wherever_it_lies() {
-    for effort in [Effort::OneRow, Effort::TwoRows, Effort::FiveRows, Effort::AllRows] {
+    for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
         for (depth_mm, x, y) in [(1.5, 6.9, 0.0), (1.5, 0.0, 6.9), (1.5, -6.9, 1.0), (2.0, 5.0, 6.0), (1.5, 1.0, -7.2)]
         {
-            let (force_n, status) = pressed(effort, depth_mm, [x, y]);
+            let (force_n, status) = pressed(fit_level, depth_mm, [x, y]);
             let contact = status.contact;
             let sensed_n: f64 = contact.force.0.to_num();
-            let name = format!("{effort:?}, {depth_mm} mm deep at {x}, {y}: {sensed_n} of {force_n} N");
+            let name = format!("{fit_level:?}, {depth_mm} mm deep at {x}, {y}: {sensed_n} of {force_n} N");
             assert!((sensed_n - force_n).abs() <= 0.01 * force_n + 0.005, "{name}, {}", contact.confidence);
             assert!((CONFIDENCE_LEAST..255).contains(&contact.confidence), "{name}, {}", contact.confidence);
         }

@@ -1,6 +1,6 @@
 //! A single look at a picture: what it looks at, and what it leaves to the sums.
 
-use fingertip::contact::{Effort, Refined, from_sums, read};
+use fingertip::contact::{FitLevel, Refined, from_sums, read};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
@@ -18,7 +18,8 @@ fn cut_off(d_mm: f64, x_mm: f64) -> Picture {
     reading.picture(&scene.pressures(), NONE, &mut fastrand::Rng::with_seed(0)).0
 }
 
-/// Where the sum is more than 16 peaks, every other taxel is enough for a single refinement: like a chessboard's white fields.
+/// Where the sum is more than 16 peaks, every other taxel is enough for a single refinement: like a chessboard's white
+/// fields.
 #[test]
 fn a_single_refinement_of_a_large_contact_looks_at_every_other_taxel() {
     let config = config();
@@ -47,22 +48,27 @@ fn a_single_refinement_of_a_large_contact_looks_at_every_other_taxel() {
     assert!((5..27).contains(&large), "{large}");
 }
 
-/// A contact that jumps from place to place, farther than a refinement goes, is found anew: a guess that leads nowhere is given up.
+/// A contact that jumps from place to place, farther than a refinement goes, is found anew: a guess that leads nowhere
+/// is given up.
 #[test]
 fn a_contact_elsewhere_is_found_again() {
     let config = config();
-    for effort in [Effort::OneRow, Effort::AllRows] {
-        let mut fit = Fit::new(effort);
+    for fit_level in [FitLevel::OneRow, FitLevel::AllRows] {
+        let mut fit = Fit::new(fit_level);
         for (d_mm, x_mm) in [(1.0, -7.0), (0.5, 6.5), (2.5, -6.0), (0.6, 6.0), (0.4, -6.5)] {
             let picture = cut_off(d_mm, x_mm);
-            let frames = if effort == Effort::AllRows { 60 } else { 660 };
+            let frames = if fit_level == FitLevel::AllRows { 60 } else { 660 };
             for _ in 0..frames {
                 fit.read(&picture, &config);
             }
             let contact = fit.read(&picture, &config);
             let fresh = read(&picture, Refined::Full, &config);
             let share = contact.force.0.to_num::<f64>() / fresh.force.0.to_num::<f64>();
-            assert!((share - 1.0).abs() < 0.02, "{share} of {:?} at {x_mm} mm, {effort:?}: {contact:?}", fresh.force);
+            assert!(
+                (share - 1.0).abs() < 0.02,
+                "{share} of {:?} at {x_mm} mm, {fit_level:?}: {contact:?}",
+                fresh.force
+            );
             assert!(fresh.force > from_sums(&picture, &config).force);
         }
     }

@@ -149,7 +149,8 @@ proptest! {
         }
         for (tare, mean) in array.tare().flatten().zip(means.as_flattened()) {
             let tare = f64::from(*tare) / f64::from(1 << (TARE_BITS - CODE_BITS));
-            // The n-th of 32 looks counts 1/n in 16 bits, rounded down: that moves the mean by n/32 of 2^-16 of what the looks differ.
+            // The n-th of 32 looks counts 1/n in 16 bits, rounded down: that moves the mean by n/32 of 2^-16 of what
+            // the looks differ.
             let bound = 1.5 + f64::from(highest) * 16.5 / 65_536.0;
             prop_assert!((tare - mean).abs() <= bound, "{tare}, not {mean}, to {bound}");
         }

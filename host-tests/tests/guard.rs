@@ -1,4 +1,5 @@
-//! The guard alone, against any frames, senses and duties: what it promises holds whatever the loop, the array and the host do.
+//! The guard alone, against any frames, senses and duties: what it promises holds whatever the loop, the array and the
+//! host do.
 
 use fastrand::Rng;
 use fingertip::config::newtons;
@@ -47,8 +48,8 @@ fn lets_through(guard: &Guard) -> [bool; 2] {
     })
 }
 
-/// Beyond an end of the travel, or behind the floor, no duty drives the tip farther out, and 1 mm beyond it is stopped: for any
-/// counts, forces and voltages, jumps included.
+/// Beyond an end of the travel, or behind the floor, no duty drives the tip farther out, and 1 mm beyond it is stopped:
+/// for any counts, forces and voltages, jumps included.
 #[test]
 fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);
@@ -81,7 +82,8 @@ fn no_input_opens_an_end() {
     }
 }
 
-/// A motor, pushed about by somebody who wants to break the envelope: full duty this way and that, for as long as it pleases.
+/// A motor, pushed about by somebody who wants to break the envelope: full duty this way and that, for as long as it
+/// pleases.
 struct Adversary {
     travel_mm: f64,
     speed_mm_per_s: f64,
@@ -107,8 +109,8 @@ impl Adversary {
     }
 }
 
-/// Where nothing is pressed, a tip that is fast 20 ms after the last contact is stopped within 30 ms more, whatever duty is asked for,
-/// and whatever the array reads in the air: noise, a wrong baseline, anything.
+/// Where nothing is pressed, a tip that is fast 20 ms after the last contact is stopped within 30 ms more, whatever
+/// duty is asked for, and whatever the array reads in the air: noise, a wrong baseline, anything.
 #[test]
 fn no_duty_makes_it_fast_in_the_air() {
     let mut rng = Rng::with_seed(2);
@@ -143,7 +145,8 @@ fn no_duty_makes_it_fast_in_the_air() {
     assert!(fast > 0 && stopped > 100, "the adversary never tried");
 }
 
-/// A finger that is as strong as its parameters say, give or take 30 %, with friction and contacts, is never taken for a broken one.
+/// A finger that is as strong as its parameters say, give or take 30 %, with friction and contacts, is never taken for
+/// a broken one.
 #[test]
 fn a_sound_finger_is_never_stopped_for_its_direction() {
     let mut rng = Rng::with_seed(3);
@@ -176,7 +179,8 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
     }
 }
 
-/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a dead encoder too.
+/// Swapped channels or leads: stopped within 5 ms and 0.5 mm of full drive, in either direction. A blocked motor or a
+/// dead encoder too.
 #[test]
 fn the_wrong_way_ends_within_half_a_millimetre() {
     let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
@@ -205,8 +209,8 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
     (travel_mm / count_mm(config)).round() as i32
 }
 
-/// The tip goes back no farther behind a touch than the clearance and 1 mm behind the surface; what only looks like a touch while the
-/// host asks for none moves nothing.
+/// The tip goes back no farther behind a touch than the clearance and 1 mm behind the surface; what only looks like a
+/// touch while the host asks for none moves nothing.
 #[test]
 fn a_touch_bounds_the_retreat() {
     let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");

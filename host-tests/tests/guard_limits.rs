@@ -45,7 +45,8 @@ impl Finger {
         self.pushed(0)
     }
 
-    /// Speeds up over 50 ms, so that no change of the speed is large, and goes on for a time: the first fault, and when.
+    /// Speeds up over 50 ms, so that no change of the speed is large, and goes on for a time: the first fault, and
+    /// when.
     fn goes(&mut self, speed_mm_per_s: f64, seconds: f64) -> Option<(Fault, f64)> {
         let from = self.speed_mm_per_s;
         let frames = (seconds / self.frame_s()) as u32;
@@ -164,7 +165,8 @@ fn after_a_contact_it_may_be_fast_for_a_while() {
     }
 }
 
-/// Pressed is from half a millimetre behind where it touched to two indentations forward, or five back, and half a millimetre more.
+/// Pressed is from half a millimetre behind where it touched to two indentations forward, or five back, and half a
+/// millimetre more.
 #[test]
 fn a_tip_is_pressed_as_deep_as_its_force_bears_out() {
     let mut finger = Finger::new();

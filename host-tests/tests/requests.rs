@@ -1,4 +1,5 @@
-//! Requests in the loop: what comes in one frame is done, and what cannot be done leaves a word. The first frame with torque.
+//! Requests in the loop: what comes in one frame is done, and what cannot be done leaves a word. The first frame with
+//! torque.
 
 use fingertip::config::newtons;
 use fingertip::identify::{Identification, Refusal};
@@ -224,7 +225,8 @@ fn identify_without_a_tare_is_refused() {
     assert_eq!(board.step().identification, NOT_READY);
 }
 
-/// A host that asks for another measurement in the frame in which one ends gets another, and the first one's end is not spoilt.
+/// A host that asks for another measurement in the frame in which one ends gets another, and the first one's end is not
+/// spoilt.
 #[test]
 fn identify_in_the_frame_in_which_another_ends_begins_anew() {
     let refused_at = {

@@ -1,4 +1,5 @@
-//! What is compared between processors: every public function of the model, over its whole domain, and more than refusals.
+//! What is compared between processors: every public function of the model, over its whole domain, and more than
+//! refusals.
 
 use host_tests::prove::domain::reference_tip;
 use images::same_bits::model::Sample;

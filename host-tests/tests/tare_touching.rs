@@ -33,13 +33,14 @@ fn normal(rng: &mut Rng) -> f64 {
 }
 
 impl Finger {
-    /// Gains spread by 10 %, preload by 20 % and uneven by 30 % from side to side, amplifiers by 10 codes, noise of 3 codes; up to five
-    /// taxels dead, up to three masked.
+    /// Gains spread by 10 %, preload by 20 % and uneven by 30 % from side to side, amplifiers by 10 codes, noise of 3
+    /// codes; up to five taxels dead, up to three masked.
     fn new(seed: u64, modulus_kpa: f64) -> Self {
         let mut rng = Rng::with_seed(seed);
         let mut setup = Setup::default();
         setup.tip.modulus_kpa = modulus_kpa;
-        // The frames are made without the row's sag; what little preload a few taxels have here is more than few may lack.
+        // The frames are made without the row's sag; what little preload a few taxels have here is more than few may
+        // lack.
         let params = Params {
             modulus_pa: (modulus_kpa * 1e3) as i32,
             row_sag_ppb_per_code: 0,

@@ -1,9 +1,9 @@
-//! Instructions of the Cortex-M4F that stable Rust offers only as assembly: two signed 16-bit numbers in a word, worked on
-//! at once, and the FPU's square root.
+//! Instructions of the Cortex-M4F that stable Rust offers only as assembly: two signed 16-bit numbers in a word, worked
+//! on at once, and the FPU's square root.
 //!
-//! Everywhere else each function is the same in portable Rust ([`portable`]). This crate is the only place outside the board layer with
-//! `unsafe`: the core forbids it. A test compares the portable functions with plain arithmetic on any host, and the
-//! emulated target's digest compares the instructions with the portable functions.
+//! Everywhere else each function is the same in portable Rust ([`portable`]). This crate is the only place outside the
+//! board layer with `unsafe`: the core forbids it. A test compares the portable functions with plain arithmetic on any
+//! host, and the emulated target's digest compares the instructions with the portable functions.
 #![no_std]
 
 #[cfg(not(target_os = "none"))]
@@ -163,8 +163,8 @@ mod instructions {
         root
     }
 
-    /// sqrt(x y), to within 2.5 x 2^-24 of itself and rounded down to an integer (VMUL and VSQRT, in single precision); and
-    /// x times the gain, the last 64 bits (UMULL and MLA), which costs nothing while the FPU takes the root.
+    /// sqrt(x y), to within 2.5 x 2^-24 of itself and rounded down to an integer (VMUL and VSQRT, in single precision);
+    /// and x times the gain, the last 64 bits (UMULL and MLA), which costs nothing while the FPU takes the root.
     #[inline(always)]
     pub fn root_and_product(x: u32, y: u32, gain: u64) -> (u32, u64) {
         let (root, low, high): (u32, u32, u32);

@@ -1,6 +1,7 @@
 //! One pass over the rows of a frame: from codes to taxels above their tare, their sums, and the highest of them.
 //!
-//! [`portable_pass`] is the pass to read; [`pass`] gives the same bits, for rows of ten columns by the target's instructions.
+//! [`portable_pass`] is the pass to read; [`pass`] gives the same bits, for rows of ten columns by the target's
+//! instructions.
 
 use super::{high, low, pair, portable};
 
@@ -17,8 +18,8 @@ const BOOST_DROP: u32 = GAIN_BITS + BOOST_BITS - CODE_BITS - 32;
 /// Pairs whose products with gains add up to 32 bits: 16 x 4095 x 32767 is just below 2^31.
 const BLOCK: usize = 8;
 
-/// Codes of a frame, in the order in which two converters read them: each row as pairs of the same instant, one column of the
-/// first half and one of the second. It begins on a word's border.
+/// Codes of a frame, in the order in which two converters read them: each row as pairs of the same instant, one column
+/// of the first half and one of the second. It begins on a word's border.
 #[repr(C, align(4))]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Codes<const ROWS: usize, const COLUMNS: usize> {
@@ -83,7 +84,8 @@ fn weights_at<const COLUMNS: usize>(row: &[i16; COLUMNS], at: usize) -> u32 {
     pair(weight(2 * at), weight(2 * at + 1))
 }
 
-/// Every pair of a row of up to 32 columns in turn, written out: the compiler would keep the loop where it builds for size.
+/// Every pair of a row of up to 32 columns in turn, written out: the compiler would keep the loop where it builds for
+/// size.
 #[inline(always)]
 pub fn each_pair<const COLUMNS: usize>(mut act: impl FnMut(usize)) {
     const { assert!(COLUMNS <= 32) };
@@ -106,9 +108,9 @@ pub const fn moment_bits(columns: usize) -> u32 {
 
 /// Bits dropped from a row's sum, so that neither it nor the sum of all rows nor their moment passes 32 bits.
 ///
-/// A code adds at most 4095 and a gain nearly 2 in Q14, a boost at most 1.5; a total is 4 bits coarser than a sum. The moment along the rows is
-/// a quarter of the total's, and what of it has one sign has the weights 1, 3, 5 .. of half of the rows. 10 x 10 drops none, 16 x 16 one
-/// bit, 16 x 32 two.
+/// A code adds at most 4095 and a gain nearly 2 in Q14, a boost at most 1.5; a total is 4 bits coarser than a sum. The
+/// moment along the rows is a quarter of the total's, and what of it has one sign has the weights 1, 3, 5 .. of half of
+/// the rows. 10 x 10 drops none, 16 x 16 one bit, 16 x 32 two.
 pub const fn sum_drop(rows: usize, columns: usize) -> u32 {
     let row = columns as u64 * 4095 * 32_767;
     let total = row / 16 * 3 / 2 * rows as u64;
@@ -183,8 +185,8 @@ fn taxel(net: i16, gain: i16, boost: i32, tare: i32) -> i32 {
     (boosted as i32).wrapping_sub(tare >> (TARE_BITS - CODE_BITS))
 }
 
-/// From codes to `taxels`, row by row: net codes, the row's sag by their sum, each column by its gain and the row's boost, less its
-/// tare; and the rows' sums by the same gains and boosts, which are not rounded taxel by taxel.
+/// From codes to `taxels`, row by row: net codes, the row's sag by their sum, each column by its gain and the row's
+/// boost, less its tare; and the rows' sums by the same gains and boosts, which are not rounded taxel by taxel.
 #[inline(always)]
 pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,

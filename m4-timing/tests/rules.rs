@@ -1,5 +1,5 @@
-//! The timing rules: sequences whose cost the tables of Arm's Technical Reference Manual state, and what the meter makes
-//! of them. These are checks of consistency; `silicon.rs` compares with measurements.
+//! The timing rules: sequences whose cost the tables of Arm's Technical Reference Manual state, and what the meter
+//! makes of them. These are checks of consistency; `silicon.rs` compares with measurements.
 
 use m4_timing::core::Touched;
 use m4_timing::decode::{decode, is_wide};

@@ -1,8 +1,8 @@
 //! The model against cycles that others measured on STM32F4 boards and published. Needs QEMU and the image:
 //! `cargo xtask timing --check` runs these tests.
 //!
-//! The kernels are assembly, so no compiler stands between their source and these figures; `m4-timing/tests/kernels` has them
-//! with their licences. What was measured there is the call with its arguments in place: so it is here.
+//! The kernels are assembly, so no compiler stands between their source and these figures; `m4-timing/tests/kernels`
+//! has them with their licences. What was measured there is the call with its arguments in place: so it is here.
 
 use m4_timing::report::{Measured, parse};
 use std::{env, fs, path::PathBuf, process::Command};

@@ -70,7 +70,8 @@ impl Bus {
     /// The port's own.
     pub async fn send(&mut self, bytes: &[u8]) -> Result<(), usart::Error> {
         self.transmit_enable.set_high();
-        // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given back early.
+        // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given
+        // back early.
         let mut cleared = Sr(u32::MAX);
         cleared.set_tc(false);
         pac::USART2.sr().write_value(cleared);

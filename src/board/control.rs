@@ -92,7 +92,7 @@ impl State {
         }
         self.find_frames();
         self.take_frame();
-        self.glance();
+        self.check_part();
         self.configure();
         self.save();
     }
@@ -122,12 +122,12 @@ impl State {
     }
 
     /// Looks at the rows that are already there, half a frame before the step does.
-    fn glance(&mut self) {
+    fn check_part(&mut self) {
         if !super::scan::take_halfway() || self.discard_next {
             return;
         }
         self.parts.scan.copy_so_far(&mut self.frame);
-        if self.parts.pipeline.glance(&self.frame) {
+        if self.parts.pipeline.check_part(&self.frame) {
             self.parts.bridge.apply(self.parts.pipeline.status().bridge());
             self.publish();
         }
@@ -141,7 +141,7 @@ impl State {
             supply_mv: parts.supply.read_mv(),
             bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
-            // Before the first frame nothing is known: not 0, which would let any effort in.
+            // Before the first frame nothing is known: not 0, which would let any fit level in.
             answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };
         let (_, status) = parts.pipeline.step(&self.frame, &sense, &command);
@@ -164,8 +164,8 @@ impl State {
 
     /// The guard cut the bridge: latches the fault. The scan starts anew when that is cleared.
     ///
-    /// The watchdog guards against firmware that hangs. Here it does not: it has seen the fault, and it feeds the watchdog
-    /// only after reading back that the bridge is cut, so that the fault can be read on the bus.
+    /// The watchdog guards against firmware that hangs. Here it does not: it has seen the fault, and it feeds the
+    /// watchdog only after reading back that the bridge is cut, so that the fault can be read on the bus.
     fn without_frames(&mut self) {
         self.stop(Fault::LostFrames);
         self.lost = true;
@@ -206,8 +206,8 @@ impl State {
         });
     }
 
-    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and the scan
-    /// starts anew.
+    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and
+    /// the scan starts anew.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
         self.parts.bridge.apply(Wanted::Open);
@@ -219,8 +219,8 @@ impl State {
         self.restart_scan();
     }
 
-    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so the scan
-    /// is stopped and starts anew, and the bridge stays as it is.
+    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so
+    /// the scan is stopped and starts anew, and the bridge stays as it is.
     #[inline(never)]
     fn save(&mut self) {
         let Some(record) = SAVE.take(|record| *record) else { return };

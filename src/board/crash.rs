@@ -85,8 +85,8 @@ impl Record {
         Self { magic: MAGIC, cause: CrashCause::None as u32, line: 0, pc: 0, count: 0, fresh: 0, check: 0 };
 
     fn load() -> Option<Self> {
-        // SAFETY: any bit pattern is a valid `Record`, and nothing else runs: this is called at the start and from handlers
-        // that do not return.
+        // SAFETY: any bit pattern is a valid `Record`, and nothing else runs: this is called at the start and from
+        // handlers that do not return.
         let record = unsafe { (&raw const RECORD).cast::<Self>().read_volatile() };
         (record.magic == MAGIC && record.check == record.checked()).then_some(record)
     }

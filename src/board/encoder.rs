@@ -35,7 +35,8 @@ impl Encoder {
         Self { last: timer.cnt().read().cnt(), count: 0 }
     }
 
-    /// The count now; wraps at 32 bits. Call it before the motor can move 32,768 counts, a tenth of a second at full speed.
+    /// The count now; wraps at 32 bits. Call it before the motor can move 32,768 counts, a tenth of a second at full
+    /// speed.
     pub fn read(&mut self) -> i32 {
         let now = pac::TIM3.cnt().read().cnt();
         self.count = self.count.wrapping_add(i32::from(now.wrapping_sub(self.last) as i16));

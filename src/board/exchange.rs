@@ -1,4 +1,5 @@
-//! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the other.
+//! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the
+//! other.
 
 use core::cell::{Cell, UnsafeCell};
 use core::sync::atomic::{AtomicU8, Ordering};
@@ -110,7 +111,8 @@ const EMPTY: u8 = 0;
 const FULL: u8 = 1;
 const BUSY: u8 = 2;
 
-// SAFETY: the value is reached only between winning the state (EMPTY or FULL to BUSY) and giving it up, so by one at a time.
+// SAFETY: the value is reached only between winning the state (EMPTY or FULL to BUSY) and giving it up, so by one at a
+// time.
 unsafe impl<T: Send> Sync for Mailbox<T> {}
 
 impl<T> Mailbox<T> {

@@ -41,13 +41,14 @@ impl Store {
         self.journal.load(&self.chip, tell)
     }
 
-    /// See [`Journal::make_room`]. Takes up to 2 s in which the core stands, so call it before the watchdog and the scan start.
+    /// See [`Journal::make_room`]. Takes up to 2 s in which the core stands, so call it before the watchdog and the
+    /// scan start.
     pub fn make_room(&mut self) -> Result<bool, SaveError> {
         self.journal.make_room(&mut self.chip)
     }
 
-    /// Appends a record. The core stands while each of its 72 words is written, 16 us and at most 100 us: the motor must be off,
-    /// the scan stopped, and `between` them the watchdog fed.
+    /// Appends a record. The core stands while each of its 72 words is written, 16 us and at most 100 us: the motor
+    /// must be off, the scan stopped, and `between` them the watchdog fed.
     ///
     /// # Errors
     /// There is no room, or the flash does not hold the record afterwards.
@@ -62,8 +63,8 @@ impl store::Flash for Chip {
     type Error = Error;
 
     fn bytes(&self, sector: Sector) -> &[u8] {
-        // SAFETY: the sector is flash that is always readable, and the image ends below it (memory.x). Only `program` and
-        // `erase` change it, and they borrow `self` exclusively.
+        // SAFETY: the sector is flash that is always readable, and the image ends below it (memory.x). Only `program`
+        // and `erase` change it, and they borrow `self` exclusively.
         unsafe { core::slice::from_raw_parts((FLASH_START + offset(sector)) as *const u8, SECTOR_BYTES as usize) }
     }
 
@@ -81,8 +82,8 @@ impl store::Flash for Chip {
     }
 }
 
-/// Lets the next erase take 32 bits at a time. The driver sets that for a write and clears it after; an erase it leaves at the
-/// 8 bits of the reset, which takes twice as long, up to 4 s. The driver locks the registers again.
+/// Lets the next erase take 32 bits at a time. The driver sets that for a write and clears it after; an erase it leaves
+/// at the 8 bits of the reset, which takes twice as long, up to 4 s. The driver locks the registers again.
 fn set_width() {
     if pac::FLASH.cr().read().lock() {
         pac::FLASH.keyr().write_value(0x4567_0123);

@@ -1,9 +1,9 @@
 //! The frame guard, and the stopwatch that it hangs on: TIM5 runs freely, its compare 1 is the guard's deadline.
 //!
-//! Control has three quarters of a frame time to answer a frame, and each answer moves the guard to the instant at which the
-//! next one is due: one and three quarters frame times after this frame's end. When that passes, the interrupt of the highest
-//! priority cuts the bridge, tells the control task, and sets the next deadline, so that control runs on (without frames) and
-//! can see to the bridge, the watchdog and the scan's restart.
+//! Control has three quarters of a frame time to answer a frame, and each answer moves the guard to the instant at
+//! which the next one is due: one and three quarters frame times after this frame's end. When that passes, the
+//! interrupt of the highest priority cuts the bridge, tells the control task, and sets the next deadline, so that
+//! control runs on (without frames) and can see to the bridge, the watchdog and the scan's restart.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 

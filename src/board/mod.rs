@@ -12,7 +12,7 @@ pub mod encoder;
 pub mod exchange;
 pub mod flash;
 pub mod guard;
-pub mod host;
+pub mod link_task;
 pub mod log;
 pub mod pins;
 pub mod scan;

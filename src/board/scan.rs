@@ -1,7 +1,8 @@
 //! The scan: rows, conversions and memory are moved by timers and DMA alone; see "Scan" in `docs/board.md`.
 //!
 //! The processor sees one interrupt a frame, from the second bank's stream. It counts the frame, notes the instant and
-//! wakes the control task. Another, from the rows' stream when half of them are driven, wakes it for a glance. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
+//! wakes the control task. Another, from the rows' stream when half of them are driven, wakes it for a check of the
+//! partial frame. The two halves of the buffers take turns, so the lowest bit of the sequence number names the half.
 
 mod machine;
 
@@ -111,8 +112,8 @@ impl Scan {
         start_timer(timing);
     }
 
-    /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or the DMA
-    /// was in this half meanwhile.
+    /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or
+    /// the DMA was in this half meanwhile.
     pub fn copy(&mut self, completed: Completed, frame: &mut Frame) -> bool {
         let half = completed.sequence as usize & 1;
         let arrived = bank_a_completed(half) && !overrun() && in_step();

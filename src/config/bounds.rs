@@ -38,7 +38,8 @@ pub struct Bounds {
     pub change_per_n: i32,
     /// The change of speed that must be expected before it counts, Q16 mm/s.
     pub change_least: i32,
-    /// What the speed changes less than expected by a contact that the array does not see: by 1 N and the friction, Q16 mm/s.
+    /// What the speed changes less than expected by a contact that the array does not see: by 1 N and the friction, Q16
+    /// mm/s.
     pub change_unseen: i32,
     /// The part of such a change that counts and model may be wrong by.
     pub change_unsure: i32,

@@ -1,26 +1,29 @@
 //! How quick the loop is: its gains at each pace, from the quickest that time and encoder allow to the calm of rest.
 //!
-//! A loop that is quick answers each encoder count with a kick of the voltage. An observer with its poles at w_o takes a
-//! step of one count q for a speed of about w_o q and a disturbance of w_o^2 q, and the law with w_o = 2.5 k_v answers with
+//! A loop that is quick answers each encoder count with a kick of the voltage. An observer with its poles at w_o takes
+//! a step of one count q for a speed of about w_o q and a disturbance of w_o^2 q, and the law with w_o = 2.5 k_v
+//! answers with
 //!
 //! ```text
 //! g dV = (k_v w_o 0.8 + w_o^2) q 0.7 = 5.8 k_v^2 q
 //! ```
 //!
-//! The quickest pace is the one that the dead time allows, `1 / (5 T)`, or the one at which a count moves the voltage by three
-//! quarters of the largest or is taken for 60 mm/s, whichever is slowest: so a coarse encoder makes a slower loop, never a swinging one. Each
-//! further pace is half as quick and answers with a quarter. At rest a count is worth 1/64 of that.
+//! The quickest pace is the one that the dead time allows, `1 / (5 T)`, or the one at which a count moves the voltage
+//! by three quarters of the largest or is taken for 60 mm/s, whichever is slowest: so a coarse encoder makes a slower
+//! loop, never a swinging one. Each further pace is half as quick and answers with a quarter. At rest a count is worth
+//! 1/64 of that.
 
 use crate::root::floor_sqrt;
 
 /// Paces, quickest first.
 pub const PACES: usize = 4;
 
-/// Bandwidth of the quickest speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the encoder was
-/// read and half a frame later on average through the hold; with a whole frame of reserve that is 1.5 T or 17 degrees at the crossover.
+/// Bandwidth of the quickest speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the
+/// encoder was read and half a frame later on average through the hold; with a whole frame of reserve that is 1.5 T or
+/// 17 degrees at the crossover.
 const SPEED_GAIN_FRAMES: f32 = 5.0;
-/// The position's slope k is this much slower than the speed loop: k = k_v / 3. The feed-forward a_ref puts the poles of the
-/// linear zone at exactly -k_v and -k, so they need no further distance.
+/// The position's slope k is this much slower than the speed loop: k = k_v / 3. The feed-forward a_ref puts the poles
+/// of the linear zone at exactly -k_v and -k, so they need no further distance.
 const POSITION_TO_SPEED: f32 = 3.0;
 /// The observer's poles are this much faster than the speed loop that they serve.
 const OBSERVER_TO_SPEED: f32 = 2.5;

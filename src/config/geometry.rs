@@ -1,14 +1,15 @@
 //! What the fit knows of the array and the tip before it sees a picture: places, and a table over the distance squared.
 //!
 //! Lengths are in tip radii. A taxel at the distance r from the contact's centre, with sides h, sees squared distances
-//! spread around `r^2 + h^2/6` with the variance `(h r)^2 / 3` whatever its direction. So its mean is taken over squared
-//! distances spread evenly over `r^2 + h^2/6 +- h r`, and both parts of the model have closed forms there:
+//! spread around `r^2 + h^2/6` with the variance `(h r)^2 / 3` whatever its direction. So its mean is taken over
+//! squared distances spread evenly over `r^2 + h^2/6 +- h r`, and both parts of the model have closed forms there:
 //!
 //! - inside the contact, `p/Y = 1 - s G` with `G = (L1 - L2) / (h r)`, the mean of 1/L,
 //! - under the rim, `p/Y = (L1 - s)^2 / (2 h r)`,
 //!
-//! where s is what is left between the plane and the hemisphere's centre, `1 - d`, and `L1 = sqrt(1 - r^2 - h^2/6 + h r)`
-//! and `L2 = sqrt(1 - r^2 - h^2/6 - h r)` are the columns' lengths at the near and the far end of the spread.
+//! where s is what is left between the plane and the hemisphere's centre, `1 - d`, and
+//! `L1 = sqrt(1 - r^2 - h^2/6 + h r)` and `L2 = sqrt(1 - r^2 - h^2/6 - h r)` are the columns' lengths at the near and
+//! the far end of the spread.
 
 use crate::params::Params;
 use crate::root::floor_sqrt;
@@ -42,7 +43,8 @@ pub(crate) struct Node {
 pub struct Geometry {
     /// h, Q28.
     pub(crate) pitch: i32,
-    /// How far from the array's middle a contact's centre may lie: a radius beyond its edge along the columns and the rows, Q24.
+    /// How far from the array's middle a contact's centre may lie: a radius beyond its edge along the columns and the
+    /// rows, Q24.
     pub(crate) reach: [i32; 2],
     /// 2/h, Q20.
     pub(crate) inverse_half_pitch: i32,
@@ -64,8 +66,8 @@ impl Geometry {
         for (index, node) in nodes.iter_mut().enumerate().skip(1) {
             *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));
         }
-        // At the centre nothing is spread by the distance; a taxel there is under the rim only where the whole contact is
-        // smaller than a taxel.
+        // At the centre nothing is spread by the distance; a taxel there is under the rim only where the whole contact
+        // is smaller than a taxel.
         let [centre, first, ..] = &mut nodes;
         let near_length = root(i64::from(ONE) - square(i64::from(pitch)) / 6);
         *centre = Node {

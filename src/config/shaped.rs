@@ -7,7 +7,8 @@ use crate::params::Params;
 use crate::scan::Clocks;
 use core::ops::{Deref, DerefMut};
 
-/// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`] in it.
+/// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`]
+/// in it.
 ///
 /// ```
 /// use fingertip::config::Shaped;
@@ -40,7 +41,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
     /// Checks the parameters and derives the loop's constants, with the clocks of a board.
     ///
     /// # Errors
-    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each other.
+    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each
+    /// other.
     pub fn new(params: &Params, clocks: &Clocks) -> Result<Self, ConfigError> {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         let config = Config::new(params, [ROWS, COLUMNS], clocks)?;

@@ -13,7 +13,7 @@ pub(super) const fn between(a: i32, b: i32, share_q31: i32) -> i32 {
 }
 
 /// `value` within `-limit` to `limit`.
-pub(super) const fn within(value: i64, limit: i32) -> i32 {
+pub(super) const fn clamp_to(value: i64, limit: i32) -> i32 {
     if value > limit as i64 {
         limit
     } else if value < -(limit as i64) {

@@ -1,7 +1,8 @@
-//! How far a force is known only from below: 0 not at all, 255 where much of the contact is hidden and nothing says how much.
+//! How far a force is known only from below: 0 not at all, 255 where much of the contact is hidden and nothing says how
+//! much.
 //!
-//! It is a measure and not a verdict, and it comes and goes slowly: a loop that goes by it must not jump where a rim touches the array's
-//! edge.
+//! It is a measure and not a verdict, and it comes and goes slowly: a loop that goes by it must not jump where a rim
+//! touches the array's edge.
 
 use super::fitted::RATIO_BITS;
 use super::{hides, overhang};
@@ -9,7 +10,8 @@ use crate::config::Config;
 use crate::contact::Contact;
 use crate::pressure::Picture;
 
-/// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two fifths.
+/// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two
+/// fifths.
 const RATIO_DOUBTED: [i32; 2] = [(5 << RATIO_BITS) / 4, (7 << RATIO_BITS) / 4];
 /// Confidences between which a fit is a good likeness.
 const CONFIDENCE: [i32; 2] = [96, 160];
@@ -21,7 +23,8 @@ pub(super) fn of_fit(ratio: i32, confidence: u8) -> u8 {
     ((u32::from(hidden) * (u32::from(unlike) + 1)) >> 8) as u8
 }
 
-/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on or where a bad taxel hides a part.
+/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on or where a bad
+/// taxel hides a part.
 pub(super) fn of_sums<const ROWS: usize, const COLUMNS: usize>(
     sums: &Contact,
     picture: &Picture<ROWS, COLUMNS>,

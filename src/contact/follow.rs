@@ -1,15 +1,16 @@
 //! A contact followed from frame to frame, with little work in each.
 //!
-//! A refinement is spread over frames: it begins in a frame of its own, each row of the array is then taken once, so many in a
-//! frame as the effort says, and the solution comes with the last of them. What it tells is how many times larger the contact's force is than the sum of the
-//! taxels over those frames: 1 where the array sees all of it. That ratio changes slowly, while the sum follows every
-//! frame. So the force is the sum times the last ratio, as quick as the sum itself.
+//! A refinement is spread over frames: it begins in a frame of its own, each row of the array is then taken once, so
+//! many in a frame as the fit level says, and the solution comes with the last of them. What it tells is how many times
+//! larger the contact's force is than the sum of the taxels over those frames: 1 where the array sees all of it. That
+//! ratio changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as
+//! the sum itself.
 
-use super::arith::{Divisor, within};
-use super::effort::Effort;
+use super::arith::{Divisor, clamp_to};
+use super::fit_level::FitLevel;
 use super::fitted::{Fitted, RATIO_BITS};
-use super::guess::{Guess, Pressed};
-use super::step::{Bench, Equations};
+use super::guess::{Guess, Prediction};
+use super::step::{Comparison, Equations};
 use super::sums::from_sums;
 use super::view::{Scale, View};
 use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
@@ -20,8 +21,8 @@ use crate::frame::Shape;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
 
-/// A row a frame is taken in steps of so many rows, so that what changes meanwhile is not taken for a slope: three, or the next number that
-/// shares no divisor with the number of rows, so that the steps come to each of them once.
+/// A row a frame is taken in steps of so many rows, so that what changes meanwhile is not taken for a slope: three, or
+/// the next number that shares no divisor with the number of rows, so that the steps come to each of them once.
 const fn row_step(rows: usize) -> usize {
     let mut step = 3;
     while divisor(step, rows) != 1 {
@@ -35,18 +36,21 @@ const fn divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { divisor(b, a % b) }
 }
 
-/// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be found.
+/// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be
+/// found.
 const ASTRAY_MAX: u8 = 12;
 /// Refinements after which a new start is near a solution: until then what was found before counts.
 const AFRESH: u8 = 4;
 /// With fewer live taxels than this in the model's contact there are other contacts that look the same.
 const TAXELS_LEAST: i32 = 8;
-/// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times as large.
+/// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times
+/// as large.
 const TAXELS_SURE: i32 = 12;
 /// The largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
-/// The ratio follows a good likeness at once, another by a quarter of the way: what one of them gets wrong must not push the finger.
+/// The ratio follows a good likeness at once, another by a quarter of the way: what one of them gets wrong must not
+/// push the finger.
 const RATIO_FOLLOWS_BITS: u32 = 2;
 /// A ratio this near to 1 is 1: 1/64.
 const RATIO_SAME: i32 = 1 << (RATIO_BITS - 6);
@@ -70,7 +74,7 @@ const FOLLOWS_MAX: i32 = ONE / 16;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
-    effort: Effort,
+    fit_level: FitLevel,
     at_work: bool,
     /// Whether a refinement has begun.
     begun: bool,
@@ -81,7 +85,7 @@ pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     /// The contact supposed.
     guess: Guess,
     /// The same, worked out for the taxels.
-    pressed: Pressed<ROWS, COLUMNS>,
+    prediction: Prediction<ROWS, COLUMNS>,
     /// By the peak at the beginning.
     scale: Scale,
     /// The sum's force at the beginning.
@@ -106,22 +110,22 @@ pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
 
 impl<const ROWS: usize, const COLUMNS: usize> Default for Fit<ROWS, COLUMNS> {
     fn default() -> Self {
-        Self::new(Effort::default())
+        Self::new(FitLevel::default())
     }
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     /// Nothing seen yet.
-    pub const fn new(effort: Effort) -> Self {
+    pub const fn new(fit_level: FitLevel) -> Self {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         Self {
-            effort,
+            fit_level,
             at_work: false,
             begun: false,
             frames: 0,
             covered: true,
-            guess: Guess { rest: 0, x: 0, y: 0 },
-            pressed: Pressed::NONE,
+            guess: Guess { height: 0, x: 0, y: 0 },
+            prediction: Prediction::NONE,
             scale: Scale::NONE,
             force: Newtons::ZERO,
             forces: 0,
@@ -137,9 +141,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     }
 
     /// From the next frame on. A refinement under way is begun anew; what the last one found stays.
-    pub fn set_effort(&mut self, effort: Effort) {
-        if effort != self.effort {
-            self.effort = effort;
+    pub fn set_fit_level(&mut self, fit_level: FitLevel) {
+        if fit_level != self.fit_level {
+            self.fit_level = fit_level;
             self.begun = false;
         }
     }
@@ -151,17 +155,17 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
 
     /// Reads the next frame's contact. Any picture is taken.
     ///
-    /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence is that of the last
-    /// refinement, 255 before the first.
+    /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence
+    /// is that of the last refinement, 255 before the first.
     pub fn read(&mut self, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
         let force = picture.force(config);
         self.at_work = false;
-        if self.effort.rows(ROWS) == 0 || force < config.contact_off {
+        if self.fit_level.rows(ROWS) == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);
             let doubt = if force < config.contact_off { 0 } else { doubt::of_sums(&sums, picture, config) };
             let centre = [sums.centre_x, sums.centre_y];
-            let [centre_x, centre_y] = if self.effort == Effort::Sum { [Millimetres::ZERO; 2] } else { centre };
+            let [centre_x, centre_y] = if self.fit_level == FitLevel::Sum { [Millimetres::ZERO; 2] } else { centre };
             return Contact { doubt, centre_x, centre_y, ..sums };
         }
         // At the beginning, and while the sums are all there is.
@@ -175,9 +179,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
         self.at_work = true;
         // The start has a frame of its own, where a refinement is spread over frames.
-        if !begins || self.effort.rows(ROWS) == ROWS {
+        if !begins || self.fit_level.rows(ROWS) == ROWS {
             self.take(force, picture, config);
-            if usize::from(self.frames) * self.effort.rows(ROWS) >= ROWS {
+            if usize::from(self.frames) * self.fit_level.rows(ROWS) >= ROWS {
                 self.refine(force, config);
             }
         }
@@ -196,7 +200,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
             return false;
         };
-        // Where a contact is cut off, the sums' centre lies too far in, and their radius is too small: the fit knows better.
+        // Where a contact is cut off, the sums' centre lies too far in, and their radius is too small: the fit knows
+        // better.
         self.covered = match self.fitted {
             Some(fitted) => covers(&fitted.contact(sums.force, picture, config), picture, config),
             None => covers(sums, picture, config),
@@ -204,12 +209,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         self.guess = self
             .next
             .unwrap_or_else(|| Guess::from_lengths(sums.indentation, sums.centre_x, sums.centre_y, &config.geometry));
-        self.pressed = Pressed::new(&self.guess, &scale, config);
+        self.prediction = Prediction::new(&self.guess, &scale, config);
         self.scale = scale;
         (self.begun, self.frames) = (true, 0);
         (self.force, self.forces) = (sums.force, 0);
         self.follows = Divisor::new(2 * u64::from(sums.force.to_bits().unsigned_abs()))
-            .divide((ONE - self.guess.rest).into(), FOLLOWS_BITS);
+            .divide((ONE - self.guess.height).into(), FOLLOWS_BITS);
         self.equations = Equations::NONE;
         true
     }
@@ -217,15 +222,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     /// Takes in the frame's share of the rows.
     fn take(&mut self, force: Newtons, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
         let view = View { picture, scale: self.scale };
-        self.pressed.rest = self.followed(&self.guess, force);
-        let bench = Bench { pressed: &self.pressed, view: &view, geometry: &config.geometry };
-        let (rows, frame) = (self.effort.rows(ROWS), usize::from(self.frames));
+        self.prediction.height = self.followed(&self.guess, force);
+        let comparison = Comparison { prediction: &self.prediction, view: &view, geometry: &config.geometry };
+        let (rows, frame) = (self.fit_level.rows(ROWS), usize::from(self.frames));
         let mut row = if rows == 1 { frame * const { row_step(ROWS) } % ROWS } else { frame };
         while row < ROWS {
             if self.covered {
-                self.equations.misfit.compare_row(bench, row);
+                self.equations.misfit.compare_row(comparison, row);
             } else {
-                self.equations.take_row(bench, row);
+                self.equations.take_row(comparison, row);
             }
             // As many frames as it takes: a row of every so many.
             row += ROWS.div_ceil(rows.max(1));
@@ -234,11 +239,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         self.frames += 1;
     }
 
-    /// What is left between the plane and the hemisphere's centre, where the sum's force has become this one: d goes with the root of
-    /// the force.
+    /// What is left between the plane and the hemisphere's centre, where the sum's force has become this one: d goes
+    /// with the root of the force.
     fn followed(&self, guess: &Guess, force: Newtons) -> i32 {
         let more = i64::from(force.to_bits()) - i64::from(self.force.to_bits());
-        guess.rest.saturating_sub(within((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
+        guess.height.saturating_sub(clamp_to((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
     }
 
     /// Ends a refinement.
@@ -268,8 +273,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         if self.afresh == 0 && taxels >= TAXELS_LEAST && (likely || self.fitted.is_some() && self.confidence > 0) {
             // At the mean of the frames, where noise counts least.
             let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
-            let rest = self.followed(&guess, Newtons::from_bits(mean));
-            let mean_guess = Guess::new(rest, guess.x, guess.y, &config.geometry);
+            let height = self.followed(&guess, Newtons::from_bits(mean));
+            let mean_guess = Guess::new(height, guess.x, guess.y, &config.geometry);
             let fitted = i64::from(config.tip.force(mean_guess.indentation(&config.tip)).to_bits());
             let ratio = Divisor::new(mean.unsigned_abs().into()).divide(fitted, RATIO_BITS);
             self.settle(ratio.max(1).min(RATIO_MAX), Some(guess.centre(&config.tip)));
@@ -317,7 +322,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Effort, divisor, row_step};
+    use super::{FitLevel, divisor, row_step};
 
     #[test]
     fn every_row_comes_once() {
@@ -327,8 +332,8 @@ mod tests {
             let mut seen: std::vec::Vec<_> = (0..rows).map(|frame| frame * row_step(rows) % rows).collect();
             seen.sort_unstable();
             assert!(seen.into_iter().eq(0..rows));
-            for effort in [Effort::TwoRows, Effort::FiveRows, Effort::AllRows] {
-                let most = effort.rows(rows);
+            for fit_level in [FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
+                let most = fit_level.rows(rows);
                 let frames = (1..).find(|frames| frames * most >= rows).unwrap();
                 let stride = rows.div_ceil(most);
                 assert_eq!(frames, stride);

@@ -1,6 +1,6 @@
 //! A contact supposed, and what the model makes of it for each taxel.
 
-use super::arith::{between, high, root, within};
+use super::arith::{between, clamp_to, high, root};
 use super::view::Scale;
 use crate::config::Shaped;
 use crate::config::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
@@ -12,9 +12,9 @@ pub(super) const CENTRE_BITS: u32 = 24;
 /// Fractional bits of a slope.
 pub(super) const SLOPE_BITS: u32 = 13;
 /// The deepest indentation that the fit looks for: 7/8 of the radius.
-pub(super) const REST_MIN: i32 = ONE / 8;
+pub(super) const HEIGHT_MIN: i32 = ONE / 8;
 /// The shallowest: 1/1024 of the radius.
-pub(super) const REST_MAX: i32 = ONE - ONE / 1024;
+pub(super) const HEIGHT_MAX: i32 = ONE - ONE / 1024;
 /// The largest squared distance of a taxel that a contact can reach.
 const SQUARE_MAX: u32 = 3 << (SQUARE_BITS - 1);
 
@@ -22,7 +22,7 @@ const SQUARE_MAX: u32 = 3 << (SQUARE_BITS - 1);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Guess {
     /// s = 1 - d, Q28.
-    pub rest: i32,
+    pub height: i32,
     /// Centre, Q24.
     pub x: i32,
     /// Centre, Q24.
@@ -31,24 +31,24 @@ pub(super) struct Guess {
 
 impl Guess {
     /// The nearest that the fit covers: the centre within a radius of the array.
-    pub fn new(rest: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
+    pub fn new(height: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
         let [reach_x, reach_y] = geometry.reach;
-        let centre = |value: i32, reach: i32| within(value.into(), reach);
-        Self { rest: rest.min(REST_MAX).max(REST_MIN), x: centre(x, reach_x), y: centre(y, reach_y) }
+        let centre = |value: i32, reach: i32| clamp_to(value.into(), reach);
+        Self { height: height.min(HEIGHT_MAX).max(HEIGHT_MIN), x: centre(x, reach_x), y: centre(y, reach_y) }
     }
 
     /// From lengths.
     pub fn from_lengths(d: Millimetres, x: Millimetres, y: Millimetres, geometry: &Geometry) -> Self {
         let share = |length: Millimetres, bits: u32| {
             let wide = i64::from(length.to_bits()) * i64::from(geometry.inverse_radius);
-            within(wide >> (56 - bits), i32::MAX)
+            clamp_to(wide >> (56 - bits), i32::MAX)
         };
         Self::new(ONE - share(d, SQUARE_BITS), share(x, CENTRE_BITS), share(y, CENTRE_BITS), geometry)
     }
 
     /// Indentation.
     pub fn indentation(&self, tip: &Tip) -> Millimetres {
-        Millimetres::from_bits(scale(ONE - self.rest, tip, SQUARE_BITS))
+        Millimetres::from_bits(scale(ONE - self.height, tip, SQUARE_BITS))
     }
 
     /// Centre along the columns and along the rows.
@@ -57,13 +57,13 @@ impl Guess {
     }
 
     /// s^2, Q28.
-    pub fn rest_square(&self) -> i32 {
-        high(self.rest, self.rest) << 4
+    pub fn height_square(&self) -> i32 {
+        high(self.height, self.height) << 4
     }
 
     /// r_c^2 = 1 - s^2, Q28.
     pub fn rim_square(&self) -> i32 {
-        ONE - self.rest_square()
+        ONE - self.height_square()
     }
 }
 
@@ -74,21 +74,21 @@ fn scale(radii: i32, tip: &Tip, bits: u32) -> i32 {
 
 /// What the model says of a taxel: pressure as a share of the peak, and its slopes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Felt {
+pub(super) struct TaxelModel {
     /// Pressure, Q14 of the peak.
     pub pressure: i32,
     /// How the pressure falls with ln(s), in Y, Q13: `-dp / d ln(s)`.
-    pub by_rest: i32,
+    pub by_height: i32,
     /// How it falls with the squared distance, times 2 s^2, in Y, Q13.
     pub by_square: i32,
 }
 
 /// A guess worked out for all taxels.
 #[derive(Clone, Debug)]
-pub(super) struct Pressed<const ROWS: usize, const COLUMNS: usize> {
-    pub rest: i32,
+pub(super) struct Prediction<const ROWS: usize, const COLUMNS: usize> {
+    pub height: i32,
     /// s^3, Q27.
-    rest_cube_q27: i32,
+    height_cube_q27: i32,
     /// Taxels nearer than this, squared, lie inside the contact.
     pub inside: u32,
     /// Taxels from here on, squared, lie outside of it.
@@ -105,11 +105,11 @@ pub(super) struct Pressed<const ROWS: usize, const COLUMNS: usize> {
     pub dy: [i32; ROWS],
 }
 
-impl<const ROWS: usize, const COLUMNS: usize> Pressed<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
     /// Of nothing.
     pub const NONE: Self = Self {
-        rest: 0,
-        rest_cube_q27: 0,
+        height: 0,
+        height_cube_q27: 0,
         inside: 0,
         outside: 0,
         twice_modulus: 0,
@@ -129,8 +129,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pressed<ROWS, COLUMNS> {
         let square_of = |place: i32| square(place.max(0)).min(SQUARE_MAX);
         let dx = from(&config.columns, guess.x);
         Self {
-            rest: guess.rest,
-            rest_cube_q27: high(guess.rest_square(), guess.rest) << 3,
+            height: guess.height,
+            height_cube_q27: high(guess.height_square(), guess.height) << 3,
             inside: square_of(middle - half),
             outside: square_of(middle + half),
             twice_modulus: 2 * scale.modulus,
@@ -142,30 +142,30 @@ impl<const ROWS: usize, const COLUMNS: usize> Pressed<ROWS, COLUMNS> {
         }
     }
 
-    /// A taxel at a squared distance below [`Pressed::outside`].
+    /// A taxel at a squared distance below [`Prediction::outside`].
     #[inline(always)]
-    pub fn felt(&self, square: u32, nodes: &[Node; NODES]) -> Felt {
+    pub fn taxel(&self, square: u32, nodes: &[Node; NODES]) -> TaxelModel {
         let ([low, up], share) = interval(nodes, square);
         if square < self.inside {
             let rise = up.mean_inverse_length - low.mean_inverse_length;
             let mean = low.mean_inverse_length + 2 * high(rise, share);
-            let left_q22 = high(self.rest, mean);
+            let left_q22 = high(self.height, mean);
             let strain_q22 = ((1 << 22) - left_q22).max(0);
-            return Felt {
+            return TaxelModel {
                 pressure: high(strain_q22 << 9, self.twice_modulus),
-                by_rest: left_q22 >> (22 - SLOPE_BITS),
-                by_square: high(rise, self.rest_cube_q27),
+                by_height: left_q22 >> (22 - SLOPE_BITS),
+                by_square: high(rise, self.height_cube_q27),
             };
         }
         let length = between(low.near_length, up.near_length, share);
-        let wet = (length - self.rest).max(0);
+        let compressed = (length - self.height).max(0);
         // (L1 - s) / (h r), Q14, below 8.
-        let ratio = high(wet, between(low.inverse_spread, up.inverse_spread, share)).min((8 << 14) - 1);
+        let ratio = high(compressed, between(low.inverse_spread, up.inverse_spread, share)).min((8 << 14) - 1);
         // Under the rim the column is hardly longer than s, so both slopes are taken for the same.
-        let slope = high(ratio << 3, self.rest).min(3 << (SLOPE_BITS - 1));
-        Felt {
-            pressure: high(high(wet, self.modulus), ratio << 14) >> (self.modulus_shift - 7),
-            by_rest: slope,
+        let slope = high(ratio << 3, self.height).min(3 << (SLOPE_BITS - 1));
+        TaxelModel {
+            pressure: high(high(compressed, self.modulus), ratio << 14) >> (self.modulus_shift - 7),
+            by_height: slope,
             by_square: slope,
         }
     }

@@ -19,7 +19,8 @@ pub struct Contact {
     pub peak_pa: u32,
     /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
     pub confidence: u8,
-    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit says how much.
+    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit
+    /// says how much.
     pub doubt: u8,
     /// Taxels left out because they are dead or saturated; 255 stands for more.
     pub bad_taxels: u8,

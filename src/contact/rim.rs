@@ -1,8 +1,8 @@
 //! Taxels under the rim, worked out closely: two lines across the taxel, each cut where it meets the rim.
 //!
-//! The mean over the squared distance's spread, which the quick model uses, knows no direction and is off by up to half a
-//! percent of the peak for a taxel under the rim. Here the taxel is cut by two Gauss lines along its steeper direction,
-//! and what of each lies inside the contact has two Gauss points.
+//! The mean over the squared distance's spread, which the quick model uses, knows no direction and is off by up to half
+//! a percent of the peak for a taxel under the rim. Here the taxel is cut by two Gauss lines along its steeper
+//! direction, and what of each lies inside the contact has two Gauss points.
 
 use super::arith::{between, root};
 use super::guess::{Guess, interval};
@@ -17,7 +17,7 @@ const TO_SQUARE: u32 = 2 * PLACE_BITS - SQUARE_BITS;
 /// A guess worked out for the taxels under its rim.
 pub(super) struct Rim<'a> {
     geometry: &'a Geometry,
-    rest: i32,
+    height: i32,
     rim_square: i32,
     /// Half of a taxel's side, Q15.
     half: i32,
@@ -33,10 +33,10 @@ pub(super) struct Rim<'a> {
 impl<'a> Rim<'a> {
     pub fn new(guess: &Guess, scale: &Scale, geometry: &'a Geometry) -> Self {
         let half = (geometry.pitch >> (SQUARE_BITS - PLACE_BITS + 1)).max(1);
-        let lift = (ONE - guess.rest).leading_zeros();
+        let lift = (ONE - guess.height).leading_zeros();
         Self {
             geometry,
-            rest: guess.rest,
+            height: guess.height,
             rim_square: guess.rim_square(),
             half,
             line: (half * GAUSS) >> 15,
@@ -81,7 +81,7 @@ impl<'a> Rim<'a> {
         let square = (((along * along) >> TO_SQUARE) + across_square).unsigned_abs();
         let ([low, up], share) = interval(&self.geometry.nodes, square);
         let length = between(low.length, up.length, share);
-        let wet = (length - self.rest).max(0).unsigned_abs();
-        (wet << self.lift) / (length >> 12).max(1).unsigned_abs()
+        let compressed = (length - self.height).max(0).unsigned_abs();
+        (compressed << self.lift) / (length >> 12).max(1).unsigned_abs()
     }
 }

@@ -1,12 +1,12 @@
 //! A first guess in closed form, good wherever the contact's centre is, on the array or off it.
 //!
-//! Inside the contact `1 - r^2 = s^2 z` with `z = 1 / (1 - p/Y)^2`: z falls with the squared distance, and its slope points
-//! to the centre. A plane through z over the taxels, weighted with their pressure, gives a mean m and a slope g at the
-//! taxels' own middle c. With D = c - r0, V the mean of `|c_i - c|^2 + h^2/6` and k the slope of that square (0 for a
-//! symmetric set of taxels), the paper's model says `s^2 g = -k - 2 D` and `s^2 m = 1 - V - D^2`: a quadratic equation for
-//! s^2, and then D.
+//! Inside the contact `1 - r^2 = s^2 z` with `z = 1 / (1 - p/Y)^2`: z falls with the squared distance, and its slope
+//! points to the centre. A plane through z over the taxels, weighted with their pressure, gives a mean m and a slope g
+//! at the taxels' own middle c. With D = c - r0, V the mean of `|c_i - c|^2 + h^2/6` and k the slope of that square (0
+//! for a symmetric set of taxels), the paper's model says `s^2 g = -k - 2 D` and `s^2 m = 1 - V - D^2`: a quadratic
+//! equation for s^2, and then D.
 
-use super::arith::{Divisor, high, root, within};
+use super::arith::{Divisor, clamp_to, high, root};
 use super::guess::{CENTRE_BITS, Guess};
 use super::step::Taxels;
 use super::view::{PEAK_BITS, View};
@@ -22,9 +22,9 @@ const STRAIN_MAX: i32 = 5 << 13;
 const Z_BITS: u32 = 14;
 /// Bits dropped from weighted z, so that their moments fit 32 bits: 2 of 10 x 10 and 16 x 16, 4 of 16 x 32.
 ///
-/// A weighted z is at most 64 x 100,124 by [`STRAIN_MAX`]; what of a moment has one sign has the weights 1, 3, 5 .. of half of the places,
-/// which are a quarter of their number's square. Sums without z fit as they are: 64 x^3 over half of 16 x 32 taxels is 1.6e8. About the middle
-/// 64 bits are used.
+/// A weighted z is at most 64 x 100,124 by [`STRAIN_MAX`]; what of a moment has one sign has the weights 1, 3, 5 .. of
+/// half of the places, which are a quarter of their number's square. Sums without z fit as they are: 64 x^3 over half
+/// of 16 x 32 taxels is 1.6e8. About the middle 64 bits are used.
 const fn z_drop(rows: usize, columns: usize) -> u32 {
     let side = if rows > columns { rows } else { columns };
     let mut drop = 2;
@@ -146,8 +146,8 @@ pub(super) fn plane<const ROWS: usize, const COLUMNS: usize>(
 
     // From half pitches to tip radii.
     let to_radii = |half_pitches: i32| high(half_pitches, geometry.pitch) << (31 - SQUARE_BITS);
-    let g = z_slope.map(|slope| within(product(slope, geometry.inverse_half_pitch) >> 20, SLOPE_MAX));
-    let k = k.map(|slope| within(to_radii(slope).into(), SKEW_MAX));
+    let g = z_slope.map(|slope| clamp_to(product(slope, geometry.inverse_half_pitch) >> 20, SLOPE_MAX));
+    let k = k.map(|slope| clamp_to(to_radii(slope).into(), SKEW_MAX));
     let own = to_radii(2 << BITS) / 3;
     let spread = to_radii(to_radii(by_n.divide(xx + yy, BITS - ABOUT_BITS)) + own);
 
@@ -168,13 +168,13 @@ pub(super) fn plane<const ROWS: usize, const COLUMNS: usize>(
         i64::from(root((square >> drop) as u32)) << (drop / 2)
     };
     let twice = linear + wide_root((linear * linear + 4 * quadratic * constant).max(0));
-    let rest_square = Divisor::new(twice.max(1).unsigned_abs()).divide(2 * constant, SQUARE_BITS).min(ONE);
+    let height_square = Divisor::new(twice.max(1).unsigned_abs()).divide(2 * constant, SQUARE_BITS).min(ONE);
     let centre = |mean: i32, g: i32, k: i32| {
-        let toward = (product(rest_square, g) >> SQUARE_BITS) + i64::from(k);
+        let toward = (product(height_square, g) >> SQUARE_BITS) + i64::from(k);
         let wide = (i64::from(to_radii(mean)) << (CENTRE_BITS - BITS)) + (toward << (CENTRE_BITS - BITS - 1));
-        within(wide, i32::MAX)
+        clamp_to(wide, i32::MAX)
     };
     // The root of Q30 is Q15.
-    let rest = (root((rest_square << 2).unsigned_abs()) as i32) << (SQUARE_BITS - 15);
-    Some(Guess::new(rest, centre(x, g[0], k[0]), centre(y, g[1], k[1]), geometry))
+    let height = (root((height_square << 2).unsigned_abs()) as i32) << (SQUARE_BITS - 15);
+    Some(Guess::new(height, centre(x, g[0], k[0]), centre(y, g[1], k[1]), geometry))
 }

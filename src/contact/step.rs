@@ -1,11 +1,11 @@
 //! One refinement: the weighted normal equations of all live taxels, and their solution.
 //!
-//! The unknowns are scaled so that every slope is at most about 1: the change of ln(s), and the centre's in units of s^2.
-//! A reading's error grows with the reading, so a taxel's weight falls with the model's pressure: in the quick steps from 1
-//! to 1/4 at the peak, in the close ones to 1/25.
+//! The unknowns are scaled so that every slope is at most about 1: the change of ln(s), and the centre's in units of
+//! s^2. A reading's error grows with the reading, so a taxel's weight falls with the model's pressure: in the quick
+//! steps from 1 to 1/4 at the peak, in the close ones to 1/25.
 
-use super::arith::{Divisor, high, within};
-use super::guess::{CENTRE_BITS, Felt, Guess, Pressed, SLOPE_BITS, square};
+use super::arith::{Divisor, clamp_to, high};
+use super::guess::{CENTRE_BITS, Guess, Prediction, SLOPE_BITS, TaxelModel, square};
 use super::rim::Rim;
 use super::view::{PEAK_BITS, Scale, View};
 use crate::config::geometry::{Geometry, PLACE_BITS};
@@ -15,13 +15,14 @@ const RESIDUAL_LIMIT: i32 = 1 << (PEAK_BITS - 1);
 /// Fractional bits of shares and of the solution before it is scaled.
 const SHARE_BITS: u32 = 24;
 /// The farthest that ln(s) moves in one step, Q28: 1/8.
-const REST_STEP: i32 = 1 << 25;
+const HEIGHT_STEP: i32 = 1 << 25;
 /// The farthest that a centre moves along one axis, Q24: 1/4 of the radius.
 const CENTRE_STEP: i32 = 1 << 21;
 /// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
-/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less [`Bits::ALL`] bits: 2^-24 of ten rows and columns.
+/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less [`Bits::ALL`] bits: 2^-24 of
+/// ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Misfit {
     /// Sum of the squared residuals of live taxels within the model's contact.
@@ -39,16 +40,17 @@ impl Misfit {
     pub const NONE: Self = Self { inside: 0, taxels: 0, outside: 0, others: 0 };
 }
 
-/// Sums over a row: rest is `a`, square times weight is `k`, of which the place makes the centre's slope.
+/// Sums over a row of weighted products: `height` is the slope by ln(s), `square` that by the squared distance, `x` the
+/// latter times the place along the columns, and a name alone its product with the residual.
 #[derive(Clone, Copy, Debug, Default)]
 struct Row<const ROWS: usize, const COLUMNS: usize> {
-    rest_rest: i32,
-    rest_square: i32,
-    rest_x: i32,
+    height_height: i32,
+    height_square: i32,
+    height_x: i32,
     square_square: i32,
     square_x: i32,
     x_x: i32,
-    rest: i32,
+    height: i32,
     square: i32,
     x: i32,
     misfit: Misfit,
@@ -56,8 +58,9 @@ struct Row<const ROWS: usize, const COLUMNS: usize> {
 
 /// Bits dropped from sums over the taxels, so that they fit 32 bits.
 ///
-/// A slope is at most 1.5, at the rim, and the squares of a row's slopes average 2 at most, in Q26. What all rows add up to has another
-/// bit to spare. A row loses four bits at least, so that its shifted place, up to two radii, fits too.
+/// A slope is at most 1.5, at the rim, and the squares of a row's slopes average 2 at most, in Q26. What all rows add
+/// up to has another bit to spare. A row loses four bits at least, so that its shifted place, up to two radii, fits
+/// too.
 pub(super) struct Bits<const ROWS: usize, const COLUMNS: usize>;
 
 impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
@@ -122,36 +125,44 @@ impl Taxels {
 
 /// What a row's taxels are compared with.
 #[derive(Clone, Copy)]
-pub(super) struct Bench<'a, const ROWS: usize, const COLUMNS: usize> {
-    pub pressed: &'a Pressed<ROWS, COLUMNS>,
+pub(super) struct Comparison<'a, const ROWS: usize, const COLUMNS: usize> {
+    pub prediction: &'a Prediction<ROWS, COLUMNS>,
     pub view: &'a View<'a, ROWS, COLUMNS>,
     pub geometry: &'a Geometry,
 }
 
 impl Misfit {
     /// How far the model and the picture are apart, where it is not to be refined.
-    pub fn compare<const ROWS: usize, const COLUMNS: usize>(&mut self, bench: Bench<ROWS, COLUMNS>, mut which: Taxels) {
+    pub fn compare<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        comparison: Comparison<ROWS, COLUMNS>,
+        mut which: Taxels,
+    ) {
         while let Some((row, first, stride)) = which.next_row(ROWS) {
-            self.add(bench, row, first, stride);
+            self.add(comparison, row, first, stride);
         }
     }
 
     /// The same of a row.
     #[inline(never)]
-    pub fn compare_row<const ROWS: usize, const COLUMNS: usize>(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize) {
-        self.add(bench, row, 0, 1);
+    pub fn compare_row<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        comparison: Comparison<ROWS, COLUMNS>,
+        row: usize,
+    ) {
+        self.add(comparison, row, 0, 1);
     }
 
     #[inline(always)]
     fn add<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        Bench { pressed, view, geometry }: Bench<ROWS, COLUMNS>,
+        Comparison { prediction, view, geometry }: Comparison<ROWS, COLUMNS>,
         row: usize,
         first: usize,
         stride: usize,
     ) {
         let (Some(taxels), Some(bad), Some(dy)) =
-            (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
+            (view.picture.taxels.get(row), view.picture.bad.get(row), prediction.dy.get(row))
         else {
             return;
         };
@@ -161,11 +172,11 @@ impl Misfit {
         let mut column = first;
         while column < COLUMNS {
             if bad & 1 == 0 {
-                let at = pressed.dx_square[column] + dy_square;
+                let at = prediction.dx_square[column] + dy_square;
                 let share = view.share(taxels[column]);
-                if at < pressed.outside {
+                if at < prediction.outside {
                     row.taxels += 1;
-                    let residual = residual(share - pressed.felt(at, &geometry.nodes).pressure);
+                    let residual = residual(share - prediction.taxel(at, &geometry.nodes).pressure);
                     row.inside += (residual * residual) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 } else {
                     row.others += 1;
@@ -198,7 +209,8 @@ fn weight(pressure: i32) -> i32 {
     (1 << SLOPE_BITS) - ((3 * pressure.min(1 << PEAK_BITS)) >> 3)
 }
 
-/// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak, Q13.
+/// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak,
+/// Q13.
 #[inline(always)]
 fn noise_weight(pressure: i32) -> i32 {
     let quarter = 1 << (PEAK_BITS - 2);
@@ -208,19 +220,19 @@ fn noise_weight(pressure: i32) -> i32 {
 
 impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
     #[inline(always)]
-    fn add(&mut self, felt: &Felt, dx: i32, residual: i32, weight: i32) {
-        let rest = (weight * felt.by_rest) >> SLOPE_BITS;
-        let square = (weight * felt.by_square) >> SLOPE_BITS;
+    fn add(&mut self, model: &TaxelModel, dx: i32, residual: i32, weight: i32) {
+        let height = (weight * model.by_height) >> SLOPE_BITS;
+        let square = (weight * model.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
-        let x = (felt.by_square * dx) >> PLACE_BITS;
+        let x = (model.by_square * dx) >> PLACE_BITS;
         let drop = Bits::<ROWS, COLUMNS>::TAXEL;
-        self.rest_rest += (rest * felt.by_rest) >> drop;
-        self.rest_square += (rest * felt.by_square) >> drop;
-        self.rest_x += (rest * x) >> drop;
-        self.square_square += (square * felt.by_square) >> drop;
+        self.height_height += (height * model.by_height) >> drop;
+        self.height_square += (height * model.by_square) >> drop;
+        self.height_x += (height * x) >> drop;
+        self.square_square += (square * model.by_square) >> drop;
         self.square_x += (square * x) >> drop;
         self.x_x += (weighted_x * x) >> drop;
-        self.rest += (rest * residual) >> drop;
+        self.height += (height * residual) >> drop;
         self.square += (square * residual) >> drop;
         self.x += (weighted_x * residual) >> drop;
         self.misfit.inside += (residual * residual) >> drop;
@@ -232,30 +244,37 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
     /// Takes in taxels.
-    pub fn take(&mut self, bench: Bench<ROWS, COLUMNS>, mut which: Taxels) {
+    pub fn take(&mut self, comparison: Comparison<ROWS, COLUMNS>, mut which: Taxels) {
         while let Some((row, first, stride)) = which.next_row(ROWS) {
-            self.take_part(bench, row, first, stride, None);
+            self.take_part(comparison, row, first, stride, None);
         }
     }
 
     /// Takes in all taxels, and works those under the rim out by it.
-    pub fn take_closely(&mut self, bench: Bench<ROWS, COLUMNS>, rim: &Rim) {
+    pub fn take_closely(&mut self, comparison: Comparison<ROWS, COLUMNS>, rim: &Rim) {
         for row in 0..ROWS {
-            self.take_part(bench, row, 0, 1, Some(rim));
+            self.take_part(comparison, row, 0, 1, Some(rim));
         }
     }
 
     /// Takes in a row.
     #[inline(never)]
-    pub fn take_row(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize) {
-        self.take_part(bench, row, 0, 1, None);
+    pub fn take_row(&mut self, comparison: Comparison<ROWS, COLUMNS>, row: usize) {
+        self.take_part(comparison, row, 0, 1, None);
     }
 
     #[inline(always)]
-    fn take_part(&mut self, bench: Bench<ROWS, COLUMNS>, row: usize, first: usize, stride: usize, rim: Option<&Rim>) {
-        let Bench { pressed, view, geometry } = bench;
+    fn take_part(
+        &mut self,
+        comparison: Comparison<ROWS, COLUMNS>,
+        row: usize,
+        first: usize,
+        stride: usize,
+        rim: Option<&Rim>,
+    ) {
+        let Comparison { prediction, view, geometry } = comparison;
         let (Some(taxels), Some(bad), Some(dy)) =
-            (view.picture.taxels.get(row), view.picture.bad.get(row), pressed.dy.get(row))
+            (view.picture.taxels.get(row), view.picture.bad.get(row), prediction.dy.get(row))
         else {
             return;
         };
@@ -265,17 +284,17 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
         let mut column = first;
         while column < COLUMNS {
             if bad & 1 == 0 {
-                let at = pressed.dx_square[column] + dy_square;
+                let at = prediction.dx_square[column] + dy_square;
                 let share = view.share(taxels[column]);
-                if at < pressed.outside {
-                    let dx = pressed.dx[column];
-                    let mut felt = pressed.felt(at, &geometry.nodes);
-                    if let (Some(rim), true) = (rim, at >= pressed.inside) {
-                        felt.pressure = rim.pressure(dx, *dy);
+                if at < prediction.outside {
+                    let dx = prediction.dx[column];
+                    let mut model = prediction.taxel(at, &geometry.nodes);
+                    if let (Some(rim), true) = (rim, at >= prediction.inside) {
+                        model.pressure = rim.pressure(dx, *dy);
                     }
                     sums.misfit.taxels += 1;
-                    let weight = if rim.is_some() { noise_weight(felt.pressure) } else { weight(felt.pressure) };
-                    sums.add(&felt, dx, residual(share - felt.pressure), weight);
+                    let weight = if rim.is_some() { noise_weight(model.pressure) } else { weight(model.pressure) };
+                    sums.add(&model, dx, residual(share - model.pressure), weight);
                 } else {
                     sums.misfit.others += 1;
                     sums.misfit.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
@@ -292,14 +311,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
         // A row within reach lies within two radii, so this fits; elsewhere the sums are 0.
         let dy = dy << (32 - PLACE_BITS - drop);
         let [ss, sx, sy, xx, xy, yy] = &mut self.matrix;
-        *ss += row.rest_rest >> drop;
-        *sx -= row.rest_x >> drop;
-        *sy -= high(row.rest_square, dy);
+        *ss += row.height_height >> drop;
+        *sx -= row.height_x >> drop;
+        *sy -= high(row.height_square, dy);
         *xx += row.x_x >> drop;
         *xy += high(row.square_x, dy);
         *yy += high(high(row.square_square, dy), dy) << drop;
         let [s, x, y] = &mut self.right;
-        *s -= row.rest >> drop;
+        *s -= row.height >> drop;
         *x += row.x >> drop;
         *y += high(row.square, dy);
         self.misfit.add_row::<ROWS, COLUMNS>(&row.misfit);
@@ -324,18 +343,18 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
         let by_yy = divisor(yy - times(share_y, sy) - times(share, left_xy), yy);
         let y_step = by_yy.divide((left_y - times(share, left_x)).into(), SHARE_BITS);
         let x_step = by_xx.divide((left_x - times(y_step, left_xy)).into(), SHARE_BITS);
-        let rest_step = by_ss.divide((s - times(x_step, sx) - times(y_step, sy)).into(), SHARE_BITS);
+        let height_step = by_ss.divide((s - times(x_step, sx) - times(y_step, sy)).into(), SHARE_BITS);
 
         // Slopes count Y and residuals the peak, so the solution is divided by Y over the peak.
         let drop = 62 - scale.modulus_shift - SLOPE_BITS - (28 - SHARE_BITS);
-        let scaled = |step: i32| within((i64::from(step) * i64::from(scale.inverse_modulus)) >> drop, i32::MAX);
-        let change = within(scaled(rest_step).into(), REST_STEP);
-        let rest = guess.rest + (high(guess.rest, change) << 4);
-        let rest_square = guess.rest_square();
+        let scaled = |step: i32| clamp_to((i64::from(step) * i64::from(scale.inverse_modulus)) >> drop, i32::MAX);
+        let change = clamp_to(scaled(height_step).into(), HEIGHT_STEP);
+        let height = guess.height + (high(guess.height, change) << 4);
+        let height_square = guess.height_square();
         let moved = |centre: i32, step: i32| {
-            let wide = (i64::from(rest_square) * i64::from(scaled(step))) >> (56 - CENTRE_BITS);
-            centre + within(wide, CENTRE_STEP)
+            let wide = (i64::from(height_square) * i64::from(scaled(step))) >> (56 - CENTRE_BITS);
+            centre + clamp_to(wide, CENTRE_STEP)
         };
-        Guess::new(rest, moved(guess.x, x_step), moved(guess.y, y_step), geometry)
+        Guess::new(height, moved(guess.x, x_step), moved(guess.y, y_step), geometry)
     }
 }

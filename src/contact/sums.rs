@@ -56,7 +56,8 @@ fn centre<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
 ) -> [Millimetres; 2] {
-    // All are shifted alike so that of ten rows and columns the sum keeps 16 bits and the moment, at most nine times as large, 20.
+    // All are shifted alike so that of ten rows and columns the sum keeps 16 bits and the moment, at most nine times as
+    // large, 20.
     let shift = (32 - picture.sum.leading_zeros()).saturating_sub(const { sum_bits(Shape::<ROWS, COLUMNS>::SIDE) });
     let sum = (picture.sum >> shift).max(1);
     let half_pitch = i64::from(config.half_pitch.to_bits());

@@ -31,7 +31,7 @@ pub(super) fn high(a: i32, b: i32) -> i32 {
 
 /// Held to so many bits with the sign: one instruction.
 #[inline(always)]
-pub(super) fn held(value: i32, bits: u32) -> i32 {
+pub(super) fn clamp_bits(value: i32, bits: u32) -> i32 {
     let limit = 1 << (bits - 1);
     value.max(-limit).min(limit - 1)
 }
@@ -45,7 +45,7 @@ fn held_wide(value: i64) -> i32 {
 
 #[cfg(test)]
 mod tests {
-    use super::{held, nearest_product, nearest_share, product};
+    use super::{clamp_bits, nearest_product, nearest_share, product};
 
     #[test]
     fn products_are_rounded_and_held() {
@@ -54,7 +54,10 @@ mod tests {
         for (a, b, held) in [(i32::MAX, i32::MAX, i32::MAX), (i32::MIN, i32::MAX, i32::MIN), (i32::MIN, -1, i32::MAX)] {
             assert_eq!([product(a, b, 0), nearest_product(a, b.saturating_mul(2), 1)], [held; 2]);
         }
-        assert_eq!([held(i32::MIN, 28), held(i32::MAX, 28), held(-5, 28)], [-1 << 27, (1 << 27) - 1, -5]);
+        assert_eq!(
+            [clamp_bits(i32::MIN, 28), clamp_bits(i32::MAX, 28), clamp_bits(-5, 28)],
+            [-1 << 27, (1 << 27) - 1, -5]
+        );
         assert_eq!([nearest_share(i32::MIN, i32::MAX), nearest_share(3, 1 << 30)], [-i32::MAX, 2]);
     }
 }

@@ -54,9 +54,9 @@ impl Drive {
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
     #[inline(always)]
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
-        let slewed = near(wanted, self.voltage, config.slew_limit);
+        let slewed = clamp_around(wanted, self.voltage, config.slew_limit);
         self.spare(supply_mv, config);
-        let within_current = near(slewed, back_emf, (config.current_limit >> 8) * self.share);
+        let within_current = clamp_around(slewed, back_emf, (config.current_limit >> 8) * self.share);
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != wanted {
@@ -93,7 +93,7 @@ impl Drive {
 /// The value nearest to `value` that is no further than `reach` from `middle`. (`clamp` would have to prove that the
 /// bounds are in order.)
 #[inline(always)]
-fn near(value: i32, middle: i32, reach: i32) -> i32 {
+fn clamp_around(value: i32, middle: i32, reach: i32) -> i32 {
     value.max(middle.saturating_sub(reach)).min(middle.saturating_add(reach))
 }
 

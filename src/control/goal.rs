@@ -1,7 +1,8 @@
 //! What each mode asks of the speed loop.
 //!
-//! Letting go goes by geometry first: where the surface was touched, less the clearance, is where the tip rests, whatever the
-//! array says on the way. Noise, creep, warmth and hysteresis can look like a contact in the air; none of them moves that place.
+//! Letting go goes by geometry first: where the surface was touched, less the clearance, is where the tip rests,
+//! whatever the array says on the way. Noise, creep, warmth and hysteresis can look like a contact in the air; none of
+//! them moves that place.
 
 use crate::config::Config;
 use crate::contact::Contact;
@@ -11,7 +12,8 @@ use crate::state::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
 
-/// How many times its indentation a tip may have gone into what it touches and still go at full speed: what yields goes along.
+/// How many times its indentation a tip may have gone into what it touches and still go at full speed: what yields goes
+/// along.
 const DEEPER: i32 = 2;
 /// The same on the way back: a force that is too high must not wait.
 const DEEPER_BACK: i32 = 5;
@@ -20,8 +22,8 @@ const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
 
 /// How much the indentation may be off at rest, where the encoder is coarser than that: 0.4 um.
 const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
-/// The most doubt in a force with which the tip still goes on at full speed: an eighth. Where more of the contact may be hidden, the fit
-/// needs the time of an approach to find how much.
+/// The most doubt in a force with which the tip still goes on at full speed: an eighth. Where more of the contact may
+/// be hidden, the fit needs the time of an approach to find how much.
 const SURE: u8 = u8::MAX / 8;
 
 /// Where the surface is, and where a released tip is to stand.
@@ -32,7 +34,7 @@ pub struct Goal {
     surface: Option<Millimetres>,
     /// Whether that contact was lost without letting go.
     lost: bool,
-    rest: Millimetres,
+    clear_at: Millimetres,
     /// How deep the tip is by what the motor felt when the contact began: beside the array a touch is seen late.
     pub felt: Millimetres,
 }
@@ -45,7 +47,8 @@ impl Goal {
 
     /// The speed to follow in a mode that drives the bridge.
     ///
-    /// Approach and force follow the same curve, d_goal - d; an approach is only slower. So contact changes nothing but a limit.
+    /// Approach and force follow the same curve, d_goal - d; an approach is only slower. So contact changes nothing but
+    /// a limit.
     #[inline(always)]
     pub fn reference(
         &mut self,
@@ -59,8 +62,8 @@ impl Goal {
         let travel = motion.observer.travel;
         self.enter(mode, contact, travel, config);
         let (way, quick, slack) = if mode == Mode::Release {
-            let way = Millimetres(self.rest.0.saturating_sub(travel.0));
-            let pressed = travel.0 > self.rest.0.saturating_add(config.clearance.0);
+            let way = Millimetres(self.clear_at.0.saturating_sub(travel.0));
+            let pressed = travel.0 > self.clear_at.0.saturating_add(config.clearance.0);
             (way, pressed && self.confirmed(DEEPER_BACK, contact, travel, config), config.count)
         } else {
             let way = self.way_to_goal(goal, contact, motion, config, limits);
@@ -98,14 +101,14 @@ impl Goal {
         if mode == Mode::Release {
             let clear =
                 self.surface.map_or(travel, |surface| Millimetres(surface.0.saturating_sub(config.clearance.0)));
-            self.rest = clear.min(travel);
+            self.clear_at = clear.min(travel);
         }
     }
 
     /// d_goal - d, with d brought forward from the middle of the scan to now.
     ///
-    /// A force that is known only from below is no reason to press harder: the tip is then at most as deep as it went since the touch,
-    /// and the more doubt there is, the nearer to that it is taken to be.
+    /// A force that is known only from below is no reason to press harder: the tip is then at most as deep as it went
+    /// since the touch, and the more doubt there is, the nearer to that it is taken to be.
     fn way_to_goal(
         &self,
         goal: Newtons,
@@ -114,7 +117,8 @@ impl Goal {
         config: &Config,
         limits: &mut Limits,
     ) -> Millimetres {
-        // What is less than a contact would be lost and sought again for ever; what the converter cannot see would be pressed for ever.
+        // What is less than a contact would be lost and sought again for ever; what the converter cannot see would be
+        // pressed for ever.
         let held = goal.min(config.force_max.min(config.force_seen)).max(config.contact_on);
         if held != goal {
             limits.set(Limits::GOAL);
@@ -148,7 +152,7 @@ impl Goal {
 
     /// Whether the tip stands clear of what it touched: the array's readings are then its baseline, whatever they are.
     pub fn clear(&self, travel: Millimetres, config: &Config) -> bool {
-        let half = self.rest.0.saturating_add(config.clearance.0 / 2);
+        let half = self.clear_at.0.saturating_add(config.clearance.0 / 2);
         self.mode == Mode::Release && self.surface.is_some() && config.clearance.0 > 0 && travel.0 < half
     }
 }

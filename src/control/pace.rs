@@ -1,9 +1,10 @@
 //! The pace of the loop: quick while there is a way to go, calmer the longer there is none.
 //!
-//! Rest and speed want different bandwidths. The calmest pace is for ways within twice a band that counts and noise explain, each
-//! quicker one for ways twice as long. Where the way's mean is longer, the loop is quicker at once; where it was half as long for
-//! four of the loop's own time constants, it is calmer. A loop that swings therefore slows down, however it came to
-//! swing. Only gains change, never what the observer and the drive hold, so a change of pace moves nothing.
+//! Rest and speed want different bandwidths. The calmest pace is for ways within twice a band that counts and noise
+//! explain, each quicker one for ways twice as long. Where the way's mean is longer, the loop is quicker at once; where
+//! it was half as long for four of the loop's own time constants, it is calmer. A loop that swings therefore slows
+//! down, however it came to swing. Only gains change, never what the observer and the drive hold, so a change of pace
+//! moves nothing.
 
 use crate::config::Config;
 use crate::config::gains::{Gains, PACES};

@@ -1,7 +1,7 @@
 //! The way still to go to the fastest speed from which the tip can still stop there.
 //!
-//! The time-optimal speed over the way e with a deceleration a is sqrt(2 a |e|). Its slope is infinite at e = 0, so near the goal a line of
-//! slope k takes over where both agree in value and slope (a proximate time-optimal servo):
+//! The time-optimal speed over the way e with a deceleration a is sqrt(2 a |e|). Its slope is infinite at e = 0, so
+//! near the goal a line of slope k takes over where both agree in value and slope (a proximate time-optimal servo):
 //!
 //! ```text
 //! |e| <= a / (2 k^2):  v_ref = k e                                 a_ref = -k v
@@ -24,7 +24,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`: up to 1000 m/s^2.
+    /// The fastest way over `way` that ends at rest, from the speed `speed`, with a deceleration of `brake`: up to 1000
+    /// m/s^2.
     #[inline(always)]
     pub fn towards(way: Millimetres, speed: MillimetresPerSecond, brake: MillimetresPerSecond2, gains: &Gains) -> Self {
         let (way_bits, speed_bits) = (way.to_bits(), speed.to_bits());

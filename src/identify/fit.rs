@@ -82,7 +82,8 @@ impl TravelFit {
     /// Takes no points at all.
     pub const EMPTY: Self = Self { sums: Sums::EMPTY, from: Millimetres::ZERO, travel: Axis::EMPTY, root: Axis::EMPTY };
 
-    /// No points yet; those before `from`, more than `range` beyond it or with more force than `force_max` will be left out.
+    /// No points yet; those before `from`, more than `range` beyond it or with more force than `force_max` will be left
+    /// out.
     pub fn new(from: Millimetres, range: Millimetres, force_max: Newtons) -> Self {
         Self { sums: Sums::EMPTY, from, travel: Axis::new(range.to_bits()), root: Axis::new(root(force_max.to_bits())) }
     }

@@ -1,8 +1,9 @@
 //! The press that collects the points: back off, seek the contact, press slowly, then the fit.
 //!
-//! Travel comes from the encoder alone and force from the plain sum of the taxels, so neither depends on the modulus that the parameters
-//! hold. The press ends at an indentation of 0.3 a, at the largest force allowed, or where the contact's rim reaches the
-//! array's edge or saturates a taxel, whichever comes first. A point is the mean of all frames within 1/128 mm of travel.
+//! Travel comes from the encoder alone and force from the plain sum of the taxels, so neither depends on the modulus
+//! that the parameters hold. The press ends at an indentation of 0.3 a, at the largest force allowed, or where the
+//! contact's rim reaches the array's edge or saturates a taxel, whichever comes first. A point is the mean of all
+//! frames within 1/128 mm of travel.
 
 use super::fit::TravelFit;
 use super::{Identification, Modulus, Refusal};

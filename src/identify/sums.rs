@@ -1,16 +1,16 @@
 //! The sums behind both fits, and the line through the points.
 //!
-//! Points are shares of a full scale, Q31. The sums hold powers of x up to the fourth with y and y^2: enough for a least-squares
-//! line and for the sum of `x^k e^2` over its residuals e, without keeping a single point:
+//! Points are shares of a full scale, Q31. The sums hold powers of x up to the fourth with y and y^2: enough for a
+//! least-squares line and for the sum of `x^k e^2` over its residuals e, without keeping a single point:
 //!
 //! ```text
 //! s = cov(x, y) / var(x)          t = mean(y) - s mean(x)          e = y - t - s x
 //! var(s) = mean((x - mean(x))^2 e^2) / (n var(x)^2)
 //! ```
 //!
-//! A residual is smaller than the error it comes from, by the point's leverage; at most 4/n of it for points spread evenly over a
-//! line, 5/n for points evenly spread in d on a line in d^2 through the origin. Twice that is added to the variance, as leaving
-//! out each point in turn would show to first order.
+//! A residual is smaller than the error it comes from, by the point's leverage; at most 4/n of it for points spread
+//! evenly over a line, 5/n for points evenly spread in d on a line in d^2 through the origin. Twice that is added to
+//! the variance, as leaving out each point in turn would show to first order.
 
 use crate::root::floor_sqrt;
 

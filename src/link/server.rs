@@ -115,9 +115,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
 
     /// Takes bytes up to the end of the first packet that is answered, and returns how many it took.
     ///
-    /// `reply` is cleared first. Where it is not empty afterwards, send it after [`Server::reply_delay_us`], then feed the
-    /// rest.
-    /// Do not feed what this device itself sends.
+    /// `reply` is cleared first. Where it is not empty afterwards, send it after [`Server::reply_delay_us`], then feed
+    /// the rest. Do not feed what this device itself sends.
     pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) -> usize {
         reply.clear();
         self.observe(&snapshot.status);
@@ -143,7 +142,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
 
     /// What the host asks of the loop.
     pub fn command(&self) -> Command {
-        Command { effort: self.state.settings.record.effort, ..self.state.settings.command }
+        Command { fit_level: self.state.settings.record.fit_level, ..self.state.settings.command }
     }
 
     /// All that the host may change.

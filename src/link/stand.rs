@@ -1,8 +1,8 @@
 //! How the loop stands to what the host asks, and what can therefore not be carried out.
 //!
-//! The link knows the loop by a snapshot that may be a frame old, and by what it has itself let through since. A request that is impossible
-//! by these is refused with the result error. What comes in between, as a fault in the next frame, shows in the registers
-//! `tare_state`, `identify_state` and `saved_state`.
+//! The link knows the loop by a snapshot that may be a frame old, and by what it has itself let through since. A
+//! request that is impossible by these is refused with the result error. What comes in between, as a fault in the next
+//! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
 
 use crate::command::Command;
 use crate::pipeline::{Status, Taken};
@@ -39,8 +39,8 @@ impl Stand {
     /// Refuses what a write asks for and what cannot be done.
     ///
     /// # Errors
-    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a measurement of the modulus without torque or tare; a save while the loop drives,
-    /// is about to or tares, when it must not wait for the flash.
+    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a measurement of the modulus
+    /// without torque or tare; a save while the loop drives, is about to or tares, when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;

@@ -24,7 +24,8 @@ const ARC_TANGENT: [u32; 12] = [
     2_547_104,
 ];
 
-/// `(1 - sin(t)/t) / t^2` in powers of `t^2`, Q0.64: 1/3!, 1/5!, ..; what is left out is below 2^-53 for `t` up to pi/4.
+/// `(1 - sin(t)/t) / t^2` in powers of `t^2`, Q0.64: 1/3!, 1/5!, ..; what is left out is below 2^-53 for `t` up to
+/// pi/4.
 const SINE: [u64; 7] = [
     3_074_457_345_618_258_603,
     153_722_867_280_912_930,
@@ -84,8 +85,8 @@ fn alternating_long(coefficients: &[u64], z: u64) -> u64 {
 
 /// Sine and cosine, in Q1.63, of an angle in Q8.24 between 0 and pi/2; off by less than 2^-50.
 ///
-/// From the half angle `h`: `sin = 2 sin(h) cos(h)`, `cos = 1 - 2 sin(h)^2`. What is divided by the cosine, near 1/20 for a deep
-/// contact, has it to 45 bits.
+/// From the half angle `h`: `sin = 2 sin(h) cos(h)`, `cos = 1 - 2 sin(h)^2`. What is divided by the cosine, near 1/20
+/// for a deep contact, has it to 45 bits.
 pub(super) fn sine_cosine(angle_q24: u32) -> (u64, u64) {
     // Half of an angle in Q24 is 2^39 times it in Q64; pi/2 leaves it below 1.
     let half = u64::from(angle_q24) << 39;

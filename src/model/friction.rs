@@ -14,8 +14,8 @@ use super::Tip;
 use super::arith::{quotient, square};
 use crate::units::{Millimetres, NewtonMillimetres, Newtons, Ratio};
 
-/// `g` in powers of `d/a`, Q48: Chebyshev fit on 0 to 0.951, off by less than 2e-12. The formula itself cancels at small
-/// `d`: three leading terms of its numerator vanish.
+/// `g` in powers of `d/a`, Q48: Chebyshev fit on 0 to 0.951, off by less than 2e-12. The formula itself cancels at
+/// small `d`: three leading terms of its numerator vanish.
 const SHAPE: [i64; 14] = [
     150_119_987_578_816,
     21_445_712_593_931,
@@ -81,8 +81,8 @@ impl Tip {
 impl LimitSurface {
     /// How far a load is from slip: `1 - sqrt((f_t / (mu N))^2 + (m / m_max)^2)`.
     ///
-    /// 1 is no load, 0 is about to slip, below 0 slips. One minus the margin is the share of the limit that is used; it is
-    /// told apart up to 180. Where a limit is 0, no load uses nothing of it and any other load all that can be told.
+    /// 1 is no load, 0 is about to slip, below 0 slips. One minus the margin is the share of the limit that is used; it
+    /// is told apart up to 180. Where a limit is 0, no load uses nothing of it and any other load all that can be told.
     pub fn margin(&self, tangential: Newtons, moment: NewtonMillimetres) -> Ratio {
         let force_share = share(tangential.to_bits(), self.force.to_bits());
         let moment_share = share(moment.to_bits(), self.moment.to_bits());

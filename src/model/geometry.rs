@@ -82,7 +82,8 @@ impl Tip {
         MillimetresPerRadian::from_bits(bits as i32)
     }
 
-    /// The area element for each dtheta dphi: `dS = r dr dphi = (a - d)^2 sin(theta) / cos^3(theta) dtheta dphi` (eq. 8).
+    /// The area element for each dtheta dphi: `dS = r dr dphi = (a - d)^2 sin(theta) / cos^3(theta) dtheta dphi` (eq.
+    /// 8).
     ///
     /// In mm^2/rad^2.
     pub fn area_density(&self, theta: Radians, d: Millimetres) -> SquareMillimetres {

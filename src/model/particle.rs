@@ -1,7 +1,7 @@
 //! One column of the tip: equations 9 to 13.
 //!
-//! Each is a ratio or a product, rounded once; what does not fit the result's range stops at its end. Compression counts as
-//! positive, the other way round than in the paper's equation 10.
+//! Each is a ratio or a product, rounded once; what does not fit the result's range stops at its end. Compression
+//! counts as positive, the other way round than in the paper's equation 10.
 
 use super::Tip;
 use crate::units::{Kilopascals, Millimetres, Newtons, SquareMillimetres, Strain};

@@ -51,9 +51,9 @@ impl Tip {
     /// Pressure at a distance `r` from the contact's centre: `p = Y dL/L` (eq. 13, 15, 16); 0 from the rim on.
     ///
     /// With `L = sqrt(a^2 - r^2)`, `dL = L - (a - d)` cancels at the rim and at small `d`. Here `dL/L` is
-    /// `(r_c^2 - r^2) / (L^2 + L (a - d))`: the numerator and `L^2` are exact integers, and nothing is subtracted after a
-    /// rounding. That is off by less than 0.1 of a unit; where two results remain possible, integers decide between them.
-    /// So it is correctly rounded for every input, and non-increasing in `r`.
+    /// `(r_c^2 - r^2) / (L^2 + L (a - d))`: the numerator and `L^2` are exact integers, and nothing is subtracted after
+    /// a rounding. That is off by less than 0.1 of a unit; where two results remain possible, integers decide between
+    /// them. So it is correctly rounded for every input, and non-increasing in `r`.
     pub fn pressure(&self, r: Millimetres, d: Millimetres) -> Kilopascals {
         let (depth, distance_square) = (self.depth(d), square(self.distance(r)));
         let estimate_q4 = self.strain_at_square(distance_square, depth).scale_q4(self.modulus_bits());
@@ -63,8 +63,8 @@ impl Tip {
         Kilopascals::from_bits(bits as i32)
     }
 
-    /// Whether the pressure comes within half a unit of `bits` from below: `Y (1 - (a - d)/L) >= bits - 1/2`, cleared of
-    /// fraction and root.
+    /// Whether the pressure comes within half a unit of `bits` from below: `Y (1 - (a - d)/L) >= bits - 1/2`, cleared
+    /// of fraction and root.
     fn pressure_reaches(&self, bits: u64, distance_square: u64, depth: u32) -> bool {
         let lost = u128::from(2 * self.modulus_bits() * u64::from(self.rest(depth)));
         let left = u128::from(2 * (self.modulus_bits() - bits) + 1);
@@ -98,9 +98,9 @@ impl Tip {
 
     /// Indentation from the contact radius, `d = a - sqrt(a^2 - r_c^2)`. Correctly rounded.
     ///
-    /// In floating point this cancels and is written `r_c^2 / (a + sqrt(a^2 - r_c^2))`; here the difference under the root
-    /// is exact, the root is the nearest multiple of the unit and a is a multiple of it, so nothing is lost.
-    /// The radius counts as within 0 to that of [`Tip::depth_max`].
+    /// In floating point this cancels and is written `r_c^2 / (a + sqrt(a^2 - r_c^2))`; here the difference under the
+    /// root is exact, the root is the nearest multiple of the unit and a is a multiple of it, so nothing is lost. The
+    /// radius counts as within 0 to that of [`Tip::depth_max`].
     pub fn indentation_from_radius(&self, contact_radius: Millimetres) -> Millimetres {
         let distance = self.distance(contact_radius.max(Millimetres::ZERO));
         let length = root(square(self.radius_bits()) - square(distance));
@@ -118,8 +118,8 @@ impl Tip {
     /// Total force by quadrature over rings: `F = integral of p dS` (eq. 14), the sum that the closed form
     /// [`Tip::force`] stands for.
     ///
-    /// In `u = r^2` the area element is `pi du` and the pressure is smooth up to the rim, so the midpoint rule over rings of
-    /// equal area converges with the square of their number.
+    /// In `u = r^2` the area element is `pi du` and the pressure is smooth up to the rim, so the midpoint rule over
+    /// rings of equal area converges with the square of their number.
     pub fn force_by_rings(&self, d: Millimetres, rings: NonZeroU16) -> Newtons {
         let depth = self.depth(d);
         let contact_square = self.contact_square(depth);

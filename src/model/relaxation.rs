@@ -8,8 +8,8 @@
 //!      = F_e(t) - sum of c_i m_i(t),     tau_i dm_i/dt + m_i = F_e
 //! ```
 //!
-//! so that each term remembers a low-passed force `m_i` and takes the share `c_i` of it away. With `F_e` taken as straight
-//! between samples, a step of the period T is exact: with `x = T/tau`,
+//! so that each term remembers a low-passed force `m_i` and takes the share `c_i` of it away. With `F_e` taken as
+//! straight between samples, a step of the period T is exact: with `x = T/tau`,
 //!
 //! ```text
 //! m' = m + A (F_e - m) + B (F_e' - F_e),   A = 1 - exp(-x),   B = 1 - A/x

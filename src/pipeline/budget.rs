@@ -1,14 +1,15 @@
-//! The time that the loop has, and the effort that fits it.
+//! The time that the loop has, and the fit level that fits it.
 //!
-//! The core has no clock: whoever calls the step measures how long the last one took. The effort that was asked for is in use
-//! as long as the dearest frame expected at it ends before the deadline, less a margin. It falls by one where that
-//! is no longer so, at once; it rises by one where the next effort is expected to fit after [`WINDOW`] frames, and after a
-//! fall only later and later, so that it does not hunt. An effort that is not expected to fit is not tried.
+//! The core has no clock: whoever calls the step measures how long the last one took. The fit level that was asked for
+//! is in use as long as the dearest frame expected at it ends before the deadline, less a margin. It falls by one where
+//! that is no longer so, at once; it rises by one where the next fit level is expected to fit after [`WINDOW`] frames,
+//! and after a fall only later and later, so that it does not hunt. A fit level that is not expected to fit is not
+//! tried.
 
-use crate::contact::Effort;
+use crate::contact::FitLevel;
 use crate::units::CoreCycles;
 
-/// Frames over which the time is watched before the effort rises: two refinements at the least effort, and more.
+/// Frames over which the time is watched before the fit level rises: two refinements at the least fit level, and more.
 pub const WINDOW: u32 = 32;
 /// Windows to wait at most after a fall: 0.8 s at 10 kHz.
 pub const WAIT_MAX: u32 = 256;
@@ -16,29 +17,29 @@ pub const WAIT_MAX: u32 = 256;
 /// What is expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget<const ROWS: usize, const COLUMNS: usize> {
-    effort: Effort,
+    fit_level: FitLevel,
     /// What was asked for, and the deadline, when last looked at.
-    asked: (Effort, u32),
+    asked: (FitLevel, u32),
     /// Whether the model was at work in the frame whose time comes next.
     modelled: bool,
     /// The longest time of a frame without the model, ticks.
-    rest: u32,
+    without_model: u32,
     /// The longest of this window's frames.
     longest: u32,
     frames: u32,
-    /// Windows to let pass before the effort may rise, and after the next fall.
+    /// Windows to let pass before the fit level may rise, and after the next fall.
     wait: u32,
     wait_next: u32,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
-    /// Nothing measured yet: the least effort.
+    /// Nothing measured yet: the least fit level.
     pub const fn new() -> Self {
         Self {
-            effort: Effort::Sum,
-            asked: (Effort::Sum, 0),
+            fit_level: FitLevel::Sum,
+            asked: (FitLevel::Sum, 0),
             modelled: false,
-            rest: 0,
+            without_model: 0,
             longest: 0,
             frames: 0,
             wait: 0,
@@ -51,23 +52,23 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
     /// (`cargo xtask timing`, `docs/study.md`): of 10 x 10 the start of a refinement 2,100 at most, its solution
     /// 1,600, a row 1,000. Of other shapes a row goes by its taxels, and the start by the places along both sides.
-    pub const fn model_ticks(effort: Effort) -> [u32; 2] {
+    pub const fn model_ticks(fit_level: FitLevel) -> [u32; 2] {
         // A table, worked out by the compiler.
-        Self::TICKS[effort as usize]
+        Self::TICKS[fit_level as usize]
     }
 
-    const TICKS: [[u32; 2]; Effort::ALL.len()] = {
-        let mut ticks = [[0; 2]; Effort::ALL.len()];
-        let mut effort = 0;
-        while effort < ticks.len() {
-            ticks[effort] = Self::ticks(Effort::ALL[effort]);
-            effort += 1;
+    const TICKS: [[u32; 2]; FitLevel::ALL.len()] = {
+        let mut ticks = [[0; 2]; FitLevel::ALL.len()];
+        let mut fit_level = 0;
+        while fit_level < ticks.len() {
+            ticks[fit_level] = Self::ticks(FitLevel::ALL[fit_level]);
+            fit_level += 1;
         }
         ticks
     };
 
-    const fn ticks(effort: Effort) -> [u32; 2] {
-        let rows = effort.rows(ROWS);
+    const fn ticks(fit_level: FitLevel) -> [u32; 2] {
+        let rows = fit_level.rows(ROWS);
         if rows == 0 {
             return [0, 0];
         }
@@ -81,21 +82,21 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         deadline - deadline / 8
     }
 
-    /// The effort for the next frame, where the last one took `taken` of its deadline. A time of 0 was not measured: then it is
-    /// the effort asked for.
-    pub fn next(&mut self, asked: Effort, taken: CoreCycles, deadline: CoreCycles) -> Effort {
+    /// The fit level for the next frame, where the last one took `taken` of its deadline. A time of 0 was not measured:
+    /// then it is the fit level asked for.
+    pub fn next(&mut self, asked: FitLevel, taken: CoreCycles, deadline: CoreCycles) -> FitLevel {
         let (CoreCycles(taken), CoreCycles(deadline)) = (taken, deadline);
         if self.asked != (asked, deadline) {
             self.asked = (asked, deadline);
             (self.wait, self.wait_next) = (0, 1);
         }
-        if taken == 0 || asked <= self.effort {
+        if taken == 0 || asked <= self.fit_level {
             self.set(asked);
         }
         if taken != 0 {
             self.weigh(taken, Self::usable(deadline));
         }
-        self.effort
+        self.fit_level
     }
 
     /// Whether the frame that was just worked on took the model.
@@ -107,14 +108,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     }
 
     fn weigh(&mut self, taken: u32, usable: u32) {
-        let [most, least] = Self::model_ticks(self.effort);
+        let [most, least] = Self::model_ticks(self.fit_level);
         let (expected, surely) =
             if self.modelled { (taken, taken.saturating_sub(most)) } else { (taken.saturating_add(most), taken) };
-        self.rest = self.rest.max(surely);
-        if expected > usable && self.effort > Effort::Sum {
+        self.without_model = self.without_model.max(surely);
+        if expected > usable && self.fit_level > FitLevel::Sum {
             self.wait = self.wait_next;
             self.wait_next = (2 * self.wait_next).min(WAIT_MAX);
-            return self.set(self.effort.lower());
+            return self.set(self.fit_level.lower());
         }
         self.longest = self.longest.max(taken);
         self.frames += 1;
@@ -122,20 +123,23 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
             return;
         }
         // The dearest frame of a window took at least this for the model.
-        self.rest = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
+        self.without_model = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
         self.restart();
         self.wait = self.wait.saturating_sub(1);
         // A rise needs a little more room than staying, so that what varies by a little does not undo it.
-        let higher = self.effort.higher();
+        let higher = self.fit_level.higher();
         let [most, _] = Self::model_ticks(higher);
-        if self.wait == 0 && self.effort < self.asked.0 && self.rest.saturating_add(most) <= usable - usable / 32 {
+        if self.wait == 0
+            && self.fit_level < self.asked.0
+            && self.without_model.saturating_add(most) <= usable - usable / 32
+        {
             self.set(higher);
         }
     }
 
-    fn set(&mut self, effort: Effort) {
-        if effort != self.effort {
-            self.effort = effort;
+    fn set(&mut self, fit_level: FitLevel) {
+        if fit_level != self.fit_level {
+            self.fit_level = fit_level;
             self.restart();
         }
     }

@@ -1,6 +1,6 @@
 //! What a step reports beside the duty.
 
-use crate::contact::{Contact, Effort};
+use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::{Duty, Millimetres, MillimetresPerSecond};
@@ -44,8 +44,8 @@ pub struct Status {
     pub fault: Option<Fault>,
     /// What holds it back.
     pub limits: Limits,
-    /// The effort in use: what was asked for, or what there is time for.
-    pub effort: Effort,
+    /// The fit level in use: what was asked for, or what there is time for.
+    pub fit_level: FitLevel,
     /// What the frame says.
     pub contact: Contact,
     /// Tip travel since torque was enabled.
@@ -78,8 +78,8 @@ pub enum Bridge {
 impl Status {
     /// What the bridge is to do.
     ///
-    /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many millimetres if the motor
-    /// coasted. Shorted, the motor lets go slowly, by itself.
+    /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many millimetres
+    /// if the motor coasted. Shorted, the motor lets go slowly, by itself.
     pub fn bridge(&self) -> Bridge {
         match self.mode {
             Mode::Fault if self.fault == Some(Fault::Bridge) => Bridge::Asleep,

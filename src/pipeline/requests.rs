@@ -19,8 +19,8 @@ pub(super) struct Asked {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
-    /// What is newly asked for. A tare and a clear count in the frame in which they come, whatever else that brings; a measurement of the
-    /// modulus counts until [`Pipeline::note_requests`] has an answer to it.
+    /// What is newly asked for. A tare and a clear count in the frame in which they come, whatever else that brings; a
+    /// measurement of the modulus counts until [`Pipeline::note_requests`] has an answer to it.
     pub(super) fn take_requests(&mut self, command: &Command) -> Asked {
         let taken = &mut self.status.taken;
         let asked = Asked {
@@ -67,7 +67,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// Leaves what was going on for what a new configuration or calibration asks: off, where there is no fault. A tare begins anew.
+    /// Leaves what was going on for what a new configuration or calibration asks: off, where there is no fault. A tare
+    /// begins anew.
     pub(super) fn leave(&mut self) {
         match self.status.mode {
             Mode::Fault => {}

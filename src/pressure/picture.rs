@@ -8,10 +8,11 @@ use fixed::types::I16F16;
 /// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picture<const ROWS: usize, const COLUMNS: usize> {
-    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated, and all zero where the array is broken.
+    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated, and all zero where the array is
+    /// broken.
     pub taxels: [[i32; COLUMNS]; ROWS],
-    /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows, the array is broken,
-    /// and bad ones may be in it.
+    /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows,
+    /// the array is broken, and bad ones may be in it.
     pub sum: i32,
     /// Sum weighted by twice the column's distance from the middle, in pitches: -9, -7 .. 9 of ten.
     pub moment_x: i32,
@@ -19,8 +20,8 @@ pub struct Picture<const ROWS: usize, const COLUMNS: usize> {
     pub moment_y: i32,
     /// The highest taxel, at least 0.
     pub peak: i32,
-    /// The highest code of a taxel above its column's undriven level: how near the array is to saturation. 0 where a taxel is dead or
-    /// saturated, masked ones too.
+    /// The highest code of a taxel above its column's undriven level: how near the array is to saturation. 0 where a
+    /// taxel is dead or saturated, masked ones too.
     pub peak_codes: u16,
     /// A bit for each column that is masked, dead or saturated, for each row.
     pub bad: [u32; ROWS],
@@ -47,7 +48,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
         undriven_max: 0,
     };
 
-    /// Notes bad taxels of a row, a bit each, and takes them out while the array is not broken; the highest of them, at least 0.
+    /// Notes bad taxels of a row, a bit each, and takes them out while the array is not broken; the highest of them, at
+    /// least 0.
     pub(super) fn leave_out(&mut self, row: usize, bad: u32, config: &Config) -> i32 {
         let (Some(taxels), Some(bits)) = (self.taxels.get_mut(row), self.bad.get_mut(row)) else { return 0 };
         *bits |= bad;
@@ -82,8 +84,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
         self.peak = peak;
     }
 
-    /// Bits dropped from the force of a sixteenth of a code, so that its product with the largest sum fits 64 bits: with the largest pitch
-    /// and the front end's least gain that force is 2^38.04 in its unit, and a taxel shows at most 2^17.6 sixteenths.
+    /// Bits dropped from the force of a sixteenth of a code, so that its product with the largest sum fits 64 bits:
+    /// with the largest pitch and the front end's least gain that force is 2^38.04 in its unit, and a taxel shows at
+    /// most 2^17.6 sixteenths.
     const FORCE_DROP: u32 = if ROWS * COLUMNS <= 128 { 0 } else { 4 };
 
     /// The sum as a force: the taxels' area times their pressure, never below zero, and stopped at the type's end.

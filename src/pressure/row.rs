@@ -30,8 +30,8 @@ impl<const COLUMNS: usize> Sound<COLUMNS> {
         Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), dead_codes }
     }
 
-    /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a dead one is
-    /// huge as an unsigned number.
+    /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a
+    /// dead one is huge as an unsigned number.
     #[inline(always)]
     pub fn suspects(&self, largest: u16) -> bool {
         u32::from(largest) + u32::from(self.undriven_max) + u32::from(self.dead_codes) >= u32::from(SATURATED)

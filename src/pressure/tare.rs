@@ -2,7 +2,8 @@
 
 use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
 
-/// Weight of a frame in the baseline, Q16; of ten rows each is visited every tenth frame, so the time constant is 10,240 frames.
+/// Weight of a frame in the baseline, Q16; of ten rows each is visited every tenth frame, so the time constant is
+/// 10,240 frames.
 const BASELINE_WEIGHT: i32 = 64;
 
 /// The first frames after a contact are weighed as if so many had come before.
@@ -11,8 +12,9 @@ const CLEAR_ROUNDS_FIRST: i32 = 4;
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Frames of a tare: of ten rows 160, 16 ms at 10 kHz.
     ///
-    /// Each learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32 times: that leaves 0.18 of
-    /// a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08 of ten rows.
+    /// Each learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32 times: that
+    /// leaves 0.18 of a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08 of ten
+    /// rows.
     pub const TARE_FRAMES: u32 = 32 * Self::TARE_STRIDE;
     /// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
     const TARE_STRIDE: u32 = ROWS.div_ceil(2) as u32;
@@ -46,9 +48,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_frames >= Self::TARE_FRAMES
     }
 
-    /// Lets the baseline follow the picture, one row a frame; call it only where there is no contact. Where the
-    /// tip is surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as the
-    /// filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
+    /// Lets the baseline follow the picture, one row a frame; call it only where there is no contact. Where the tip is
+    /// surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as
+    /// the filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
     pub fn follow_drift(&mut self, clear: bool) {
         let quick = (1 << 16) / (self.clear_rounds.max(0) + CLEAR_ROUNDS_FIRST);
         self.learn(self.baseline_row, if clear { quick.max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT });

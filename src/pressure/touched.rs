@@ -1,11 +1,11 @@
 //! Whether something touched the tip during a tare.
 //!
-//! A contact is a patch: some rows carry more than the rest. What taxels differ by without one, gains, preload and amplifiers, is each
-//! taxel's own, so it averages out over a row, where a contact adds up. The row that carries most is held against the one that carries
-//! least.
+//! A contact is a patch: some rows carry more than the rest. What taxels differ by without one, gains, preload and
+//! amplifiers, is each taxel's own, so it averages out over a row, where a contact adds up. The row that carries most
+//! is held against the one that carries least.
 //!
-//! Against a clean tare before, it must carry more by half of what begins a contact. Without one only the shape is known, and preload may
-//! lie unevenly: then it must carry half as much again as the other, too.
+//! Against a clean tare before, it must carry more by half of what begins a contact. Without one only the shape is
+//! known, and preload may lie unevenly: then it must carry half as much again as the other, too.
 
 use super::Array;
 use crate::config::Config;

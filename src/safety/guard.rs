@@ -1,18 +1,22 @@
 //! The last word on the duty: an envelope that holds whatever the loop, the fit or the host believe.
 //!
-//! The guard owes nothing to the loop. It counts the encoder by itself, keeps a model of the motor of its own, and takes of the array the
-//! larger of the plain sum and the force in use. `docs/safety.md` states its promises, by number:
+//! The guard owes nothing to the loop. It counts the encoder by itself, keeps a model of the motor of its own, and
+//! takes of the array the larger of the plain sum and the force in use. `docs/safety.md` states its promises, by
+//! number:
 //!
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
-//! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm on, the motor stops.
-//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a tip that stays
-//!    so fast for 20 ms stops.
-//! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of full drive.
-//! 5. A tip that goes steadily forward stops where the motor feels 1 N and its friction more than before, and the array no contact;
-//!    see `unseen.rs`.
+//! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm
+//!    on, the motor stops.
+//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a
+//!    tip that stays so fast for 20 ms stops.
+//! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of
+//!    full drive.
+//! 5. A tip that goes steadily forward stops where the motor feels 1 N and its friction more than before, and the array
+//!    no contact; see `unseen.rs`.
 //!
-//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells, and the one that its
-//! model of the motor expects. Both pass the same two filters, so a sound finger shows the same sign whatever it is asked for:
+//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells,
+//! and the one that its model of the motor expects. Both pass the same two filters, so a sound finger shows the same
+//! sign whatever it is asked for:
 //!
 //! ```text
 //! a = g V - c v - F / m       h' = a - h / tau       p' = 4 (h - p) / tau       tau = 5 ms
@@ -156,7 +160,8 @@ impl Guard {
             })
     }
 
-    /// The same, and the tip is not behind where it touched: between there and the clearance the array may show the same for ever.
+    /// The same, and the tip is not behind where it touched: between there and the clearance the array may show the
+    /// same for ever.
     pub fn presses_in(&self) -> bool {
         self.presses && self.surface.is_some_and(|surface| self.travel >= surface)
     }

@@ -44,8 +44,8 @@ impl Monitor {
         *self = Self { sums: sums(view.picture), travel: view.motion.observer.travel, ..Self::default() };
     }
 
-    /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off for a tare,
-    /// only the bus counts.
+    /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off
+    /// for a tare, only the bus counts.
     pub fn check<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -96,8 +96,8 @@ impl Monitor {
     }
 }
 
-/// A broken array. The same taxels must be bad in two frames running, or half of them in one: what a burst of interference makes of a
-/// frame is no fault.
+/// A broken array. The same taxels must be bad in two frames running, or half of them in one: what a burst of
+/// interference makes of a frame is no fault.
 pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
@@ -114,7 +114,8 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     }
 }
 
-/// Whether anything is to be read off a frame's array: not where more taxels are bad than allowed, be it for this frame only.
+/// Whether anything is to be read off a frame's array: not where more taxels are bad than allowed, be it for this frame
+/// only.
 pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>, config: &Config) -> bool {
     let p = &config.params;
     i32::from(picture.undriven_max) <= p.undriven_max_codes && i32::from(picture.bad_count) <= p.bad_taxels_max

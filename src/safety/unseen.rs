@@ -1,14 +1,16 @@
 //! A contact that the motor feels and the array does not see: beside the array, or under one that sees nothing.
 //!
-//! In steady motion through the air the motor feels friction alone. What it feels is what the speed did not change by though the guard's
-//! model expected it, see [`super::guard`]. A mean of that is kept, and 1 N and the friction more than the mean is a contact.
+//! In steady motion through the air the motor feels friction alone. What it feels is what the speed did not change by
+//! though the guard's model expected it, see [`super::guard`]. A mean of that is kept, and 1 N and the friction more
+//! than the mean is a contact.
 
 use super::guard::saturated;
 use crate::config::Config;
 use crate::state::Fault;
 use crate::units::{Millimetres, Newtons};
 
-/// The mean follows a lesser force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for friction.
+/// The mean follows a lesser force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for
+/// friction.
 const FREE_BITS: [u32; 2] = [6, 13];
 /// The tip goes steadily for so long before what the motor feels counts, ns.
 const STEADY_NS: u32 = 20_000_000;
@@ -69,7 +71,8 @@ impl Unseen {
         self.felt_ns = 0;
     }
 
-    /// How deep the tip is by what the motor felt when the array came to see the contact, where that is much more than the array sees.
+    /// How deep the tip is by what the motor felt when the array came to see the contact, where that is much more than
+    /// the array sees.
     pub fn depth(&self, seen: i32, speed: i32, config: &Config) -> Millimetres {
         let more = self.more.saturating_sub(config.bounds.change_unsure);
         // Q16 mm/s by Q16 mm/s for each N.

@@ -1,11 +1,12 @@
-//! Where records are written and what is erased when, so that at every instant one sector holds the newest whole record.
+//! Where records are written and what is erased when, so that at every instant one sector holds the newest whole
+//! record.
 //!
 //! - A save appends to the sector of the newest record; where that is full, to the other one, once that was erased.
-//! - A start whose sector is nearly full erases the other one where that has older records. Never the one with the newest whole
-//!   record.
-//! - What is damaged behind the newest whole record was written after it, and so was what is damaged in the other sector where
-//!   the newest one's is full: each start says so until the next save, which goes behind that. An erase that was cut short
-//!   at such a time looks the same, and is told too.
+//! - A start whose sector is nearly full erases the other one where that has older records. Never the one with the
+//!   newest whole record.
+//! - What is damaged behind the newest whole record was written after it, and so was what is damaged in the other
+//!   sector where the newest one's is full: each start says so until the next save, which goes behind that. An erase
+//!   that was cut short at such a time looks the same, and is told too.
 
 use super::format::{self, Found, GRID, SLOT_BYTES, encode};
 use super::{Record, Remark, taken};
@@ -116,8 +117,8 @@ impl Journal {
         Loaded { record, sound: taken && !torn }
     }
 
-    /// Erases the sector without the newest whole record where both are nearly full; says whether it did. For the start:
-    /// the core may stand for seconds.
+    /// Erases the sector without the newest whole record where both are nearly full; says whether it did. For the
+    /// start: the core may stand for seconds.
     ///
     /// # Errors
     /// The flash refuses, or is not blank afterwards.

@@ -1,7 +1,7 @@
 //! The values of a record, with their names, numbers and ranges.
 
 use super::{BAUD_RATES, CRC, ID_MAX, Record};
-use crate::contact::Effort;
+use crate::contact::FitLevel;
 use crate::params::Params;
 
 /// Values that stand before the parameters.
@@ -14,7 +14,7 @@ const HEAD: [(&str, i32, i32); HEAD_COUNT] = [
     ("id", 0, ID_MAX as i32),
     ("baud_code", 0, BAUD_RATES.len() as i32 - 1),
     ("return_delay_2us", 0, 254),
-    ("effort", 0, Effort::AllRows as i32),
+    ("fit_level", 0, FitLevel::AllRows as i32),
 ];
 
 /// The number under which a value is stored: the CRC-32 (ISO-HDLC) of its name.
@@ -57,7 +57,7 @@ pub fn ranges() -> impl Iterator<Item = (&'static str, i32, i32)> {
 impl Record {
     /// The values in order.
     pub(super) fn values(&self) -> [i32; COUNT] {
-        let head = [self.id, self.baud_code, self.return_delay_2us, self.effort as u8];
+        let head = [self.id, self.baud_code, self.return_delay_2us, self.fit_level as u8];
         let mut values = [0; COUNT];
         let all = head.into_iter().map(i32::from).chain(self.params.to_array());
         for (place, value) in values.iter_mut().zip(all) {
@@ -68,9 +68,15 @@ impl Record {
 
     /// The inverse, for values in their ranges.
     pub(super) fn from_values(values: &[i32; COUNT]) -> Self {
-        let [id, baud_code, return_delay_2us, effort, rest @ ..] = values;
-        let [id, baud_code, return_delay_2us, effort] =
-            [id, baud_code, return_delay_2us, effort].map(|value| *value as u8);
-        Self { id, baud_code, return_delay_2us, effort: Effort::from_number(effort), params: Params::from_array(rest) }
+        let [id, baud_code, return_delay_2us, fit_level, rest @ ..] = values;
+        let [id, baud_code, return_delay_2us, fit_level] =
+            [id, baud_code, return_delay_2us, fit_level].map(|value| *value as u8);
+        Self {
+            id,
+            baud_code,
+            return_delay_2us,
+            fit_level: FitLevel::from_number(fit_level),
+            params: Params::from_array(rest),
+        }
     }
 }

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | 0 to 3 | magic "FTIP" |
 //! | 4 to 7 | CRC-32 of the names of all that follows, each with a newline behind it |
-//! | 8, 9, 10, 11 | ID, baud code, return delay, effort |
+//! | 8, 9, 10, 11 | ID, baud code, return delay, fit level |
 //! | 12 to 12 + 4 n | the parameters in order, 32 bits each |
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!

@@ -11,8 +11,8 @@ use crate::params::{ParamError, Params};
 pub enum Remark {
     /// There is no whole record, but the flash is not blank: the defaults count. It is a fault.
     NoneWhole,
-    /// What was written after the newest whole record is damaged, most likely cut short: the values before it count. It is a
-    /// fault.
+    /// What was written after the newest whole record is damaged, most likely cut short: the values before it count. It
+    /// is a fault.
     Torn,
     /// A value is out of its range: its default counts. It is a fault.
     Refused(ParamError),

@@ -43,8 +43,8 @@ pub fn all_installed(packages: &[&str]) -> bool {
     packages.iter().all(|package| installed(package))
 }
 
-/// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a source of this
-/// call alone: apt does not know of them afterwards.
+/// Installs the newest version of packages that Debian has for this release, its backports included. Backports are a
+/// source of this call alone: apt does not know of them afterwards.
 ///
 /// # Errors
 /// No Debian, no root, or apt-get cannot get them: says what to install by hand.

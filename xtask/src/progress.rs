@@ -1,4 +1,5 @@
-//! How far a build is: crates done, and about how many minutes are left. In a terminal one line that changes; in a log a line a minute.
+//! How far a build is: crates done, and about how many minutes are left. In a terminal one line that changes; in a log
+//! a line a minute.
 
 use crate::console::say_line;
 use std::{
@@ -7,8 +8,8 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Crates of a build that take longer than a second, with about how many: what is left is told by them. Their ratios matter, not
-/// their size.
+/// Crates of a build that take longer than a second, with about how many: what is left is told by them. Their ratios
+/// matter, not their size.
 pub type Slow = &'static [(&'static str, f64)];
 /// What runs on this machine, without the emulator.
 pub const HOST: Slow = &[("fixed", 5.0), ("clap_builder", 5.0), ("fingertip", 4.0), ("host-tests", 10.0)];

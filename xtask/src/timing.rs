@@ -1,4 +1,5 @@
-//! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are worth.
+//! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are
+//! worth.
 
 use crate::{
     apt,

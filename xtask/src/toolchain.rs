@@ -67,8 +67,8 @@ impl Toolchain {
     }
 }
 
-/// The flag that names the sources of other crates by their place in cargo's home: where a panic would be is part of the image,
-/// which is the same bytes on every machine.
+/// The flag that names the sources of other crates by their place in cargo's home: where a panic would be is part of
+/// the image, which is the same bytes on every machine.
 pub fn short_paths() -> Option<String> {
     Some(format!("--remap-path-prefix={}=crates", sources()?.display()))
 }

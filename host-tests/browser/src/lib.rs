@@ -1,5 +1,5 @@
-//! A headless Chromium, driven over the DevTools protocol: opens a page as a screen or a phone shows it, light or dark, and tells
-//! what is wrong with it.
+//! A headless Chromium, driven over the DevTools protocol: opens a page as a screen or a phone shows it, light or dark,
+//! and tells what is wrong with it.
 
 mod complaints;
 mod devtools;

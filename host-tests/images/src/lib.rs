@@ -1,4 +1,5 @@
-//! What the images for an emulated Cortex-M4F share with this machine: recordings, and the same inputs for every function.
+//! What the images for an emulated Cortex-M4F share with this machine: recordings, and the same inputs for every
+//! function.
 #![no_std]
 #![forbid(unsafe_code)]
 

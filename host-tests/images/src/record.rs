@@ -5,7 +5,7 @@
 use crc::{CRC_64_XZ, Crc, Table};
 use fingertip::command::Command;
 use fingertip::contact::Contact;
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::frame::Sense;
 use fingertip::identify::Modulus;
 use fingertip::pipeline::{Status, Taken};
@@ -49,15 +49,16 @@ impl Record {
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
         put(&answer.0.to_le_bytes());
-        let Command { torque, goal, bus_watchdog_ms, effort, tare_request, clear_request, identify_request } = command;
+        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request } =
+            command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
         put(&bus_watchdog_ms.to_le_bytes());
-        put(&[*effort as u8, *tare_request, *clear_request, *identify_request]);
+        put(&[*fit_level as u8, *tare_request, *clear_request, *identify_request]);
         bytes
     }
 
-    /// The inverse of [`Record::to_bytes`]; any byte but 0 is true, and any number above the largest effort is that.
+    /// The inverse of [`Record::to_bytes`]; any byte but 0 is true, and any number above the largest fit level is that.
     pub fn from_bytes(bytes: &[u8; Self::BYTES]) -> Self {
         let mut rest = &bytes[..];
         let mut frame = Frame::EMPTY;
@@ -74,7 +75,7 @@ impl Record {
             torque: take(&mut rest) != [0],
             goal: Newtons::from_bits(i32::from_le_bytes(take(&mut rest))),
             bus_watchdog_ms: u16::from_le_bytes(take(&mut rest)),
-            effort: Effort::from_number(u8::from_le_bytes(take(&mut rest))),
+            fit_level: FitLevel::from_number(u8::from_le_bytes(take(&mut rest))),
             tare_request: u8::from_le_bytes(take(&mut rest)),
             clear_request: u8::from_le_bytes(take(&mut rest)),
             identify_request: u8::from_le_bytes(take(&mut rest)),
@@ -115,7 +116,7 @@ impl Digest {
             mode,
             fault,
             limits,
-            effort,
+            fit_level,
             contact,
             travel,
             speed,
@@ -143,7 +144,14 @@ impl Digest {
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());
         self.0.update(&applied.0.to_le_bytes());
-        self.0.update(&[effort as u8, mode as u8, fault.map_or(0, |fault| fault as u8), confidence, doubt, bad_taxels]);
+        self.0.update(&[
+            fit_level as u8,
+            mode as u8,
+            fault.map_or(0, |fault| fault as u8),
+            confidence,
+            doubt,
+            bad_taxels,
+        ]);
     }
 
     /// The digest of what was added.
@@ -175,7 +183,7 @@ mod tests {
         assert_eq!(record.command.identify_request, 248);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
-        // Bytes differ where a truth value was neither 0 nor 1, where an effort was none, and nowhere else.
+        // Bytes differ where a truth value was neither 0 nor 1, where a fit level was none, and nowhere else.
         let differing = bytes.iter().zip(&again).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
         assert!(differing.eq([232, 237, 244]));
     }
@@ -201,7 +209,7 @@ mod tests {
             with(|status| status.mode = Mode::Force),
             with(|status| status.fault = Some(Fault::LostFrames)),
             with(|status| status.limits = Limits(1)),
-            with(|status| status.effort = Effort::AllRows),
+            with(|status| status.fit_level = FitLevel::AllRows),
             with(|status| status.travel = Millimetres::from_bits(1)),
             with(|status| status.speed = MillimetresPerSecond::from_bits(1)),
             with(|status| status.duty = Duty(1)),

@@ -2,8 +2,8 @@
 //!
 //! Two processors whose digests are equal agree in every bit of every answer. Each input goes to all functions of the
 //! model ([`model`]) and to what has a configuration or a state ([`machines`]); about a quarter of the numbers is
-//! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what is costly to
-//! make, [`made::MADE`], every 1024th.
+//! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what
+//! is costly to make, [`made::MADE`], every 1024th.
 
 mod frames;
 pub mod machines;
@@ -70,8 +70,8 @@ impl Default for Source {
     }
 }
 
-/// A digest of numbers in order. Each number permutes it, so that two runs that differ in one number differ for good, unless
-/// another difference undoes it.
+/// A digest of numbers in order. Each number permutes it, so that two runs that differ in one number differ for good,
+/// unless another difference undoes it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mix(u64);
 

@@ -1,6 +1,7 @@
-//! What effects cost that are compiled in but not named: runs a scene without its effects, by turns with none compiled and with all,
-//! and prints the ratios of the times: the pairs' median, and of the quickest run of each, which a busy machine disturbs least. Then names
-//! effects without magnitude, each alone and all together: together they cost at most the sum, or cost grew faster than their number.
+//! What effects cost that are compiled in but not named: runs a scene without its effects, by turns with none compiled
+//! and with all, and prints the ratios of the times: the pairs' median, and of the quickest run of each, which a busy
+//! machine disturbs least. Then names effects without magnitude, each alone and all together: together they cost at
+//! most the sum, or cost grew faster than their number.
 //!
 //! `cargo run --profile host -p sim --example unnamed-cost -- [SCENE] [PAIRS]`
 

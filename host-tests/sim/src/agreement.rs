@@ -1,11 +1,12 @@
 //! Whether two boards do the same in a scene: the second one's trajectory beside the first one's.
 //!
-//! Both begin with the script. They cannot be alike to the bit: the emulated board's frames run on through the script's times, so a
-//! goal is taken up to two frames sooner or later; its duty acts some microseconds beside the native board's; its PWM counts in
-//! steps; a row is sampled where its conversions begin, not at its slot's end. All but the PWM's steps is a shift in time. So the bound is
-//! a tube: at each time the second board lies between the least and the largest value of the first one within [`SHIFT_S`], or beyond
-//! them by a little: [`BEYOND_N`] and [`BEYOND_MM`]. The loop rests where it is within two counts of the encoder, so two boards may
-//! rest four counts apart, 4.4 um of the reference finger, one on this side of the goal and one on the other.
+//! Both begin with the script. They cannot be alike to the bit: the emulated board's frames run on through the script's
+//! times, so a goal is taken up to two frames sooner or later; its duty acts some microseconds beside the native
+//! board's; its PWM counts in steps; a row is sampled where its conversions begin, not at its slot's end. All but the
+//! PWM's steps is a shift in time. So the bound is a tube: at each time the second board lies between the least and the
+//! largest value of the first one within [`SHIFT_S`], or beyond them by a little: [`BEYOND_N`] and [`BEYOND_MM`]. The
+//! loop rests where it is within two counts of the encoder, so two boards may rest four counts apart, 4.4 um of the
+//! reference finger, one on this side of the goal and one on the other.
 
 use crate::scene::Scene;
 use crate::watch::{Step, Watch};

@@ -106,8 +106,8 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
     read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))
 }
 
-/// Does what is asked for. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2: it could not be
-/// done.
+/// Does what is asked for. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2: it
+/// could not be done.
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
         explain::list().map(say::text).map(|()| true)

@@ -1,7 +1,7 @@
 //! The effects: what a scene may name, each in a file of its own with its equations, its source and its keys.
 //!
-//! An effect acts at one stage and knows no other effect. A stage holds the named ones in the order of the registry, so an effect
-//! that is not named has no state and is never called.
+//! An effect acts at one stage and knows no other effect. A stage holds the named ones in the order of the registry, so
+//! an effect that is not named has no state and is never called.
 
 pub mod contact;
 pub mod drive;

@@ -1,5 +1,5 @@
-//! The host at the other end of the bus: it sends its command when the script changes it, and repeats it. Where the scene says so it
-//! reads the controller too, and grips harder when it must.
+//! The host at the other end of the bus: it sends its command when the script changes it, and repeats it. Where the
+//! scene says so it reads the controller too, and grips harder when it must.
 
 pub mod grip;
 
@@ -71,15 +71,16 @@ impl Host {
         self.arrived_n
     }
 
-    /// Lets the host read the controller where it is time to: the reading arrives later, or not at all. Times never fall.
+    /// Lets the host read the controller where it is time to: the reading arrives later, or not at all. Times never
+    /// fall.
     pub fn read(&mut self, time_s: f64, reading: impl FnOnce() -> Reading, stages: &mut impl Stages) {
         if let Some(asked_s) = self.ask(time_s, time_s, stages) {
             self.hear(Grip::answered_s(asked_s), reading());
         }
     }
 
-    /// Asks for a reading where that is due by a time, at `now_s` or when it is due, whichever is later. Says when the request
-    /// arrives at the controller; none where nothing is due, or where the request is lost. Times never fall.
+    /// Asks for a reading where that is due by a time, at `now_s` or when it is due, whichever is later. Says when the
+    /// request arrives at the controller; none where nothing is due, or where the request is lost. Times never fall.
     pub fn ask(&mut self, now_s: f64, until_s: f64, stages: &mut impl Stages) -> Option<f64> {
         let reader = self.reader.as_mut().filter(|reader| reader.read_s <= until_s)?;
         let at_s = reader.read_s.max(now_s);

@@ -1,4 +1,5 @@
-//! What a key of a scene is, told once: the reader checks by it, errors quote it, and the reference page is made from it.
+//! What a key of a scene is, told once: the reader checks by it, errors quote it, and the reference page is made from
+//! it.
 
 use std::fmt;
 

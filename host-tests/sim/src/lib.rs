@@ -1,11 +1,12 @@
 //! Scenes: simulate only the effects a scene calls for.
 //!
-//! A scene is a text file (TOML). It says what the finger is made of, what it touches, which forces are asked for and which
-//! effects are there. An effect that the scene does not name is not there: it has no state, is never called, and costs nothing.
+//! A scene is a text file (TOML). It says what the finger is made of, what it touches, which forces are asked for and
+//! which effects are there. An effect that the scene does not name is not there: it has no state, is never called, and
+//! costs nothing.
 //!
-//! One run goes like this: [`scene`] reads the file; [`registry`] knows every effect by its name and builds those that are named;
-//! the world moves the finger and fills the frames; the core's `Pipeline::step` answers each with a duty; everything that wants to see the run
-//! watches it step by step ([`watch`]): metrics, ledger, recording, report.
+//! One run goes like this: [`scene`] reads the file; [`registry`] knows every effect by its name and builds those that
+//! are named; the world moves the finger and fills the frames; the core's `Pipeline::step` answers each with a duty;
+//! everything that wants to see the run watches it step by step ([`watch`]): metrics, ledger, recording, report.
 //!
 //! All of it is simulated; nothing here has touched silicon.
 

@@ -1,7 +1,8 @@
 //! What is measured in a run, and what a scene may ask of it.
 //!
 //! [`METRICS`] is the one table of them: the reader checks `[[expect]]` by it, the results are named by it, and the
-//! reference page shows it. All figures are of what is simulated; times before 0, when the finger is tared, do not count.
+//! reference page shows it. All figures are of what is simulated; times before 0, when the finger is tared, do not
+//! count.
 
 mod at_goal;
 mod conduct;

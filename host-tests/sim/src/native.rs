@@ -1,7 +1,7 @@
 //! The native board: the same core on the host, closed over the world.
 //!
-//! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came of a frame acts
-//! three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
+//! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came
+//! of a frame acts three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
 
 mod clock;
 mod digest;

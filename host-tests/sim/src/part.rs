@@ -1,7 +1,7 @@
 //! What a long piece of work has done so far, a line each, so that it can go on where it was stopped.
 //!
-//! A line is `<CRC-64 of the text, 16 hexadecimal digits> <text>`. The first says what work it is. A line that was cut off, or that is
-//! damaged otherwise, is not taken up: what it stood for is done again.
+//! A line is `<CRC-64 of the text, 16 hexadecimal digits> <text>`. The first says what work it is. A line that was cut
+//! off, or that is damaged otherwise, is not taken up: what it stood for is done again.
 
 use crate::run::RunError;
 use host_tests::kept::{self, Lock};

@@ -1,7 +1,7 @@
 //! Populations: what the fingers are like that a usual build brings about, and how the controller does on them.
 //!
-//! A population's file is a scene whose values may be drawn, each finger anew. Its bounds are the envelope: what each finger promises.
-//! A finger is a scene like any other, so what is found can be run again by itself.
+//! A population's file is a scene whose values may be drawn, each finger anew. Its bounds are the envelope: what each
+//! finger promises. A finger is a scene like any other, so what is found can be run again by itself.
 
 pub mod cli;
 mod draw;
@@ -77,7 +77,8 @@ pub struct Finger {
 }
 
 impl Population {
-    /// Draws a finger, from 0. Each value has a stream of random numbers of its own, so one more leaves the others as they are.
+    /// Draws a finger, from 0. Each value has a stream of random numbers of its own, so one more leaves the others as
+    /// they are.
     ///
     /// # Errors
     /// It is no scene.

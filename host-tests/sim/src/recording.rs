@@ -7,8 +7,9 @@
 //! | `/finger0/image` | `foxglove.RawImage` | 100 times a second | the same as a grey picture |
 //! | `/finger0/core` | `fingertip.Core` | each step | all that the core was given, byte for byte, and a digest of all that it answered |
 //!
-//! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file. A
-//! recording of the emulated board holds what is seen of it from outside, a step each millisecond: it cannot be replayed, and says so.
+//! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file. A recording of
+//! the emulated board holds what is seen of it from outside, a step each millisecond: it cannot be replayed, and says
+//! so.
 
 mod check;
 mod replay;

@@ -3,7 +3,8 @@
 use crate::effects::{Build, Part, contact, drive, link, sensor, stream};
 use crate::key::{Key, Values};
 
-/// An effect as the table knows it. Each stands in the file that holds its equations, as a `pub const EFFECT: Description`.
+/// An effect as the table knows it. Each stands in the file that holds its equations, as a
+/// `pub const EFFECT: Description`.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// Its name in a scene: `[effects.NAME]`.

@@ -1,7 +1,7 @@
 //! Many runs of a scene: over values of its keys, over seeds, over all cores and over machines.
 //!
-//! Runs are numbered point by point and, within a point, seed by seed. A shard takes every n-th of them; what is merged from
-//! shards is the same, byte for byte, as one whole sweep.
+//! Runs are numbered point by point and, within a point, seed by seed. A shard takes every n-th of them; what is merged
+//! from shards is the same, byte for byte, as one whole sweep.
 
 pub mod cores;
 pub mod files;
@@ -44,7 +44,8 @@ pub struct Plan {
     pub out: Option<PathBuf>,
 }
 
-/// Where sweeps lie that are not told where to go, each in a folder named by its scene and a digest of all that makes it what it is.
+/// Where sweeps lie that are not told where to go, each in a folder named by its scene and a digest of all that makes
+/// it what it is.
 pub const FOLDER: &str = "target/sweep";
 /// More points or runs than this are a slip of the keyboard: they would take weeks, and more memory than there is.
 const MOST: usize = 1_000_000;
@@ -57,7 +58,8 @@ struct Task<'a> {
     seed: u64,
 }
 
-/// Runs the sweep, or the shard, and writes its files; also tells their folder. A sweep that was stopped goes on where it stood.
+/// Runs the sweep, or the shard, and writes its files; also tells their folder. A sweep that was stopped goes on where
+/// it stood.
 ///
 /// # Errors
 /// The scene is none at a point, a run fails, a file cannot be written, or another process writes it.

@@ -14,7 +14,8 @@ use fingertip::units::CoreCycles;
 use host_tests::plant::setup::Tip;
 use host_tests::plant::{Bridge, Setup};
 
-/// A step times the fastest oscillation's angular frequency is at most this: its solution then gains a factor of 16 a round or more.
+/// A step times the fastest oscillation's angular frequency is at most this: its solution then gains a factor of 16 a
+/// round or more.
 const STEP_RAD: f64 = 0.5;
 
 /// Why a world cannot be simulated.
@@ -164,8 +165,8 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Fingers and object, round by round: mean forces from the ends, ends from the mean forces. Where they agree, what one gains the
-    /// others lose, in momentum and in energy.
+    /// Fingers and object, round by round: mean forces from the ends, ends from the mean forces. Where they agree, what
+    /// one gains the others lose, in momentum and in energy.
     #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);

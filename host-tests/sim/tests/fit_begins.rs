@@ -1,5 +1,6 @@
-//! The fit takes hold of every contact that reaches over the array's edge, however quickly its force rises from frame to frame: with a
-//! scan that settles slowly, and with stiff tips. Until it does, the force is the sum of what the array sees, and the tip presses harder.
+//! The fit takes hold of every contact that reaches over the array's edge, however quickly its force rises from frame
+//! to frame: with a scan that settles slowly, and with stiff tips. Until it does, the force is the sum of what the
+//! array sees, and the tip presses harder.
 
 use fingertip::contact::CONFIDENCE_LEAST;
 use sim::native::simulate;
@@ -22,7 +23,8 @@ impl Watch for Held {
     }
 }
 
-/// Touches an object so far away at the default speed, with the contact's centre so far from the array's middle, and holds.
+/// Touches an object so far away at the default speed, with the contact's centre so far from the array's middle, and
+/// holds.
 fn is_held(keys: &str, distance_mm: f64, centre_mm: f64, goal_n: f64) {
     let text = format!(
         "about = \"a touch off the middle\"\nduration_s = 1.0\n{keys}\n\

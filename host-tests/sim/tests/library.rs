@@ -1,5 +1,5 @@
-//! The library of scenes: each is read, runs on the native board, and holds what it promises. The forces and pressures of the paper's
-//! compression test come out of its scene.
+//! The library of scenes: each is read, runs on the native board, and holds what it promises. The forces and pressures
+//! of the paper's compression test come out of its scene.
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::metrics::Verdict;
@@ -37,13 +37,14 @@ fn every_scene_of_the_library_holds_its_bounds() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-/// What breaks a scene's bounds: keys to set, one at a time. Between them they break each side of each bound: a side that nothing breaks
-/// says nothing.
+/// What breaks a scene's bounds: keys to set, one at a time. Between them they break each side of each bound: a side
+/// that nothing breaks says nothing.
 type Breakers = (&'static str, &'static [&'static str]);
 
 /// A supply that is too low: the finger stops with a fault.
 const LOW: &str = "supply.source_v=3";
-/// A controller that reads too little and presses half as much again, and one that reads too much and presses two thirds.
+/// A controller that reads too little and presses half as much again, and one that reads too much and presses two
+/// thirds.
 const MORE: &str = "controller.codes_per_kpa_milli=36000";
 const LESS: &str = "controller.codes_per_kpa_milli=16000";
 
@@ -66,8 +67,8 @@ const BREAKERS: &[Breakers] = &[
     ("worn_sensor", &[LOW, MORE, LESS, "effects.broken_taxels.dead=[]", "effects.creep.rate_percent_per_decade=0"]),
 ];
 
-/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here, and a finger that
-/// stopped with a fault breaks only that it must not.
+/// The sides of a scene's bounds that are not broken by any of the keys set. A metric that is missing breaks none here,
+/// and a finger that stopped with a fault breaks only that it must not.
 fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
     let sides = |verdict: &Verdict| {
         let Verdict { bound: Bound { metric, min, .. }, value, max, .. } = verdict;

@@ -1,6 +1,6 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use host_tests::fit_tables::{CASES, markdown, renewed};
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-const USAGE: &str = "fit [--cases N] [--quick] [--effort N] [--write | --check]";
+const USAGE: &str = "fit [--cases N] [--quick] [--fit-level N] [--write | --check]";
 
 enum Page {
     Print,
@@ -27,7 +27,7 @@ fn main() -> ExitCode {
 }
 
 fn run() -> Result<(), String> {
-    let (mut cases, mut effort, mut page) = (CASES, Effort::default(), Page::Print);
+    let (mut cases, mut fit_level, mut page) = (CASES, FitLevel::default(), Page::Print);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
@@ -35,10 +35,10 @@ fn run() -> Result<(), String> {
                 let number = arguments.next().and_then(|number| number.parse().ok()).filter(|number| *number > 0);
                 cases = number.ok_or("--cases takes a number above 0")?;
             }
-            "--effort" => {
+            "--fit-level" => {
                 let number = arguments.next().and_then(|number| number.parse::<usize>().ok());
-                let found = number.and_then(|number| Effort::ALL.get(number));
-                effort = *found.ok_or("--effort takes a number from 0 to 5")?;
+                let found = number.and_then(|number| FitLevel::ALL.get(number));
+                fit_level = *found.ok_or("--fit-level takes a number from 0 to 5")?;
             }
             "--quick" => cases = CASES / 20,
             "--write" => page = Page::Write,
@@ -49,7 +49,7 @@ fn run() -> Result<(), String> {
     // A log wants the results only.
     let live = io::stderr().is_terminal();
     let shown = Mutex::new(Instant::now());
-    let tables = markdown(cases, effort, &|name, done| {
+    let tables = markdown(cases, fit_level, &|name, done| {
         if live
             && let Ok(mut shown) = shown.try_lock()
             && shown.elapsed() > Duration::from_millis(500)

@@ -1,5 +1,5 @@
-//! Takes the filters and integrators of the loop through 10^9 inputs: their cycles, and for the default scan and the relaxation also
-//! every input one by one. Some minutes.
+//! Takes the filters and integrators of the loop through 10^9 inputs: their cycles, and for the default scan and the
+//! relaxation also every input one by one. Some minutes.
 
 use host_tests::long_run::{STEPS, all};
 use std::process::ExitCode;

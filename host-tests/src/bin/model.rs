@@ -2,9 +2,9 @@
 //!
 //! Standard input has a header line with the columns `a_mm`, `Y_kPa`, `d_mm` and `r_mm` in any order; further columns
 //! are ignored. Standard output repeats the four as they were written and adds what the model says. Decimals are read
-//! exactly and rounded once to the nearest value that the core can hold; results have the digits that tell them from their
-//! neighbours. A row outside the domain keeps its place with empty cells, is named on standard error, and makes the exit
-//! code 1.
+//! exactly and rounded once to the nearest value that the core can hold; results have the digits that tell them from
+//! their neighbours. A row outside the domain keeps its place with empty cells, is named on standard error, and makes
+//! the exit code 1.
 
 use std::error::Error;
 use std::fmt;

@@ -1,7 +1,7 @@
 //! Proves the model's error bounds over whole input ranges; `--quick` takes a thousandth of the inputs.
 //!
-//! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold. `--write` puts
-//! these figures into `docs/model.md`, `--check` fails where they are stale there.
+//! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
+//! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;

@@ -1,4 +1,5 @@
-//! Gives the same random inputs to every function of the model on the emulated Cortex-M4F and on this machine, and compares.
+//! Gives the same random inputs to every function of the model on the emulated Cortex-M4F and on this machine, and
+//! compares.
 //!
 //! `same-bits IMAGE [INPUTS [FUNCTION]]`: the image, how many inputs (10^6), a function that is made to differ.
 

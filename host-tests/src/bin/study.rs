@@ -1,7 +1,8 @@
 //! What accuracy costs in time: makes the study's inputs, and tables and pictures of its run.
 //!
-//! `study inputs FILE` writes the inputs for the image. `study report SHIPPED QUICK [--check] [--json FILE]
-//! [--out DIR]` judges two runs, of the image built as the firmware is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
+//! `study inputs FILE` writes the inputs for the image.
+//! `study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
+//! is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
 
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;

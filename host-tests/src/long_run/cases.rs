@@ -27,8 +27,8 @@ const CALM_TRAVEL_SWING: i64 = 12;
 const SPEED_SWING: i64 = 131;
 const DISTURBANCE_SWING: i64 = 1_024;
 
-/// All machines. With `whole`, those that are quick enough also take all their steps one by one, and the relaxation has its
-/// longest time constant.
+/// All machines. With `whole`, those that are quick enough also take all their steps one by one, and the relaxation has
+/// its longest time constant.
 pub fn all(whole: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {

@@ -8,8 +8,8 @@ use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 
-/// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat itself no sooner
-/// than after this many steps.
+/// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat
+/// itself no sooner than after this many steps.
 const PERIOD: u64 = 110;
 
 /// The frame of a tip that presses, or not, in the middle of the array.
@@ -23,8 +23,8 @@ fn frame(codes: u16) -> Frame {
     frame
 }
 
-/// Holds a goal against frames that show so many codes on 16 taxels, with an encoder that stands, until nothing in the pipeline changes
-/// from period to period but the frames' number.
+/// Holds a goal against frames that show so many codes on 16 taxels, with an encoder that stands, until nothing in the
+/// pipeline changes from period to period but the frames' number.
 ///
 /// # Panics
 /// Something still changes after `most` steps.

@@ -1,8 +1,9 @@
 //! What a taxel feels: the pressure averaged over its square.
 //!
-//! A square inside the contact is a smooth function's, so 3 x 3 Gauss points do. The rim bends the pressure, so a square
-//! that it crosses is cut into strips along y at every place where the rim meets a side or turns, each strip into chords
-//! that end on the rim. Along a chord the pressure is smooth; across, it ends like (r_c - y)^1.5, which takes 5 points.
+//! A square inside the contact is a smooth function's, so 3 x 3 Gauss points do. The rim bends the pressure, so a
+//! square that it crosses is cut into strips along y at every place where the rim meets a side or turns, each strip
+//! into chords that end on the rim. Along a chord the pressure is smooth; across, it ends like (r_c - y)^1.5, which
+//! takes 5 points.
 
 use super::setup::{Setup, Tip};
 use super::tip::Flattened;

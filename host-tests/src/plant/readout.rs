@@ -1,4 +1,5 @@
-//! From pressures to the columns' voltages and codes: zero-potential readout, its row sag, its settling and its defects.
+//! From pressures to the columns' voltages and codes: zero-potential readout, its row sag, its settling and its
+//! defects.
 
 use super::setup::Array;
 use fingertip::shipped::{COLUMNS, ROWS};

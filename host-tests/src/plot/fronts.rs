@@ -225,8 +225,8 @@ fn apart(a: Place, b: Place) -> f64 {
     (a.0 - b.0).hypot(a.1 - b.1)
 }
 
-/// The nearest place for a label where it and the line to it cover nothing, nearer to its point than to another: its distance
-/// from the point, and its middle.
+/// The nearest place for a label where it and the line to it cover nothing, nearer to its point than to another: its
+/// distance from the point, and its middle.
 fn free_place(
     at: Place,
     half: (f64, f64),

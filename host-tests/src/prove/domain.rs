@@ -44,7 +44,8 @@ pub fn boundary_distances(tip: &Tip, d: i32) -> Vec<i32> {
     around(0, i32::MAX, &[rim - 2, rim - 1, rim, rim + 1, rim / 2, radius - 1, radius, radius + 1])
 }
 
-/// Whether a force is at most that of the deepest indentation, judged exactly: its rounded value may be half a unit more.
+/// Whether a force is at most that of the deepest indentation, judged exactly: its rounded value may be half a unit
+/// more.
 pub fn in_reach(tip: &Tip, force: i32) -> bool {
     force < tip.force_max().to_bits() || super::exact::force_in_reach(tip, force)
 }

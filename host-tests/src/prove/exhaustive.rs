@@ -14,8 +14,8 @@ pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
 const CHUNK: u64 = 1 << 16;
 
-/// Every depth from one unit to the deepest: force, radius, stiffness, peak and mean pressure; that the force never falls
-/// and never jumps; and the way back from the force.
+/// Every depth from one unit to the deepest: force, radius, stiffness, peak and mean pressure; that the force never
+/// falls and never jumps; and the way back from the force.
 pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7] {
     let round_trip_max = (tip.indentation(newtons(1)).to_bits() + 1).into();
     let tallies = [
@@ -47,8 +47,8 @@ pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7
     })
 }
 
-/// Every force up to that of the deepest indentation: indentation and stiffness; and that a unit of force never moves the
-/// indentation back, nor by more than the first unit does.
+/// Every force up to that of the deepest indentation: indentation and stiffness; and that a unit of force never moves
+/// the indentation back, nor by more than the first unit does.
 pub fn forces(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 3] {
     let first = tip.indentation(newtons(1)).to_bits();
     let tallies = [Tally::new("d(F)", 0.5), Tally::new("k(F)", 0.5), Tally::new("d(F + 1 ulp) - d(F)", first.into())];

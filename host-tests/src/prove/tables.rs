@@ -35,7 +35,8 @@ pub fn renewed(page: &str, tables: &str) -> Option<String> {
     Some(format!("{before}{BEGIN}{tables}{END}{after}"))
 }
 
-/// Whole units as they are, anything else to 4 digits after the point. Rounded up: a worst case must not look better than it is.
+/// Whole units as they are, anything else to 4 digits after the point. Rounded up: a worst case must not look better
+/// than it is.
 fn number(ulp: f64) -> String {
     if ulp == ulp.trunc() { thousands(ulp as u64) } else { format!("{:.4}", (ulp * 1e4).ceil() / 1e4) }
 }

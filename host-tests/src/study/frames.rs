@@ -12,7 +12,8 @@ const HALF_PITCH_MM: f64 = 0.75;
 /// Newtons for a code on a taxel: its area over the codes for a kPa.
 const NEWTONS_PER_CODE: f64 = 1.5 * 1.5 * 1e-3 / 24.0;
 
-/// Largest and root mean square error of the force in N and of the centre in mm; the tare is the exact reading of the quiet frame.
+/// Largest and root mean square error of the force in N and of the centre in mm; the tare is the exact reading of the
+/// quiet frame.
 pub fn errors(returned: &[Vec<Number>], frames: &Frames) -> Option<[[f64; 2]; 2]> {
     let config = Config::shipped(&Params::DEFAULT).ok()?;
     let tare = sums(&frames.quiet, frames, &config);

@@ -145,7 +145,7 @@ pub const KERNELS: &[Kernel] = &[
         name: "fit-clean",
         title: "Contact from a picture, no noise",
         text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, without noise, read to a sixteenth of a code. *One*, *Two* and *Full* see one picture; \
-            *Fit* sees 90 at each of the loop's efforts and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
+            *Fit* sees 90 at each of the loop's fit_levels and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Fit { noisy: false },
@@ -155,7 +155,7 @@ pub const KERNELS: &[Kernel] = &[
         name: "fit-noise",
         title: "Contact from a picture, 1 % of noise",
         text: "64 contacts, with their centres on the array or beyond its edge, as [contact.md](contact.md) draws them, each taxel with noise of 1 % of its reading. *One*, *Two* and *Full* see one picture; \
-            *Fit* sees 90 at each of the loop's efforts and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
+            *Fit* sees 90 at each of the loop's fit_levels and is judged on the last; 0 and 1 are the sums. The error is that against the simulated truth. All are the firmware's.",
         error: "force error, N",
         other: Some("centre error, mm"),
         measure: Measure::Fit { noisy: true },
@@ -177,7 +177,7 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "step",
         title: "The step and its parts",
-        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default effort, 2, and at the others; its parts over the first 3,000.",
+        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default fit level, 2, and at the others; its parts over the first 3,000.",
         error: "",
         other: None,
         measure: Measure::Cost,

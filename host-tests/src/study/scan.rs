@@ -11,7 +11,8 @@ use std::fmt::Write as _;
 
 /// Noise of a conversion, codes: assumed, as the simulated converters have none.
 const NOISE_CODES: f64 = 1.0;
-/// The converter's resistance and capacitance with the largest source for which 15 cycles are meant: 6 kOhm, 10 kOhm, 4 pF.
+/// The converter's resistance and capacitance with the largest source for which 15 cycles are meant: 6 kOhm, 10 kOhm, 4
+/// pF.
 const SAMPLING_TAU_S: f64 = (6e3 + 10e3) * 4e-12;
 /// Force of a code on a taxel, mN.
 const MN_PER_CODE: f64 = 1.5 * 1.5 / 24.0;

@@ -1,4 +1,5 @@
-//! What the simulation's own accuracy costs: the plant's integrator and step, and the points at which a taxel's pressure is taken.
+//! What the simulation's own accuracy costs: the plant's integrator and step, and the points at which a taxel's
+//! pressure is taken.
 
 use super::page::figure;
 use crate::plant::cells::Cell;

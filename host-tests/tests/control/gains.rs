@@ -37,7 +37,8 @@ fn a_fine_encoder_leaves_the_pace_to_the_time() {
     }
 }
 
-/// A count moves the voltage by three quarters of the largest at most: 5.8 k_v^2 q = 0.75 g V_max; no pace is slower than 60 /s.
+/// A count moves the voltage by three quarters of the largest at most: 5.8 k_v^2 q = 0.75 g V_max; no pace is slower
+/// than 60 /s.
 #[test]
 fn a_coarse_encoder_makes_a_slower_loop() {
     let config = shipped::Config::shipped(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
@@ -54,7 +55,8 @@ fn a_coarse_encoder_makes_a_slower_loop() {
     assert!(at_the_least < config.paces.len() - 1, "{quickest} /s");
 }
 
-/// Nor is a count taken for more than 60 mm/s by an observer 2.5 times as quick: where the motor drives the tip almost directly.
+/// Nor is a count taken for more than 60 mm/s by an observer 2.5 times as quick: where the motor drives the tip almost
+/// directly.
 #[test]
 fn a_count_is_no_more_than_so_fast() {
     let config = shipped::Config::shipped(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");

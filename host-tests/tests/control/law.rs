@@ -99,8 +99,8 @@ fn the_law_is_the_documented_one() {
     }
 }
 
-/// A force that pushes back helps to stop where it presses, and drives where it lets go: 85 % of it is counted on, between a quarter and
-/// twice of what the motor can.
+/// A force that pushes back helps to stop where it presses, and drives where it lets go: 85 % of it is counted on,
+/// between a quarter and twice of what the motor can.
 #[test]
 fn the_brake_counts_on_the_force_where_it_helps() {
     let config = config();
@@ -122,7 +122,8 @@ fn the_brake_counts_on_the_force_where_it_helps() {
     }
 }
 
-/// While the loop is quick every way counts; once it is calm, one within the slack is none, and of a longer one what is beyond it.
+/// While the loop is quick every way counts; once it is calm, one within the slack is none, and of a longer one what is
+/// beyond it.
 #[test]
 fn a_calm_loop_leaves_a_way_within_the_slack() {
     let config = config();

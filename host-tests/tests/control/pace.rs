@@ -42,7 +42,8 @@ fn without_a_way_each_pace_lasts_twice_as_long_as_the_one_before() {
     assert_eq!(run(&mut pace, 0, 1_000, &config), [PACES - 1; 1_000], "there is none calmer");
 }
 
-/// Two bands at the calmest pace, twice that at each quicker one. A mean that comes down to its way meets it to the last bit.
+/// Two bands at the calmest pace, twice that at each quicker one. A mean that comes down to its way meets it to the
+/// last bit.
 #[test]
 fn a_pace_is_kept_up_to_its_longest_way_and_no_farther() {
     let config = config();
@@ -84,8 +85,8 @@ fn a_long_way_is_soon_met_and_soon_forgotten() {
     let config = config();
     for way in [i32::MAX, i32::MIN] {
         let mut pace = calmest(&config);
-        // The mean goes 1/8 of the way to 16 bands: 2, 3.75, 5.3, 6.6, 7.8, 8.8 of them. Rounding leaves the first one at its limit or
-        // just beyond it.
+        // The mean goes 1/8 of the way to 16 bands: 2, 3.75, 5.3, 6.6, 7.8, 8.8 of them. Rounding leaves the first one
+        // at its limit or just beyond it.
         let met = run(&mut pace, way, 6, &config);
         assert_eq!(met[1..], [2, 1, 1, 1, 0]);
         run(&mut pace, way, 1_000, &config);

@@ -1,6 +1,7 @@
 //! A client that nobody here wrote: the crate `dynamixel2`, over a pseudo-terminal.
 //!
-//! Its timeouts follow the bus speed, so the terminal is set to 1 baud: the shortest is then two minutes of a device that hangs.
+//! Its timeouts follow the bus speed, so the terminal is set to 1 baud: the shortest is then two minutes of a device
+//! that hangs.
 
 use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
 use dynamixel2::serial2::SerialPort;

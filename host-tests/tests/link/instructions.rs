@@ -1,6 +1,6 @@
 //! What each instruction does, and when it is answered.
 
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::link::{Actions, Settings};
 use fingertip::shipped::address;
 use fingertip::store::Record;
@@ -82,7 +82,7 @@ fn reboot_is_answered_first() {
 fn factory_reset_keeps_what_it_is_told_to() {
     let mut params = Record::DEFAULT.params;
     params.pitch_um = 2_000;
-    let record = Record { id: 9, baud_code: 4, return_delay_2us: 3, effort: Effort::AllRows, params };
+    let record = Record { id: 9, baud_code: 4, return_delay_2us: 3, fit_level: FitLevel::AllRows, params };
     for (kind, id, baud_code) in [(0x01, 9, 3), (0x02, 9, 4), (0xFF, 1, 3)] {
         let mut bench = Bench::with(record);
         assert_eq!(bench.ask(0x06, &[kind]), Answer { id: 9, error: 0, data: vec![] });

@@ -1,4 +1,5 @@
-//! Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went can be read.
+//! Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went
+//! can be read.
 
 use fingertip::command::Command;
 use fingertip::identify::{Identification, Refusal};

@@ -1,6 +1,6 @@
 //! Reading the control table.
 
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::READ_MAX;
 use fingertip::shipped::{REGISTERS, TAXELS, address};
@@ -90,7 +90,7 @@ fn each_figure_stands_where_the_page_says() {
     status.contact.peak_pa = 123_456;
     status.contact.confidence = 200;
     status.contact.bad_taxels = 3;
-    status.effort = Effort::FiveRows;
+    status.fit_level = FitLevel::FiveRows;
     status.travel = Millimetres::from_bits(i32::MIN);
     status.speed = MillimetresPerSecond::from_bits(-65_536 * 30);
     status.duty = Duty(-i16::MAX);
@@ -129,8 +129,8 @@ fn each_figure_stands_where_the_page_says() {
         (address::CRASH_COUNT, 4, 7),
         (address::CRASH_PC, 4, 0x0800_1234),
         (address::CRASH_LINE, 2, 321),
-        (address::EFFORT, 1, 2),
-        (address::EFFORT_IN_USE, 1, 4),
+        (address::FIT_LEVEL, 1, 2),
+        (address::FIT_LEVEL_IN_USE, 1, 4),
         (address::PARAMS, 4, 10_000),
         (address::PRESSURES, 2, 20_000),
         (address::PRESSURES + 2 * TAXELS as u16 - 2, 2, 20_099),

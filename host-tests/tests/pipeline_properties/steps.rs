@@ -142,7 +142,8 @@ proptest! {
         prop_assert_eq!(digest(), digest());
     }
 
-    /// Whatever was commanded before: with torque off nothing drives, and with torque on again the old goal is forgotten.
+    /// Whatever was commanded before: with torque off nothing drives, and with torque on again the old goal is
+    /// forgotten.
     #[test]
     fn nothing_commanded_acts_after_torque_off(params in any_params(), inputs in any_inputs(100)) {
         let mut run = Run::new(&params, true);

@@ -97,7 +97,8 @@ fn a_frame_holds_every_slot() {
     }
     // 0.3 V of virtual ground is 372.36 codes; the preload of the undriven slot has settled away.
     assert_eq!(frame.code(ROWS, 5), 372);
-    // The middle taxels' mean r^2 is 1.5 mm^2, where p is 23.3 kPa: 559 codes, 40 of preload, 0.4 % of sag, 372 of ground.
+    // The middle taxels' mean r^2 is 1.5 mm^2, where p is 23.3 kPa: 559 codes, 40 of preload, 0.4 % of sag, 372 of
+    // ground.
     assert!((963..975).contains(&frame.code(5, 5)), "{}", frame.code(5, 5));
 }
 

@@ -1,21 +1,21 @@
 //! The loop closed over a finger: it approaches, holds 1 N and 2 N, and lets go.
 
 use super::finger::Finger;
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::state::Mode;
 
 /// How far the true force may be from the goal: this share.
 const HELD: f64 = 0.01;
 
 /// The whole run; the digest of every step.
-fn run<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, effort: Effort) -> u64 {
-    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], effort);
+fn run<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, fit_level: FitLevel) -> u64 {
+    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], fit_level);
     finger.start();
     for goal_mn in [1_000, 2_000] {
         let ([least, most], status) = finger.hold(goal_mn, 0.6);
         let goal = f64::from(goal_mn) * 1e-3;
         println!(
-            "{ROWS} x {COLUMNS}, {effort:?}: {goal} N held to {least:.4} .. {most:.4} N, confidence {}",
+            "{ROWS} x {COLUMNS}, {fit_level:?}: {goal} N held to {least:.4} .. {most:.4} N, confidence {}",
             status.contact.confidence
         );
         assert!(goal * (1.0 - HELD) < least && most < goal * (1.0 + HELD), "{least} .. {most} N");
@@ -30,9 +30,9 @@ fn run<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, effort: Effort) -
 }
 
 fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
-    let digests = [(); 2].map(|()| run::<ROWS, COLUMNS>(pitch_um, Effort::OneRow));
+    let digests = [(); 2].map(|()| run::<ROWS, COLUMNS>(pitch_um, FitLevel::OneRow));
     assert_eq!(digests[0], digests[1], "the same run twice");
-    assert_ne!(run::<ROWS, COLUMNS>(pitch_um, Effort::AllRows), digests[0]);
+    assert_ne!(run::<ROWS, COLUMNS>(pitch_um, FitLevel::AllRows), digests[0]);
 }
 
 #[test]
@@ -70,10 +70,14 @@ fn sixteen_by_thirty_two() {
     holds::<16, 32>(900);
 }
 
-/// A contact that reaches over the array's edge: what the array sees is too little, and the fit has to find the rest. Gives the share of the
-/// force that the array does not see.
-fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, centre_mm: [f64; 2], effort: Effort) -> f64 {
-    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, centre_mm, effort);
+/// A contact that reaches over the array's edge: what the array sees is too little, and the fit has to find the rest.
+/// Gives the share of the force that the array does not see.
+fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
+    pitch_um: i32,
+    centre_mm: [f64; 2],
+    fit_level: FitLevel,
+) -> f64 {
+    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, centre_mm, fit_level);
     finger.start();
     let mut hidden = 0.0;
     for goal_mn in [1_000, 2_000] {
@@ -83,7 +87,7 @@ fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, centre_
         hidden = 1.0 - seen / finger.force_n();
         let centre = [status.contact.centre_x, status.contact.centre_y].map(|place| place.0.to_num::<f64>());
         println!(
-            "{ROWS} x {COLUMNS}, {effort:?}: {goal} N held to {least:.4} .. {most:.4} N with {hidden:.3} hidden, centre {centre:.2?} mm, confidence {}",
+            "{ROWS} x {COLUMNS}, {fit_level:?}: {goal} N held to {least:.4} .. {most:.4} N with {hidden:.3} hidden, centre {centre:.2?} mm, confidence {}",
             status.contact.confidence
         );
         assert!(goal * 0.97 < least && most < goal * 1.03, "{least} .. {most} N");
@@ -95,13 +99,13 @@ fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, centre_
 
 #[test]
 fn the_fit_finds_what_an_edge_hides() {
-    for effort in [Effort::OneRow, Effort::TwoRows, Effort::FiveRows, Effort::AllRows] {
+    for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
         let hidden = [
-            over_the_edge::<8, 8>(1_500, [4.5, 0.0], effort),
-            over_the_edge::<8, 8>(1_500, [-2.0, -4.0], effort),
-            over_the_edge::<16, 16>(750, [4.5, 1.0], effort),
-            over_the_edge::<16, 32>(700, [9.0, -4.0], effort),
-            over_the_edge::<9, 7>(1_500, [-3.5, 4.5], effort),
+            over_the_edge::<8, 8>(1_500, [4.5, 0.0], fit_level),
+            over_the_edge::<8, 8>(1_500, [-2.0, -4.0], fit_level),
+            over_the_edge::<16, 16>(750, [4.5, 1.0], fit_level),
+            over_the_edge::<16, 32>(700, [9.0, -4.0], fit_level),
+            over_the_edge::<9, 7>(1_500, [-3.5, 4.5], fit_level),
         ];
         assert!(hidden.iter().all(|hidden| (0.1..0.6).contains(hidden)), "{hidden:?}");
     }

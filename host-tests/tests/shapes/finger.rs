@@ -1,8 +1,9 @@
-//! A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end and motor.
+//! A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end
+//! and motor.
 
 use fingertip::command::Command;
 use fingertip::config::{Shaped, newtons};
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Pipeline, Status};
@@ -32,7 +33,7 @@ pub struct Finger<const ROWS: usize, const COLUMNS: usize> {
 
 impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     /// With taxels so far apart, whose array meets the plane there.
-    pub fn new(pitch_um: i32, centre_mm: [f64; 2], effort: Effort) -> Self {
+    pub fn new(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel) -> Self {
         let params = Params { pitch_um, ..Params::DEFAULT };
         let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).expect("a pitch that is allowed");
         let mut setup = Setup::default();
@@ -41,7 +42,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         Self {
             setup,
             pipeline: Pipeline::new(&config),
-            command: Command { effort, ..Command::default() },
+            command: Command { fit_level, ..Command::default() },
             digest: Digest::new(),
             frame: Frame::EMPTY,
             shaft: Shaft::default(),

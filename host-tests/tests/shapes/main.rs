@@ -1,4 +1,5 @@
-//! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can bring.
+//! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can
+//! bring.
 
 mod closed_loop;
 mod finger;

@@ -1,9 +1,9 @@
-//! The worst that frames can bring: every code at the top, one corner, half of them, alternating ones, and any at all. Nothing may overflow,
-//! so these are worth most with overflow checks.
+//! The worst that frames can bring: every code at the top, one corner, half of them, alternating ones, and any at all.
+//! Nothing may overflow, so these are worth most with overflow checks.
 
 use fingertip::command::Command;
 use fingertip::config::{Shaped, newtons};
-use fingertip::contact::{self, Effort, Fit, Refined};
+use fingertip::contact::{self, Fit, FitLevel, Refined};
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
@@ -96,7 +96,7 @@ fn sums<const ROWS: usize, const COLUMNS: usize>(
     sums
 }
 
-/// Every frame several times, through the array, all efforts of the fit and the readings of single pictures.
+/// Every frame several times, through the array, all fit levels and the readings of single pictures.
 fn survives<const ROWS: usize, const COLUMNS: usize>() {
     let frames = frames::<ROWS, COLUMNS>();
     for params in extremes::<ROWS, COLUMNS>() {
@@ -105,7 +105,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
         for gain in [GAIN_MAX, 1 << 14] {
             let mut array = Array::new();
             array.calibrate(&Calibration::new(&[[gain; COLUMNS]; ROWS], &[0; ROWS]).expect("gains within their range"));
-            let mut fits = Effort::ALL.map(Fit::<ROWS, COLUMNS>::new);
+            let mut fits = FitLevel::ALL.map(Fit::<ROWS, COLUMNS>::new);
             for frame in &frames {
                 let picture = *array.read(frame, &config);
                 let exact = sums(frame, gain, &config);
@@ -260,15 +260,15 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
         for _ in 0..Array::<ROWS, COLUMNS>::TARE_FRAMES + 2 {
             pipeline.step(&quiet, &still, &command);
         }
-        for (frame, sense, effort) in &steps {
-            command.effort = Effort::from_number(*effort);
+        for (frame, sense, fit_level) in &steps {
+            command.fit_level = FitLevel::from_number(*fit_level);
             for _ in 0..ROWS + 2 {
-                pipeline.glance(frame);
+                pipeline.check_part(frame);
                 let (duty, status) = pipeline.step(frame, sense, &command);
                 assert_eq!(duty, status.duty);
                 command.torque = status.fault.is_none();
                 command.clear_request += u8::from(status.fault.is_some());
-                command.identify_request = command.identify_request.wrapping_add(effort % 2);
+                command.identify_request = command.identify_request.wrapping_add(fit_level % 2);
             }
         }
         Ok(())

@@ -114,8 +114,8 @@ fn the_format_before_is_read_and_is_older_than_any() {
     assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(7), sound: true });
 }
 
-/// Where this fails, the parameters have changed: then no firmware of that format has records that can be read any more, and
-/// its reader can go.
+/// Where this fails, the parameters have changed: then no firmware of that format has records that can be read any
+/// more, and its reader can go.
 #[test]
 fn the_fingerprint_of_the_format_before_is_the_one_that_boards_have() {
     assert_eq!(of_before(&record(5))[4..8], 0x794F_976C_u32.to_le_bytes());

@@ -24,13 +24,13 @@ fn finish(mut bytes: Vec<u8>) -> Vec<u8> {
 
 /// The names before the parameters, and the parameters' names.
 pub fn names() -> Vec<&'static str> {
-    let head = ["id", "baud_code", "return_delay_2us", "effort"].into_iter();
+    let head = ["id", "baud_code", "return_delay_2us", "fit_level"].into_iter();
     head.chain(Params::RANGES.iter().map(|(name, ..)| *name)).collect()
 }
 
 /// Names and values of a record, in the order in which they are stored.
 pub fn named(record: &Record) -> Vec<(&'static str, i32)> {
-    let head = [record.id, record.baud_code, record.return_delay_2us, record.effort as u8];
+    let head = [record.id, record.baud_code, record.return_delay_2us, record.fit_level as u8];
     let values = head.map(i32::from).into_iter().chain(record.params.to_array());
     names().into_iter().zip(values).collect()
 }
@@ -53,7 +53,7 @@ pub fn of_before(record: &Record) -> Vec<u8> {
     let names: String = names().iter().map(|name| format!("{name}\n")).collect();
     let mut bytes = b"FTIP".to_vec();
     bytes.extend(crc32(names.as_bytes()).to_le_bytes());
-    bytes.extend([record.id, record.baud_code, record.return_delay_2us, record.effort as u8]);
+    bytes.extend([record.id, record.baud_code, record.return_delay_2us, record.fit_level as u8]);
     bytes.extend(record.params.to_array().into_iter().flat_map(i32::to_le_bytes));
     finish(bytes)
 }

@@ -1,7 +1,7 @@
 //! Two sectors of flash that lose power, and the start and the save of a board on them.
 //!
-//! Programming only clears bits, of words that are blank; erasing sets all bits of a sector. A loss of power leaves of the word
-//! that was programmed any of its bits undone, and of an erase any mixture: see [`Cut`].
+//! Programming only clears bits, of words that are blank; erasing sets all bits of a sector. A loss of power leaves of
+//! the word that was programmed any of its bits undone, and of an erase any mixture: see [`Cut`].
 
 use fingertip::params::Params;
 use fingertip::store::{Flash, Journal, Loaded, Record, SaveError, Sector};
@@ -169,8 +169,8 @@ impl Board {
         Self { nor, journal, kept, tried: None, trace: false, told: false, erase_torn: false, false_alarms: 0 }
     }
 
-    /// Starts as the board does, and checks what comes up: the old values or the new ones, and a fault where the new ones were
-    /// begun and are not there.
+    /// Starts as the board does, and checks what comes up: the old values or the new ones, and a fault where the new
+    /// ones were begun and are not there.
     pub fn start(&mut self, cut: Option<Cut>) {
         self.nor.power_on(cut);
         self.journal = Journal::new(&self.nor);

@@ -2,8 +2,8 @@
 
 use crate::fleet::{LACKED, OTHERS, Other, named, of_values};
 use crate::nor::{Nor, record};
-use fingertip::config::Config;
 use fingertip::params::{ParamError, Params};
+use fingertip::shipped::Config;
 use fingertip::store::{Journal, Loaded, Record, Remark, SLOT_BYTES, Sector, number, settle};
 
 fn start(bytes: &[u8]) -> (Loaded, Vec<Remark>) {
@@ -41,7 +41,7 @@ fn the_order_of_the_values_does_not_count() {
 #[test]
 fn a_value_out_of_its_range_is_its_default_and_a_fault() {
     let heads =
-        [("id", 252), ("baud_code", 5), ("return_delay_2us", 254), ("effort", 5)].map(|(name, max)| (name, 0, max));
+        [("id", 252), ("baud_code", 5), ("return_delay_2us", 254), ("fit_level", 5)].map(|(name, max)| (name, 0, max));
     let params = Params::RANGES.iter().map(|(name, _, min, max)| (*name, *min, *max));
     let whole = record(3);
     for (place, (name, min, max)) in heads.into_iter().chain(params).enumerate() {
@@ -75,7 +75,7 @@ fn no_values_at_all_are_all_defaults() {
 fn what_contradicts_goes_back_to_its_defaults_and_the_rest_stays() {
     let settled = |mut params: Params| {
         let mut told = 0;
-        let made = settle(&mut params, Config::new, |_| told += 1);
+        let made = settle(&mut params, Config::shipped, |_| told += 1);
         assert_eq!(made.expect("a configuration").params, params);
         (params, told)
     };
@@ -102,7 +102,7 @@ fn what_contradicts_goes_back_to_its_defaults_and_the_rest_stays() {
     }
     // Where nothing helps it says so.
     let mut params = own;
-    let error = Config::new(&Params { pitch_um: 1, ..own }).expect_err("out of range");
+    let error = Config::shipped(&Params { pitch_um: 1, ..own }).expect_err("out of range");
     assert!(settle(&mut params, |_| Err::<(), _>(error), |_| ()).is_none());
     assert_eq!(params, Params::DEFAULT);
 }

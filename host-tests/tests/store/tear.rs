@@ -61,8 +61,8 @@ fn ops(board: &Board) -> Vec<Done> {
     board.nor.done
 }
 
-/// Two cuts in a row: the first at all places, the second at one place in `few` of what the start after it does and of the save
-/// after that, others each time.
+/// Two cuts in a row: the first at all places, the second at one place in `few` of what the start after it does and of
+/// the save after that, others each time.
 fn tear_twice(board: &Board, words: usize, few: usize) -> [usize; 2] {
     let (mut cases, mut alarms) = (0, 0);
     for first in cuts(&ops(board), words, 1, true) {

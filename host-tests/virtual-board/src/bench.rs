@@ -141,8 +141,8 @@ impl Bench {
         self.encoder_ns = now_ns;
     }
 
-    /// The part had something to do at an instant between two of the grid. Where that was the end of a frame the image looks at the
-    /// encoder next.
+    /// The part had something to do at an instant between two of the grid. Where that was the end of a frame the image
+    /// looks at the encoder next.
     pub fn stopped(&mut self, board: &mut FingerBoard, at_ns: u64) {
         if !self.follows_frames {
             return;
@@ -190,7 +190,8 @@ impl Bench {
         self.next_ns = (self.next_ns / self.grid_ns + 1) * self.grid_ns;
     }
 
-    /// Where to stop next: at the instant of the grid, or where the host begins to send before it. A byte begins at a stop.
+    /// Where to stop next: at the instant of the grid, or where the host begins to send before it. A byte begins at a
+    /// stop.
     pub fn next_stop(&self, board: &mut FingerBoard, now: VirtualNanos) -> VirtualNanos {
         let sends_ns = board.wire().sends_ns().filter(|sends_ns| *sends_ns > now.0);
         VirtualNanos(sends_ns.map_or(self.next_ns, |sends_ns| sends_ns.min(self.next_ns)))

@@ -58,7 +58,8 @@ impl FingerBoard {
         self.part.chip.usart[BUS_PORT].chip_mut().expect("the wire was attached when the board was made")
     }
 
-    /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it coasts.
+    /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it
+    /// coasts.
     pub fn bridge(&mut self) -> Bridge {
         if level(&mut self.part, PORT_C, 9) == Level::Low {
             return Bridge::Coast;

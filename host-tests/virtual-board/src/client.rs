@@ -1,10 +1,11 @@
 //! The crate `dynamixel2` as the bus's host.
 //!
 //! It talks to a serial port of the operating system, so it gets one end of a pseudo-terminal; at the other end each
-//! packet that it sends becomes a transaction of the rig. Virtual time passes only inside transactions, so what the client
-//! does repeats exactly. The client measures its timeouts on the wall clock, by the time that a packet takes at the port's
-//! speed. Its end is opened at 1 baud, which a pseudo-terminal ignores: the shortest of these timeouts is then two minutes of a
-//! board that hangs. A packet that the board leaves unanswered in virtual time is answered at once, by a device that does not exist.
+//! packet that it sends becomes a transaction of the rig. Virtual time passes only inside transactions, so what the
+//! client does repeats exactly. The client measures its timeouts on the wall clock, by the time that a packet takes at
+//! the port's speed. Its end is opened at 1 baud, which a pseudo-terminal ignores: the shortest of these timeouts is
+//! then two minutes of a board that hangs. A packet that the board leaves unanswered in virtual time is answered at
+//! once, by a device that does not exist.
 
 use crate::error::Error;
 use crate::link::{is_whole, packet_length};

@@ -1,10 +1,11 @@
 //! The converters with what the crate's own lack: the external trigger, two of them at once, and the array at their
 //! inputs.
 //!
-//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the words wait
-//! together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110 conversions a frame cost
-//! 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected group, continuous and discontinuous
-//! mode, analogue watchdog, resolutions other than 12 bits; asking for one is told to the run.
+//! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
+//! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
+//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected
+//! group, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told
+//! to the run.
 
 use crate::front_end::{Shared, Slot};
 use crate::scan_timer::COMPARE_1;
@@ -99,8 +100,8 @@ impl Converter {
         begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
     }
 
-    /// The next slot of a scene: the sequence of the one before is over, and one begins at the trigger. It is an event only where
-    /// somebody waits for it: at the frame's end.
+    /// The next slot of a scene: the sequence of the one before is over, and one begins at the trigger. It is an event
+    /// only where somebody waits for it: at the frame's end.
     fn next_slot(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if let Some(running) = self.running.take_if(|running| running.event.is_none()) {
             self.finish(running, registers, context);
@@ -222,7 +223,8 @@ impl Device for Converter {
     }
 
     /// The part's description sends requests to the first converter only, so this one hands the trigger on: as a write
-    /// to the second's data register, which is read-only and means nothing else there. In a scene [`crate::streams`] triggers both so.
+    /// to the second's data register, which is read-only and means nothing else there. In a scene [`crate::streams`]
+    /// triggers both so.
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);

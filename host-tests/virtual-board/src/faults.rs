@@ -27,7 +27,8 @@ pub enum Fault {
     ScanInterruptLost,
     /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
     CoreHangs,
-    /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of the driver.
+    /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of
+    /// the driver.
     BusMemoryLost,
     /// The core's next access to these addresses is a bus error: a hard fault.
     BusError {

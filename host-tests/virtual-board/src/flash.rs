@@ -1,9 +1,9 @@
 //! What the flash holds, for the sectors of the stored parameters.
 //!
-//! The crate's flash interface times operations but keeps nothing: its memory map names nobody who programs the flash. The
-//! part therefore shows the emulator a map of its own while that lays out memory ([`layout`]), and the run then programs
-//! and erases here, under the interface's registers. While a word is programmed the core stands, as one that runs from the
-//! same bank does. Errors that the interface would flag are not modelled.
+//! The crate's flash interface times operations but keeps nothing: its memory map names nobody who programs the flash.
+//! The part therefore shows the emulator a map of its own while that lays out memory ([`layout`]), and the run then
+//! programs and erases here, under the interface's registers. While a word is programmed the core stands, as one that
+//! runs from the same bank does. Errors that the interface would flag are not modelled.
 
 use crate::board::FingerBoard;
 use rigless::emulator::{Access, AccessKind, Host};

@@ -25,7 +25,8 @@ struct Drive {
     since_ns: u64,
 }
 
-/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time later.
+/// A slot of a scene's scan. The update that moves the rows begins it, and the converters are triggered a fixed time
+/// later.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct Slot {
     /// When the converters begin in it.
@@ -34,9 +35,9 @@ pub struct Slot {
     pub rows: u16,
 }
 
-/// The scan of a scene. The image hears of it when half of the rows are driven, then looks at how far it is, and hears of it again when
-/// a frame is complete. Nothing else that it can see depends on when the slots in between are worked out. So that is done for all of them
-/// at once, by then: four events a frame in place of three a slot.
+/// The scan of a scene. The image hears of it when half of the rows are driven, then looks at how far it is, and hears
+/// of it again when a frame is complete. Nothing else that it can see depends on when the slots in between are worked
+/// out. So that is done for all of them at once, by then: four events a frame in place of three a slot.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Scan {
     /// From an update to the trigger.
@@ -130,8 +131,8 @@ impl FrontEnd {
         self.drives[0] = Drive { rows, since_ns: at_ns };
     }
 
-    /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a slot. It ends
-    /// here: that the pins follow is seen where the board is in the plant.
+    /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a
+    /// slot. It ends here: that the pins follow is seen where the board is in the plant.
     pub fn begin_slot(&mut self, word: u64, words: [usize; 2]) {
         if let Some(scan) = &mut self.scan {
             let [set, reset] = [word as u16, (word >> 16) as u16].map(|pins| pins & ((1 << ROWS) - 1));

@@ -97,7 +97,8 @@ pub fn packet_length(bytes: &[u8]) -> Option<usize> {
     Some(7 + usize::from(u16::from_le_bytes([length[0], length[1]])))
 }
 
-/// The bus as a byte stream. A read with nothing there runs the board until something comes, or times out in virtual time.
+/// The bus as a byte stream. A read with nothing there runs the board until something comes, or times out in virtual
+/// time.
 #[derive(Debug)]
 pub struct Stream<'a> {
     rig: &'a mut Rig,

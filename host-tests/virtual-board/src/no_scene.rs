@@ -1,4 +1,5 @@
-//! In place of the scenes where this crate is built without them (feature `scenes`): a finger and a host of which there is none.
+//! In place of the scenes where this crate is built without them (feature `scenes`): a finger and a host of which there
+//! is none.
 
 /// A scene's finger.
 pub mod finger {

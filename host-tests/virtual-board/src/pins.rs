@@ -1,4 +1,5 @@
-//! That the image sets up each pin for what the board wires to it: the emulator joins peripherals whatever the pins say.
+//! That the image sets up each pin for what the board wires to it: the emulator joins peripherals whatever the pins
+//! say.
 
 use crate::error::Error;
 use crate::rig::Rig;

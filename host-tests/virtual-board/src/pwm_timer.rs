@@ -1,9 +1,9 @@
 //! The bridge's timer, asleep where nothing of it changes.
 //!
-//! The crate's timer wakes at each edge that it makes, 50,000 times a virtual second, and the emulated core is stopped each time.
-//! Nobody hears these edges: of the bridge the world knows the duty, which follows from the registers in use ([`Tim::pulse`]). What the
-//! image writes is in use from the next update on. So the timer is let wake until that is over, and then sleeps until it is looked at
-//! or driven; it catches up by itself with what it slept through.
+//! The crate's timer wakes at each edge that it makes, 50,000 times a virtual second, and the emulated core is stopped
+//! each time. Nobody hears these edges: of the bridge the world knows the duty, which follows from the registers in use
+//! ([`Tim::pulse`]). What the image writes is in use from the next update on. So the timer is let wake until that is
+//! over, and then sleeps until it is looked at or driven; it catches up by itself with what it slept through.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;

@@ -1,7 +1,8 @@
 //! The rig: an image on the board, run piece by piece from outside.
 //!
-//! The emulator owns its loop, so it runs on a thread of its own and hands over at instants of the world's grid. What is
-//! asked of it there happens between two instructions; nothing runs while nobody asks. The same calls give the same run.
+//! The emulator owns its loop, so it runs on a thread of its own and hands over at instants of the world's grid. What
+//! is asked of it there happens between two instructions; nothing runs while nobody asks. The same calls give the same
+//! run.
 
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
@@ -122,8 +123,8 @@ impl Rig {
         self.await_reached()
     }
 
-    /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is posted or
-    /// asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
+    /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is
+    /// posted or asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
     ///
     /// # Errors
     /// The emulator stopped.

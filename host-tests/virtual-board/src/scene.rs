@@ -1,15 +1,15 @@
 //! A scene on the emulated board: the flash image, unmodified, in the world that the scene names.
 //!
-//! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's goals over
-//! the bus at the times at which the scene's link lets them through; it reads the status registers once in ten frames, and when its
-//! grip asks for it. A step of the run is what an answer says, together with the frame that it was made from and what was true at that
-//! frame's end. What the core has inside and no register shows is not in it, so a recording of such a run cannot be fed through the
-//! core again.
+//! The scene's parameters lie in the image's parameter sector. The host tares, enables torque, and writes the script's
+//! goals over the bus at the times at which the scene's link lets them through; it reads the status registers once in
+//! ten frames, and when its grip asks for it. A step of the run is what an answer says, together with the frame that it
+//! was made from and what was true at that frame's end. What the core has inside and no register shows is not in it, so
+//! a recording of such a run cannot be fed through the core again.
 //!
-//! What makes a run slow are the instants at which the emulated core is stopped, and the code that must be translated because it was
-//! stopped in it. So the world moves on where something depends on it, and else in steps of [`finger::Finger::grid_ns`]; the
-//! scan's slots are worked out together ([`crate::front_end::Scan`]), the bridge's timer sleeps ([`crate::pwm_timer`]), and the host takes
-//! its turns where the core stands anyway.
+//! What makes a run slow are the instants at which the emulated core is stopped, and the code that must be translated
+//! because it was stopped in it. So the world moves on where something depends on it, and else in steps of
+//! [`finger::Finger::grid_ns`]; the scan's slots are worked out together ([`crate::front_end::Scan`]), the bridge's
+//! timer sleeps ([`crate::pwm_timer`]), and the host takes its turns where the core stands anyway.
 //!
 //! The world stands still until a millisecond before the scene's start: the boards come up and are tared in it.
 //!
@@ -178,14 +178,16 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
 
 /// From the converters' number of a frame to the image's own, which the image counts where the symbol says.
 ///
-/// The status alone does not tell it: by how many frames an answer is late at the least depends on the load of the core.
+/// The status alone does not tell it: by how many frames an answer is late at the least depends on the load of the
+/// core.
 fn frame_offset(rig: &mut Rig) -> Result<u32, Error> {
     let Some(address) = rig.image().item("scan", "SEQUENCE") else {
         let why = "the image has no counter of frames named `scan::SEQUENCE`".into();
         return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why });
     };
     let mut offset = i32::MIN;
-    // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right one.
+    // Where a frame has just ended the image is about to count it: of several looks the largest difference is the right
+    // one.
     for _ in 0..3 {
         rig.run_until_ns(rig.now_ns() + MS / 10)?;
         let (number, frames) = rig.with(move |stand| {

@@ -2,8 +2,8 @@
 //!
 //! The crate's own controller moves one item a request and an access at a time, which costs more than all else in a
 //! scan. This one takes a whole sequence's words at once and writes them in one go. Modelled: direct mode, circular or
-//! not, the requests below, half and full transfer, transfer errors, the registers' protection while a stream runs. Asking
-//! for more is told to the run.
+//! not, the requests below, half and full transfer, transfer errors, the registers' protection while a stream runs.
+//! Asking for more is told to the run.
 
 mod registers;
 
@@ -94,8 +94,8 @@ impl Streams {
         }
     }
 
-    /// In a scene a row's word ends here: it begins a slot of both converters, and where more updates have passed, it is the next one's
-    /// turn.
+    /// In a scene a row's word ends here: it begins a slot of both converters, and where more updates have passed, it
+    /// is the next one's turn.
     fn begin_slot(&mut self, stream: usize, word: u64, context: &mut DeviceContext<'_>) -> bool {
         let state = &self.streams[stream];
         let mut front_end = self.front_end.lock();

@@ -128,8 +128,8 @@ fn the_crate_dynamixel2_is_understood() {
 #[test]
 fn at_least_half_of_the_stack_is_never_used() {
     let mut rig = holding();
-    // The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a configuration, and
-    // everything saved.
+    // The deepest calls: all pictures read at once, then with torque off a parameter changed, which makes a
+    // configuration, and everything saved.
     let read = |bus: &mut virtual_board::client::Client| {
         for register in REGISTERS {
             bus.read(1, register.address, register.bytes()).expect("it answers");

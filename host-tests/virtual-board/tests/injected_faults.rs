@@ -1,4 +1,5 @@
-//! Faults injected while the image holds 1 N: the time until the bridge drives nothing, what it does then, and the number on the bus.
+//! Faults injected while the image holds 1 N: the time until the bridge drives nothing, what it does then, and the
+//! number on the bus.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
@@ -12,8 +13,8 @@ use host_tests::plant::{Bridge, Faults, Row, Setup, Taxel, World};
 use std::sync::Mutex;
 use virtual_board::{Fault, Options, Rig};
 
-/// Two frames of 99.8 us. A taxel that fails just after it was read is read again a frame later; the step at that frame's end
-/// would be too late for the first rows, the glance in its middle is not.
+/// Two frames of 99.8 us. A taxel that fails just after it was read is read again a frame later; the step at that
+/// frame's end would be too late for the first rows, the check of the partial frame in its middle is not.
 const TWO_FRAMES_US: f64 = 199.5;
 /// Where in a frame a fault of the array begins: every 9 us, so in each slot.
 const PHASES_US: std::ops::Range<u64> = 0..11;
@@ -38,8 +39,8 @@ fn bridge(rig: &mut Rig) -> Bridge {
     rig.with(|stand| stand.session.board_mut().bridge()).expect("it runs")
 }
 
-/// How far the tip, which pressed with 1 N, goes back in a fault that brakes: no farther than its own indentation, the clearance
-/// and 1 mm.
+/// How far the tip, which pressed with 1 N, goes back in a fault that brakes: no farther than its own indentation, the
+/// clearance and 1 mm.
 fn check_way_back(rig: &mut Rig, name: &str, held_mm: f64) {
     let params = Params::DEFAULT;
     let indentation_mm = (1e6 / (std::f64::consts::PI * f64::from(params.modulus_pa))).sqrt();

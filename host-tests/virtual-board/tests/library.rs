@@ -1,4 +1,5 @@
-//! The library of scenes on the emulated board: each runs with the flash image, and holds what it promises on the native board.
+//! The library of scenes on the emulated board: each runs with the flash image, and holds what it promises on the
+//! native board.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 

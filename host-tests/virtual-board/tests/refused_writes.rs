@@ -1,4 +1,5 @@
-//! Every register refuses every value out of its range, over the bus of a board that holds a force, and nothing changes.
+//! Every register refuses every value out of its range, over the bus of a board that holds a force, and nothing
+//! changes.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 

@@ -1,7 +1,7 @@
 //! The board behind a port, for clients that nobody here wrote.
 //!
-//! `FINGERTIP_IMAGE` names the image, `FINGERTIP_PYTHON` a Python with the package `dynamixel-sdk`; `cargo xtask test` makes
-//! both and sets them.
+//! `FINGERTIP_IMAGE` names the image, `FINGERTIP_PYTHON` a Python with the package `dynamixel-sdk`; `cargo xtask test`
+//! makes both and sets them.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

@@ -9,8 +9,8 @@ const PAIRS: usize = 2 * WRITTEN_OUT;
 
 /// [`super::portable_pass`].
 ///
-/// For rows of ten columns it is written out, because the compiler has too few registers for any order of these instructions, and keeps
-/// loading and storing. It works through a row in about 170 cycles.
+/// For rows of ten columns it is written out, because the compiler has too few registers for any order of these
+/// instructions, and keeps loading and storing. It works through a row in about 170 cycles.
 #[inline(always)]
 pub fn pass<const ROWS: usize, const COLUMNS: usize>(
     codes: &Codes<ROWS, COLUMNS>,
@@ -23,13 +23,14 @@ pub fn pass<const ROWS: usize, const COLUMNS: usize>(
         return portable_pass(codes, rows, common, taxels);
     }
     let (first, second, running, largest, peak);
-    // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the codes, the rows and what is common, writes each row's boost and the taxels; the types hold their
-    // lengths and places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
+    // SAFETY: the rows have as many columns as the offsets suppose, and the codes begin on a word's border. Reads the
+    // codes, the rows and what is common, writes each row's boost and the taxels; the types hold their lengths and
+    // places, and the codes' end ends the loop. The stack is as it was at the end, and so are r6 and r7, which an
     // operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
         core::arch::asm!(
-            // The two columns of a pair, whose net codes are in `net`: sums, taxels, peak. The left one's tare goes to `left`; the first
-            // pair has no register left for it beside its own, and begins the sums.
+            // The two columns of a pair, whose net codes are in `net`: sums, taxels, peak. The left one's tare goes to
+            // `left`; the first pair has no register left for it beside its own, and begins the sums.
             ".macro columns place, net, left",
             "ldr r8, [r1, #4 * \\place]", // gains
             "ldr r9, [r1, #4 * \\place + {moments}]",

@@ -143,8 +143,9 @@ pub fn written_half(stream: usize) -> usize {
 
 /// Whether the codes belong to the rows under which they are stored.
 ///
-/// In the slot that the rows' stream has set last, each bank has completed as many slots of the frame as came before it, or
-/// one more. A trigger that was lost leaves the banks behind the rows for good; only a new start brings them together.
+/// In the slot that the rows' stream has set last, each bank has completed as many slots of the frame as came before
+/// it, or one more. A trigger that was lost leaves the banks behind the rows for good; only a new start brings them
+/// together.
 pub fn in_step() -> bool {
     let slots = SLOTS as u16;
     let current = (2 * slots - pac::DMA2.st(STREAM_ROWS).ndtr().read().ndt() - 1) % slots;

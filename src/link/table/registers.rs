@@ -1,12 +1,13 @@
 //! The definition itself: one entry for each register, in the order of the addresses.
 //!
-//! As [`control_table`](super::define) reads it: `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
-//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes each; nor are the
-//! [pictures](super::pictures) of the array, which go by its shape.
+//! As [`control_table`](super::define) reads it:
+//! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
+//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes
+//! each; nor are the [pictures](super::pictures) of the array, which go by its shape.
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 
-use crate::contact::Effort;
+use crate::contact::FitLevel;
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
@@ -69,13 +70,15 @@ control_table! {
     /// Milliseconds since reset; wraps after 32767.
     120 REALTIME_TICK: U16 ReadOnly, "ms" * 1, 0 to 0x7FFF,
         |view, _| view.snapshot.tick_ms & 0x7FFF;
-    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error; one below contact_on_mn is held as
-    /// contact_on_mn, with limit 3. Goes to 0 on a fault; while that stands, other goals are refused with a result error.
+    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error; one below
+    /// contact_on_mn is held as contact_on_mn, with limit 3. Goes to 0 on a fault; while that stands, other goals are
+    /// refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
-    /// 1 measures the zero of every taxel; nothing may touch the tip: where something seems to, limit 10 says so until the next tare. Refused with a result error in fault, but for one that is cleared
-    /// in the same write or was just before. Reads 0.
+    /// 1 measures the zero of every taxel; nothing may touch the tip: where something seems to, limit 10 says so until
+    /// the next tare. Refused with a result error in fault, but for one that is cleared in the same write or was just
+    /// before. Reads 0.
     260 TARE: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { bump(&mut staged.settings.command.tare_request, value); Ok(()) };
@@ -83,7 +86,8 @@ control_table! {
     261 CLEAR_FAULT: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { bump(&mut staged.settings.command.clear_request, value); Ok(()) };
-    /// 1 writes the stored registers to flash. Refused with a result error before the loop is off, and while a tare is under way. Reads 0.
+    /// 1 writes the stored registers to flash. Refused with a result error before the loop is off, and while a tare is
+    /// under way. Reads 0.
     262 SAVE_PARAMETERS: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { staged.actions.save |= value != 0; Ok(()) };
@@ -99,8 +103,8 @@ control_table! {
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 16,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
-    /// frame missed, 8 slew, 9 effort held back by time, 10 something touched during the last tare, 11 force known only from below, 12
-    /// guard.
+    /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known
+    /// only from below, 12 guard.
     266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FFF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force.
@@ -195,8 +199,8 @@ control_table! {
     /// Good instruction packets for this device, broadcasts included; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.counters().good_packets;
-    /// 1 measures Young's modulus: backs off, presses slowly, lets go. Refused with a result error without torque and before a tare.
-    /// Reads 0.
+    /// 1 measures Young's modulus: backs off, presses slowly, lets go. Refused with a result error without torque and
+    /// before a tare. Reads 0.
     350 IDENTIFY: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { bump(&mut staged.settings.command.identify_request, value); Ok(()) };
@@ -219,16 +223,16 @@ control_table! {
     /// out of the model's range, 6 bad taxels, 7 array's edge, 8 no contact, 9 stalled, 10 interrupted, 11 no torque.
     366 IDENTIFY_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
         |view, _| u32::from(view.snapshot.status.identification.refusal());
-    /// How much work the loop puts into the contact of a frame: 0 force by the sum, 1 centre by the moments, 2 the model
-    /// with a row a frame, 3 with two rows, 4 with five, 5 with all rows and a solution in every frame.
-    367 EFFORT: U8 StoredLive, "" * 1, 0 to 5 = Record::DEFAULT.effort as i64,
-        |view, _| view.settings().record.effort as u32,
-        |staged, value| { staged.settings.record.effort = Effort::from_number(value as u8); Ok(()) };
-    /// The effort in use: less than asked for where the deadline leaves no time for that.
-    368 EFFORT_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
-        |view, _| view.snapshot.status.effort as u32;
-    /// The tare that was last asked for: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault: ask again once that is
-    /// cleared.
+    /// How much work the loop puts into the contact of a frame: 0 force by the sum, 1 centre by the moments, 2 the
+    /// model with a row a frame, 3 with two rows, 4 with five, 5 with all rows and a solution in every frame.
+    367 FIT_LEVEL: U8 StoredLive, "" * 1, 0 to 5 = Record::DEFAULT.fit_level as i64,
+        |view, _| view.settings().record.fit_level as u32,
+        |staged, value| { staged.settings.record.fit_level = FitLevel::from_number(value as u8); Ok(()) };
+    /// The fit level in use: less than asked for where the deadline leaves no time for that.
+    368 FIT_LEVEL_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
+        |view, _| view.snapshot.status.fit_level as u32;
+    /// The tare that was last asked for: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault: ask
+    /// again once that is cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
 }
@@ -236,7 +240,8 @@ control_table! {
 /// How many registers there are.
 pub const COUNT: usize = FIXED.len() + Params::COUNT + 3;
 
-/// Every register of an array of this shape, in the order of the addresses; the last three are the pressures, the raw codes and the tare's.
+/// Every register of an array of this shape, in the order of the addresses; the last three are the pressures, the raw
+/// codes and the tare's.
 pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let mut all = [FIXED[0]; COUNT];
     let pictures = pictures::registers::<ROWS, COLUMNS>();

@@ -1,5 +1,5 @@
-//! The core on an emulated Cortex-M4F: replays a recording, or gives random inputs to every function of the model, and reports
-//! digests of what came out.
+//! The core on an emulated Cortex-M4F: replays a recording, or gives random inputs to every function of the model, and
+//! reports digests of what came out.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line is one of
 //!

@@ -1,4 +1,5 @@
-//! The loop's kernels, each in a region of its own, for the timing model: replays a recording, and measures with real data.
+//! The loop's kernels, each in a region of its own, for the timing model: replays a recording, and measures with real
+//! data.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line names the recording. A line
 //! `region NUMBER NAME` on the standard output names each region; region 0 is an empty call.

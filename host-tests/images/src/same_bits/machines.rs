@@ -1,11 +1,11 @@
-//! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer, profile and drive, the least
-//! squares of the modulus.
+//! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer,
+//! profile and drive, the least squares of the modulus.
 
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Effort, Refined};
+use fingertip::contact::{self, FitLevel, Refined};
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::goal::Goal;
@@ -130,7 +130,7 @@ pub const FRAMES: [Step; 6] = [
     ("Fit::read", |m, s, mix| {
         // A change now and then, in the middle of a refinement as well.
         if s.share_q32 >> 27 == 4 {
-            m.fit.set_effort(Effort::from_number((s.share_q32 >> 24 & 7) as u8));
+            m.fit.set_fit_level(FitLevel::from_number((s.share_q32 >> 24 & 7) as u8));
         }
         add_contact(mix, &m.fit.read(m.pictures.next(s, &m.config), &m.config));
     }),
@@ -174,7 +174,7 @@ pub const STEPS: [Step; 20] = [
     }),
     ("Budget::next", |m, s, mix| {
         // A whole deadline is about 2^13 ticks; the model is now and then at work.
-        let asked = Effort::from_number((s.share_q32 >> 29) as u8);
+        let asked = FitLevel::from_number((s.share_q32 >> 29) as u8);
         let taken = s.words[0].unsigned_abs() >> 17;
         mix.add(m.budget.next(asked, CoreCycles(taken), CoreCycles(12_568)) as u32);
         m.budget.note(s.words[1] > 0);

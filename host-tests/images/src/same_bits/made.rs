@@ -77,7 +77,8 @@ fn params(source: &mut Source) -> Params {
     params
 }
 
-/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in the fit.
+/// Every number of a configuration, but the parameters that it was made from and the array's geometry, which shows in
+/// the fit.
 fn add_config(mix: &mut Mix, config: &Config) {
     // Taken apart, so that a field cannot be forgotten.
     let config::Config {

@@ -19,8 +19,8 @@ pub fn pass(region: u32, kernel: *const (), registers: &mut Registers) {
     let kernel = black_box(kernel);
     let [r0, r1, r2, r3] = registers.core;
     let (first, second);
-    // SAFETY: a call by the calling convention, with every register that it may change named; the markers do nothing. The
-    // singles are loaded before the region and stored behind it, from and to a structure that outlives the call.
+    // SAFETY: a call by the calling convention, with every register that it may change named; the markers do nothing.
+    // The singles are loaded before the region and stored behind it, from and to a structure that outlives the call.
     unsafe {
         asm!(
             "vldr s0, [{singles}]",

@@ -1,6 +1,7 @@
 //! A controller's step: proportional and integral by increments, its output held to a range and to a slew.
 //!
-//! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. What is cut never enters y1: nothing winds up.
+//! y = y1 + (k_p + k_i) e - k_p e1, within 1 either way and within `SLEW` of y1. What is cut never enters y1: nothing
+//! winds up.
 
 use super::call::pass_on;
 use super::inputs::Inputs;

@@ -1,10 +1,10 @@
-//! From a picture to a contact: from a single one, and followed from frame to frame at each effort.
+//! From a picture to a contact: from a single one, and followed from frame to frame at each fit level.
 
 use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Effort, Refined};
+use fingertip::contact::{self, FitLevel, Refined};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 
@@ -18,17 +18,17 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// The name, the way, and of one that follows the pictures its effort.
-const VARIANTS: [(&str, Kernel, Option<Effort>); 9] = [
+/// The name, the way, and of one that follows the pictures its fit level.
+const VARIANTS: [(&str, Kernel, Option<FitLevel>); 9] = [
     ("One", one, None),
     ("Two", two, None),
     ("Full", full, None),
-    ("Fit, effort 0", follow, Some(Effort::Sum)),
-    ("Fit, effort 1", follow, Some(Effort::Moments)),
-    ("**Fit, effort 2**", follow, Some(Effort::OneRow)),
-    ("Fit, effort 3", follow, Some(Effort::TwoRows)),
-    ("Fit, effort 4", follow, Some(Effort::FiveRows)),
-    ("Fit, effort 5", follow, Some(Effort::AllRows)),
+    ("Fit, level 0", follow, Some(FitLevel::Sum)),
+    ("Fit, level 1", follow, Some(FitLevel::Moments)),
+    ("**Fit, level 2**", follow, Some(FitLevel::OneRow)),
+    ("Fit, level 3", follow, Some(FitLevel::TwoRows)),
+    ("Fit, level 4", follow, Some(FitLevel::FiveRows)),
+    ("Fit, level 5", follow, Some(FitLevel::AllRows)),
 ];
 
 extern "C" fn one(bench: &mut Bench) {
@@ -47,13 +47,13 @@ extern "C" fn follow(bench: &mut Bench) {
     bench.contact = bench.fit.read(&bench.picture, bench.config);
 }
 
-/// Measures all over the next section: for each pitch its cases, of as many pictures each. Variants without an effort see the
-/// first picture only.
+/// Measures all over the next section: for each pitch its cases, of as many pictures each. Variants without a fit level
+/// see the first picture only.
 #[inline(never)]
 pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
     let [count, frames] = inputs.words();
     let start = inputs.place();
-    for (name, variant, effort) in VARIANTS {
+    for (name, variant, fit_level) in VARIANTS {
         say(format_args!("region {region} {kernel}: {name}"));
         inputs.seek(start);
         let mut left = count;
@@ -64,7 +64,7 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
                 fail("a pitch is refused")
             };
             for _ in 0..cases {
-                one_case(*region, variant, effort, frames, &config, inputs);
+                one_case(*region, variant, fit_level, frames, &config, inputs);
             }
             left -= cases;
         }
@@ -73,12 +73,19 @@ pub fn run(kernel: &str, region: &mut u32, inputs: &mut Inputs) {
 }
 
 /// Measures a case.
-fn one_case(region: u32, variant: Kernel, effort: Option<Effort>, frames: i32, config: &Config, inputs: &mut Inputs) {
-    let fit = Fit::new(effort.unwrap_or_default());
+fn one_case(
+    region: u32,
+    variant: Kernel,
+    fit_level: Option<FitLevel>,
+    frames: i32,
+    config: &Config,
+    inputs: &mut Inputs,
+) {
+    let fit = Fit::new(fit_level.unwrap_or_default());
     let mut bench = Bench { picture: Picture::EMPTY, config, fit, contact: Contact::default() };
     for frame in 0..frames {
         bench.picture = picture(inputs);
-        if frame == 0 || effort.is_some() {
+        if frame == 0 || fit_level.is_some() {
             pass_on(region, variant, &mut bench);
         }
     }

@@ -1,7 +1,8 @@
-//! What the dense pass replaced: a pass that only sums the rows up, and single taxels by rows, where somebody looks at them.
+//! What the dense pass replaced: a pass that only sums the rows up, and single taxels by rows, where somebody looks at
+//! them.
 //!
-//! The pass takes codes above floors, which a dead taxel falls short of: it then shows as a huge number. What the floors hold back of
-//! a row's sums these begin with.
+//! The pass takes codes above floors, which a dead taxel falls short of: it then shows as a huge number. What the
+//! floors hold back of a row's sums these begin with.
 
 use super::frame::{Bench, Sums, pairs};
 use fingertip::frame::SATURATED;
@@ -96,13 +97,19 @@ fn read(bench: &mut Bench, mut wanted: u16) {
         let row = wanted.trailing_zeros() as usize % ROWS;
         wanted &= wanted - 1;
         let Row { weights: [gains, _], boost, .. } = &bench.sparse.rows[row];
-        develop([&codes[row], undriven], gains, *boost, &bench.tare[row], &mut bench.sparse.taxels[row]);
+        taxels_of([&codes[row], undriven], gains, *boost, &bench.tare[row], &mut bench.sparse.taxels[row]);
     }
 }
 
 /// A row's taxels in sixteenths.
 #[inline(always)]
-fn develop([codes, undriven]: [&Pairs; 2], gains: &Pairs, boost: i32, tare: &[i32; COLUMNS], out: &mut [i32; COLUMNS]) {
+fn taxels_of(
+    [codes, undriven]: [&Pairs; 2],
+    gains: &Pairs,
+    boost: i32,
+    tare: &[i32; COLUMNS],
+    out: &mut [i32; COLUMNS],
+) {
     let boost = i64::from(boost >> (GAIN_BITS + BOOST_BITS - CODE_BITS - 32));
     let taxel = |net: i16, gain: i16| ((i64::from(i32::from(net) * i32::from(gain)) * boost + (1 << 31)) >> 32) as i32;
     for place in 0..BANK_COLUMNS {
@@ -118,9 +125,9 @@ fn develop([codes, undriven]: [&Pairs; 2], gains: &Pairs, boost: i32, tare: &[i3
 fn pass(codes: &[Pairs; ROWS], rows: &mut [Row; ROWS], common: &Common) -> [i32; 4] {
     const { assert!(ROWS.is_multiple_of(2)) };
     let (first, second, running, largest);
-    // SAFETY: reads the codes, the rows and what is common, writes each row's boost; the types hold their lengths and places,
-    // and the codes' end ends the loop, which takes two rows a turn. The stack is as it was at the end, and so are r6 and r7,
-    // which an operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
+    // SAFETY: reads the codes, the rows and what is common, writes each row's boost; the types hold their lengths and
+    // places, and the codes' end ends the loop, which takes two rows a turn. The stack is as it was at the end, and so
+    // are r6 and r7, which an operand cannot be. The flag that it can set (Q) is sticky and read nowhere.
     unsafe {
         core::arch::asm!(
             "push {{r6, r7, r9}}",

@@ -1,11 +1,11 @@
-//! The loop as it is, over the recorded stimulus: the whole step at each effort, and its parts.
+//! The loop as it is, over the recorded stimulus: the whole step at each fit level, and its parts.
 
 use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::say;
 use fingertip::command::Command;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Effort};
+use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
@@ -19,7 +19,7 @@ use images::record::Record;
 /// What the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
-    effort: Effort,
+    fit_level: FitLevel,
     record: Record,
     pipeline: Pipeline,
     duty: Duty,
@@ -36,14 +36,14 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// The whole step at each effort.
-const STEPS: [(&str, Effort); 6] = [
-    ("Pipeline::step, effort 0", Effort::Sum),
-    ("Pipeline::step, effort 1", Effort::Moments),
-    ("**Pipeline::step**", Effort::OneRow),
-    ("Pipeline::step, effort 3", Effort::TwoRows),
-    ("Pipeline::step, effort 4", Effort::FiveRows),
-    ("Pipeline::step, effort 5", Effort::AllRows),
+/// The whole step at each fit level.
+const STEPS: [(&str, FitLevel); 6] = [
+    ("Pipeline::step, fit level 0", FitLevel::Sum),
+    ("Pipeline::step, fit level 1", FitLevel::Moments),
+    ("**Pipeline::step**", FitLevel::OneRow),
+    ("Pipeline::step, fit level 3", FitLevel::TwoRows),
+    ("Pipeline::step, fit level 4", FitLevel::FiveRows),
+    ("Pipeline::step, fit level 5", FitLevel::AllRows),
 ];
 
 /// The place of the first part that works on what those before it left.
@@ -65,7 +65,7 @@ const PARTS: [(&str, Kernel, bool); 8] = [
 
 extern "C" fn step(bench: &mut Bench) {
     let Record { frame, sense, command } = &bench.record;
-    bench.duty = bench.pipeline.step(frame, sense, &Command { effort: bench.effort, ..*command }).0;
+    bench.duty = bench.pipeline.step(frame, sense, &Command { fit_level: bench.fit_level, ..*command }).0;
 }
 
 extern "C" fn read(bench: &mut Bench) {
@@ -108,10 +108,10 @@ extern "C" fn guard(bench: &mut Bench) {
 }
 
 impl<'a> Bench<'a> {
-    fn new(effort: Effort, config: &'a Config) -> Self {
+    fn new(fit_level: FitLevel, config: &'a Config) -> Self {
         Self {
             config,
-            effort,
+            fit_level,
             record: Record::from_bytes(&[0; Record::BYTES]),
             pipeline: Pipeline::new(config),
             duty: Duty::ZERO,
@@ -134,15 +134,15 @@ fn record(inputs: &mut Inputs) -> Record {
     Record::from_bytes(&bytes)
 }
 
-/// Replays the next section's records, once for each effort and part.
+/// Replays the next section's records, once for each fit level and part.
 #[inline(never)]
 pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let start = inputs.place();
-    for (name, effort) in STEPS {
+    for (name, fit_level) in STEPS {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(effort, config);
+        let mut bench = Bench::new(fit_level, config);
         for _ in 0..count {
             bench.record = record(inputs);
             pass_on(*region, step, &mut bench);
@@ -152,7 +152,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(Effort::default(), config);
+        let mut bench = Bench::new(FitLevel::default(), config);
         for n in 0..count.min(PART_RECORDS) {
             bench.record = record(inputs);
             step(&mut bench);

@@ -10,7 +10,8 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::Instant;
 
-/// Runs a scene many times: over values of its keys and over seeds, on all cores. Writes runs.csv, summary.csv and plots.
+/// Runs a scene many times: over values of its keys and over seeds, on all cores. Writes runs.csv, summary.csv and
+/// plots.
 #[derive(Parser)]
 #[command(
     name = "sweep",

@@ -1,9 +1,10 @@
 //! Between tip and object.
 //!
-//! Where tip and object overlap by x, the tip is indented by d and pushes back with F. The stages in order: the object's surface
-//! (shape), the force that the tip has forgotten (memory), the object's own yielding (series), what is left of it (strength), and
-//! the motion along the surface (tangent). Without effects the object is a rigid plane without friction: d = x, F = pi Y d^2.
-//! All forces of a step come from one energy, which is asked for its mean slope, so a step creates none.
+//! Where tip and object overlap by x, the tip is indented by d and pushes back with F. The stages in order: the
+//! object's surface (shape), the force that the tip has forgotten (memory), the object's own yielding (series), what is
+//! left of it (strength), and the motion along the surface (tangent). Without effects the object is a rigid plane
+//! without friction: d = x, F = pi Y d^2. All forces of a step come from one energy, which is asked for its mean slope,
+//! so a step creates none.
 
 mod breakable_object;
 mod cylinder;
@@ -34,8 +35,9 @@ pub const EFFECTS: &[&Description] = &[
 
 /// Acts on the object's surface.
 pub trait Shape: Send {
-    /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where it falls away.
-    /// `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is that.
+    /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where
+    /// it falls away. `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is
+    /// that.
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
 
     /// Whether the height is 0 wherever a tip reaches: then the plane's closed forms hold.

@@ -1,10 +1,10 @@
 //! From the bridge's duty to the tip's way.
 //!
-//! A step of the drive asks each stage once: what feeds the winding (circuit), what takes energy from the shaft (friction). Torques
-//! that store energy (potential) are asked for at every round of the step's solution, and give the mean over the step's way, so that
-//! none is lost. After the step the winding's heat and the tip's place behind the gear's play follow; the encoder's count is worked out
-//! where it is read. Without effects there is a rotor without friction, a winding that is a resistance, an ideal source, and a rigid
-//! transmission.
+//! A step of the drive asks each stage once: what feeds the winding (circuit), what takes energy from the shaft
+//! (friction). Torques that store energy (potential) are asked for at every round of the step's solution, and give the
+//! mean over the step's way, so that none is lost. After the step the winding's heat and the tip's place behind the
+//! gear's play follow; the encoder's count is worked out where it is read. Without effects there is a rotor without
+//! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
 mod backlash;
 mod cogging;

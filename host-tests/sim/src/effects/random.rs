@@ -2,7 +2,8 @@
 
 use fastrand::Rng;
 
-/// A number of the normal distribution, mean 0 and deviation 1: Marsaglia's polar method. The logarithm is libm's own, in plain Rust.
+/// A number of the normal distribution, mean 0 and deviation 1: Marsaglia's polar method. The logarithm is libm's own,
+/// in plain Rust.
 pub fn normal(rng: &mut Rng) -> f64 {
     loop {
         let (u, v) = (2.0 * rng.f64() - 1.0, 2.0 * rng.f64() - 1.0);
@@ -13,7 +14,8 @@ pub fn normal(rng: &mut Rng) -> f64 {
     }
 }
 
-/// So many of them, to the bit what [`normal`] gives one after the other, but quicker: no draw that is thrown away is waited for.
+/// So many of them, to the bit what [`normal`] gives one after the other, but quicker: no draw that is thrown away is
+/// waited for.
 pub fn normals<const COUNT: usize>(rng: &mut Rng) -> [f64; COUNT] {
     let (mut first, mut squares) = ([0.0; COUNT], [0.0; COUNT]);
     let mut drawn = 0;
@@ -29,7 +31,8 @@ pub fn normals<const COUNT: usize>(rng: &mut Rng) -> [f64; COUNT] {
     first
 }
 
-/// One of [`normal`], drawn again beyond three deviations: for what a part is made with, since worse parts are thrown away.
+/// One of [`normal`], drawn again beyond three deviations: for what a part is made with, since worse parts are thrown
+/// away.
 pub fn normal_within_3(rng: &mut Rng) -> f64 {
     loop {
         let draw = normal(rng);

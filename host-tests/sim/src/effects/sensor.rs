@@ -1,8 +1,8 @@
 //! From the taxels' pressure to the frame's codes.
 //!
-//! The stages in order: pressure (kPa a row), conductance (S a row), network (what a column sees of the driven row), volts (at the
-//! column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal: every taxel alike, a
-//! perfect row switch, a perfect virtual ground, settled at once, 12 bits.
+//! The stages in order: pressure (kPa a row), conductance (S a row), network (what a column sees of the driven row),
+//! volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal:
+//! every taxel alike, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
 mod broken_taxels;
 mod converter;

@@ -1,6 +1,7 @@
 //! A host that holds on: it reads the controller, and asks for more force before the contact slips, or when it did.
 //!
-//! It knows only what the bus tells: force and centre of pressure. A load along the surface stretches the patch and moves the centre:
+//! It knows only what the bus tells: force and centre of pressure. A load along the surface stretches the patch and
+//! moves the centre:
 //!
 //! ```text
 //! s = centre - centre at rest        T = grip_n_per_mm |s|
@@ -9,10 +10,12 @@
 //!         still to slipping; the force asked for rises by a quarter
 //! ```
 //!
-//! What was asked for is kept until the script lets go. A slip at which friction does not fall shows no drop: only the margin helps.
+//! What was asked for is kept until the script lets go. A slip at which friction does not fall shows no drop: only the
+//! margin helps.
 //!
-//! Two fingers that hold a free thing each with a force of its own push it aside without end, since no two arrays read quite alike. So a
-//! finger that went on by x from where its force first stood asks for centre_n_per_mm x less, and one that was pushed back for more.
+//! Two fingers that hold a free thing each with a force of its own push it aside without end, since no two arrays read
+//! quite alike. So a finger that went on by x from where its force first stood asks for centre_n_per_mm x less, and one
+//! that was pushed back for more.
 
 use crate::key::Values;
 use fingertip::pipeline::Status;

@@ -132,7 +132,8 @@ impl<C: Stages> Contact<C> {
         [x, y + self.along.stretch_mm]
     }
 
-    /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it has none.
+    /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it
+    /// has none.
     pub fn steepest_n_per_mm(&self, deepest_mm: f64) -> f64 {
         let tip = self.elastic.n_per_mm(deepest_mm);
         tip / (1.0 + self.mm_per_n * tip)
@@ -140,7 +141,8 @@ impl<C: Stages> Contact<C> {
 }
 
 impl Along {
-    /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the state behind it.
+    /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the
+    /// state behind it.
     pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
         let mut next = *self;
         let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };

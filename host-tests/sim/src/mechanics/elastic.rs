@@ -62,7 +62,8 @@ impl Table {
         self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.slope(line))
     }
 
-    /// The mean force between two indentations. On one line it is the mean of the ends, which loses nothing at any distance.
+    /// The mean force between two indentations. On one line it is the mean of the ends, which loses nothing at any
+    /// distance.
     fn mean_n(&self, d0: f64, d1: f64) -> f64 {
         if d0 == d1 {
             return self.force_n(d0);

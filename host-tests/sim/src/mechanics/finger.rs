@@ -122,7 +122,8 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
     }
 
-    /// Where the step prepared ends against a load: its mean force between two places of the pressing flank. Changes nothing.
+    /// Where the step prepared ends against a load: its mean force between two places of the pressing flank. Changes
+    /// nothing.
     pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
         let mut acting = Acts {
             alone: self.drive.none(),

@@ -1,4 +1,5 @@
-//! The normal force between tip and object over a step: elastic, less what is forgotten, in series with the object's own yielding.
+//! The normal force between tip and object over a step: elastic, less what is forgotten, in series with the object's
+//! own yielding.
 //!
 //! With the elastic force F_e, a forgotten force S, the object's compliance c and the share k that is left of it all:
 //!
@@ -31,7 +32,8 @@ impl Law<'_> {
     }
 
     fn yielding_mm(&self, x_mm: f64) -> f64 {
-        // Between these two d + c N(d) - x changes its sign; it rises and bends upwards, so Newton from above never leaves.
+        // Between these two d + c N(d) - x changes its sign; it rises and bends upwards, so Newton from above never
+        // leaves.
         let free_mm = self.elastic.depth_mm(self.forgotten_n);
         if x_mm <= free_mm {
             return x_mm;

@@ -1,8 +1,10 @@
-//! What each taxel feels of a contact, quick: its mean pressure depends only on the indentation and on where the contact's centre is.
+//! What each taxel feels of a contact, quick: its mean pressure depends only on the indentation and on where the
+//! contact's centre is.
 //!
-//! Means are worked out at the knots of a grid, once each and only where a contact comes by, and interpolated between them. The grid
-//! runs in the square root of the indentation, in which the rim moves evenly, and holds the means as shares of the peak Y d / a, which
-//! vary slowly. Cubic lines through four knots, with equal slopes where they meet (Catmull and Rom).
+//! Means are worked out at the knots of a grid, once each and only where a contact comes by, and interpolated between
+//! them. The grid runs in the square root of the indentation, in which the rim moves evenly, and holds the means as
+//! shares of the peak Y d / a, which vary slowly. Cubic lines through four knots, with equal slopes where they meet
+//! (Catmull and Rom).
 
 use super::shape;
 use crate::effects::contact::Stages;
@@ -26,7 +28,8 @@ pub struct Pressures {
     centre_mm: [f64; 2],
     deepest_mm: f64,
     peak_per_mm: f64,
-    /// For each place of the centre by the root, beginning with the knot before the first: the shares are even in the root.
+    /// For each place of the centre by the root, beginning with the knot before the first: the shares are even in the
+    /// root.
     knots: Vec<Vec<Knot>>,
 }
 

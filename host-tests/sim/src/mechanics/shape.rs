@@ -1,8 +1,8 @@
 //! The tip on a surface that is no plane: force, centre and the taxels' means from the surface's height.
 //!
-//! The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`, `L = sqrt(a^2 - r^2)`, so with polar
-//! coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the angle: sample by sample, a ramp that
-//! begins at the sample's clearance `a - L - h`.
+//! The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`,
+//! `L = sqrt(a^2 - r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL`
+//! over `L` and the angle: sample by sample, a ramp that begins at the sample's clearance `a - L - h`.
 
 use super::elastic::{Elastic, Table};
 use crate::effects::contact::Stages;

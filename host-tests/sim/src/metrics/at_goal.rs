@@ -16,7 +16,8 @@ impl AtGoal {
     }
 }
 
-/// Takes a value in, and keeps those only that are not made up for by another: a larger one at a goal as small. So a long run keeps few.
+/// Takes a value in, and keeps those only that are not made up for by another: a larger one at a goal as small. So a
+/// long run keeps few.
 pub fn note(kept: &mut Vec<AtGoal>, new: AtGoal) {
     let covers = |a: &AtGoal, b: &AtGoal| a.goal_n <= b.goal_n && a.value >= b.value;
     if !kept.iter().any(|known| covers(known, &new)) {

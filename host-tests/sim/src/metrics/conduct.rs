@@ -1,5 +1,5 @@
-//! How a finger behaved: what it must never do, and what it was like once a goal had had its time. All of it is judged by what is true of
-//! the finger, never by what the controller reports.
+//! How a finger behaved: what it must never do, and what it was like once a goal had had its time. All of it is judged
+//! by what is true of the finger, never by what the controller reports.
 
 use super::at_goal::{AtGoal, note};
 use super::finger::{duty, newtons, trimmed};
@@ -123,7 +123,8 @@ impl Conduct {
         self.last.push_back(sample);
     }
 
-    /// The true force against the goal. A fault leaves the goal that counted: what was pressed need not be let go without a motor.
+    /// The true force against the goal. A fault leaves the goal that counted: what was pressed need not be let go
+    /// without a motor.
     fn press(&mut self, step: &Step) {
         let over = step.time_s >= self.since_s + TAKEN_BACK_S;
         if !self.faulty && (self.goal_n > self.counted_n || over) {

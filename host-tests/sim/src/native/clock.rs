@@ -1,5 +1,5 @@
-//! Virtual time, exact: whole 21sts of a femtosecond from the scene's start, of which the timer's tick (168 MHz) is 125 million. So any
-//! number of ticks is what it is, and no sum is rounded.
+//! Virtual time, exact: whole 21sts of a femtosecond from the scene's start, of which the timer's tick (168 MHz) is 125
+//! million. So any number of ticks is what it is, and no sum is rounded.
 
 /// In a second.
 const UNITS: i128 = 21_000_000_000_000_000;

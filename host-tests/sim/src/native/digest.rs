@@ -9,8 +9,8 @@ use fingertip::shipped::Frame;
 use fingertip::units::Duty;
 use twox_hash::xxhash3_128::Hasher;
 
-/// The 128 bits of XXH3 over what every control step took and gave, in order: equal where two runs are equal to the bit. It finds
-/// runs that happen to differ, and keeps nobody from making two that do not seem to.
+/// The 128 bits of XXH3 over what every control step took and gave, in order: equal where two runs are equal to the
+/// bit. It finds runs that happen to differ, and keeps nobody from making two that do not seem to.
 pub struct Digest(Hasher);
 
 /// Words of what a step takes beside the codes, and of what it gives.
@@ -41,7 +41,7 @@ impl Digest {
 
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
     let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
-    let Command { torque, goal, bus_watchdog_ms, effort, tare_request, clear_request, identify_request } = *command;
+    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request } = *command;
     [
         sequence,
         encoder as u32,
@@ -52,7 +52,7 @@ fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
         torque.into(),
         goal.to_bits() as u32,
         bus_watchdog_ms.into(),
-        effort as u32,
+        fit_level as u32,
         tare_request.into(),
         clear_request.into(),
         identify_request.into(),
@@ -66,7 +66,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         mode,
         fault,
         limits,
-        effort,
+        fit_level,
         contact,
         travel,
         speed,
@@ -83,7 +83,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         mode as u32,
         fault.map_or(0, |fault| fault as u32),
         limits.0.into(),
-        effort as u32,
+        fit_level as u32,
         force.to_bits() as u32,
         indentation.to_bits() as u32,
         centre_x.to_bits() as u32,

@@ -74,7 +74,8 @@ impl Expression {
         }
     }
 
-    /// Within what it lies, where every variable lies within something. Two that go together are taken as if they did not.
+    /// Within what it lies, where every variable lies within something. Two that go together are taken as if they did
+    /// not.
     pub fn range(&self, variable: &dyn Fn(&str) -> Option<[f64; 2]>) -> Option<[f64; 2]> {
         match self {
             Self::Number(number) => Some([*number; 2]),

@@ -41,7 +41,8 @@ pub fn load(name: &str) -> Result<Population, String> {
     Ok(Population { name: stem(&file), ..population })
 }
 
-/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole. What is counted is added.
+/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole. What is
+/// counted is added.
 fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {

@@ -181,7 +181,8 @@ impl Parts {
     }
 }
 
-/// All of the text that says something of the population's own: a key with its value, or tables from head to last value.
+/// All of the text that says something of the population's own: a key with its value, or tables from head to last
+/// value.
 fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
     let whole = |table: &Table| {
         let head = table.span()?;

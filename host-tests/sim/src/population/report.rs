@@ -232,7 +232,8 @@ impl Report {
         names.into_iter().enumerate().map(row).collect()
     }
 
-    /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no fault came before.
+    /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no
+    /// fault came before.
     pub fn errors(&self) -> [Spread; 2] {
         let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty && !hold.missed);
         let off_n = |hold: &Hold| (hold.mean_n - hold.goal_n).abs();

@@ -1,7 +1,7 @@
 //! Whether a recording is as it was written: every byte of the file stands under a checksum, and all are looked at.
 //!
-//! MCAP has one over all in front of the record `DataEnd` and one over the summary behind it, footer included. What these do not
-//! cover (the checksums themselves, both ends' magic, the head of `DataEnd`) can only be one thing.
+//! MCAP has one over all in front of the record `DataEnd` and one over the summary behind it, footer included. What
+//! these do not cover (the checksums themselves, both ends' magic, the head of `DataEnd`) can only be one thing.
 
 use crate::run::RunError;
 use mcap::MAGIC;
@@ -54,7 +54,8 @@ pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Of a metadata record's entries: says whether they are the ones that were written, also after another program wrote the file anew.
+/// Of a metadata record's entries: says whether they are the ones that were written, also after another program wrote
+/// the file anew.
 pub fn digest(entries: &BTreeMap<String, String>) -> String {
     texts(entries.iter().flat_map(|(name, value)| [name.as_bytes(), value.as_bytes()]))
 }

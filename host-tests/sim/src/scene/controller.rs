@@ -34,7 +34,8 @@ pub fn setup(scene: &Scene) -> Setup {
     setup
 }
 
-/// The controller's parameters: what `[controller]` gives, what the other tables say, else the firmware's defaults. Unchecked.
+/// The controller's parameters: what `[controller]` gives, what the other tables say, else the firmware's defaults.
+/// Unchecked.
 pub fn params(scene: &Scene) -> Params {
     let [tip, array, motor] = ["tip", "array", "motor"].map(|name| scene.table(name));
     let [transmission, supply] = ["transmission", "supply"].map(|name| scene.table(name));

@@ -1,4 +1,5 @@
-//! From a scene's text to the scene. Strict: whatever is not described is an error, and all errors of a text come together.
+//! From a scene's text to the scene. Strict: whatever is not described is an error, and all errors of a text come
+//! together.
 
 mod values;
 

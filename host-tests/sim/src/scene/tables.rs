@@ -1,4 +1,5 @@
-//! The tables of a scene, beside those of the effects. The reader, the errors and the reference page all come from here.
+//! The tables of a scene, beside those of the effects. The reader, the errors and the reference page all come from
+//! here.
 
 use crate::key::{Key, Kind};
 use fingertip::params::Params;

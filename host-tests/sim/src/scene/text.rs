@@ -5,8 +5,8 @@ use crate::key::{Value, Values};
 use crate::registry::Description;
 use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
-/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value as TOML writes it; comments
-/// stay. What is set is checked when the text is read.
+/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value as TOML writes it;
+/// comments stay. What is set is checked when the text is read.
 ///
 /// # Errors
 /// The text or the value is not TOML, or there is no such place.

@@ -1,6 +1,7 @@
 //! A sweep's files: `runs.csv` with a row for each run, `summary.csv`, and a plot for each metric that is bounded.
 //!
-//! A shard writes `runs-1-of-4.csv` alone; merging makes the rest. Each row says to which sweep it belongs and of how many runs.
+//! A shard writes `runs-1-of-4.csv` alone; merging makes the rest. Each row says to which sweep it belongs and of how
+//! many runs.
 
 use super::table::{self, Table};
 use super::{Plan, Shard};

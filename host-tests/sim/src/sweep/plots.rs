@@ -28,7 +28,8 @@ pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
     Ok(pictures)
 }
 
-/// A metric over a varied key: each run a circle, the medians a line, the least and the largest pale, the bounds dashed.
+/// A metric over a varied key: each run a circle, the medians a line, the least and the largest pale, the bounds
+/// dashed.
 fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
     let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
     let at = |row: &Vec<String>| number(&row[key]);

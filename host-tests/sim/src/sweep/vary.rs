@@ -17,7 +17,8 @@ const MOST: usize = 100_000;
 impl std::str::FromStr for Vary {
     type Err = String;
 
-    /// Reads `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole where they come out so.
+    /// Reads `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole where they come out
+    /// so.
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || format!("--vary {text}: table.key=lo..hi or table.key=lo..hi:n is asked for");
         let (key, range) = text.split_once('=').ok_or_else(wrong)?;

@@ -6,8 +6,8 @@ use crate::mechanics::contact::Place;
 use fingertip::shipped::COLUMNS;
 
 impl<E: Set> World<E> {
-    /// How a finger touches at a time within the last step. Several may be asked for before their rows: one then need not wait for
-    /// another to be worked out.
+    /// How a finger touches at a time within the last step. Several may be asked for before their rows: one then need
+    /// not wait for another to be worked out.
     #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {
         let mut body = self.body;

@@ -1,4 +1,5 @@
-//! Interruptions by the hundred: nothing that was whole is lost or changed, and what goes on ends as if nothing had happened.
+//! Interruptions by the hundred: nothing that was whole is lost or changed, and what goes on ends as if nothing had
+//! happened.
 
 use crate::jobs::Job;
 use crate::strike::{Kind, strike};

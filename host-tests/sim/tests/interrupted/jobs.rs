@@ -97,7 +97,8 @@ impl Job {
         command
     }
 
-    /// The same under a limit of its files' size. Beyond it the system kills it, or lets it live with a write that failed.
+    /// The same under a limit of its files' size. Beyond it the system kills it, or lets it live with a write that
+    /// failed.
     pub fn limited(&self, bytes: u64, lives: bool) -> Command {
         let mut command = Command::new("sh");
         let trap = if lives { "trap '' XFSZ; " } else { "" };

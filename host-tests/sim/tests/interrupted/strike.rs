@@ -46,7 +46,8 @@ impl Kind {
     ];
 }
 
-/// Interrupts a job at so many bytes, and checks how it ends. Returns whether it was interrupted: a command may be done before.
+/// Interrupts a job at so many bytes, and checks how it ends. Returns whether it was interrupted: a command may be done
+/// before.
 pub fn strike(job: &Job, kind: Kind, at: u64) -> bool {
     match kind {
         Kind::CutWrite => {

@@ -210,7 +210,8 @@ fn every_changed_byte_is_found_before_the_replay() {
         damaged[at] ^= 1 << bit;
         check(&damaged).map_err(|error| error.to_string())
     };
-    // All that is in front of the first chunk and behind the last one by elevens, both ends whole, and some of the messages.
+    // All that is in front of the first chunk and behind the last one by elevens, both ends whole, and some of the
+    // messages.
     let chunks = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let first = chunks.iter().map(|chunk| chunk.chunk_start_offset as usize).min().unwrap();
     let last = chunks.iter().map(|chunk| (chunk.chunk_start_offset + chunk.chunk_length) as usize).max().unwrap();

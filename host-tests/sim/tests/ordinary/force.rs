@@ -85,7 +85,8 @@ fn a_doubtful_fit_does_not_press_harder() {
     }
 }
 
-/// The contact's middle is 1.5 to 2.5 mm beside the array, which sees nothing until it is wide: it touched at full speed meanwhile.
+/// The contact's middle is 1.5 to 2.5 mm beside the array, which sees nothing until it is wide: it touched at full
+/// speed meanwhile.
 #[test]
 fn a_touch_far_beside_the_array_is_slow_until_it_is_known() {
     for spread_percent in [0.0, 6.0] {
@@ -115,7 +116,8 @@ fn the_motor_feels_a_touch_that_the_array_sees_late() {
     }
 }
 
-/// Still farther out the array sees nothing of the first newton, and loses what it saw: 4.8 N were pressed at goal 0.5, 2.4 N at goal 1.
+/// Still farther out the array sees nothing of the first newton, and loses what it saw: 4.8 N were pressed at goal 0.5,
+/// 2.4 N at goal 1.
 #[test]
 fn a_touch_that_the_array_hardly_sees_is_pressed_no_harder() {
     for (goal_n, spread_percent) in [(0.5, 0.0), (0.5, 6.0), (1.0, 0.0), (1.0, 6.0)] {
@@ -163,7 +165,8 @@ fn a_step_beside_the_middle_stays_in_the_envelope() {
     }
 }
 
-/// A doubtful fit once said that a force was a thirteenth of what the taxels carry, and the tip was pressed for the rest.
+/// A doubtful fit once said that a force was a thirteenth of what the taxels carry, and the tip was pressed for the
+/// rest.
 #[test]
 fn a_doubtful_fit_never_says_less_than_the_taxels() {
     let population = sim::population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));

@@ -1,4 +1,5 @@
-//! A tip that lets go goes to its clearance and stays there, whatever the array reads in the air; and the next touch is found.
+//! A tip that lets go goes to its clearance and stays there, whatever the array reads in the air; and the next touch is
+//! found.
 
 use crate::{Ran, asks};
 
@@ -93,8 +94,8 @@ fn what_an_array_remembers_is_learnt_anew_after_each_touch() {
     }
 }
 
-/// The array reads more than a contact in the air, and to the bit the same while the tip goes through it: no array that stands still. An
-/// offset beyond `contact_off_mn` ended in fault 4, or in fault 1.
+/// The array reads more than a contact in the air, and to the bit the same while the tip goes through it: no array that
+/// stands still. An offset beyond `contact_off_mn` ended in fault 4, or in fault 1.
 #[test]
 fn an_offset_in_the_air_is_no_fault() {
     for (zero_kpa_per_k, time_constant_s) in [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)] {

@@ -1,5 +1,6 @@
-//! Ordinary fingers: noise, warmth, coarse encoders, contacts off the middle, weak sources. What each once did wrong is asked for here, by
-//! what is true of the simulated finger, and so are its neighbours. Every run is held to the envelope of the population `ordinary`.
+//! Ordinary fingers: noise, warmth, coarse encoders, contacts off the middle, weak sources. What each once did wrong is
+//! asked for here, by what is true of the simulated finger, and so are its neighbours. Every run is held to the
+//! envelope of the population `ordinary`.
 
 mod force;
 mod letting_go;

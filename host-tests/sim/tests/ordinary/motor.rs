@@ -48,7 +48,8 @@ fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
     assert!((50..100).contains(&quiet), "{quiet} are quite quiet: with noise and counts not all are");
 }
 
-/// A coarse encoder makes a slower loop, never a swinging one. 256 counts swung by 33 mN, 128 by 158, 48 by 817; 16 held 3 N at goal 1.
+/// A coarse encoder makes a slower loop, never a swinging one. 256 counts swung by 33 mN, 128 by 158, 48 by 817; 16
+/// held 3 N at goal 1.
 #[test]
 fn coarse_encoders_do_not_swing() {
     for counts in [256, 128, 64, 48, 24, 16] {
@@ -102,8 +103,8 @@ fn a_weak_source_is_spared() {
     }
 }
 
-/// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5, at three times the
-/// speed of the approach.
+/// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5,
+/// at three times the speed of the approach.
 #[test]
 fn a_small_reduction_is_no_fault() {
     for (ratio, counts) in [(1.2, 1_600), (2.4, 1_600), (6.0, 256), (12.0, 256)] {

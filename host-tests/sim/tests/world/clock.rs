@@ -22,7 +22,8 @@ fn after(steps: u32, step_s: f64) -> Clock {
 #[test]
 fn after_more_than_a_day_of_frames_it_is_what_the_timer_says_to_the_last_bit() {
     let slot_s = SLOT_TICKS / TIMER_HZ;
-    // In as many slots as there are ticks in a second, 1523 s are whole. In six times as many frames, of 11 slots, 28 hours.
+    // In as many slots as there are ticks in a second, 1523 s are whole. In six times as many frames, of 11 slots, 28
+    // hours.
     assert_eq!(after(168_000_000, slot_s), Clock::from_start(1523.0));
     let day = after(6 * 168_000_000, 11.0 * slot_s);
     assert_eq!(day, Clock::from_start(100_518.0));
@@ -87,7 +88,8 @@ fn what_a_script_asks_for_after_a_day_goes_as_at_the_start() {
     let worst = |of: usize| early.iter().zip(&late).map(|(a, b)| (a[of] - b[of]).abs()).fold(0.0, f64::max);
     let most = |of: usize| early.iter().map(|truth| truth[of]).fold(0.0, f64::max);
     println!("{:?} of {:?}", [0, 1, 2, 3, 4].map(worst), [0, 1, 2, 3, 4].map(most));
-    // Behind a day's seconds a number has 36 bits left, steps of 15 ps: the lifting hand goes 6e-10 mm in one, a thousand times.
+    // Behind a day's seconds a number has 36 bits left, steps of 15 ps: the lifting hand goes 6e-10 mm in one, a
+    // thousand times.
     assert!([1e-9, 1e-8, 1e-9, 1e-7, 1e-9].into_iter().enumerate().all(|(of, least)| worst(of) < least));
     assert!(most(0) > 1.5 && most(3) > 1.5);
 }

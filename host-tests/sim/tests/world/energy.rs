@@ -17,8 +17,9 @@ const HENRY: f64 = 70e-6;
 const COPPER_PER_K: f64 = 0.0039;
 const MAGNET_PER_K: f64 = -0.001;
 
-/// Random lengths of step, kicks now and then, the bridge open, braking or driven. Between kicks the energy of finger, contact and body
-/// never rises by more than the source gives less what the circuit's resistance takes. `share` is that of the relaxation named.
+/// Random lengths of step, kicks now and then, the bridge open, braking or driven. Between kicks the energy of finger,
+/// contact and body never rises by more than the source gives less what the circuit's resistance takes. `share` is that
+/// of the relaxation named.
 fn never_rises(text: &str, share: f64) {
     let scene = format!("[object]\ndistance_mm = {WALL_MM:?}\n{text}");
     let mut moving = world(&scene);
@@ -99,7 +100,8 @@ impl Fed {
         }
     }
 
-    /// By the charge that went through, u V dt = R q + k angle + L di, and as a current that varies heats more than its mean.
+    /// By the charge that went through, u V dt = R q + k angle + L di, and as a current that varies heats more than its
+    /// mean.
     fn at_most_mj(&self, dt_s: f64, world: &World<Named>) -> f64 {
         let finger = &world.fingers()[0];
         let turned_rad = finger.shaft().angle_rad - self.angle_rad;
@@ -110,8 +112,8 @@ impl Fed {
     }
 }
 
-/// Energy of a tip on a plane that remembers q, mJ: E(d) - g q d + g (q d_q - E(d_q)), F_e(d_q) = q, at the indentation or, off the
-/// object, at that of its shape.
+/// Energy of a tip on a plane that remembers q, mJ: E(d) - g q d + g (q d_q - E(d_q)), F_e(d_q) = q, at the indentation
+/// or, off the object, at that of its shape.
 fn relaxing_mj(world: &World<Named>, share: f64) -> f64 {
     let finger = &world.fingers()[0];
     let forgotten_n = finger.contact.law().forgotten_n;

@@ -24,7 +24,8 @@ fn the_error_falls_with_the_square_of_the_step_from_200_us_to_1_us() {
     for text in [
         "[effects.dry_friction]\n",
         "[effects.dry_friction]\n[effects.gear_efficiency]\n",
-        // Where the load of a stuck shaft fades, it creeps: each start then counts from a step's border. So no dry friction here.
+        // Where the load of a stuck shaft fades, it creeps: each start then counts from a step's border. So no dry
+        // friction here.
         "[effects.viscous_friction]\n[effects.relaxation]\nshare = 0.3\ntau_s = 0.01\n",
         "[effects.viscous_friction]\n[effects.object_stiffness]\n",
         "[effects.object_mass]\nmass_g = 400.0\n",

@@ -59,8 +59,8 @@ pub fn write_u8(rig: &mut Rig, doing: &str, address: u16, value: u8) -> Result<(
 
 /// Reads whole registers.
 ///
-/// The client (0.9.1) leaves the stuffing in a reply with FF FF FF FD: a negative number, and a register that begins with FD.
-/// Read in two parts, these do not meet.
+/// The client (0.9.1) leaves the stuffing in a reply with FF FF FF FD: a negative number, and a register that begins
+/// with FD. Read in two parts, these do not meet.
 fn read(rig: &mut Rig, doing: &str, from: u16, bytes: u16) -> Result<Vec<u8>, DemoError> {
     let half = bytes / 8 * 4;
     match rig.client(WAIT_NS, move |bus| bus.read(ID, from, bytes))? {

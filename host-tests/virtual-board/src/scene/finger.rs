@@ -123,8 +123,8 @@ impl Finger {
         Ok(joints.into_iter().zip(sensors).map(finger).collect())
     }
 
-    /// These slots are to come, with the rows driven in them. They may be asked for later than they begin, when the world has moved on:
-    /// it lets them be sampled before.
+    /// These slots are to come, with the rows driven in them. They may be asked for later than they begin, when the
+    /// world has moved on: it lets them be sampled before.
     pub fn expect(&mut self, slots: impl Iterator<Item = (u64, u16)>) {
         let mut slots = slots.peekable();
         let first_ns = slots.peek().map_or(0, |(begun_ns, _)| *begun_ns);
@@ -165,8 +165,8 @@ impl Finger {
         self.reference_v
     }
 
-    /// A column's code in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both converters
-    /// see one and the same readout of the slot.
+    /// A column's code in the sequence that began at an instant. A sequence is sampled at once, at its beginning: both
+    /// converters see one and the same readout of the slot.
     pub fn code(&mut self, column: usize, rows: u16, begun_ns: u64) -> u16 {
         self.slot(rows, begun_ns)[column]
     }

@@ -1,8 +1,9 @@
 //! The scene's host on the bus of one board: it writes goals when the link lets them through, and reads the status.
 //!
-//! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes out where the line
-//! is free for it and for its answer, and where the one before was answered: once in ten frames or more to see what the board does, and when the
-//! grip of `[host]` asks for a reading. Each answer is shown, beside the frame that it was made from.
+//! It takes a turn at each step of the world's grid. Goals go out in time, whatever else is on the line. A read goes
+//! out where the line is free for it and for its answer, and where the one before was answered: once in ten frames or
+//! more to see what the board does, and when the grip of `[host]` asks for a reading. Each answer is shown, beside the
+//! frame that it was made from.
 
 use super::MS;
 use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener, READ_BYTES};
@@ -25,10 +26,11 @@ const LOST_NS: u64 = 10 * MS;
 /// Packets on the line.
 const GOAL_NS: u64 = GOAL_BYTES * BYTE_NS;
 const REQUEST_NS: u64 = READ_BYTES * BYTE_NS;
-/// The line rests so long between two packets, for the board to take them for two: a packet begins where the emulated part next has
-/// something to do, which may be a slot of the scan later.
+/// The line rests so long between two packets, for the board to take them for two: a packet begins where the emulated
+/// part next has something to do, which may be a slot of the scan later.
 const GAP_NS: u64 = 10 * BYTE_NS;
-/// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the emulator's.
+/// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the
+/// emulator's.
 const LOOK_FRAMES: u64 = 10;
 /// In a long scene there are about so many looks, and more frames between them.
 const LOOKS: f64 = 4_000.0;
@@ -113,8 +115,8 @@ impl std::fmt::Debug for Host {
 }
 
 impl Host {
-    /// Before the start, with the time of a frame, what lies between it and the board, and between the converters' numbers of frames
-    /// and the board's.
+    /// Before the start, with the time of a frame, what lies between it and the board, and between the converters'
+    /// numbers of frames and the board's.
     pub fn new(scene: &Scene, finger: usize, link: Named, start_ns: u64, frame_ns: u64, offset: u32) -> Self {
         let watchdog_ms = scene.table("host").whole("watchdog_ms") as u64;
         let least_ns = (scene.duration_s * 1e9 / LOOKS) as u64;
@@ -171,8 +173,8 @@ impl Host {
         }
     }
 
-    /// A turn: takes in what came from the board and the frames made since the last one, and puts on the line what is to go out until
-    /// the next one.
+    /// A turn: takes in what came from the board and the frames made since the last one, and puts on the line what is
+    /// to go out until the next one.
     pub fn turn(&mut self, now_ns: u64, next_ns: u64, received: Vec<TimedByte>, seen: Vec<Seen>, wire: &mut Wire) {
         self.frames.extend(seen);
         while self.frames.len() > FRAMES {
@@ -267,8 +269,8 @@ impl Host {
 
     /// When to look at the board next.
     ///
-    /// The board's bus watchdog counts a read as a sign of life. Where a scene sets it, a read therefore comes only right behind a
-    /// goal, and once more when the watchdog must have tripped.
+    /// The board's bus watchdog counts a read as a sign of life. Where a scene sets it, a read therefore comes only
+    /// right behind a goal, and once more when the watchdog must have tripped.
     fn look_due_ns(&mut self, now_ns: u64, next_ns: u64) -> Option<u64> {
         let due = (self.look_ns < next_ns).then_some(self.look_ns);
         if self.watchdog_ns == 0 || now_ns < self.start_ns {

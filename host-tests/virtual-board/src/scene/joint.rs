@@ -1,8 +1,8 @@
 //! The world of a scene, which the fingers' boards share.
 //!
-//! Each board runs on a thread of its own. One board alone moves the world on whenever it must. Two meet at every step of the world's
-//! grid: the last to come moves the world on, and none goes on before. What a board sees between two meetings is the same whichever
-//! comes first, so a run repeats exactly. Its duty acts on the whole step, as its mean.
+//! Each board runs on a thread of its own. One board alone moves the world on whenever it must. Two meet at every step
+//! of the world's grid: the last to come moves the world on, and none goes on before. What a board sees between two
+//! meetings is the same whichever comes first, so a run repeats exactly. Its duty acts on the whole step, as its mean.
 
 use super::finger::Clock;
 use crate::bench::STEP_NS;
@@ -119,8 +119,8 @@ impl Joint {
         self.meeting.grid_ns
     }
 
-    /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by whole steps of the
-    /// grid.
+    /// Goes on to an instant of the board with this finger's bridge held. Where fingers share the world it moves by
+    /// whole steps of the grid.
     pub fn advance(&mut self, to_ns: u64, clock: &Clock, bridge: Bridge) {
         let to_s = clock.time_s(to_ns);
         if !self.shared {

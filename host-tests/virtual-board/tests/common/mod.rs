@@ -43,8 +43,8 @@ pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
     read.expect("the client runs").expect("the image answers")
 }
 
-/// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it. Where a test
-/// fails the next one has a new board.
+/// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it.
+/// Where a test fails the next one has a new board.
 pub fn on_a_shared(board: &Mutex<Option<Rig>>, start: impl FnOnce() -> Rig, test: impl FnOnce(&mut Rig)) {
     let mut shared = board.lock().unwrap_or_else(PoisonError::into_inner);
     let mut rig = shared.take().unwrap_or_else(start);
@@ -76,7 +76,8 @@ fn hold(options: &Options) -> Rig {
     rig
 }
 
-/// A board that holds 1 N against a wall 0.5 mm away: the first one that was started, and after it what its snapshot kept.
+/// A board that holds 1 N against a wall 0.5 mm away: the first one that was started, and after it what its snapshot
+/// kept.
 pub fn holding() -> Rig {
     static SNAPSHOT: OnceLock<PathBuf> = OnceLock::new();
     let mut started = None;

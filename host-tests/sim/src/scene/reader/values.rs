@@ -8,7 +8,8 @@ use std::ops::Range;
 use toml_edit::{Item, TableLike};
 
 impl Reader<'_> {
-    /// The checked values of a table; none where one is wrong or missing. `open` leaves what is not described to others.
+    /// The checked values of a table; none where one is wrong or missing. `open` leaves what is not described to
+    /// others.
     pub(super) fn values(
         &mut self,
         table: &Table,

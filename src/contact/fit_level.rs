@@ -2,11 +2,12 @@
 
 /// How much work the loop puts into the contact of each frame. The numbers are stable: hosts store them.
 ///
-/// A refinement of the model takes each row of the array once, so many rows in a frame at most. Where it is spread over frames, it begins
-/// in one of its own. How often it comes is said for ten rows; an array with fewer rows than the effort takes has them all in every frame.
+/// A refinement of the model takes each row of the array once, so many rows in a frame at most. Where it is spread over
+/// frames, it begins in one of its own. How often it comes is said for ten rows; an array with fewer rows than the fit
+/// level takes has them all in every frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
-pub enum Effort {
+pub enum FitLevel {
     /// Force by the sum of the taxels; the centre stays at the array's middle.
     Sum = 0,
     /// Force by the sum, centre by the moments.
@@ -22,11 +23,11 @@ pub enum Effort {
     AllRows = 5,
 }
 
-impl Effort {
+impl FitLevel {
     /// All of them, least first.
     pub const ALL: [Self; 6] = [Self::Sum, Self::Moments, Self::OneRow, Self::TwoRows, Self::FiveRows, Self::AllRows];
 
-    /// The effort of this number; the largest where there is none.
+    /// The fit level of this number; the largest where there is none.
     pub const fn from_number(number: u8) -> Self {
         match number {
             0 => Self::Sum,

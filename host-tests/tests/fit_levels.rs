@@ -2,15 +2,15 @@
 
 use fastrand::Rng;
 use fingertip::contact::Contact;
-use fingertip::contact::{CONFIDENCE_LEAST, Effort, from_sums};
+use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, from_sums};
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
 const NONE: [u32; ROWS] = [0; ROWS];
-/// Efforts that take the model, and the frames of a refinement.
-const BY_MODEL: [(Effort, usize); 4] =
-    [(Effort::OneRow, 11), (Effort::TwoRows, 6), (Effort::FiveRows, 3), (Effort::AllRows, 1)];
+/// FitLevels that take the model, and the frames of a refinement.
+const BY_MODEL: [(FitLevel, usize); 4] =
+    [(FitLevel::OneRow, 11), (FitLevel::TwoRows, 6), (FitLevel::FiveRows, 3), (FitLevel::AllRows, 1)];
 
 fn config() -> Config {
     Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
@@ -36,19 +36,19 @@ fn first_refined(fit: &mut Fit, picture: &Picture, config: &Config) -> usize {
 
 #[test]
 fn efforts_are_counted_without_a_gap() {
-    for (number, effort) in Effort::ALL.into_iter().enumerate() {
-        assert_eq!(Effort::from_number(number as u8), effort);
-        assert_eq!(effort.higher(), Effort::ALL[(number + 1).min(5)]);
-        assert_eq!(effort.lower(), Effort::ALL[number.saturating_sub(1)]);
+    for (number, fit_level) in FitLevel::ALL.into_iter().enumerate() {
+        assert_eq!(FitLevel::from_number(number as u8), fit_level);
+        assert_eq!(fit_level.higher(), FitLevel::ALL[(number + 1).min(5)]);
+        assert_eq!(fit_level.lower(), FitLevel::ALL[number.saturating_sub(1)]);
     }
-    assert_eq!([6, 255].map(Effort::from_number), [Effort::AllRows; 2]);
+    assert_eq!([6, 255].map(FitLevel::from_number), [FitLevel::AllRows; 2]);
 }
 
 #[test]
 fn a_refinement_ends_in_the_frame_that_the_effort_says() {
     let (config, picture) = (config(), still(1.5));
-    for (effort, frames) in BY_MODEL {
-        assert_eq!(first_refined(&mut Fit::new(effort), &picture, &config), frames, "{effort:?}");
+    for (fit_level, frames) in BY_MODEL {
+        assert_eq!(first_refined(&mut Fit::new(fit_level), &picture, &config), frames, "{fit_level:?}");
     }
 }
 
@@ -56,14 +56,14 @@ fn a_refinement_ends_in_the_frame_that_the_effort_says() {
 fn another_effort_begins_anew_and_the_same_does_not() {
     let (config, picture) = (config(), still(1.5));
     for before in 1..11 {
-        for (effort, frames) in BY_MODEL {
-            let mut fit = Fit::new(Effort::OneRow);
+        for (fit_level, frames) in BY_MODEL {
+            let mut fit = Fit::new(FitLevel::OneRow);
             for _ in 0..before {
                 fit.read(&picture, &config);
             }
-            fit.set_effort(effort);
-            let expected = if effort == Effort::OneRow { 11 - before } else { frames };
-            assert_eq!(first_refined(&mut fit, &picture, &config), expected, "{effort:?} after {before} frames");
+            fit.set_fit_level(fit_level);
+            let expected = if fit_level == FitLevel::OneRow { 11 - before } else { frames };
+            assert_eq!(first_refined(&mut fit, &picture, &config), expected, "{fit_level:?} after {before} frames");
         }
     }
 }
@@ -72,13 +72,13 @@ fn another_effort_begins_anew_and_the_same_does_not() {
 #[test]
 fn another_effort_keeps_what_was_found() {
     let (config, picture) = (config(), still(1.5));
-    let mut fit = Fit::new(Effort::AllRows);
+    let mut fit = Fit::new(FitLevel::AllRows);
     for _ in 0..20 {
         fit.read(&picture, &config);
     }
     let found = fit.read(&picture, &config);
     assert!(found.force > from_sums(&picture, &config).force);
-    fit.set_effort(Effort::OneRow);
+    fit.set_fit_level(FitLevel::OneRow);
     for _ in 0..10 {
         assert_eq!(fit.read(&picture, &config).force, found.force);
     }
@@ -88,7 +88,7 @@ fn another_effort_keeps_what_was_found() {
 #[test]
 fn what_was_found_goes_with_the_contact() {
     let (config, picture) = (config(), still(1.5));
-    let mut fit = Fit::new(Effort::OneRow);
+    let mut fit = Fit::new(FitLevel::OneRow);
     for _ in 0..100 {
         fit.read(&picture, &config);
     }
@@ -106,7 +106,7 @@ fn a_contact_that_comes_into_sight_is_its_sum() {
     let config = config();
     let scene = Scene { x_mm: 0.5, ..cut_off(1.0) };
     let seen = picture(&scene, Noise::None, &mut Rng::with_seed(0));
-    let mut fit = Fit::new(Effort::AllRows);
+    let mut fit = Fit::new(FitLevel::AllRows);
     for _ in 0..40 {
         fit.read(&still(1.0), &config);
     }
@@ -120,24 +120,25 @@ fn a_contact_that_comes_into_sight_is_its_sum() {
 #[test]
 fn the_model_is_at_work_where_there_is_a_contact_and_an_effort_for_it() {
     let (config, picture) = (config(), still(1.5));
-    for effort in Effort::ALL {
-        let mut fit = Fit::new(effort);
+    for fit_level in FitLevel::ALL {
+        let mut fit = Fit::new(fit_level);
         assert!(!fit.at_work());
         for _ in 0..25 {
             fit.read(&picture, &config);
-            assert_eq!(fit.at_work(), effort >= Effort::OneRow, "{effort:?}");
+            assert_eq!(fit.at_work(), fit_level >= FitLevel::OneRow, "{fit_level:?}");
         }
         fit.read(&Picture::EMPTY, &config);
-        assert!(!fit.at_work(), "{effort:?}");
+        assert!(!fit.at_work(), "{fit_level:?}");
     }
 }
 
-/// Within a refinement the indentation goes with the root of the force, so what changes meanwhile is not taken for another contact.
+/// Within a refinement the indentation goes with the root of the force, so what changes meanwhile is not taken for
+/// another contact.
 #[test]
 fn a_force_that_changes_within_a_refinement_is_followed() {
     let config = config();
     for (from_mm, to_mm) in [(1.2, 2.0), (2.0, 1.2)] {
-        let mut fit = Fit::new(Effort::OneRow);
+        let mut fit = Fit::new(FitLevel::OneRow);
         for _ in 0..200 {
             fit.read(&still(from_mm), &config);
         }
@@ -164,7 +165,7 @@ fn a_fit_without_confidence_never_says_less_than_the_taxels() {
         scene.pitch_mm = 1.5;
         let picture = picture(&scene, Noise::OfReading(0.1), &mut rng);
         let sums = from_sums(&picture, &config);
-        let mut fit = Fit::new(Effort::AllRows);
+        let mut fit = Fit::new(FitLevel::AllRows);
         for _ in 0..40 {
             let Contact { confidence, force, .. } = fit.read(&picture, &config);
             if confidence >= CONFIDENCE_LEAST {

@@ -1,4 +1,4 @@
-//! The effort of the fit over the bus: what there is time for is used, what there is none for is held back and said, and no
+//! The fit level over the bus: what there is time for is used, what there is none for is held back and said, and no
 //! deadline is missed for it.
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
@@ -6,7 +6,7 @@
 mod common;
 
 use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
-use fingertip::contact::Effort;
+use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
@@ -36,27 +36,28 @@ fn holding_over_the_edge() -> Rig {
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");
-    // As long as a frame in the air: the effort goes by the longest, and a tare must not miss its deadline.
+    // As long as a frame in the air: the fit level goes by the longest, and a tare must not miss its deadline.
     let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
     assert!(longest_us <= 45, "a frame of the tare, or at rest: {longest_us} us");
     hold(&mut rig);
     rig
 }
 
-/// What the board says, without a fault: the effort in use, whether that is held back, and the longest loop time in us.
+/// What the board says, without a fault: the fit level in use, whether that is held back, and the longest loop time in
+/// us.
 fn said(rig: &mut Rig) -> (u8, bool, u16) {
     assert_eq!(read_u8(rig, address::FAULT), 0);
     let limits = Limits(read_u16(rig, address::LIMITS));
-    (read_u8(rig, address::EFFORT_IN_USE), limits.has(Limits::EFFORT), read_u16(rig, address::LOOP_TIME_MAX_US))
+    (read_u8(rig, address::FIT_LEVEL_IN_USE), limits.has(Limits::FIT_LEVEL), read_u16(rig, address::LOOP_TIME_MAX_US))
 }
 
 #[test]
 fn the_highest_effort_is_held_back_before_a_deadline_is_missed() {
     let mut rig = holding_over_the_edge();
     let (in_use, held_back, before_us) = said(&mut rig);
-    assert_eq!((in_use, held_back), (Effort::default() as u8, false), "the default has its time");
+    assert_eq!((in_use, held_back), (FitLevel::default() as u8, false), "the default has its time");
     for asked in [5, 4, 3] {
-        write_u8(&mut rig, address::EFFORT, asked);
+        write_u8(&mut rig, address::FIT_LEVEL, asked);
         rig.run_ms(300).expect("it runs");
         let (in_use, held_back, longest_us) = said(&mut rig);
         println!("asked {asked}: in use {in_use}, longest loop time {longest_us} us ({before_us} us with the default)");
@@ -69,24 +70,28 @@ fn the_highest_effort_is_held_back_before_a_deadline_is_missed() {
         }
     }
     for asked in [0, 1, 2] {
-        write_u8(&mut rig, address::EFFORT, asked);
+        write_u8(&mut rig, address::FIT_LEVEL, asked);
         rig.run_ms(50).expect("it runs");
         let (in_use, held_back, _) = said(&mut rig);
         assert_eq!((in_use, held_back), (asked, false));
         assert_eq!(read_u32(&mut rig, address::MISSED_FRAMES), 0);
         let force_n = rig.world(|world| world.force_n()).expect("it runs");
-        // By the sums half of the force is not seen, and the board says so. It presses no deeper than the goal's indentation, by the
-        // travel since the touch: that the touch was seen late, too, is left.
+        // By the sums half of the force is not seen, and the board says so. It presses no deeper than the goal's
+        // indentation, by the travel since the touch: that the touch was seen late, too, is left.
         let (from_below, expected) = if asked < 2 { (true, 1.0..1.25) } else { (false, 0.95..1.05) };
-        assert!(expected.contains(&force_n), "effort {asked}: {force_n} N");
-        assert_eq!(Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::FROM_BELOW), from_below, "effort {asked}");
+        assert!(expected.contains(&force_n), "fit level {asked}: {force_n} N");
+        assert_eq!(
+            Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::FROM_BELOW),
+            from_below,
+            "fit level {asked}"
+        );
     }
 }
 
 #[test]
 fn slower_frames_leave_room_for_the_highest_effort() {
     let mut rig = holding_over_the_edge();
-    write_u8(&mut rig, address::EFFORT, 5);
+    write_u8(&mut rig, address::FIT_LEVEL, 5);
     rig.run_ms(100).expect("it runs");
     let (in_use, held_back, _) = said(&mut rig);
     assert!(in_use < 5 && held_back, "{in_use}");
@@ -112,7 +117,7 @@ fn a_change_of_effort_does_not_stop_the_scan() {
     let frame_ns = 99_750;
     let (from_ns, from) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
     for asked in [0, 5, 1, 3, 2, 4, 2] {
-        write_u8(&mut rig, address::EFFORT, asked);
+        write_u8(&mut rig, address::FIT_LEVEL, asked);
     }
     let (to_ns, to) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));
     let (scanned, stepped) = ((to_ns - from_ns) / frame_ns, u64::from(to - from));

@@ -20,18 +20,18 @@ const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(bus: Bus, record: Record, boot: Boot) {
-    let mut host = Host { bus, boot, server: Server::new(record, &CLOCKS), line_good: true };
+    let mut host = LinkTask { bus, boot, server: Server::new(record, &CLOCKS), line_good: true };
     host.run().await;
 }
 
-struct Host {
+struct LinkTask {
     bus: Bus,
     boot: Boot,
     server: Server,
     line_good: bool,
 }
 
-impl Host {
+impl LinkTask {
     async fn run(&mut self) {
         let mut received = [0; 256];
         let mut reply = Reply::new();

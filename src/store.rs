@@ -41,14 +41,30 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// What outlives a reset.
 ///
 /// ```
-/// use fingertip::store::{Record, encode, latest, next_offset};
+/// use fingertip::store::{Flash, Journal, Record, Sector};
 ///
-/// let mut sector = [0xff_u8; 1024]; // erased
+/// /// Two sectors in memory.
+/// struct Sectors([[u8; 1024]; 2]);
+///
+/// impl Flash for Sectors {
+///     type Error = ();
+///     fn bytes(&self, sector: Sector) -> &[u8] {
+///         &self.0[sector as usize]
+///     }
+///     fn program(&mut self, sector: Sector, offset: usize, word: u32) -> Result<(), ()> {
+///         self.0[sector as usize][offset..offset + 4].copy_from_slice(&word.to_le_bytes());
+///         Ok(())
+///     }
+///     fn erase(&mut self, sector: Sector) -> Result<(), ()> {
+///         self.0[sector as usize].fill(0xff);
+///         Ok(())
+///     }
+/// }
+///
+/// let mut flash = Sectors([[0xff; 1024]; 2]);
 /// let record = Record { id: 7, ..Record::DEFAULT };
-/// let place = next_offset(&sector).expect("room");
-/// let bytes = encode(&record);
-/// sector[place..place + bytes.len()].copy_from_slice(&bytes);
-/// assert_eq!(latest(&sector), Ok(Some(record)));
+/// Journal::new(&flash).save(&mut flash, &record, || ()).unwrap();
+/// assert_eq!(Journal::new(&flash).load(&flash, |_| ()).record, record);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {

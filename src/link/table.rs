@@ -1,7 +1,7 @@
 //! The control table: every register defined once, for the device and for its documentation.
 //!
 //! `table/registers.rs` holds the definition. From it come the addresses as constants ([`address`]), reading and
-//! writing here, and [`registers`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes
+//! writing here, and [`registers()`], from which `docs/control-table.md` is rendered. Reading puts a register's bytes
 //! straight into the reply.
 
 #[macro_use]

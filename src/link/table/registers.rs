@@ -3,7 +3,7 @@
 //! As [`control_table`](super::define) reads it:
 //! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
 //! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes
-//! each; nor are the [pictures](super::pictures) of the array, which go by its shape.
+//! each; nor are the [`super::pictures`] of the array, which go by its shape.
 //!
 //! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
 

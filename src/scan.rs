@@ -104,9 +104,9 @@ impl ScanTiming {
             return Err(ScanError::SampleCycles { cycles: sample_cycles, allowed });
         }
         let settle = (u64::from(settle_ns) * u64::from(clocks.timer_hz)).div_ceil(1_000_000_000);
-        let conversion = u32::from(sample_cycles) + clocks.conversion_cycles;
-        let cycles = lanes::pairs(columns) as u32 * conversion + clocks.trigger_cycles;
-        let slot = settle + u64::from(cycles * clocks.ticks_per_converter_cycle);
+        let conversion = u64::from(sample_cycles) + u64::from(clocks.conversion_cycles);
+        let cycles = lanes::pairs(columns) as u64 * conversion + u64::from(clocks.trigger_cycles);
+        let slot = cycles.saturating_mul(clocks.ticks_per_converter_cycle.into()).saturating_add(settle);
         if slot > u64::from(u16::MAX) {
             return Err(ScanError::SlotTooLong { ticks: u32::try_from(slot).unwrap_or(u32::MAX) });
         }
@@ -156,8 +156,8 @@ mod tests {
         let Params { settle_ns, sample_cycles, .. } = Params::DEFAULT;
         let timing = timing(settle_ns as u32, sample_cycles as u16, [10, 10]).unwrap();
         assert!((90_000..=100_000).contains(&timing.frame_ns), "{} ns", timing.frame_ns);
-        let nine_tenths = |share: u32| timing.frame_ns / 1_000 * share / 1_000 * 168;
-        assert!((nine_tenths(740)..nine_tenths(760)).contains(&timing.deadline.0), "{:?}", timing.deadline);
+        let of_the_frame = |share: u32| timing.frame_ns / 1_000 * share / 1_000 * 168;
+        assert!((of_the_frame(740)..of_the_frame(760)).contains(&timing.deadline.0), "{:?}", timing.deadline);
     }
 
     #[test]
@@ -176,5 +176,11 @@ mod tests {
             ScanTiming::new(settle_ns as u32, sample_cycles as u16, [10, 10], &clocks).unwrap().deadline.0
         };
         assert_eq!(of(2 * CLOCKS.core_hz) / 2, of(CLOCKS.core_hz));
+    }
+
+    #[test]
+    fn clocks_that_no_timer_has_are_refused_without_an_overflow() {
+        let clocks = Clocks { conversion_cycles: u32::MAX, ticks_per_converter_cycle: u32::MAX, ..CLOCKS };
+        assert!(matches!(ScanTiming::new(u32::MAX, 3, [16, 32], &clocks), Err(ScanError::SlotTooLong { .. })));
     }
 }

@@ -45,7 +45,7 @@ impl Loop {
     /// A frame: the fit level and how long it took.
     fn frame(&mut self, asked: FitLevel, deadline: u32, with: &Stretch) -> (FitLevel, u32) {
         let fit_level = self.budget.next(asked, CoreCycles(self.taken), CoreCycles(deadline));
-        let [most, least] = Budget::model_ticks(fit_level);
+        let [most, least] = Budget::model_cycles(fit_level);
         self.taken = with.rest + self.random.u32(0..=with.spread);
         if with.contact && most > 0 {
             // The dearest frame is one of several, which come in turn; the others take a part.
@@ -61,7 +61,7 @@ impl Loop {
 /// What a loop can be sure to keep: the frame by the sums, the model's most, and the margin for what jumps.
 fn fits(fit_level: FitLevel, rest: u32) -> bool {
     let usable = Budget::usable(DEADLINE);
-    rest + Budget::model_ticks(fit_level)[0] <= usable - usable / 32
+    rest + Budget::model_cycles(fit_level)[0] <= usable - usable / 32
 }
 
 proptest! {
@@ -124,7 +124,7 @@ proptest! {
         // With a contact the rest is known less well: by what a window's dearest frame may take for the model more than
         // its least.
         let sure = |fit_level: FitLevel| {
-            let blur = if contact { Budget::model_ticks(fit_level.lower()) } else { [0, 0] };
+            let blur = if contact { Budget::model_cycles(fit_level.lower()) } else { [0, 0] };
             fits(fit_level, rest + 100 + blur[0] - blur[1])
         };
         let reached = (1..=asked as u8).map(FitLevel::from_number).take_while(|fit_level| sure(*fit_level)).last();

@@ -19,7 +19,7 @@ fn at(fit_level: FitLevel) -> Budget {
 }
 
 fn most(fit_level: FitLevel) -> u32 {
-    Budget::model_ticks(fit_level)[0]
+    Budget::model_cycles(fit_level)[0]
 }
 
 /// Frames until the fit level is another, at most so many.
@@ -84,7 +84,7 @@ fn it_rises_where_the_next_effort_fits_with_room() {
 #[test]
 fn with_a_contact_the_models_least_is_taken_off() {
     let (fit_level, next) = (FitLevel::OneRow, FitLevel::TwoRows);
-    let longest = USABLE - ROOM - most(next) + Budget::model_ticks(fit_level)[1];
+    let longest = USABLE - ROOM - most(next) + Budget::model_cycles(fit_level)[1];
     for (taken, rises) in [(longest, Some((WINDOW, next))), (longest + 1, None)] {
         let mut budget = at(fit_level);
         budget.note(true);
@@ -155,11 +155,11 @@ fn the_dearest_frame_is_the_start_and_the_rows_of_an_effort() {
         (FitLevel::FiveRows, 5, 0),
         (FitLevel::AllRows, 10, 1_600),
     ] {
-        let [most, least] = Budget::model_ticks(fit_level);
+        let [most, least] = Budget::model_cycles(fit_level);
         assert_eq!(most, 2_100 + 1_000 * rows + solution, "{fit_level:?}");
         assert!((most / 4..=most / 2).contains(&least), "{fit_level:?}: {least}");
     }
-    assert_eq!([FitLevel::Sum, FitLevel::Moments].map(Budget::model_ticks), [[0; 2]; 2]);
+    assert_eq!([FitLevel::Sum, FitLevel::Moments].map(Budget::model_cycles), [[0; 2]; 2]);
 }
 
 /// Frames that are too long even by the sum are no falls: nothing has to be waited for after them.

@@ -20,8 +20,8 @@ const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(bus: Bus, record: Record, boot: Boot) {
-    let mut host = LinkTask { bus, boot, server: Server::new(record, &CLOCKS), line_good: true };
-    host.run().await;
+    let mut task = LinkTask { bus, boot, server: Server::new(record, &CLOCKS), line_good: true };
+    task.run().await;
 }
 
 struct LinkTask {

@@ -52,12 +52,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
     /// (`cargo xtask timing`, `docs/study.md`): of 10 x 10 the start of a refinement 2,100 at most, its solution
     /// 1,600, a row 1,000. Of other shapes a row goes by its taxels, and the start by the places along both sides.
-    pub const fn model_ticks(fit_level: FitLevel) -> [u32; 2] {
+    pub const fn model_cycles(fit_level: FitLevel) -> [u32; 2] {
         // A table, worked out by the compiler.
-        Self::TICKS[fit_level as usize]
+        Self::MODEL_CYCLES[fit_level as usize]
     }
 
-    const TICKS: [[u32; 2]; FitLevel::ALL.len()] = {
+    const MODEL_CYCLES: [[u32; 2]; FitLevel::ALL.len()] = {
         let mut ticks = [[0; 2]; FitLevel::ALL.len()];
         let mut fit_level = 0;
         while fit_level < ticks.len() {
@@ -108,7 +108,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
     }
 
     fn weigh(&mut self, taken: u32, usable: u32) {
-        let [most, least] = Self::model_ticks(self.fit_level);
+        let [most, least] = Self::model_cycles(self.fit_level);
         let (expected, surely) =
             if self.modelled { (taken, taken.saturating_sub(most)) } else { (taken.saturating_add(most), taken) };
         self.without_model = self.without_model.max(surely);
@@ -128,7 +128,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         self.wait = self.wait.saturating_sub(1);
         // A rise needs a little more room than staying, so that what varies by a little does not undo it.
         let higher = self.fit_level.higher();
-        let [most, _] = Self::model_ticks(higher);
+        let [most, _] = Self::model_cycles(higher);
         if self.wait == 0
             && self.fit_level < self.asked.0
             && self.without_model.saturating_add(most) <= usable - usable / 32

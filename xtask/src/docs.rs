@@ -2,7 +2,9 @@
 
 use crate::{
     console::{self, Console},
-    figures, host, image, paths,
+    figures, host, image,
+    package::PACKAGES,
+    paths,
     toolchain::Choice,
     tools,
 };
@@ -16,9 +18,6 @@ const GENERATED: [(&str, (&str, &str)); 4] = [
     ("docs/pictures/imports.svg", ("host-tests", "imports")),
     ("examples/python/registers.py", ("host-tests", "registers-python")),
 ];
-/// What the packages offer that others may depend on.
-const OFFERED: [(&str, &str); 2] =
-    [("docs/api/fingertip.txt", "fingertip"), ("docs/api/fingertip-lanes.txt", "fingertip-lanes")];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
 /// Its pictures, and those of the paper.
@@ -45,8 +44,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     for (path, example) in GENERATED {
         renew(path, &print(example, None)?, args.check, &mut stale, console)?;
     }
-    for (path, package) in OFFERED {
-        renew(path, &tools::public_items(package, console)?, args.check, &mut stale, console)?;
+    for package in PACKAGES {
+        let items = tools::public_items(package, console)?;
+        renew(&format!("docs/api/{package}.txt"), &items, args.check, &mut stale, console)?;
     }
     let drawn = paths::target().join("docs").join("figures");
     figures::draw(&drawn, console)?;
@@ -82,13 +82,13 @@ fn print((package, example): (&str, &str), argument: Option<&Path>) -> Result<St
     console::output(&mut command)
 }
 
-fn renew(path: &'static str, text: &str, check: bool, stale: &mut Vec<&str>, console: &Console) -> Result<()> {
+fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
     let file = paths::root().join(path);
     if fs::read_to_string(&file).is_ok_and(|present| present == text) {
         console.say(&format!("fresh    {path}"));
     } else if check {
         console.say(&format!("stale    {path}"));
-        stale.push(path);
+        stale.push(path.into());
     } else {
         fs::write(&file, text).with_context(|| format!("cannot write {path}"))?;
         console.say(&format!("written  {path}"));

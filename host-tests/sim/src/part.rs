@@ -39,10 +39,7 @@ impl Part {
         }
         // What stands behind a link is written, and not the link.
         let of = &fs::canonicalize(of).unwrap_or(of.into());
-        let lock = Lock::take(of).map_err(|error| match error.kind() {
-            ErrorKind::WouldBlock => error.to_string(),
-            _ => cannot_write(of, &error),
-        })?;
+        let lock = Lock::take(of).map_err(|error| cannot_write(of, &error))?;
         let path = kept::beside(of, "part");
         let lines = match found(&path, head).map_err(|error| format!("cannot read {}: {error}", path.display()))? {
             Found::Lines(lines) => lines,
@@ -107,6 +104,8 @@ impl Part {
 /// For people: a file that cannot be written, and what to do.
 pub fn cannot_write(path: &Path, error: &io::Error) -> String {
     let advice = match error.kind() {
+        // The lock says who writes it.
+        ErrorKind::WouldBlock => return error.to_string(),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
             ": make room and give the same command again"
         }
@@ -115,8 +114,13 @@ pub fn cannot_write(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}{advice}", path.display())
 }
 
+/// A text's check word: CRC-64 in 16 hexadecimal digits.
+pub fn check(text: &str) -> String {
+    format!("{:016x}", CRC.checksum(text.as_bytes()))
+}
+
 fn line(text: &str) -> String {
-    format!("{:016x} {text}\n", CRC.checksum(text.as_bytes()))
+    format!("{} {text}\n", check(text))
 }
 
 fn found(path: &Path, head: &str) -> io::Result<Found> {
@@ -139,6 +143,6 @@ fn found(path: &Path, head: &str) -> io::Result<Found> {
 /// A line's text; none where it is cut off or damaged.
 fn whole(line: &[u8]) -> Option<&str> {
     let text = str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
-    let (check, text) = text.split_once(' ')?;
-    (check == format!("{:016x}", CRC.checksum(text.as_bytes()))).then_some(text)
+    let (found, text) = text.split_once(' ')?;
+    (found == check(text)).then_some(text)
 }

@@ -15,6 +15,7 @@ mod vary;
 
 pub use files::merge;
 pub use shard::Shard;
+pub(crate) use shard::first_missing;
 pub use table::Table;
 pub use vary::Vary;
 

@@ -3,8 +3,9 @@
 use super::spread::Spread;
 use super::{Counted, Finger, Population};
 use crate::metrics::Hold;
-use crate::part::cannot_write;
+use crate::part::{cannot_write, check};
 use crate::run::{Outcome, RunError};
+use crate::sweep::first_missing;
 use host_tests::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -123,7 +124,7 @@ impl Ran {
 /// Of all that makes a population's fingers what they are.
 pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: usize) -> String {
     let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
-    format!("{}-{:016x}", population.name, crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(said.as_bytes()))
+    format!("{}-{}", population.name, check(&said))
 }
 
 impl Report {
@@ -174,11 +175,8 @@ impl Report {
         if let Some(number) = fingers.keys().find(|number| !(1..=all).contains(*number)) {
             return Err(format!("there is a finger {number}, where there are {all} in all").into());
         }
-        let missing = all - fingers.len();
-        if missing > 0 {
-            // In order: the first whose number is not its place.
-            let places = fingers.keys().zip(1..);
-            let first = places.clone().find(|(number, place)| *number != place).map_or(fingers.len() + 1, |(_, at)| at);
+        if let Some(first) = first_missing(fingers.keys(), all) {
+            let missing = all - fingers.len();
             return Err(format!(
                 "{missing} of {all} fingers are missing, finger {first} the first: is a shard missing?"
             )

@@ -14,7 +14,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, ErrorKind};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 /// Between two frames as arrays and pictures.
@@ -52,10 +52,7 @@ impl Recorder {
     /// # Errors
     /// The file cannot be made, or another process is recording there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
-        let file = Whole::create(path).map_err(|error| match error.kind() {
-            ErrorKind::WouldBlock => error.to_string(),
-            _ => cannot_write(path, &error),
-        })?;
+        let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
         let options = WriteOptions::new().profile("").library(concat!("fingertip-sim/", env!("CARGO_PKG_VERSION")));
         Ok(Self {
             path: path.into(),

@@ -43,9 +43,8 @@ pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     columns.extend(scene.bounds.iter().map(|bound| format!("{EXPECT}{}", bound.metric)));
     let side = |side: Option<f64>| side.map_or(String::new(), |side| side.to_string());
     let expected = scene.bounds.iter().map(|bound| format!("{}..{}", side(bound.min), side(bound.max))).collect();
-    let crc = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let said = format!("{} {:?} {}\n{}", env!("CARGO_PKG_VERSION"), plan.vary, plan.seeds, scene.text);
-    Head { columns, id: format!("{}-{:016x}", scene.name, crc.checksum(said.as_bytes())), runs, expected }
+    Head { columns, id: format!("{}-{}", scene.name, part::check(&said)), runs, expected }
 }
 
 /// The rows so far, also on disk, so that a sweep that is stopped can go on.

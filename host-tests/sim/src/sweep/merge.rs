@@ -1,6 +1,7 @@
 //! Shards put together. What they hold may come from another machine or out of an editor: all of it is checked.
 
 use super::files::{DIGEST, EXPECT, ID, PASSED, RUN, RUNS, SEED};
+use super::shard::first_missing;
 use super::table::Table;
 use crate::run::RunError;
 use csv::Reader;
@@ -43,11 +44,8 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
         }
     }
     let (_, all) = sweep.ok_or("there are no runs in these files")?;
-    let missing = all - rows.len();
-    if missing > 0 {
-        // Runs are in order: the first whose number is not its place.
-        let first =
-            rows.keys().zip(1..).find(|(number, place)| **number != *place).map_or(rows.len() + 1, |(_, at)| at);
+    if let Some(first) = first_missing(rows.keys(), all) {
+        let missing = all - rows.len();
         return Err(format!("{missing} of {all} runs are missing, run {first} the first: is a shard missing?").into());
     }
     Ok(Table { head: known.map(|columns| columns.head).unwrap_or_default(), rows: rows.into_values().collect() })

@@ -27,6 +27,13 @@ impl Shard {
     }
 }
 
+/// The first number from 1 to `all` that is none of these, which are in order.
+pub(crate) fn first_missing<'a>(numbers: impl Iterator<Item = &'a usize>, all: usize) -> Option<usize> {
+    // In order, the first whose number is not its place; behind the last there is none.
+    let mut numbers = numbers.copied();
+    (1..=all).find(|place| numbers.next() != Some(*place))
+}
+
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}/{}", self.number, self.of)

@@ -5,21 +5,23 @@
 //! `docs/control.md`.
 
 pub mod bounds;
+mod error;
 pub mod gains;
-pub mod geometry;
+pub(crate) mod geometry;
 mod shaped;
 
+pub use error::ConfigError;
+pub use geometry::Geometry;
 pub use shaped::Shaped;
 
 use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
-use crate::scan::{Clocks, ScanError, ScanTiming};
+use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use bounds::{Bounds, Drives};
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
-use geometry::Geometry;
 
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
@@ -43,32 +45,6 @@ const BRAKE_MAX: i64 = 1_000_000 << 8;
 const JUMP_FRAMES: f32 = 4.0;
 /// and at least this far, mm.
 const JUMP_MM: f32 = 0.5;
-
-/// Why parameters were refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ConfigError {
-    /// One is out of its range.
-    Param(ParamError),
-    /// The scan cannot be timed so.
-    Scan(ScanError),
-    /// Two contradict each other, by name and value: the first must be below the second; the speeds may be equal.
-    Order([(&'static str, i32); 2]),
-}
-
-impl core::fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Param(error) => error.fmt(f),
-            Self::Scan(error) => error.fmt(f),
-            Self::Order([(low, low_value), (high, high_value)]) => {
-                write!(f, "{low} of {low_value}: below {high}, which is {high_value}, is allowed")
-            }
-        }
-    }
-}
-
-impl core::error::Error for ConfigError {}
 
 /// What the loop derives from [`Params`], the same for arrays of all shapes but for the scan's time; see [`Shaped`].
 #[derive(Clone, Debug)]

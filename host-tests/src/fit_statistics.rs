@@ -6,8 +6,9 @@
 use crate::fit_cases::{Noise, PITCHES_MM, Pressures, Reading, Scene, Steps};
 use fastrand::Rng;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, CONFIDENCE_LEAST, FitLevel, Refined};
+use fingertip::contact::{self, CONFIDENCE_LEAST, FitLevel};
 use fingertip::shipped::{Config, Fit, Picture};
+use images::single::{self, Refined};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A contact that fewer live taxels see is not judged.
@@ -192,7 +193,7 @@ impl Verdict {
                 earlier[place] = last;
             }
         }
-        let read = |refined| Outcome::of(&contact::read(&case.picture, refined, config), &case.scene, noisy);
+        let read = |refined| Outcome::of(&single::read(&case.picture, refined, config), &case.scene, noisy);
         let [one, two, full] = Refined::ALL.map(read);
         Self { case, outcomes: [sums, one, two, full, last], earlier }
     }

@@ -1,12 +1,13 @@
 //! The contact from pictures: the named hard cases, and small samples of what `cargo xtask fit` judges at length.
 
 use fingertip::contact::Contact;
-use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, Refined, from_sums, read};
+use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, from_sums};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use fingertip::units::{Millimetres, Newtons};
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
+use images::single::{Refined, read};
 
 /// A converter that gives its smallest and its largest code, in sixteenths.
 const FULL: i32 = 4095 * 16;

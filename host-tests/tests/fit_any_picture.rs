@@ -1,10 +1,11 @@
 //! Any picture that the array's reading can make, under any finger's parameters: the fit ends, within its range.
 
 use fingertip::contact::Contact;
-use fingertip::contact::{FitLevel, Refined, read};
+use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use host_tests::fit_cases::picture;
+use images::single::{Refined, read};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 

@@ -15,19 +15,19 @@ use crate::params::Params;
 use crate::root::floor_sqrt;
 
 /// Fractional bits of a squared distance, of a column's length and of s.
-pub(crate) const SQUARE_BITS: u32 = 28;
+pub const SQUARE_BITS: u32 = 28;
 /// Fractional bits of a taxel's place.
-pub(crate) const PLACE_BITS: u32 = 15;
+pub const PLACE_BITS: u32 = 15;
 /// Squared distance from node to node: 1/128.
-pub(crate) const NODE_BITS: u32 = SQUARE_BITS - 7;
+pub const NODE_BITS: u32 = SQUARE_BITS - 7;
 /// Nodes of the table; the last stands at 1.5, where no contact within the radius reaches a taxel.
-pub(crate) const NODES: usize = 193;
+pub const NODES: usize = 193;
 /// 1 in Q28.
-pub(crate) const ONE: i32 = 1 << SQUARE_BITS;
+pub const ONE: i32 = 1 << SQUARE_BITS;
 
 /// The model at one distance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Node {
+pub struct Node {
     /// G, Q26.
     pub mean_inverse_length: i32,
     /// L, Q28.
@@ -42,18 +42,18 @@ pub(crate) struct Node {
 #[derive(Clone, Debug)]
 pub struct Geometry {
     /// h, Q28.
-    pub(crate) pitch: i32,
+    #[doc(hidden)]
+    pub pitch: i32,
     /// How far from the array's middle a contact's centre may lie: a radius beyond its edge along the columns and the
     /// rows, Q24.
     pub(crate) reach: [i32; 2],
-    /// 2/h, Q20.
-    pub(crate) inverse_half_pitch: i32,
     /// 2^56 over the tip's radius in units of its last place.
     pub(crate) inverse_radius: i32,
     /// What a taxel under the pressure Y shows, in sixteenths of a code, Q8.
     pub(crate) modulus_q8: u32,
     /// The model over the squared distance.
-    pub(crate) nodes: [Node; NODES],
+    #[doc(hidden)]
+    pub nodes: [Node; NODES],
 }
 
 impl Geometry {
@@ -79,7 +79,6 @@ impl Geometry {
         Self {
             pitch,
             reach: [columns, rows].map(|side| ((side as i32 * (pitch >> 4)) >> 1) + (1 << (SQUARE_BITS - 4))),
-            inverse_half_pitch: ((radius_um << 21) / pitch_um.max(1)) as i32,
             inverse_radius: ((1_i64 << 32) * 1000 / radius_um) as i32,
             modulus_q8: units_q8.max(1).min(i64::from(u32::MAX)) as u32,
             nodes,

@@ -2,18 +2,18 @@
 
 /// The upper half of a product.
 #[inline(always)]
-pub(super) const fn high(a: i32, b: i32) -> i32 {
+pub const fn high(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
 }
 
 /// `a` plus the share `share_q31` of the way to `b`.
 #[inline(always)]
-pub(super) const fn between(a: i32, b: i32, share_q31: i32) -> i32 {
+pub const fn between(a: i32, b: i32, share_q31: i32) -> i32 {
     a + 2 * high(b - a, share_q31)
 }
 
 /// `value` within `-limit` to `limit`.
-pub(super) const fn clamp_to(value: i64, limit: i32) -> i32 {
+pub const fn clamp_to(value: i64, limit: i32) -> i32 {
     if value > limit as i64 {
         limit
     } else if value < -(limit as i64) {
@@ -24,7 +24,7 @@ pub(super) const fn clamp_to(value: i64, limit: i32) -> i32 {
 }
 
 /// 2^63 / n, off by less than 2^-29 of itself. The top bit of n counts as set.
-pub(super) const fn reciprocal(n: u32) -> u32 {
+pub const fn reciprocal(n: u32) -> u32 {
     let n = n | 1 << 31;
     let coarse = (u32::MAX / (n >> 16)) << 15;
     // One Newton step, x (2 - n x), with n x near 2^31 in the upper half.
@@ -35,7 +35,7 @@ pub(super) const fn reciprocal(n: u32) -> u32 {
 
 /// A divisor of several numbers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Divisor {
+pub struct Divisor {
     /// 2^62 over the divisor shifted up.
     inverse: i32,
     shift: u32,
@@ -75,7 +75,7 @@ impl Divisor {
 }
 
 /// The root of a number, off by less than 2^-15 of itself.
-pub(super) const fn root(x: u32) -> u32 {
+pub const fn root(x: u32) -> u32 {
     if x == 0 {
         return 0;
     }

@@ -8,19 +8,19 @@ use crate::model::Tip;
 use crate::units::Millimetres;
 
 /// Fractional bits of a centre.
-pub(super) const CENTRE_BITS: u32 = 24;
+pub const CENTRE_BITS: u32 = 24;
 /// Fractional bits of a slope.
-pub(super) const SLOPE_BITS: u32 = 13;
+pub const SLOPE_BITS: u32 = 13;
 /// The deepest indentation that the fit looks for: 7/8 of the radius.
-pub(super) const HEIGHT_MIN: i32 = ONE / 8;
+pub const HEIGHT_MIN: i32 = ONE / 8;
 /// The shallowest: 1/1024 of the radius.
-pub(super) const HEIGHT_MAX: i32 = ONE - ONE / 1024;
+pub const HEIGHT_MAX: i32 = ONE - ONE / 1024;
 /// The largest squared distance of a taxel that a contact can reach.
 const SQUARE_MAX: u32 = 3 << (SQUARE_BITS - 1);
 
 /// A contact, in tip radii.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Guess {
+pub struct Guess {
     /// s = 1 - d, Q28.
     pub height: i32,
     /// Centre, Q24.
@@ -74,7 +74,7 @@ fn scale(radii: i32, tip: &Tip, bits: u32) -> i32 {
 
 /// What the model says of a taxel: pressure as a share of the peak, and its slopes.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct TaxelModel {
+pub struct TaxelModel {
     /// Pressure, Q14 of the peak.
     pub pressure: i32,
     /// How the pressure falls with ln(s), in Y, Q13: `-dp / d ln(s)`.
@@ -85,7 +85,8 @@ pub(super) struct TaxelModel {
 
 /// A guess worked out for all taxels.
 #[derive(Clone, Debug)]
-pub(super) struct Prediction<const ROWS: usize, const COLUMNS: usize> {
+pub struct Prediction<const ROWS: usize, const COLUMNS: usize> {
+    /// s, Q28.
     pub height: i32,
     /// s^3, Q27.
     height_cube_q27: i32,
@@ -120,6 +121,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         dy: [0; ROWS],
     };
 
+    /// Of a guess, in shares of this scale's peak.
     pub fn new(guess: &Guess, scale: &Scale, config: &Shaped<ROWS, COLUMNS>) -> Self {
         let geometry = &config.geometry;
         // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
@@ -179,14 +181,14 @@ fn from<const SIDE: usize>(places: &[i32; SIDE], centre: i32) -> [i32; SIDE] {
 
 /// The nodes around a squared distance, and its share of the way between them in Q31.
 #[inline(always)]
-pub(super) fn interval(nodes: &[Node; NODES], square: u32) -> ([&Node; 2], i32) {
+pub fn interval(nodes: &[Node; NODES], square: u32) -> ([&Node; 2], i32) {
     let index = ((square >> NODE_BITS) as usize).min(NODES - 2);
     ([&nodes[index], &nodes[index + 1]], ((square << (32 - NODE_BITS)) >> 1) as i32)
 }
 
 /// The square of a place, Q28; it stops at 4.
 #[inline(always)]
-pub(super) fn square(place: i32) -> u32 {
+pub fn square(place: i32) -> u32 {
     let place = place.unsigned_abs().min(u32::from(u16::MAX));
     (place * place) >> 2
 }

@@ -1,12 +1,11 @@
 //! One refinement: the weighted normal equations of all live taxels, and their solution.
 //!
 //! The unknowns are scaled so that every slope is at most about 1: the change of ln(s), and the centre's in units of
-//! s^2. A reading's error grows with the reading, so a taxel's weight falls with the model's pressure: in the quick
-//! steps from 1 to 1/4 at the peak, in the close ones to 1/25.
+//! s^2. A reading's error grows with the reading, so a taxel's weight falls with the model's pressure, from 1 to 1/4 at
+//! the peak.
 
 use super::arith::{Divisor, clamp_to, high};
 use super::guess::{CENTRE_BITS, Guess, Prediction, SLOPE_BITS, TaxelModel, square};
-use super::rim::Rim;
 use super::view::{PEAK_BITS, Scale, View};
 use crate::config::geometry::{Geometry, PLACE_BITS};
 
@@ -24,7 +23,7 @@ const GUARD_BITS: u32 = 14;
 /// How far the model and the picture are apart; squares count 2^-28 of the peak's, less [`Bits::ALL`] bits: 2^-24 of
 /// ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Misfit {
+pub struct Misfit {
     /// Sum of the squared residuals of live taxels within the model's contact.
     pub inside: i32,
     /// How many these are.
@@ -61,7 +60,7 @@ struct Row<const ROWS: usize, const COLUMNS: usize> {
 /// A slope is at most 1.5, at the rim, and the squares of a row's slopes average 2 at most, in Q26. What all rows add
 /// up to has another bit to spare. A row loses four bits at least, so that its shifted place, up to two radii, fits
 /// too.
-pub(super) struct Bits<const ROWS: usize, const COLUMNS: usize>;
+pub struct Bits<const ROWS: usize, const COLUMNS: usize>;
 
 impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
     /// From a taxel's part of its row: none up to 15 columns, 2 of 32.
@@ -86,80 +85,31 @@ impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
 
 /// The normal equations, Q26 less [`Bits::ALL`]: Q22 of ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Equations<const ROWS: usize, const COLUMNS: usize> {
+pub struct Equations<const ROWS: usize, const COLUMNS: usize> {
     matrix: [i32; 6],
     right: [i32; 3],
     /// At the guess.
     pub misfit: Misfit,
 }
 
-/// Which taxels a pass over a whole picture looks at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Taxels {
-    /// The next row.
-    row: usize,
-    /// The row's first column.
-    first: usize,
-    /// From column to column; the next row begins one later.
-    stride: usize,
-}
-
-impl Taxels {
-    /// All.
-    pub const ALL: Self = Self { row: 0, first: 0, stride: 1 };
-    /// Every other one, like a chessboard's white fields.
-    pub const HALF: Self = Self { stride: 2, ..Self::ALL };
-
-    /// The next row, its first column and the distance to the next column.
-    #[inline(always)]
-    pub const fn next_row(&mut self, rows: usize) -> Option<(usize, usize, usize)> {
-        let (row, first) = (self.row, self.first);
-        if row >= rows {
-            return None;
-        }
-        self.row += 1;
-        self.first = if first + 1 < self.stride { first + 1 } else { 0 };
-        Some((row, first, self.stride))
-    }
-}
-
 /// What a row's taxels are compared with.
 #[derive(Clone, Copy)]
-pub(super) struct Comparison<'a, const ROWS: usize, const COLUMNS: usize> {
+pub struct Comparison<'a, const ROWS: usize, const COLUMNS: usize> {
+    /// What the guess makes of each taxel.
     pub prediction: &'a Prediction<ROWS, COLUMNS>,
+    /// The picture.
     pub view: &'a View<'a, ROWS, COLUMNS>,
+    /// Where the taxels are.
     pub geometry: &'a Geometry,
 }
 
 impl Misfit {
-    /// How far the model and the picture are apart, where it is not to be refined.
-    pub fn compare<const ROWS: usize, const COLUMNS: usize>(
-        &mut self,
-        comparison: Comparison<ROWS, COLUMNS>,
-        mut which: Taxels,
-    ) {
-        while let Some((row, first, stride)) = which.next_row(ROWS) {
-            self.add(comparison, row, first, stride);
-        }
-    }
-
-    /// The same of a row.
+    /// How far the model and a row are apart, where it is not to be refined.
     #[inline(never)]
     pub fn compare_row<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
-        comparison: Comparison<ROWS, COLUMNS>,
-        row: usize,
-    ) {
-        self.add(comparison, row, 0, 1);
-    }
-
-    #[inline(always)]
-    fn add<const ROWS: usize, const COLUMNS: usize>(
-        &mut self,
         Comparison { prediction, view, geometry }: Comparison<ROWS, COLUMNS>,
         row: usize,
-        first: usize,
-        stride: usize,
     ) {
         let (Some(taxels), Some(bad), Some(dy)) =
             (view.picture.taxels.get(row), view.picture.bad.get(row), prediction.dy.get(row))
@@ -167,13 +117,12 @@ impl Misfit {
             return;
         };
         let dy_square = square(*dy);
-        let mut bad = *bad >> first;
+        let mut bad = *bad;
         let mut row = Self::NONE;
-        let mut column = first;
-        while column < COLUMNS {
+        for (taxel, dx_square) in taxels.iter().zip(&prediction.dx_square) {
             if bad & 1 == 0 {
-                let at = prediction.dx_square[column] + dy_square;
-                let share = view.share(taxels[column]);
+                let at = dx_square + dy_square;
+                let share = view.share(*taxel);
                 if at < prediction.outside {
                     row.taxels += 1;
                     let residual = residual(share - prediction.taxel(at, &geometry.nodes).pressure);
@@ -183,8 +132,7 @@ impl Misfit {
                     row.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
-            column += stride;
-            bad >>= stride;
+            bad >>= 1;
         }
         self.add_row::<ROWS, COLUMNS>(&row);
     }
@@ -203,19 +151,10 @@ fn residual(of: i32) -> i32 {
     of.max(-RESIDUAL_LIMIT).min(RESIDUAL_LIMIT - 1)
 }
 
-/// The weight of the quick model and of the residual: 1 less 3/4 of the model's pressure over the peak, Q13.
+/// The weight: 1 less 3/4 of the model's pressure over the peak, Q13.
 #[inline(always)]
 fn weight(pressure: i32) -> i32 {
     (1 << SLOPE_BITS) - ((3 * pressure.min(1 << PEAK_BITS)) >> 3)
-}
-
-/// The weight of the close model, for errors in proportion to the reading: `(1 + 4 p)^-2` for a share p of the peak,
-/// Q13.
-#[inline(always)]
-fn noise_weight(pressure: i32) -> i32 {
-    let quarter = 1 << (PEAK_BITS - 2);
-    let ratio = (quarter << SLOPE_BITS) / (pressure.max(0).min(1 << PEAK_BITS) + quarter);
-    (ratio * ratio) >> SLOPE_BITS
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
@@ -243,65 +182,44 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
     /// Without a taxel.
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
-    /// Takes in taxels.
-    pub fn take(&mut self, comparison: Comparison<ROWS, COLUMNS>, mut which: Taxels) {
-        while let Some((row, first, stride)) = which.next_row(ROWS) {
-            self.take_part(comparison, row, first, stride, None);
-        }
-    }
-
-    /// Takes in all taxels, and works those under the rim out by it.
-    pub fn take_closely(&mut self, comparison: Comparison<ROWS, COLUMNS>, rim: &Rim) {
-        for row in 0..ROWS {
-            self.take_part(comparison, row, 0, 1, Some(rim));
-        }
-    }
-
     /// Takes in a row.
     #[inline(never)]
     pub fn take_row(&mut self, comparison: Comparison<ROWS, COLUMNS>, row: usize) {
-        self.take_part(comparison, row, 0, 1, None);
+        self.take_row_by(comparison, row, |model, _| weight(model.pressure));
     }
 
+    /// Takes in a row; `weigh` gives a taxel's weight, Q13, and may work its pressure out anew: it is given the squared
+    /// distance, Q28, and the place, Q15.
     #[inline(always)]
-    fn take_part(
+    pub fn take_row_by(
         &mut self,
-        comparison: Comparison<ROWS, COLUMNS>,
+        Comparison { prediction, view, geometry }: Comparison<ROWS, COLUMNS>,
         row: usize,
-        first: usize,
-        stride: usize,
-        rim: Option<&Rim>,
+        weigh: impl Fn(&mut TaxelModel, (u32, [i32; 2])) -> i32,
     ) {
-        let Comparison { prediction, view, geometry } = comparison;
         let (Some(taxels), Some(bad), Some(dy)) =
             (view.picture.taxels.get(row), view.picture.bad.get(row), prediction.dy.get(row))
         else {
             return;
         };
         let dy_square = square(*dy);
-        let mut bad = *bad >> first;
+        let mut bad = *bad;
         let mut sums = Row::<ROWS, COLUMNS>::default();
-        let mut column = first;
-        while column < COLUMNS {
+        for ((taxel, dx), dx_square) in taxels.iter().zip(&prediction.dx).zip(&prediction.dx_square) {
             if bad & 1 == 0 {
-                let at = prediction.dx_square[column] + dy_square;
-                let share = view.share(taxels[column]);
+                let at = dx_square + dy_square;
+                let share = view.share(*taxel);
                 if at < prediction.outside {
-                    let dx = prediction.dx[column];
                     let mut model = prediction.taxel(at, &geometry.nodes);
-                    if let (Some(rim), true) = (rim, at >= prediction.inside) {
-                        model.pressure = rim.pressure(dx, *dy);
-                    }
+                    let weight = weigh(&mut model, (at, [*dx, *dy]));
                     sums.misfit.taxels += 1;
-                    let weight = if rim.is_some() { noise_weight(model.pressure) } else { weight(model.pressure) };
-                    sums.add(&model, dx, residual(share - model.pressure), weight);
+                    sums.add(&model, *dx, residual(share - model.pressure), weight);
                 } else {
                     sums.misfit.others += 1;
                     sums.misfit.outside += (residual(share) * residual(share)) >> Bits::<ROWS, COLUMNS>::TAXEL;
                 }
             }
-            column += stride;
-            bad >>= stride;
+            bad >>= 1;
         }
         self.add(&sums, *dy);
     }

@@ -5,7 +5,7 @@ use crate::config::geometry::Geometry;
 use crate::pressure::{CODE_BITS, Picture};
 
 /// Fractional bits of a pressure as a share of the peak.
-pub(super) const PEAK_BITS: u32 = 14;
+pub const PEAK_BITS: u32 = 14;
 /// The lowest peak that is looked at: one code.
 const PEAK_MIN: i32 = 1 << CODE_BITS;
 /// The highest peak that the converter, the sag and the gain can make.
@@ -16,14 +16,16 @@ const MODULUS_MAX: u32 = 1 << (PEAK_BITS + 9);
 const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 
 /// A picture and its scale.
-pub(super) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+    /// The picture.
     pub picture: &'a Picture<ROWS, COLUMNS>,
+    /// By its peak.
     pub scale: Scale,
 }
 
 /// What makes a taxel a share of the peak.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Scale {
+pub struct Scale {
     /// 2^34 over the peak.
     inverse_peak: i32,
     /// Y in shares of the peak, Q14.

@@ -9,3 +9,5 @@ extern crate std;
 pub mod record;
 
 pub mod same_bits;
+
+pub mod single;

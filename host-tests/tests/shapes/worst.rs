@@ -3,12 +3,13 @@
 
 use fingertip::command::Command;
 use fingertip::config::{Shaped, newtons};
-use fingertip::contact::{self, Fit, FitLevel, Refined};
+use fingertip::contact::{self, Fit, FitLevel};
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, GAIN_MAX};
 use fingertip::units::CoreCycles;
+use images::single::{self, Refined};
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed};
 
@@ -114,7 +115,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
                 // The boost's series is off by 2^-20 at its end.
                 assert!(off < 2e-5 * exact[0] * ROWS.max(COLUMNS) as f64 + 20.0, "{found:?}, not {exact:?}");
                 for refined in Refined::ALL {
-                    contact::read(&picture, refined, &config);
+                    single::read(&picture, refined, &config);
                 }
                 for fit in &mut fits {
                     (0..2 * ROWS + 3).for_each(|_| _ = fit.read(&picture, &config));

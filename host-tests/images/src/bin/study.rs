@@ -13,6 +13,8 @@ mod control;
 mod fit;
 #[path = "../study/force.rs"]
 mod force;
+#[path = "../study/formats.rs"]
+mod formats;
 #[path = "../study/frame.rs"]
 mod frame;
 mod host;

@@ -11,8 +11,8 @@ mod host;
 use core::arch::asm;
 use core::hint::black_box;
 use cortex_m_semihosting::debug;
+use fingertip::contact;
 use fingertip::contact::Contact;
-use fingertip::contact::{self, Refined};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
@@ -22,6 +22,7 @@ use fingertip::state::{Limits, Mode};
 use fingertip::units::{Duty, Millimetres};
 use host::{File, command_line, fail, say};
 use images::record::{MAGIC, Record};
+use images::single::{self, Refined};
 
 /// What the kernels read and write.
 struct Bench<'a> {
@@ -113,7 +114,7 @@ extern "C" fn duty(bench: &mut Bench) {
 }
 
 fn read(bench: &mut Bench, refined: Refined) {
-    bench.contact = contact::read(&bench.picture, refined, bench.config);
+    bench.contact = single::read(&bench.picture, refined, bench.config);
 }
 
 extern "C" fn read_moments(bench: &mut Bench) {

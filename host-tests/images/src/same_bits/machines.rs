@@ -4,8 +4,9 @@
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
+use crate::single::{self, Refined};
 use fingertip::contact::Contact;
-use fingertip::contact::{self, FitLevel, Refined};
+use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::goal::Goal;
@@ -116,13 +117,13 @@ pub const FRAMES: [Step; 6] = [
         m.array.tare().flatten().for_each(|tare| mix.add(*tare));
     }),
     ("Array::bad_taxels", |m, _, mix| mix.add(m.array.bad_taxels(&m.frame, &m.config))),
-    ("contact::read", |m, s, mix| {
+    ("single::read", |m, s, mix| {
         let refined = match s.share_q32 >> 27 {
             0 => Refined::Full,
             1 => Refined::Two,
             _ => Refined::One,
         };
-        add_contact(mix, &contact::read(m.pictures.next(s, &m.config), refined, &m.config));
+        add_contact(mix, &single::read(m.pictures.next(s, &m.config), refined, &m.config));
     }),
     ("contact::from_sums", |m, s, mix| {
         add_contact(mix, &contact::from_sums(m.pictures.next(s, &m.config), &m.config));

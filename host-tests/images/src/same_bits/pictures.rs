@@ -97,7 +97,8 @@ fn sum_up(picture: &mut Picture) {
 mod tests {
     use super::*;
     use crate::same_bits::Source;
-    use fingertip::contact::{self, Refined};
+    use crate::single::{self, Refined};
+    use fingertip::contact;
     use fingertip::params::Params;
 
     #[test]
@@ -108,7 +109,7 @@ mod tests {
         for _ in 0..20_000 {
             sample.renew(&mut source);
             let picture = pictures.next(&sample, &config);
-            let contact = contact::read(picture, Refined::One, &config);
+            let contact = single::read(picture, Refined::One, &config);
             let sums = contact::from_sums(picture, &config);
             good += u32::from(contact.confidence >= contact::CONFIDENCE_LEAST);
             fitted += u32::from(contact.force != sums.force);

@@ -4,9 +4,10 @@ use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::contact::Contact;
-use fingertip::contact::{self, FitLevel, Refined};
+use fingertip::contact::{self, FitLevel};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
+use images::single::{self, Refined};
 
 /// What the variants read and write.
 struct Bench<'a> {
@@ -32,15 +33,15 @@ const VARIANTS: [(&str, Kernel, Option<FitLevel>); 9] = [
 ];
 
 extern "C" fn one(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Refined::One, bench.config);
+    bench.contact = single::read(&bench.picture, Refined::One, bench.config);
 }
 
 extern "C" fn two(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Refined::Two, bench.config);
+    bench.contact = single::read(&bench.picture, Refined::Two, bench.config);
 }
 
 extern "C" fn full(bench: &mut Bench) {
-    bench.contact = contact::read(&bench.picture, Refined::Full, bench.config);
+    bench.contact = single::read(&bench.picture, Refined::Full, bench.config);
 }
 
 extern "C" fn follow(bench: &mut Bench) {

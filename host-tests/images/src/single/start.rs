@@ -6,11 +6,8 @@
 //! for a symmetric set of taxels), the paper's model says `s^2 g = -k - 2 D` and `s^2 m = 1 - V - D^2`: a quadratic
 //! equation for s^2, and then D.
 
-use super::arith::{Divisor, clamp_to, high, root};
-use super::guess::{CENTRE_BITS, Guess};
-use super::step::Taxels;
-use super::view::{PEAK_BITS, View};
-use crate::config::geometry::{Geometry, ONE, SQUARE_BITS};
+use fingertip::config::Shaped;
+use fingertip::contact::parts::{CENTRE_BITS, Divisor, Guess, ONE, PEAK_BITS, SQUARE_BITS, View, clamp_to, high, root};
 
 /// Taxels below an eighth of the peak are left out: the rim crosses most of them.
 const SHARE_MIN: i32 = 1 << (PEAK_BITS - 3);
@@ -63,19 +60,17 @@ struct Sums {
 }
 
 impl Sums {
-    fn of<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS>, mut which: Taxels) -> Self {
+    fn of<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS>) -> Self {
         let z_drop = const { z_drop(ROWS, COLUMNS) };
         let mut all = Self::default();
         // 2^38 over Y as a share of the peak.
         let inverse_modulus = (view.scale.inverse_modulus >> (24 - view.scale.modulus_shift)) as i32;
-        while let Some((row, mut column, stride)) = which.next_row(ROWS) {
-            let taxels = &view.picture.taxels[row];
+        for (row, taxels) in view.picture.taxels.iter().enumerate() {
             let y = 2 * row as i32 + 1 - ROWS as i32;
             let (mut n, mut sx, mut sxx, mut sxxx, mut z, mut zx) = (0, 0, 0, 0, 0, 0);
-            while column < COLUMNS {
+            for (column, taxel) in taxels.iter().enumerate() {
                 let x = 2 * column as i32 + 1 - COLUMNS as i32;
-                let share = view.share(taxels[column]).min(1 << PEAK_BITS);
-                column += stride;
+                let share = view.share(*taxel).min(1 << PEAK_BITS);
                 if share < SHARE_MIN {
                     continue;
                 }
@@ -108,14 +103,14 @@ impl Sums {
 }
 
 /// The plane's guess; None where the taxels lie on one line, or fit no contact.
-pub(super) fn plane<const ROWS: usize, const COLUMNS: usize>(
+pub fn plane<const ROWS: usize, const COLUMNS: usize>(
     view: &View<ROWS, COLUMNS>,
-    which: Taxels,
-    geometry: &Geometry,
+    config: &Shaped<ROWS, COLUMNS>,
 ) -> Option<Guess> {
+    let geometry = &config.geometry;
     // Fractional bits of sums of z.
     let z_sum_bits = const { Z_BITS - z_drop(ROWS, COLUMNS) };
-    let sums = Sums::of(view, which);
+    let sums = Sums::of(view);
     let by_n = Divisor::new(sums.n.unsigned_abs().into());
     let (x, y) = (by_n.divide(sums.x.into(), BITS), by_n.divide(sums.y.into(), BITS));
 
@@ -144,9 +139,11 @@ pub(super) fn plane<const ROWS: usize, const COLUMNS: usize>(
     };
     let k = slope(cube_about(sums.x_cube, x, xx, xy, y), cube_about(sums.y_cube, y, yy, xy, x), BITS);
 
-    // From half pitches to tip radii.
+    // From half pitches to tip radii; 2/h, Q20.
+    let (radius_um, pitch_um) = (i64::from(config.params.tip_radius_um), i64::from(config.params.pitch_um));
+    let inverse_half_pitch = ((radius_um << 21) / pitch_um.max(1)) as i32;
     let to_radii = |half_pitches: i32| high(half_pitches, geometry.pitch) << (31 - SQUARE_BITS);
-    let g = z_slope.map(|slope| clamp_to(product(slope, geometry.inverse_half_pitch) >> 20, SLOPE_MAX));
+    let g = z_slope.map(|slope| clamp_to(product(slope, inverse_half_pitch) >> 20, SLOPE_MAX));
     let k = k.map(|slope| clamp_to(to_radii(slope).into(), SKEW_MAX));
     let own = to_radii(2 << BITS) / 3;
     let spread = to_radii(to_radii(by_n.divide(xx + yy, BITS - ABOUT_BITS)) + own);

@@ -4,10 +4,8 @@
 //! a percent of the peak for a taxel under the rim. Here the taxel is cut by two Gauss lines along its steeper
 //! direction, and what of each lies inside the contact has two Gauss points.
 
-use super::arith::{between, root};
-use super::guess::{Guess, interval};
-use super::view::Scale;
-use crate::config::geometry::{Geometry, ONE, PLACE_BITS, SQUARE_BITS};
+use fingertip::config::Geometry;
+use fingertip::contact::parts::{Guess, ONE, PLACE_BITS, SQUARE_BITS, Scale, between, interval, root};
 
 /// 1/sqrt(3), Q15: Gauss points on -1 to 1.
 const GAUSS: i32 = 18_919;
@@ -15,7 +13,7 @@ const GAUSS: i32 = 18_919;
 const TO_SQUARE: u32 = 2 * PLACE_BITS - SQUARE_BITS;
 
 /// A guess worked out for the taxels under its rim.
-pub(super) struct Rim<'a> {
+pub struct Rim<'a> {
     geometry: &'a Geometry,
     height: i32,
     rim_square: i32,
@@ -47,8 +45,8 @@ impl<'a> Rim<'a> {
     }
 
     /// Mean pressure on the taxel at a place from the centre, both in Q15, as a share of the peak in Q14.
-    pub fn pressure(&self, dx: i32, dy: i32) -> i32 {
-        let (dx, dy) = (dx.abs(), dy.abs());
+    pub fn pressure(&self, place: [i32; 2]) -> i32 {
+        let [dx, dy] = place.map(i32::abs);
         let (along, across) = if dx < dy { (dy, dx) } else { (dx, dy) };
         let sum = self.chord(along, across - self.line) + self.chord(along, across + self.line);
         // Strain in Q(12 + lift), length in Q15, two lines of two points each; the side is twice `half`.

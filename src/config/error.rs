@@ -1,0 +1,30 @@
+//! Why parameters are refused.
+
+use crate::params::ParamError;
+use crate::scan::ScanError;
+
+/// Why parameters were refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ConfigError {
+    /// One is out of its range.
+    Param(ParamError),
+    /// The scan cannot be timed so.
+    Scan(ScanError),
+    /// Two contradict each other, by name and value: the first must be below the second; the speeds may be equal.
+    Order([(&'static str, i32); 2]),
+}
+
+impl core::fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Param(error) => error.fmt(f),
+            Self::Scan(error) => error.fmt(f),
+            Self::Order([(low, low_value), (high, high_value)]) => {
+                write!(f, "{low} of {low_value}: below {high}, which is {high_value}, is allowed")
+            }
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}

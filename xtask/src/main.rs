@@ -2,6 +2,7 @@
 
 mod apt;
 mod browser;
+mod cluster;
 mod console;
 mod demo;
 mod docs;
@@ -100,6 +101,8 @@ enum Command {
     Docs(docs::Args),
     /// Make the packages that others take, and test them from a project outside of this workspace
     Package,
+    /// Try the examples for clusters here: Slurm with one node, GNU parallel, the Kubernetes job's shell, DuckDB
+    Cluster,
     /// Install everything that the other commands need, for use offline
     Setup,
 }
@@ -137,6 +140,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Lint => lint::run(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
         Command::Package => package::run(console),
+        Command::Cluster => cluster::run(console),
         Command::Setup => setup(toolchain, console),
     }
 }
@@ -147,11 +151,12 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     timing::ensure(console)?;
     qemu::ensure(console)?;
     python::ensure(console)?;
+    cluster::ensure(console)?;
     browser::ensure(console)?;
     tools::ensure_all(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
-        "All set up: demo, sim, sweep, population, test, build, qemu, timing, size, lint and docs work offline now.",
+        "All set up: demo, sim, sweep, population, cluster, test, build, qemu, timing, size, lint and docs work offline now.",
     );
     Ok(())
 }

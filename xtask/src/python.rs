@@ -1,44 +1,66 @@
-//! A Python with the package `dynamixel-sdk`, a bus client that nobody here wrote.
+//! Pythons with packages of others: clients of the bus that nobody here wrote, and what reads a sweep's files.
 
 use crate::{apt, console::Console, paths};
 use anyhow::{Context, Result, ensure};
-use std::{path::PathBuf, process::Command};
+use std::{
+    path::{Path, PathBuf},
+    process::Command,
+};
 
-const PACKAGE: &str = "dynamixel-sdk==4.1.0";
+/// A virtual environment in the build folder.
+pub struct Environment {
+    /// Its folder.
+    pub folder: &'static str,
+    /// What is installed in it, with its version.
+    pub packages: &'static [&'static str],
+    /// The names by which a program imports that, with commas between.
+    pub imports: &'static str,
+    /// What it is for.
+    pub does: &'static str,
+}
 
-/// Finds or makes the virtual environment, and returns its interpreter.
+const BUS: Environment = Environment {
+    folder: "venv",
+    packages: &["dynamixel-sdk==4.1.0"],
+    imports: "dynamixel_sdk",
+    does: "the example and its test talk to the board by it",
+};
+
+/// Finds or makes the environment with the bus client, and returns its interpreter.
+///
+/// # Errors
+/// As [`environment`].
+pub fn ensure(console: &mut Console) -> Result<PathBuf> {
+    environment(&BUS, console)
+}
+
+/// Finds or makes a virtual environment, and returns its interpreter.
 ///
 /// # Errors
 /// No Python, no `venv`, or no package: says what to install.
-pub fn ensure(console: &mut Console) -> Result<PathBuf> {
-    let folder = paths::target().join("venv");
+pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
+    let Environment { folder, packages, imports, does } = environment;
+    let folder = paths::target().join(folder);
     let python = folder.join("bin").join("python");
-    if has_package(&python) {
+    if has(&python, imports) {
         return Ok(python);
     }
-    console.say("Making a Python environment with `dynamixel-sdk`: the example and its test talk to the board by it.");
+    let list = packages.join(" ");
+    console.say(&format!("Making a Python environment with `{list}`: {does}."));
     let make = || Command::new("python3").args(["-m", "venv", "--clear"]).arg(&folder).output();
     // Debian splits `venv` off Python, and may lack Python altogether.
     if !make().is_ok_and(|output| output.status.success()) {
-        apt::ensure(&["python3", "python3-venv"], "the Python client of the bus", console)?;
+        apt::ensure(&["python3", "python3-venv"], "a Python environment", console)?;
         let output = make().context("cannot start python3")?;
         ensure!(output.status.success(), "python3 -m venv: {}", String::from_utf8_lossy(&output.stderr));
     }
-    console
-        .run(Command::new(&python).args([
-            "-m",
-            "pip",
-            "install",
-            "--quiet",
-            "--no-cache-dir",
-            "--disable-pip-version-check",
-            PACKAGE,
-        ]))
-        .with_context(|| format!("pip cannot install {PACKAGE}: is a package index in reach?"))?;
-    ensure!(has_package(&python), "{PACKAGE} is installed in {}, but does not import", paths::shown(&folder));
+    let mut install = Command::new(&python);
+    install.args(["-m", "pip", "install", "--quiet", "--no-cache-dir", "--disable-pip-version-check"]).args(*packages);
+    console.run(&mut install).with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
+    ensure!(has(&python, imports), "{list} is installed in {}, but does not import", paths::shown(&folder));
     Ok(python)
 }
 
-fn has_package(python: &PathBuf) -> bool {
-    Command::new(python).args(["-c", "import dynamixel_sdk"]).output().is_ok_and(|output| output.status.success())
+fn has(python: &Path, imports: &str) -> bool {
+    Command::new(python).args(["-c", &format!("import {imports}")]).output().is_ok_and(|output| output.status.success())
 }

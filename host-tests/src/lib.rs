@@ -3,7 +3,6 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod control_table;
-pub mod demo;
 pub mod emulator;
 pub mod figures;
 pub mod fit_cases;

@@ -10,7 +10,7 @@ use images::record::Record;
 
 /// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
 /// up.
-const DUTY_DELAY_SLOTS: usize = 3;
+pub const DUTY_DELAY_SLOTS: usize = 3;
 
 /// A board with the core running on it.
 pub struct Native {

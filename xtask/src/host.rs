@@ -21,8 +21,8 @@ pub struct Program {
     pub whole: bool,
 }
 
-/// The demonstration on the native core, with nothing that it does not need.
-pub const NATIVE_DEMO: Program = Program { package: "host-tests", name: "demo", whole: false };
+/// The demonstration on the native board, with nothing that it does not need.
+pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", whole: false };
 /// The emulated board without scenes and without the text of the log.
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
 /// The emulated board with all that it can.

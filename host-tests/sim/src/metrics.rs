@@ -13,7 +13,7 @@ mod table;
 pub use at_goal::AtGoal;
 pub use conduct::Hold;
 pub use finger::Finger;
-pub(crate) use finger::newtons;
+pub use finger::newtons;
 pub use table::{BY_GOAL, METRICS};
 
 use crate::scene::Bound;

@@ -25,12 +25,9 @@ use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use host_tests::native::bridge;
+use host_tests::native::{DUTY_DELAY_SLOTS, bridge};
 use host_tests::plant::Bridge;
 use std::time::Instant;
-
-/// Slots between the end of a frame and the duty that came of it.
-const DUTY_DELAY_SLOTS: usize = 3;
 
 /// Why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

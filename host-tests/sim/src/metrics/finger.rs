@@ -255,7 +255,7 @@ pub(super) fn duty(duty: Duty) -> f64 {
 }
 
 /// A force as a number.
-pub(crate) fn newtons(force: Newtons) -> f64 {
+pub fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }
 

@@ -1,9 +1,9 @@
 //! The figures of a run, each against its bound.
 
 use super::{DemoError, Run};
-use crate::metrics::{self, DriveLimits, Sample, Step, Touch};
-use crate::plant::Setup;
 use fingertip::params::Params;
+use host_tests::metrics::{self, DriveLimits, Sample, Step, Touch};
+use host_tests::plant::Setup;
 use serde::Serialize;
 
 /// Figures of the true force.

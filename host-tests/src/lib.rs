@@ -12,7 +12,6 @@ pub mod heatmap;
 pub mod imports;
 pub mod kept;
 pub mod long_run;
-pub mod metrics;
 pub mod native;
 pub mod optimal;
 pub mod plant;

@@ -6,7 +6,7 @@ mod curves;
 mod fronts;
 mod maps;
 
-pub use charts::{Panel, overview, steps};
+pub use charts::{Panel, Sample, overview, steps};
 pub use curves::{Curve, Curves, curves};
 pub use fronts::{Dot, Front, front};
 pub use maps::{Map, maps};

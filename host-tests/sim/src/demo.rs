@@ -11,11 +11,11 @@ mod trace;
 pub use figures::{Check, Forces};
 pub use trace::{Taxels, Trace};
 
-use crate::metrics;
+use crate::metrics::{self, Meter};
 use crate::scene::{Scene, library, read};
 use host_tests::heatmap::Pressures;
-use host_tests::metrics::{MetricsError, Sample};
-use host_tests::plot::PlotError;
+use host_tests::optimal::Unreachable;
+use host_tests::plot::{PlotError, Sample};
 use std::path::PathBuf;
 
 /// The scene's name in the library.
@@ -38,17 +38,38 @@ pub struct Picture {
     pub pressures_kpa: Pressures,
 }
 
+/// A goal and what came of it.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// When it reached the controller.
+    pub at_s: f64,
+    /// The force asked for.
+    pub goal_n: f64,
+    /// The true force then.
+    pub from_n: f64,
+    /// What is measured until the next one.
+    pub meter: Meter,
+}
+
 /// What came of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// When each goal reached the controller, and the goal.
-    pub goals: Vec<(f64, f64)>,
+    /// The goals.
+    pub goals: Vec<Asked>,
     /// The world.
     pub trace: Vec<Sample>,
     /// Pressure maps.
     pub pictures: Vec<Picture>,
     /// Frames that the controller says it missed.
     pub missed_frames: u32,
+}
+
+impl Run {
+    /// The samples from one instant to before another.
+    pub fn between(&self, from_s: f64, to_s: f64) -> &[Sample] {
+        let [start, end] = [from_s, to_s].map(|at_s| self.trace.partition_point(|sample| sample.time_s < at_s));
+        &self.trace[start..end.max(start)]
+    }
 }
 
 /// The demonstration has no result.
@@ -60,12 +81,12 @@ pub enum DemoError {
     /// It cannot be simulated.
     #[error(transparent)]
     Simulated(#[from] crate::SimError),
-    /// The run has no figures.
-    #[error(transparent)]
-    Metrics(#[from] MetricsError),
-    /// The script has no touch or no release.
-    #[error("the script has no touch or no release")]
-    Script,
+    /// The run has no touch or no release.
+    #[error("nothing was touched, or it was not let go")]
+    NoTouch,
+    /// The motor cannot do a step at all.
+    #[error("no bound for a step: {0}")]
+    Unreachable(#[from] Unreachable),
     /// The controller stopped with this fault.
     #[error("the controller stopped with fault {0}")]
     Fault(u8),

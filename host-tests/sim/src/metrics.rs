@@ -7,6 +7,7 @@
 mod at_goal;
 mod conduct;
 mod finger;
+mod response;
 mod slips;
 mod table;
 

@@ -1,7 +1,6 @@
 //! The demonstration's pictures.
 
 use super::{DemoError, Forces, Picture, Run};
-use host_tests::metrics::stretch;
 use host_tests::plant::Setup;
 use host_tests::plot::{self, Map, Panel};
 use std::path::{Path, PathBuf};
@@ -15,8 +14,8 @@ const AFTER_MS: f64 = 60.0;
 /// # Errors
 /// A file cannot be written.
 pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
-    let touched_s = run.goals.first().map_or(0.0, |(at_s, _)| *at_s) + forces.touch.touched_after_ms * 1e-3;
-    let window = |zero_s: f64| stretch(&run.trace, zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
+    let touched_s = run.goals.first().map_or(0.0, |asked| asked.at_s) + forces.touch.touched_after_ms * 1e-3;
+    let window = |zero_s: f64| run.between(zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
     let panel = |title, zero_s, time_optimal_ms| Panel {
         title,
         samples: window(zero_s),
@@ -25,9 +24,9 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
         time_optimal_ms,
     };
     let mut panels = vec![panel(format!("First touch, goal {} N", forces.touch.goal_n), touched_s, None)];
-    for (step, (at_s, _)) in forces.steps.iter().zip(run.goals.iter().skip(1)) {
+    for (step, asked) in forces.steps.iter().zip(run.goals.iter().skip(1)) {
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
-        panels.push(panel(title, *at_s, Some(step.time_optimal_ms)));
+        panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
     }
     let map = |picture: &Picture| Map {
         title: format!("{} N", picture.goal_n),

@@ -1,12 +1,13 @@
 //! What is kept of a run: the goals, the world at every frame, the array at the end of each hold.
 
-use super::{DemoError, Picture, Run};
-use crate::scene::{Event, Scene, controller};
-use crate::watch::{Step, Watch};
+use super::{Asked, DemoError, Picture, Run};
+use crate::metrics::{Meter, newtons};
+use crate::scene::{Scene, controller};
+use crate::watch::{Controller, Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::state::Fault;
 use host_tests::heatmap::Pressures;
-use host_tests::metrics::Sample;
+use host_tests::plot::Sample;
 
 /// Holds of at least this are drawn, each force once.
 const DRAWN_N: f64 = 1.0;
@@ -14,11 +15,9 @@ const DRAWN_N: f64 = 1.0;
 /// Watches the demonstration's scene.
 #[derive(Clone, Debug)]
 pub struct Trace {
-    script: Vec<Event>,
     array: Taxels,
     run: Run,
-    /// Goals whose time has come.
-    begun: usize,
+    controllers: Vec<Controller>,
     /// The array as it was last, under the last of them.
     last: Option<Picture>,
     fault: Option<Fault>,
@@ -27,14 +26,7 @@ pub struct Trace {
 impl Trace {
     /// Of a run of this scene.
     pub fn new(scene: &Scene) -> Self {
-        Self {
-            script: scene.script.clone(),
-            array: Taxels::of(scene),
-            run: Run::default(),
-            begun: 0,
-            last: None,
-            fault: None,
-        }
+        Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
     }
 
     /// What came of it.
@@ -64,30 +56,38 @@ impl Watch for Trace {
         true
     }
 
+    fn begin(&mut self, controllers: &[Controller]) {
+        self.controllers = controllers.to_vec();
+    }
+
     fn step(&mut self, step: &Step) {
-        while let Some(event) = self.script.get(self.begun).filter(|event| event.at_s <= step.time_s) {
-            self.run.goals.push((event.at_s, event.goal_n));
-            self.begun += 1;
-            self.keep();
-        }
-        let Some((_, goal_n)) = self.run.goals.last().copied() else { return };
         let (truth, status) = (step.truth, step.status);
+        // As it was asked for, in whole mN.
+        let goal_n = (newtons(step.command.goal) * 1e3).round() / 1e3;
+        let known_n = self.run.goals.last().map_or(0.0, |asked| asked.goal_n);
+        if goal_n != known_n {
+            self.keep();
+            let mut meter = Meter::default();
+            meter.begin(&self.controllers);
+            self.run.goals.push(Asked { at_s: step.time_s, goal_n, from_n: truth.force_n, meter });
+        }
+        let Some(asked) = self.run.goals.last_mut() else { return };
+        asked.meter.step(step);
         self.fault = self.fault.or(status.fault);
         self.run.missed_frames = status.missed_frames;
         self.run.trace.push(Sample {
             time_s: step.time_s,
             goal_n,
             true_force_n: truth.force_n,
-            sensed_force_n: status.contact.force.0.to_num(),
+            sensed_force_n: newtons(status.contact.force),
             travel_mm: truth.travel_mm,
             indentation_mm: truth.indentation_mm,
             duty: truth.duty,
-            mode: status.mode,
         });
         let contact = &status.contact;
         self.last = Some(Picture {
             goal_n,
-            force_n: contact.force.0.to_num(),
+            force_n: newtons(contact.force),
             centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],
             radius_mm: contact.radius.0.to_num(),
             pressures_kpa: self.array.kilopascals(step.frame),

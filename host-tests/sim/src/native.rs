@@ -25,8 +25,7 @@ use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use host_tests::native::{DUTY_DELAY_SLOTS, bridge};
-use host_tests::plant::Bridge;
+use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
 
 /// Why a scene does not run.
@@ -259,7 +258,7 @@ impl<E: Set> Board<E> {
         }
         let sense = self.world.sense(finger, silent_ms);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        unit.next = bridge(status);
+        unit.next = Bridge::of(status);
         if unit.command.torque {
             unit.host.read(time_s, || Reading::of(status), &mut unit.link);
         }

@@ -10,10 +10,9 @@ use fingertip::pipeline::{Pipeline, Status};
 use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
 use fingertip::units::CoreCycles;
-use host_tests::native::{DUTY_DELAY_SLOTS, bridge};
 use host_tests::plant::cells::Cell;
 use host_tests::plant::drive::{Dynamics, Shaft, Source};
-use host_tests::plant::{Bridge, Setup};
+use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS, Setup};
 use images::record::Digest;
 
 /// The finger with its controller.
@@ -97,7 +96,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let slots = Shape::<ROWS, COLUMNS>::SLOTS;
         for slot in 0..slots {
             if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
-                self.bridge = bridge(self.pipeline.status());
+                self.bridge = Bridge::of(self.pipeline.status());
             }
             self.advance();
             self.scan(slot);

@@ -45,7 +45,11 @@ impl Program {
     /// It does not compile.
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
-        command.args(["--bin", self.name]).args((!self.whole).then_some("--no-default-features"));
+        command.args(["--bin", self.name]);
+        if !self.whole {
+            // With the features of both in view, what the demonstration's two programs share is compiled once.
+            command.args(["--no-default-features", "--package", BOARD.package]);
+        }
         console.build(&mut command, self.name, slow(self.package))?;
         Ok(Command::new(paths::target().join(PROFILE).join(self.name)))
     }

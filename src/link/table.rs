@@ -6,6 +6,9 @@
 
 #[macro_use]
 mod define;
+pub mod indirect;
+mod list;
+pub mod mirrors;
 mod pictures;
 mod registers;
 mod values;
@@ -15,14 +18,23 @@ use crate::identify::{Identification, Modulus};
 use crate::params::Params;
 use crate::pipeline::Taring;
 use crate::scan::Clocks;
+use crate::state::Limits;
 
 use super::packet::StatusError;
 use super::server::{Counters, State};
 use super::settings::{Actions, Settings};
 use super::snapshot::Snapshot;
 use super::stand::Stand;
+use indirect::Part;
 
-pub use registers::{COUNT, address, registers};
+pub use list::{COUNT, registers};
+
+/// Where each register begins.
+pub mod address {
+    pub use super::indirect::address::*;
+    pub use super::mirrors::address::*;
+    pub use super::registers::address::*;
+}
 
 /// The longest read.
 pub const READ_MAX: u16 = 256;
@@ -120,6 +132,8 @@ impl Register {
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     address: u16,
+    /// Where its value belongs: elsewhere for a mirror.
+    of: u16,
     count: u16,
     kind: Kind,
     access: Access,
@@ -130,15 +144,26 @@ impl Cell {
         self.kind.width() * self.count
     }
 
-    /// The cell that a byte belongs to.
-    fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Result<Self, StatusError> {
+    /// The cell that a byte belongs to; none in a gap.
+    fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Option<Self> {
         if let Some(param) = param_place(address) {
             let address = address::PARAMS + 4 * param as u16;
-            return Ok(Self { address, count: 1, kind: Kind::I32, access: Access::Stored });
+            return Some(Self { address, of: address, count: 1, kind: Kind::I32, access: Access::Stored });
         }
         let holds = |cell: &&Self| address.checked_sub(cell.address).is_some_and(|offset| offset < cell.bytes());
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        registers::CELLS.iter().chain(pictures).find(holds).copied().ok_or(StatusError::Access)
+        let listed = registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).find(holds);
+        listed.copied().or_else(|| mirrors::cell(address))
+    }
+
+    /// The element that a byte belongs to, and how many bytes of it come before.
+    fn element(&self, address: u16) -> (u16, u16) {
+        let offset = address.saturating_sub(self.address);
+        match self.kind.width() {
+            1 => (offset, 0),
+            2 => (offset / 2, offset % 2),
+            _ => (offset / 4, offset % 4),
+        }
     }
 }
 
@@ -154,8 +179,45 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         &self.state.settings
     }
 
-    fn contact(&self) -> &'a Contact {
-        &self.snapshot.status.contact
+    /// Before the first tare the array's offsets look like a contact: nothing is told of it then.
+    fn contact(&self) -> Contact {
+        if self.tared() { self.snapshot.status.contact } else { Contact::default() }
+    }
+
+    fn tared(&self) -> bool {
+        !self.snapshot.status.limits.has(Limits::NOT_TARED)
+    }
+
+    fn hindrance(&self) -> u32 {
+        let settings = self.settings();
+        Stand::of(self.snapshot).hindrance(&settings.record.params, self.state.actions()) as u32
+    }
+
+    /// The value of an element of a cell that is not indirect data.
+    fn value(&self, cell: &Cell, element: u16) -> u32 {
+        if let Some(place) = param_place(cell.of) {
+            return self.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32);
+        }
+        match indirect::part(cell.of) {
+            Some(Part::Address(first)) => self.indirect(first, element).into(),
+            Some(Part::Data(_)) => 0,
+            None => registers::get(*self, cell.of, usize::from(element)),
+        }
+    }
+
+    fn indirect(&self, first: usize, element: u16) -> u16 {
+        self.settings().indirect.get(first + usize::from(element)).copied().unwrap_or(0)
+    }
+
+    /// The byte that an indirect address leads to.
+    fn led_to(&self, first: usize, element: u16) -> u8 {
+        let target = self.indirect(first, element);
+        let cell = if target == 0 { None } else { Cell::at::<ROWS, COLUMNS>(target) };
+        let byte = cell.and_then(|cell| {
+            let (element, skip) = cell.element(target);
+            self.value(&cell, element).to_le_bytes().get(usize::from(skip)).copied()
+        });
+        byte.unwrap_or(0)
     }
 
     fn identified(&self) -> Modulus {
@@ -198,7 +260,7 @@ pub(super) struct Staged {
     pub clocks: &'static Clocks,
 }
 
-/// Refuses a read that is too long, or that touches a byte without a register.
+/// Refuses a read that is too long, or that goes beyond the table.
 pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
     address: u16,
     length: u16,
@@ -206,16 +268,11 @@ pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
     if !(1..=READ_MAX).contains(&length) {
         return Err(StatusError::Length);
     }
-    let end = address.checked_add(length).ok_or(StatusError::Access)?;
-    let mut at = address;
-    while at < end {
-        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
-        at = cell.address + cell.bytes();
-    }
-    Ok(())
+    let end = const { pictures::end::<ROWS, COLUMNS>() };
+    address.checked_add(length).filter(|&last| last <= end).map(|_| ()).ok_or(StatusError::Access)
 }
 
-/// Sends the bytes of a read that [`check_read`] let through.
+/// Sends the bytes of a read that [`check_read`] let through; 0 where there is no register.
 pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
     view: View<'_, ROWS, COLUMNS>,
     address: u16,
@@ -225,21 +282,19 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
     let end = address.saturating_add(length);
     let mut at = address;
     while at < end {
-        let Ok(cell) = Cell::at::<ROWS, COLUMNS>(at) else { return };
+        let Some(cell) = Cell::at::<ROWS, COLUMNS>(at) else {
+            put(0);
+            at += 1;
+            continue;
+        };
         let stop = end.min(cell.address + cell.bytes());
         let width = cell.kind.width();
         while at < stop {
-            let offset = at - cell.address;
-            let (element, skip) = match width {
-                1 => (offset, 0),
-                2 => (offset / 2, offset % 2),
-                _ => (offset / 4, offset % 4),
+            let (element, skip) = cell.element(at);
+            let bytes = match indirect::part(cell.of) {
+                Some(Part::Data(first)) => [view.led_to(first, element), 0, 0, 0],
+                _ => view.value(&cell, element).to_le_bytes(),
             };
-            let value = match param_place(cell.address) {
-                Some(place) => view.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32),
-                None => registers::get(view, cell.address, usize::from(element)),
-            };
-            let bytes = value.to_le_bytes();
             let take = usize::from(skip)..usize::from(width.min(skip + (stop - at)));
             for &byte in bytes.get(take).unwrap_or_default() {
                 put(byte);
@@ -262,30 +317,70 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         return Err(StatusError::Length);
     }
     let before = staged.settings.command;
-    let torque = before.torque;
     let params = staged.settings.record.params;
     let mut at = address;
     let mut rest = data;
     while !rest.is_empty() {
-        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
-        match cell.access {
-            Access::ReadOnly => return Err(StatusError::Access),
-            Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
-            _ => {}
-        }
-        if at != cell.address {
-            return Err(StatusError::Length);
-        }
-        let value = cell.kind.decode(rest).ok_or(StatusError::Length)?;
-        match param_place(at) {
-            Some(place) => write_param(&mut staged.settings.record.params, place, value),
-            None => registers::set(staged, at, value)?,
-        }
-        rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
-        at = at.saturating_add(cell.bytes());
+        let cell = Cell::at::<ROWS, COLUMNS>(at).ok_or(StatusError::Access)?;
+        let taken = match indirect::part(cell.of) {
+            Some(Part::Data(first)) => {
+                let element = usize::from(cell.element(at).0);
+                let targets = staged.settings.indirect;
+                let block = targets.get(first + element..first + indirect::BLOCK).unwrap_or_default();
+                write_through::<ROWS, COLUMNS>(staged, block, rest, before.torque)?
+            }
+            _ => write_element::<ROWS, COLUMNS>(staged, &cell, at, rest, before.torque)?,
+        };
+        rest = rest.get(usize::from(taken)..).ok_or(StatusError::Length)?;
+        at = at.saturating_add(taken);
     }
     staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params, staged.clocks)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
+}
+
+/// Writes the element that begins at `at`, and tells how many bytes it took.
+fn write_element<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged,
+    cell: &Cell,
+    at: u16,
+    data: &[u8],
+    torque: bool,
+) -> Result<u16, StatusError> {
+    match cell.access {
+        Access::ReadOnly => return Err(StatusError::Access),
+        Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
+        _ => {}
+    }
+    let (element, 0) = cell.element(at) else { return Err(StatusError::Length) };
+    let value = cell.kind.decode(data).ok_or(StatusError::Length)?;
+    if let Some(place) = param_place(cell.of) {
+        write_param(&mut staged.settings.record.params, place, value);
+    } else if let Some(Part::Address(first)) = indirect::part(cell.of) {
+        let target = value as u16;
+        indirect::check::<ROWS, COLUMNS>(target)?;
+        if let Some(slot) = staged.settings.indirect.get_mut(first + usize::from(element)) {
+            *slot = target;
+        }
+    } else {
+        registers::set(staged, cell.of, value)?;
+    }
+    Ok(cell.kind.width())
+}
+
+/// Writes the register that the first of these addresses leads to: the others must lead to the rest of it.
+fn write_through<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged,
+    targets: &[u16],
+    data: &[u8],
+    torque: bool,
+) -> Result<u16, StatusError> {
+    let target = targets.first().copied().filter(|&target| target != 0).ok_or(StatusError::Access)?;
+    let cell = Cell::at::<ROWS, COLUMNS>(target).ok_or(StatusError::Access)?;
+    let along = (0..cell.kind.width()).zip(targets).all(|(offset, &next)| next == target.saturating_add(offset));
+    if !along || targets.len() < usize::from(cell.kind.width()) {
+        return Err(StatusError::Length);
+    }
+    write_element::<ROWS, COLUMNS>(staged, &cell, target, data, torque)
 }
 
 /// Which parameter a byte belongs to.

@@ -37,7 +37,7 @@ fn sync_read_is_answered_in_the_order_of_the_list() {
     let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data[0])).collect();
     assert_eq!(answers, [(3, 0, 103), (1, 0, 101), (2, 0, 102)]);
 
-    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[10, 0, 1, 0, 2, 1]));
+    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[0xFF, 0x7F, 1, 0, 2, 1]));
     let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data.len())).collect();
     assert_eq!(answers, [(2, 7, 0), (1, 7, 0)], "refused in turn too");
 }
@@ -129,7 +129,7 @@ fn fast_sync_read_gives_way_to_another_packet() {
     assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
     // Data that cannot be read is zero, with its error; and nothing at all is sent where it would not fit.
     let mut first = device(1);
-    let reply = first.hear(&packet(BROADCAST, 0x8A, &[10, 0, 3, 0, 1])).concat();
+    let reply = first.hear(&packet(BROADCAST, 0x8A, &[0xFF, 0x7F, 3, 0, 1])).concat();
     assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
     assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 1, 1, 1])).is_empty());
     assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 0xFF, 0xFF, 1])).is_empty());

@@ -25,6 +25,9 @@
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
 //! | broadcast Ping | answered after 14 byte times for each lower ID |
 //! | Action | answered like a write where it names this device; `dynamixel-sdk` does not read that answer, so let it pass |
+//! | fast reads | answered in one packet to which each device adds its part; zeros, with the error, where a part cannot be read |
+//! | Clear | `02 "ERCL"` is `recover`; there is no multi-turn position to clear (`01 "DXL\""`): range error |
+//! | Control Table Backup | `01 "CTRL"` is `save_parameters`; there is no older backup to restore (`02 "CTRL"`): range error |
 //! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
 
 pub mod crc;

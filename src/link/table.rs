@@ -10,24 +10,22 @@ pub mod indirect;
 mod list;
 pub mod mirrors;
 mod pictures;
+mod register;
 mod registers;
 mod values;
+mod view;
 
-use crate::contact::Contact;
-use crate::identify::{Identification, Modulus};
 use crate::params::Params;
-use crate::pipeline::Taring;
 use crate::scan::Clocks;
-use crate::state::Limits;
 
 use super::packet::StatusError;
-use super::server::{Counters, State};
 use super::settings::{Actions, Settings};
-use super::snapshot::Snapshot;
 use super::stand::Stand;
 use indirect::Part;
 
 pub use list::{COUNT, registers};
+pub use register::{Access, Kind, Register};
+pub(super) use view::View;
 
 /// Where each register begins.
 pub mod address {
@@ -38,95 +36,6 @@ pub mod address {
 
 /// The longest read.
 pub const READ_MAX: u16 = 256;
-
-/// Who may write a register, and when.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Nobody.
-    ReadOnly,
-    /// The host, at any time.
-    ReadWrite,
-    /// The host, while torque is off.
-    TorqueOff,
-    /// The host, while torque is off; kept in flash once `save_parameters` was written.
-    Stored,
-    /// The same at any time.
-    StoredLive,
-}
-
-/// How a register's bytes make a number, little-endian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// 8 bits.
-    U8,
-    /// 8 bits, two's complement.
-    I8,
-    /// 16 bits.
-    U16,
-    /// 16 bits, two's complement.
-    I16,
-    /// 32 bits.
-    U32,
-    /// 32 bits, two's complement.
-    I32,
-}
-
-impl Kind {
-    /// Bytes on the bus.
-    pub const fn width(self) -> u16 {
-        match self {
-            Self::U8 | Self::I8 => 1,
-            Self::U16 | Self::I16 => 2,
-            Self::U32 | Self::I32 => 4,
-        }
-    }
-
-    /// The number that `bytes` make, or none where there are not enough of them.
-    fn decode(self, bytes: &[u8]) -> Option<i64> {
-        Some(match self {
-            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-        })
-    }
-}
-
-/// A register as its documentation has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Register {
-    /// The constant in [`address`], or the field of [`Params`].
-    pub name: &'static str,
-    /// Of its first byte.
-    pub address: u16,
-    /// How its bytes make a number.
-    pub kind: Kind,
-    /// How many numbers stand side by side: 1, but for the pictures of the array.
-    pub count: u16,
-    /// Who may write it.
-    pub access: Access,
-    /// Physical unit; empty where it is a plain number.
-    pub unit: &'static str,
-    /// What a step of the number means, in that unit: the resolution.
-    pub scale: u16,
-    /// The least value.
-    pub min: i64,
-    /// The largest value.
-    pub max: i64,
-    /// After a factory reset where it is stored, after a reset where it can be written.
-    pub default: Option<i64>,
-    /// What it means.
-    pub doc: &'static str,
-}
-
-impl Register {
-    /// Bytes on the bus.
-    pub const fn bytes(&self) -> u16 {
-        self.kind.width() * self.count
-    }
-}
 
 /// The part of a [`Register`] that the device needs.
 #[derive(Clone, Copy, Debug)]
@@ -164,89 +73,6 @@ impl Cell {
             2 => (offset / 2, offset % 2),
             _ => (offset / 4, offset % 4),
         }
-    }
-}
-
-/// What a read sees.
-#[derive(Clone, Copy)]
-pub(super) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    pub state: &'a State<ROWS, COLUMNS>,
-    pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
-}
-
-impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
-    fn settings(&self) -> &'a Settings {
-        &self.state.settings
-    }
-
-    /// Before the first tare the array's offsets look like a contact: nothing is told of it then.
-    fn contact(&self) -> Contact {
-        if self.tared() { self.snapshot.status.contact } else { Contact::default() }
-    }
-
-    fn tared(&self) -> bool {
-        !self.snapshot.status.limits.has(Limits::NOT_TARED)
-    }
-
-    fn hindrance(&self) -> u32 {
-        let settings = self.settings();
-        Stand::of(self.snapshot).hindrance(&settings.record.params, self.state.actions()) as u32
-    }
-
-    /// The value of an element of a cell that is not indirect data.
-    fn value(&self, cell: &Cell, element: u16) -> u32 {
-        if let Some(place) = param_place(cell.of) {
-            return self.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32);
-        }
-        match indirect::part(cell.of) {
-            Some(Part::Address(first)) => self.indirect(first, element).into(),
-            Some(Part::Data(_)) => 0,
-            None => registers::get(*self, cell.of, usize::from(element)),
-        }
-    }
-
-    fn indirect(&self, first: usize, element: u16) -> u16 {
-        self.settings().indirect.get(first + usize::from(element)).copied().unwrap_or(0)
-    }
-
-    /// The byte that an indirect address leads to.
-    fn led_to(&self, first: usize, element: u16) -> u8 {
-        let target = self.indirect(first, element);
-        let cell = if target == 0 { None } else { Cell::at::<ROWS, COLUMNS>(target) };
-        let byte = cell.and_then(|cell| {
-            let (element, skip) = cell.element(target);
-            self.value(&cell, element).to_le_bytes().get(usize::from(skip)).copied()
-        });
-        byte.unwrap_or(0)
-    }
-
-    fn identified(&self) -> Modulus {
-        self.snapshot.status.identification.result()
-    }
-
-    /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
-    fn tare_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.tare_request != status.taken.tare {
-            return Taring::Running as u32;
-        }
-        status.tare as u32
-    }
-
-    fn identify_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.identify_request != status.taken.identify {
-            return Identification::Running.number().into();
-        }
-        status.identification.number().into()
-    }
-
-    fn refused(&self, error: StatusError) -> u32 {
-        u32::from(self.state.counters.refused(error))
-    }
-
-    fn counters(&self) -> &'a Counters {
-        &self.state.counters
     }
 }
 

@@ -15,8 +15,8 @@ macro_rules! mirrors {
             $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
         }
 
-        /// Address, and that of the register that it is another name of.
-        pub(super) static PLACES: [(u16, u16); REGISTERS.len()] = [$(($address, registers::address::$of)),*];
+        /// The address of each, and that of the register that it is another name of.
+        pub static PLACES: [(u16, u16); REGISTERS.len()] = [$(($address, registers::address::$of)),*];
 
         /// As their documentation has them.
         pub(super) const REGISTERS: &[Register] = &[$(Register {

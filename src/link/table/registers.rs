@@ -146,7 +146,7 @@ control_table! {
         |view, _| u32::from(view.contact().confidence);
     /// Taxels left out because they are dead or saturated.
     293 BAD_TAXELS: U8 ReadOnly, "" * 1, 0 to 100,
-        |view, _| u32::from(view.contact().bad_taxels);
+        |view, _| u32::from(view.snapshot.status.contact.bad_taxels);
     /// Share of the supply at the motor; positive presses the tip into the object.
     294 DUTY_PERMILLE: I16 ReadOnly, "permille" * 1, -1000 to 1000,
         |view, _| permille(view.snapshot.status.duty) as u32;

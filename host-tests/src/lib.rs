@@ -21,6 +21,8 @@ pub mod kept;
 #[cfg(feature = "judges")]
 pub mod long_run;
 #[cfg(feature = "judges")]
+pub mod model_file;
+#[cfg(feature = "judges")]
 pub mod native;
 pub mod optimal;
 pub mod plant;

@@ -1,14 +1,24 @@
-//! The page of the control table.
+//! The page of the control table, and the model files made of it.
 
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use host_tests::control_table::{COMMAND, markdown, step};
+use host_tests::model_file::text;
 
 #[test]
 fn the_page_is_fresh() {
     let path = concat!(env!("FINGERTIP_ROOT"), "/docs/control-table.md");
     let page = std::fs::read_to_string(path).expect("docs/control-table.md can be read");
     assert!(page == markdown(), "docs/control-table.md is stale: write it anew with `{COMMAND}`");
+}
+
+#[test]
+fn the_model_files_are_fresh() {
+    for (path, direct) in [("fingertip.model", false), ("fingertip_direct.model", true)] {
+        let path = format!("{}/examples/dynamixel/{path}", env!("FINGERTIP_ROOT"));
+        let file = std::fs::read_to_string(&path).expect("the model file can be read");
+        assert!(file == text(direct), "{path} is stale: write it anew with `{COMMAND}`");
+    }
 }
 
 #[test]

@@ -54,6 +54,11 @@ pub(super) const fn part(cell: u16) -> Option<Part> {
     }
 }
 
+/// Whether a block of them begins here.
+pub const fn begins(address: u16) -> bool {
+    part(address).is_some()
+}
+
 const fn addresses(address: u16) -> Cell {
     Cell { address, of: address, count: BLOCK as u16, kind: Kind::U16, access: Access::ReadWrite }
 }

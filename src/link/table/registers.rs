@@ -50,8 +50,8 @@ control_table! {
     11 OPERATING_MODE: U8 TorqueOff, "" * 1, 0 to 0 = 0,
         |_, _| 0,
         |_, _| Ok(());
-    /// 1 lets the bridge be driven. Goes to 0 on a fault. 0 takes the goal back: the next 1 moves nothing before a new
-    /// goal.
+    /// 1 lets the bridge be driven. Goes to 0 on a fault. 0 takes the goal back: the next 1 presses nothing before a
+    /// new goal.
     64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |view, _| u32::from(view.settings().command.torque),
         set_torque;

@@ -60,9 +60,25 @@ impl Cell {
             return Some(Self { address, of: address, count: 1, kind: Kind::I32, access: Access::Stored });
         }
         let holds = |cell: &&Self| address.checked_sub(cell.address).is_some_and(|offset| offset < cell.bytes());
+        Self::all::<ROWS, COLUMNS>().find(holds).copied()
+    }
+
+    /// Where the gap ends that a byte lies in.
+    fn next<const ROWS: usize, const COLUMNS: usize>(gap: u16) -> u16 {
+        let after = Self::all::<ROWS, COLUMNS>().map(|cell| cell.address).chain([address::PARAMS]);
+        after.filter(|&address| address > gap).min().unwrap_or(u16::MAX)
+    }
+
+    /// All but the parameters.
+    fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        let listed = registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).find(holds);
-        listed.copied().or_else(|| mirrors::cell(address))
+        registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).chain(&mirrors::CELLS)
+    }
+
+    /// That of a register by itself, where it begins.
+    const fn of(address: u16) -> Self {
+        let Register { kind, count, access, .. } = registers::fixed(address);
+        Self { address, of: address, count, kind, access }
     }
 
     /// The element that a byte belongs to, and how many bytes of it come before.
@@ -109,8 +125,9 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
     let mut at = address;
     while at < end {
         let Some(cell) = Cell::at::<ROWS, COLUMNS>(at) else {
-            put(0);
-            at += 1;
+            let stop = end.min(Cell::next::<ROWS, COLUMNS>(at));
+            (at..stop).for_each(|_| put(0));
+            at = stop;
             continue;
         };
         let stop = end.min(cell.address + cell.bytes());

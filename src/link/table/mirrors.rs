@@ -16,7 +16,9 @@ macro_rules! mirrors {
         }
 
         /// The address of each, and that of the register that it is another name of.
-        pub static PLACES: [(u16, u16); REGISTERS.len()] = [$(($address, registers::address::$of)),*];
+        pub const PLACES: [(u16, u16); REGISTERS.len()] = [$(($address, registers::address::$of)),*];
+
+        pub(super) static CELLS: [Cell; PLACES.len()] = [$(Cell { address: $address, ..Cell::of(registers::address::$of) }),*];
 
         /// As their documentation has them.
         pub(super) const REGISTERS: &[Register] = &[$(Register {
@@ -85,13 +87,4 @@ mirrors! {
     766 PICTURE_TARE_STATE = TARE_STATE;
     /// The same as confidence.
     767 PICTURE_CONFIDENCE = CONFIDENCE;
-}
-
-/// The mirror that a byte belongs to.
-pub(super) fn cell(at: u16) -> Option<Cell> {
-    PLACES.iter().find_map(|&(address, of)| {
-        let offset = at.checked_sub(address)?;
-        let cell = registers::CELLS.iter().find(|cell| cell.of == of)?;
-        (offset < cell.bytes()).then_some(Cell { address, ..*cell })
-    })
 }

@@ -16,7 +16,7 @@ pub const COUNT: usize = 2 * BLOCK;
 const TARGET_MIN: u16 = 64;
 
 /// Where the blocks begin.
-pub mod address {
+pub(super) mod address {
     /// Addresses of the first block.
     pub const INDIRECT_ADDRESS_1: u16 = 168;
     /// Bytes of the first block.

@@ -11,7 +11,7 @@ use super::{Cell, Register, registers};
 macro_rules! mirrors {
     ($($(#[doc = $doc:literal])+ $address:literal $name:ident = $of:ident;)*) => {
         /// Where each mirror begins.
-        pub mod address {
+        pub(super) mod address {
             $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
         }
 

@@ -49,6 +49,9 @@ def sdk(port):
     assert packets.ping(port, ID)[:2] == (21574, ok)
     assert packets.broadcastPing(port) == ({ID: [21574, 1]}, ok)
 
+    # Whatever an earlier client left.
+    assert write(reg.TORQUE_ENABLE.address, [0]) == 0
+
     # From the least address to the largest, whatever lies between.
     least, largest = reg.TORQUE_ENABLE.address, reg.PRESENT_MODE.address + 54
     assert len(read(least, largest - least)) == largest - least

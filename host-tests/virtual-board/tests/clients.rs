@@ -16,8 +16,12 @@ use std::process::Command;
 
 /// A pseudo-terminal: the device's end, and the name of the client's, which is held open.
 fn terminal() -> (SerialPort, SerialPort, PathBuf) {
-    let (far, near) = SerialPort::pair().expect("a pseudo-terminal");
-    let name = std::fs::read_link(format!("/proc/self/fd/{}", far.as_raw_fd())).expect("its name");
+    let (one, other) = SerialPort::pair().expect("a pseudo-terminal");
+    let name = |port: &SerialPort| std::fs::read_link(format!("/proc/self/fd/{}", port.as_raw_fd())).expect("its name");
+    // The device has the end that has no name.
+    let (near, far) = if name(&one).starts_with("/dev/pts") { (other, one) } else { (one, other) };
+    let name = name(&far);
+    assert!(name.starts_with("/dev/pts"), "{}", name.display());
     (near, far, name)
 }
 

@@ -27,6 +27,8 @@ pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", whole: 
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
 /// The emulated board with all that it can.
 pub const SCENE_BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: true };
+/// What recordings of a sensor say.
+pub const SENSOR: Program = Program { package: "sensor", name: "sensor", whole: true };
 
 impl Program {
     /// One of the tools of `host-tests`.

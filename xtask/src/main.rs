@@ -70,6 +70,12 @@ enum Command {
         after_help = "Examples:\n  cargo xtask population ordinary --fingers 100\n  cargo xtask population --help    (all that it takes)"
     )]
     Population(sim::Args),
+    /// Fit a real sensor's characteristic or creep to recordings, and judge it on others
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask sensor fit cycles.csv --judge others.csv --json fit.json\n  cargo xtask sensor fit --help    (all that it takes)"
+    )]
+    Sensor(sim::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -125,6 +131,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sim(args) => sim::sim(args, toolchain, console),
         Command::Sweep(args) => sim::sweep(args, console),
         Command::Population(args) => sim::population(args, toolchain, console),
+        Command::Sensor(args) => sim::sensor(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),

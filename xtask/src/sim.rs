@@ -1,4 +1,4 @@
-//! Scenes: one run, or many.
+//! Scenes: one run, or many; and recordings.
 
 use crate::{
     console::{self, Console},
@@ -38,6 +38,14 @@ pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
 /// As [`sim`].
 pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     on_board("population", args, choice, console)
+}
+
+/// Fits a sensor to recordings.
+///
+/// # Errors
+/// As [`sim`].
+pub fn sensor(args: &Args, console: &mut Console) -> Result<()> {
+    start(host::SENSOR.build(console)?.args(&args.arguments))
 }
 
 /// Runs a program on this machine, or the same command of the board that runs the flash image.

@@ -5,6 +5,7 @@
 //! `docs/control.md`.
 
 pub mod bounds;
+pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
@@ -20,6 +21,7 @@ use crate::params::{ParamError, Params};
 use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use bounds::{Bounds, Drives};
+use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
 
@@ -60,6 +62,8 @@ pub struct Config {
     pub sag_q32: u16,
     /// See [`Params::dead_codes`].
     pub dead_codes: u16,
+    /// The characteristic, where it is not a line.
+    pub curve: Option<Curve>,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
     pub newtons_per_sum_q48: i64,
     /// Pressure in Pa for a sixteenth of a corrected code, Q32.
@@ -74,6 +78,11 @@ pub struct Config {
     pub touch_line: i32,
     /// See [`Params::contact_off_mn`].
     pub contact_off: Newtons,
+
+    /// Share of a held reading that is creep in the end, Q32; 0 where none is taken off.
+    pub creep_share_q32: u32,
+    /// Share of its way that the creep goes in a frame, Q32: at most 1/64.
+    pub creep_leak_q32: u32,
 
     /// Frame time in s, Q39.
     pub frame_s_q39: i32,
@@ -140,6 +149,7 @@ impl Config {
     fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
+        let codes_milli = codes_at_full_range(p)?;
         // By how much the one must be below the other, the two, and their names.
         for (apart, low, high, names) in [
             (1, p.contact_off_mn, p.contact_on_mn, ("contact_off_mn", "contact_on_mn")),
@@ -177,8 +187,9 @@ impl Config {
 
         let sag_q32 = (p.row_sag_ppb_per_code as f32 * 1e-9 * exp2(32)) as u16;
         let pitch_mm = p.pitch_um as f32 * 1e-3;
-        let codes_per_kpa = p.codes_per_kpa_milli as f32 * 1e-3;
+        let codes_per_kpa = codes_milli as f32 * 1e-3;
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
+        let creep = p.creep_permille as f32 * 1e-3;
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
         let paces = gains::paces(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
         let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
@@ -192,13 +203,16 @@ impl Config {
             tip,
             sag_q32,
             dead_codes: p.dead_codes as u16,
+            curve: Curve::new(p.curve_permille),
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),
-            geometry: Geometry::new(p, rows, columns),
+            geometry: Geometry::new(p, codes_milli, rows, columns),
             half_pitch: millimetres(p.pitch_um / 2),
             contact_on: newtons(p.contact_on_mn),
             contact_off: newtons(p.contact_off_mn),
             touch_line: narrow(0.5e-3 * p.contact_on_mn as f32 / newtons_per_sum),
+            creep_share_q32: (creep / (1.0 + creep) * exp2(32)) as u32,
+            creep_leak_q32: (frame_s * (1.0 + creep) / (p.creep_time_ms as f32 * 1e-3) * exp2(32)) as u32,
             frame_s_q39: narrow(frame_s * exp2(39)),
             mm_per_count_q40,
             count: Millimetres(I8F24::from_bits(narrow(mm_per_count * exp2(24)))),
@@ -226,7 +240,7 @@ impl Config {
             bounds,
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
-            force_seen: force_seen(p, &tip),
+            force_seen: force_seen(p, codes_milli, &tip),
         })
     }
 }
@@ -237,10 +251,25 @@ const fn sag_max(columns: usize) -> i32 {
     (320_000_000 / (4_095 * columns)) as i32
 }
 
+/// The codes for a kPa at the full range, thousandths: fewer where the characteristic is not a line. Rounded, at most by
+/// 5e-4 of them.
+fn codes_at_full_range(p: &Params) -> Result<i32, ConfigError> {
+    let whole = 1_000 + p.curve_permille;
+    let codes = (p.codes_per_kpa_milli.unsigned_abs() * 1_000 + whole.unsigned_abs() / 2) / whole.unsigned_abs().max(1);
+    if codes < 1_000 {
+        let (name, value) = ("codes_per_kpa_milli", p.codes_per_kpa_milli);
+        return Err(ConfigError::Param(ParamError { name, value, min: whole, max: 200_000 }));
+    }
+    Ok(codes as i32)
+}
+
 /// See [`Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.
-fn force_seen(p: &Params, tip: &Tip) -> Newtons {
+fn force_seen(p: &Params, codes_milli: i32, tip: &Tip) -> Newtons {
     let codes = SEEN * f32::from(SATURATED) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
-    let peak_kpa = codes / (p.codes_per_kpa_milli as f32 * 1e-3);
+    let grown = p.curve_permille as f32 * 1e-3;
+    // See `Curve`: what so many codes carry, in those of the full range.
+    let codes = codes * (1.0 + grown * codes / 4_096.0) / (1.0 + grown);
+    let peak_kpa = codes / (codes_milli as f32 * 1e-3);
     tip.force(tip.indentation_from_peak(Kilopascals::from_bits(narrow(peak_kpa * exp2(16)))))
 }
 

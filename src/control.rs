@@ -23,6 +23,7 @@
 //! a change of mode is bumpless.
 
 mod arith;
+pub mod creep;
 pub mod drive;
 pub mod goal;
 pub mod observer;

@@ -141,6 +141,14 @@ params! {
     supply_min_mv = 5_000 in 1_000..=48_000;
     /// Above this supply the motor is stopped. Must be above supply_min_mv.
     supply_max_mv = 8_500 in 2_000..=60_000;
+    /// How much more force a code means at the converter's full range than at none, permille: the array's
+    /// characteristic. 0 is a line. With more, codes_per_kpa_milli is that of small pressures, and must leave 1,000 at
+    /// the full range.
+    curve_permille = 0 in 0..=8_000;
+    /// By how much the reading of a held force grows in the end, permille of it: the array's creep. 0 takes none off.
+    creep_permille = 0 in 0..=300;
+    /// Time constant of the creep.
+    creep_time_ms = 10_000 in 500..=600_000;
 }
 
 impl Default for Params {

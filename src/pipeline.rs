@@ -216,6 +216,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.travel = self.motion.observer.travel;
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
+        self.status.creep = self.goal.creep.force();
         (duty, &self.status)
     }
 

@@ -9,6 +9,7 @@
 //! taxel's pressure, what they add up to, the highest of them, and whether any may be dead or saturated.
 
 mod calibration;
+mod curve;
 mod picture;
 mod row;
 mod suspect;
@@ -48,6 +49,8 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     tare_frames: u32,
     touched: Touched<ROWS>,
     baseline_row: usize,
+    /// What that row read above its tare, where its picture says what it carries instead.
+    baseline_line: Option<[i32; COLUMNS]>,
     /// Rounds of the baseline over all rows since a contact.
     clear_rounds: i32,
 }
@@ -72,6 +75,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             tare_frames: 0,
             touched: Touched::NONE,
             baseline_row: 0,
+            baseline_line: None,
             clear_rounds: 0,
         }
     }
@@ -106,6 +110,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.picture.sum = total_sum.wrapping_sub(sum);
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
+        // A tare learns what the taxels read, not what they carry.
+        if let Some(curve) = config.curve.filter(|_| self.tare_frames >= Self::TARE_FRAMES) {
+            self.baseline_line = self.picture.taxels.get(self.baseline_row).copied();
+            curve::bend(curve, &mut self.picture, &self.rows);
+        }
         if sound.suspects(largest) {
             self.leave_out(frame, &sound, &before, config);
         }
@@ -139,7 +148,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             self.picture.bad_again += (bad & before).count_ones() as u16;
             highest = self.picture.leave_out(number, bad, config).max(highest);
         }
-        if i32::from(self.picture.bad_count) > config.params.bad_taxels_max {
+        let broken = i32::from(self.picture.bad_count) > config.params.bad_taxels_max;
+        if let (Some(line), Some(bad)) = (&mut self.baseline_line, self.picture.bad.get(self.baseline_row)) {
+            for (column, value) in line.iter_mut().enumerate() {
+                *value = if broken || bad >> column & 1 != 0 { 0 } else { *value };
+            }
+        }
+        if broken {
             self.picture.taxels.as_flattened_mut().fill(0);
             self.picture.peak = 0;
         } else if highest > 0 && highest == self.picture.peak {

@@ -4,7 +4,7 @@
 //! needs no entry.
 
 /// Words that a unit is made of, and how they are shown.
-const WORDS: [(&str, &str); 38] = [
+const WORDS: [(&str, &str); 39] = [
     ("a", "A"),
     ("c", "degrees Celsius"),
     ("cm2", "cm^2"),
@@ -31,6 +31,7 @@ const WORDS: [(&str, &str); 38] = [
     ("ohm", "Ohm"),
     ("pa", "Pa"),
     ("percent", "%"),
+    ("permille", "permille"),
     ("ppb", "ppb"),
     ("ppm", "ppm"),
     ("rad", "rad"),

@@ -205,7 +205,7 @@ impl State {
         PICTURE.visit(|picture| {
             picture.report = Some(report);
             picture.frame = *frame;
-            picture.taxels = pipeline.array().picture().taxels;
+            picture.taxels.copy_from_slice(&pipeline.array().picture().taxels);
             picture.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
             picture.tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
         });

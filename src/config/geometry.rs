@@ -58,10 +58,10 @@ pub struct Geometry {
 
 impl Geometry {
     /// The geometry that these parameters describe. In integers; they must have been checked.
-    pub(crate) fn new(params: &Params, rows: usize, columns: usize) -> Self {
+    pub(crate) fn new(params: &Params, codes_milli: i32, rows: usize, columns: usize) -> Self {
         let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
         let pitch = ((pitch_um << SQUARE_BITS) / radius_um) as i32;
-        let units_q8 = i64::from(params.modulus_pa) * i64::from(params.codes_per_kpa_milli) * (16 << 8) / 1_000_000;
+        let units_q8 = i64::from(params.modulus_pa) * i64::from(codes_milli) * (16 << 8) / 1_000_000;
         let mut nodes = [Node::default(); NODES];
         for (index, node) in nodes.iter_mut().enumerate().skip(1) {
             *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));

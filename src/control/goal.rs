@@ -7,6 +7,7 @@
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::SpeedLoop;
+use crate::control::creep::Creep;
 use crate::control::profile::Reference;
 use crate::state::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
@@ -37,6 +38,8 @@ pub struct Goal {
     clear_at: Millimetres,
     /// How deep the tip is by what the motor felt when the contact began: beside the array a touch is seen late.
     pub felt: Millimetres,
+    /// What of the reading is creep.
+    pub creep: Creep,
 }
 
 impl Goal {
@@ -61,6 +64,7 @@ impl Goal {
     ) -> Reference {
         let travel = motion.observer.travel;
         self.enter(mode, contact, travel, config);
+        self.creep.observe(mode == Mode::Force, contact.force, config);
         let (way, quick, slack) = if mode == Mode::Release {
             let way = Millimetres(self.clear_at.0.saturating_sub(travel.0));
             let pressed = travel.0 > self.clear_at.0.saturating_add(config.clearance.0);
@@ -119,11 +123,14 @@ impl Goal {
     ) -> Millimetres {
         // What is less than a contact would be lost and sought again for ever; what the converter cannot see would be
         // pressed for ever.
-        let held = goal.min(config.force_max.min(config.force_seen)).max(config.contact_on);
+        let most = config.force_max.min(config.force_seen);
+        let held = goal.min(most).max(config.contact_on);
         if held != goal {
             limits.set(Limits::GOAL);
         }
-        let wanted = config.tip.indentation(held);
+        // While the force is held the reading creeps away from it. It is led no farther than where it may be.
+        let reading = Newtons(held.0.saturating_add(self.creep.force().0)).min(most).max(held);
+        let wanted = config.tip.indentation(reading);
         if contact.force < config.contact_off {
             return wanted;
         }

@@ -3,7 +3,7 @@
 use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
 use crate::state::{Fault, Limits, Mode};
-use crate::units::{Duty, Millimetres, MillimetresPerSecond};
+use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
 
 /// The numbers of the requests last taken up: a command's number that differs still waits, for a frame or for torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +48,8 @@ pub struct Status {
     pub fit_level: FitLevel,
     /// What the frame says.
     pub contact: Contact,
+    /// What of the contact's force is taken for the array's creep: the force that is held is less by this.
+    pub creep: Newtons,
     /// Tip travel since torque was enabled.
     pub travel: Millimetres,
     /// Tip speed by the observer.

@@ -25,6 +25,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_lines = [[0; 2]; ROWS];
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
+        self.baseline_line = None;
     }
 
     /// Takes the picture last read into the tare's running means; true when the tare is complete.
@@ -70,7 +71,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     fn learn(&mut self, row: usize, weight: i32) {
         let row = row.min(ROWS - 1);
         let (mut sum, mut moment) = (0, 0);
-        for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(&self.picture.taxels[row]).enumerate() {
+        let values = self.baseline_line.as_ref().unwrap_or(&self.picture.taxels[row]);
+        for (column, (tare, value)) in self.rows[row].tare.iter_mut().zip(values).enumerate() {
             *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;

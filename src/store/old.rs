@@ -8,14 +8,17 @@
 //! | 12 to 12 + 4 n | the parameters in order, 32 bits each |
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
-//! They can be read as long as the parameters are the same in the same order: see [`LAYOUT`].
+//! They can be read as long as these parameters come first, in the same order: see [`LAYOUT`]. What they lack takes
+//! its default.
 
 use super::CRC;
 use crate::params::Params;
 
+/// Parameters that they have: the first so many.
+const COUNT: usize = 30;
 pub const MAGIC: [u8; 4] = *b"FTIP";
 const HEAD: &[u8] = b"id\nbaud_code\nreturn_delay_2us\neffort\n";
-const BODY_BYTES: usize = 12 + 4 * Params::COUNT;
+const BODY_BYTES: usize = 12 + 4 * COUNT;
 const LAYOUT: [u8; 4] = fingerprint().to_le_bytes();
 /// From the record's start to the next one's.
 pub const BYTES: usize = (BODY_BYTES + 4).next_multiple_of(16);
@@ -24,7 +27,7 @@ const fn fingerprint() -> u32 {
     let mut digest = CRC.digest();
     digest.update(HEAD);
     let mut place = 0;
-    while place < Params::COUNT {
+    while place < COUNT {
         digest.update(Params::RANGES[place].0.as_bytes());
         digest.update(b"\n");
         place += 1;

@@ -118,6 +118,7 @@ impl Digest {
             limits,
             fit_level,
             contact,
+            creep,
             travel,
             speed,
             duty: applied,
@@ -134,6 +135,7 @@ impl Digest {
             self.0.update(&length.to_bits().to_le_bytes());
         }
         self.0.update(&force.to_bits().to_le_bytes());
+        self.0.update(&creep.to_bits().to_le_bytes());
         self.0.update(&speed.to_bits().to_le_bytes());
         let Modulus { modulus, sigma, contact, points } = identification.result();
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
@@ -214,6 +216,7 @@ mod tests {
             with(|status| status.speed = MillimetresPerSecond::from_bits(1)),
             with(|status| status.duty = Duty(1)),
             with(|status| status.contact.force = Newtons::from_bits(1)),
+            with(|status| status.creep = Newtons::from_bits(1)),
             with(|status| status.contact.indentation = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_x = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_y = Millimetres::from_bits(1)),

@@ -19,8 +19,9 @@ pub fn solve<const N: usize>(points: impl Iterator<Item = ([f64; N], f64)>) -> O
         }
         for row in pivot + 1..N {
             let share = matrix[row][pivot] / matrix[pivot][pivot];
-            for column in pivot..N {
-                matrix[row][column] -= share * matrix[pivot][column];
+            let above = matrix[pivot];
+            for (value, above) in matrix[row].iter_mut().zip(above) {
+                *value -= share * above;
             }
             right[row] -= share * right[pivot];
         }

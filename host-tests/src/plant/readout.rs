@@ -53,7 +53,7 @@ impl ArrayFaults {
     /// Conductance of a taxel under a pressure.
     pub fn siemens(&self, array: &Array, row: usize, column: usize, pressure_kpa: f64) -> f64 {
         match self.taxels[row][column] {
-            Taxel::Sound => array.preload_siemens + array.siemens_per_kpa * pressure_kpa,
+            Taxel::Sound => array.loaded(array.preload_siemens + array.siemens_per_kpa * pressure_kpa),
             Taxel::Dead => 0.0,
             Taxel::Shorted => array.short_siemens,
         }
@@ -61,6 +61,16 @@ impl ArrayFaults {
 }
 
 impl Array {
+    /// The conductance where one on the line would be so large: a parabola through it, solved.
+    fn loaded(&self, line: f64) -> f64 {
+        if self.growth == 0.0 {
+            return line;
+        }
+        // As a share of the converter's full range.
+        let range = self.reference_v / (self.feedback_ohm * self.drive_v);
+        2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
+    }
+
     /// What a driven row of these conductances adds to each column's voltage: R_f G V_drive / (1 + R_on S).
     pub fn row_volts(&self, siemens: &[f64; COLUMNS]) -> [f64; COLUMNS] {
         let scale = self.feedback_ohm * self.drive_v / (1.0 + self.row_ohm * siemens.iter().sum::<f64>());

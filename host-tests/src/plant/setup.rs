@@ -60,6 +60,8 @@ pub struct Array {
     pub preload_siemens: f64,
     /// Conductance that a kPa adds, alpha.
     pub siemens_per_kpa: f64,
+    /// How much more pressure a code means at the converter's full range than at none; 0 is a line.
+    pub growth: f64,
     /// Conductance of a shorted taxel.
     pub short_siemens: f64,
     /// Row switch and trace, R_on.
@@ -92,6 +94,7 @@ impl Default for Array {
             pitch_mm: 1.5,
             preload_siemens: 40.0 / Self::CODES_OHM,
             siemens_per_kpa: 24.0 / Self::CODES_OHM,
+            growth: 0.0,
             short_siemens: 0.1,
             row_ohm: 30.0,
             feedback_ohm: Self::CODES_OHM * reference_v / (Self::CODES * drive_v),

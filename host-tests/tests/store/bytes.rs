@@ -1,6 +1,6 @@
 //! A record's bytes, and what is never taken for a record.
 
-use crate::fleet::{crc32, named, of_before, of_values};
+use crate::fleet::{crc32, named, names, of_before, of_values};
 use crate::nor::{Nor, bits, record};
 use fingertip::store::{Flash as _, Journal, Loaded, Record, Remark, SLOT_BYTES, SaveError, Sector, encode};
 
@@ -43,6 +43,11 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
     }
 }
 
+/// Bytes of a record without what fills it up to the next one's place.
+fn whole() -> usize {
+    12 + 8 * names().len() + 4
+}
+
 #[test]
 fn the_bytes_are_the_documented_ones() {
     let bytes = encode(&record(9), 0x1234_5678);
@@ -57,7 +62,7 @@ fn every_flipped_bit_of_the_newest_is_seen_and_the_one_before_counts() {
     for sector in [Sector::A, Sector::B] {
         let mut both = [encode(&record(1), 1), encode(&record(2), 2)].concat();
         assert_eq!(start_in(sector, &both).0, Loaded { record: record(2), sound: true });
-        for place in SLOT_BYTES..2 * SLOT_BYTES {
+        for place in SLOT_BYTES..SLOT_BYTES + whole() {
             for bit in 0..8 {
                 both[place] ^= 1 << bit;
                 let (loaded, remarks) = start_in(sector, &both);
@@ -72,7 +77,7 @@ fn every_flipped_bit_of_the_newest_is_seen_and_the_one_before_counts() {
 #[test]
 fn a_write_cut_short_anywhere_is_no_record() {
     let bytes = encode(&record(2), 2);
-    for cut in 1..SLOT_BYTES {
+    for cut in 1..whole() {
         let both = [&encode(&record(1), 1)[..], &bytes[..cut]].concat();
         assert_eq!(start(&both), Loaded { record: record(1), sound: false }, "cut after {cut} bytes");
         assert_eq!(start(&bytes[..cut]), Loaded { record: Record::DEFAULT, sound: false });

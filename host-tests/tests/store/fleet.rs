@@ -48,15 +48,18 @@ pub fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
     finish(bytes)
 }
 
+/// Parameters of the format before this one: the first so many.
+pub const BEFORE: usize = 30;
+
 /// A record of the format before this one.
 pub fn of_before(record: &Record) -> Vec<u8> {
     // The fit level had another name.
-    let names: String = names().iter().map(|name| format!("{name}\n")).collect();
+    let names: String = names().iter().take(4 + BEFORE).map(|name| format!("{name}\n")).collect();
     let names = names.replace("fit_level", "effort");
     let mut bytes = b"FTIP".to_vec();
     bytes.extend(crc32(names.as_bytes()).to_le_bytes());
     bytes.extend([record.id, record.baud_code, record.return_delay_2us, record.fit_level as u8]);
-    bytes.extend(record.params.to_array().into_iter().flat_map(i32::to_le_bytes));
+    bytes.extend(record.params.to_array().into_iter().take(BEFORE).flat_map(i32::to_le_bytes));
     finish(bytes)
 }
 

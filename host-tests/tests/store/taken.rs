@@ -1,6 +1,6 @@
 //! What a firmware takes of another firmware's values, and what it says of the rest.
 
-use crate::fleet::{LACKED, OTHERS, Other, named, of_values};
+use crate::fleet::{BEFORE, LACKED, OTHERS, Other, named, of_values};
 use crate::nor::{Nor, record};
 use fingertip::params::{ParamError, Params};
 use fingertip::shipped::Config;
@@ -20,7 +20,8 @@ fn a_changed_layout_is_no_fault_and_every_known_value_is_taken() {
         let (loaded, remarks) = start(&bytes);
         assert_eq!(loaded, Loaded { record: expected, sound: true }, "{other:?}");
         let expected = match other {
-            Other::None | Other::Before => vec![],
+            Other::None => vec![],
+            Other::Before => Params::RANGES[BEFORE..].iter().map(|(name, ..)| Remark::New(name)).collect(),
             Other::More => vec![Remark::Unknown { number: number("one_more"), value: -5 }],
             Other::Fewer => vec![Remark::New(LACKED)],
             Other::Renamed => {

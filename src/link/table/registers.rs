@@ -241,6 +241,10 @@ control_table! {
     /// again once that is cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
+    /// What of present_force_mn is taken for the array's creep: the force that is held is less by this. 0 where the
+    /// parameter creep_permille is.
+    372 PRESENT_CREEP_MN: I32 ReadOnly, "mN" * 1, 0 to 32_768_000,
+        |view, _| thousandths(view.snapshot.status.creep.to_bits(), 16) as u32;
     /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6
     /// other.
     384 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,

@@ -27,6 +27,8 @@ use images::single::{self, Refined};
 /// What the kernels read and write.
 struct Bench<'a> {
     config: &'a Config,
+    /// With a characteristic that is no line, and creep.
+    curved: &'a Config,
     record: Record,
     pipeline: Pipeline,
     array: Array,
@@ -59,13 +61,15 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 18] = [
+const KERNELS: [(&str, Kernel, When); 20] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
+    ("frame pass, by a curve", curved_pass, Always),
     ("indentation from force", indentation, Always),
     ("observer", observe, Driving),
     ("goal and profile", reference, Driving),
+    ("goal and profile, with creep", creeping, Driving),
     ("speed law and limits", follow, Driving),
     ("duty from the voltage", duty, Driving),
     ("contact, whole, moments", read_moments, When::Contact),
@@ -91,6 +95,10 @@ extern "C" fn frame_pass(bench: &mut Bench) {
     bench.array.read(&bench.record.frame, bench.config);
 }
 
+extern "C" fn curved_pass(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.curved);
+}
+
 extern "C" fn indentation(bench: &mut Bench) {
     bench.depth = bench.config.tip.indentation(bench.contact.force);
 }
@@ -102,6 +110,11 @@ extern "C" fn observe(bench: &mut Bench) {
 extern "C" fn reference(bench: &mut Bench) {
     let Bench { config, record, contact, motion, goal, limits, .. } = bench;
     bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, config, limits);
+}
+
+extern "C" fn creeping(bench: &mut Bench) {
+    let Bench { curved, record, contact, motion, goal, limits, .. } = bench;
+    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, curved, limits);
 }
 
 extern "C" fn follow(bench: &mut Bench) {
@@ -153,8 +166,11 @@ fn main() -> ! {
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
     let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let params = Params { curve_permille: 3_300, creep_permille: 66, ..Params::DEFAULT };
+    let Ok(curved) = Config::shipped(&params) else { fail("a curve is refused") };
     let mut bench = Bench {
         config: &config,
+        curved: &curved,
         record: Record::from_bytes(&[0; Record::BYTES]),
         pipeline: Pipeline::new(&config),
         array: Array::new(),

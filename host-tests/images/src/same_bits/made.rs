@@ -2,6 +2,7 @@
 
 use super::machines::Machines;
 use super::{Mix, Source, frames};
+use fingertip::config::curve::Curve;
 use fingertip::config::gains::Gains;
 use fingertip::config::{self, ConfigError};
 use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
@@ -90,6 +91,9 @@ fn add_config(mix: &mut Mix, config: &Config) {
         dead_codes,
         newtons_per_sum_q48,
         pascals_per_sum_q32,
+        curve,
+        creep_share_q32,
+        creep_leak_q32,
         half_pitch,
         contact_on,
         contact_off,
@@ -133,7 +137,11 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [newtons_per_sum_q48, pascals_per_sum_q32, mm_per_count_q40] {
         mix.add(*number);
     }
-    for number in [frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
+    let Curve { least, growth } = curve.unwrap_or(Curve { least: 0, growth: 0 });
+    for number in [least, growth] {
+        mix.add(number);
+    }
+    for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }
     for number in [*frame_s_q39, *counts_max, calm_frames.cast_signed()] {

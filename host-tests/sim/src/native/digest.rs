@@ -68,6 +68,8 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         limits,
         fit_level,
         contact,
+        // What it does is in the duty.
+        creep: _,
         travel,
         speed,
         duty: applied,

@@ -8,7 +8,7 @@ use board::bridge::Bridge;
 use board::control::{self, Control};
 use board::encoder::Encoder;
 use board::flash::Store;
-use board::log::{log_boot, log_refusal, log_remark, log_save_error};
+use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
 use board::{bus, clocks, crash, guard, link_task, watch};
@@ -40,12 +40,14 @@ fn SPI3() {
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
     let boot = crash::boot();
-    let p = embassy_stm32::init(clocks::config());
+    let clocked = clocks::start_external();
+    let p = embassy_stm32::init(clocks::config(clocked));
     let bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
     clocks::accelerate_flash();
     clocks::freeze_when_halted();
     board::set_priorities();
     log_boot(boot);
+    let unfit = (!clocked).then_some(Fault::NoClock);
 
     let mut store = Store::new(p.FLASH);
     let (mut record, mut sound) = load(&mut store);
@@ -54,6 +56,10 @@ async fn main(spawner: Spawner) {
         sound = false;
     });
     let pipeline = unwrap!(made, "the default parameters make a configuration: a test of the core holds that");
+    if let Some(fault) = unfit {
+        log_unfit(fault);
+        pipeline.stop(fault);
+    }
     if !sound {
         pipeline.stop(Fault::BrokenParameters);
     }
@@ -94,6 +100,7 @@ async fn main(spawner: Spawner) {
         watchdog: IndependentWatchdog::new(p.IWDG, control::WATCHDOG_US),
         store,
         pipeline,
+        unfit,
     };
     let bus_parts = bus::Parts {
         usart: p.USART2,

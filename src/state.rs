@@ -74,6 +74,9 @@ pub enum Fault {
     Reversed = 15,
     /// The motor presses on something that the array does not see.
     Unseen = 16,
+    /// The external clock was not there at the start: what is timed is known to a few percent only. Stands until the
+    /// next start.
+    NoClock = 17,
 }
 
 /// What holds the loop back just now: a set of flags, stable by bit.

@@ -42,6 +42,8 @@ pub struct Control {
     pub store: Store,
     /// The core.
     pub pipeline: &'static mut Pipeline,
+    /// Why this board must not drive a motor: a fault that cannot be cleared.
+    pub unfit: Option<Fault>,
 }
 
 /// Runs for ever.
@@ -145,7 +147,13 @@ impl State {
             answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };
         let (_, status) = parts.pipeline.step(&self.frame, &sense, &command);
+        let stopped = status.mode == Mode::Fault;
         parts.bridge.apply(status.bridge());
+        if let Some(fault) = parts.unfit
+            && !stopped
+        {
+            parts.pipeline.stop(fault);
+        }
 
         let timing = parts.pipeline.config().timing;
         let loop_time = Stopwatch::since(completed.stamp);

@@ -87,6 +87,8 @@ pub enum CrashCause {
     HardFault = 2,
     /// It hung until the watchdog's reset.
     Hang = 3,
+    /// The external clock failed.
+    Clock = 4,
 }
 
 /// The crash record, which survives a reset.
@@ -117,7 +119,8 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
             | Fault::BrokenParameters
             | Fault::MissedDeadline
             | Fault::Crash
-            | Fault::Runaway,
+            | Fault::Runaway
+            | Fault::NoClock,
         ) => 1 << 7,
     }
 }

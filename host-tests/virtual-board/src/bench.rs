@@ -1,6 +1,7 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
 use crate::board::FingerBoard;
+use crate::clock::ExternalClock;
 use crate::flash::Kept;
 use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
@@ -46,6 +47,8 @@ pub struct Bench {
     pub core_held: bool,
     /// What the image wrote to the flash.
     pub flash: Kept,
+    /// The external clock; a snapshot does not keep it.
+    pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,
     /// Samples the world where somebody asked for it; a snapshot does not keep it.
@@ -77,6 +80,7 @@ impl Bench {
             received: Vec::new(),
             core_held: false,
             flash: Kept::default(),
+            clock: ExternalClock::default(),
             host: None,
             recorder: None,
             world_ns: 0,
@@ -172,6 +176,7 @@ impl Bench {
         if session.resets().len() != self.resets {
             self.resets = session.resets().len();
             self.log.restart();
+            self.clock.restarted(host);
             if std::mem::take(&mut self.core_held) {
                 host.hold(false);
             }

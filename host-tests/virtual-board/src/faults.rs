@@ -27,6 +27,9 @@ pub enum Fault {
     ScanInterruptLost,
     /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
     CoreHangs,
+    /// The external clock stops, and is not there at a start. The emulated part has no exception that nothing masks:
+    /// its handler is entered as the frame guard's interrupt, which has the highest priority.
+    ClockLost,
     /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of
     /// the driver.
     BusMemoryLost,
@@ -46,6 +49,7 @@ impl Fault {
             Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
             Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
             Self::CoreHangs => host.hold(defect),
+            Self::ClockLost => {}
             Self::BusMemoryLost if defect => {
                 let mut access = |kind, address, value| {
                     let access = Access::new(kind, address, Width::W32, value).at(stop.instruction_count, stop.at);
@@ -86,6 +90,9 @@ impl Rig {
             fault.apply(defect, stand.session, stand.host, stand.stop);
             if fault == Fault::CoreHangs {
                 stand.bench.core_held = defect;
+            }
+            if fault == Fault::ClockLost {
+                stand.bench.clock.set_lost(defect, stand.session, stand.host, stand.stop);
             }
             if fault == Fault::BridgeFault {
                 let at_ns = stand.bench.next_ns;

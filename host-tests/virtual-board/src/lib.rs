@@ -10,6 +10,7 @@
 pub mod bench;
 pub mod board;
 pub mod client;
+mod clock;
 pub mod converter;
 pub mod demo;
 pub mod error;

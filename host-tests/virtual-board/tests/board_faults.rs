@@ -4,7 +4,8 @@
 
 mod common;
 
-use common::{WAIT_NS, image, on_a_shared, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
+use fingertip::shipped::address;
 use host_tests::plant::{Setup, World};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
@@ -52,6 +53,34 @@ fn a_core_that_hangs_is_reset_by_the_watchdog_and_scans_again() {
     let before = frames(&mut rig);
     rig.run_ms(10).expect("it runs");
     assert!(frames(&mut rig) > before + 90);
+}
+
+#[test]
+fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
+    let mut rig = holding();
+    let lost_ns = rig.now_ns();
+    rig.inject(Fault::ClockLost).expect("it runs");
+    rig.run_ms(150).expect("it runs");
+    let edges = rig.with(|stand| stand.bench.bridge_edges.clone()).expect("it runs");
+    let last = edges.last().expect("the bridge was driven");
+    assert!(!last.on && last.at_ns <= lost_ns + 20_000, "{last:?} after {lost_ns} ns");
+    let resets = rig.resets().expect("it runs");
+    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["software"]);
+    assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 4);
+    // It scans at its rate, answers, and cannot be brought to drive.
+    assert_eq!(read_u8(&mut rig, address::FAULT), 17);
+    write_u8(&mut rig, address::CLEAR_FAULT, 1);
+    rig.run_ms(2).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (17, 5));
+    let before = frames(&mut rig);
+    rig.run_ms(100).expect("it runs");
+    let after = frames(&mut rig);
+    assert!((1_000..=1_005).contains(&(after - before)), "{} frames in 100 ms", after - before);
+    // With its clock it starts as ever.
+    rig.mend(Fault::ClockLost).expect("it runs");
+    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (0, 0));
 }
 
 #[test]

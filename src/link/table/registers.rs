@@ -99,8 +99,8 @@ control_table! {
         |view, _| view.snapshot.status.mode as u32;
     /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
-    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact.
-    265 FAULT: U8 ReadOnly, "" * 1, 0 to 16,
+    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact, 17 no clock.
+    265 FAULT: U8 ReadOnly, "" * 1, 0 to 17,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
     /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known
@@ -159,8 +159,8 @@ control_table! {
     /// other.
     318 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
         |view, _| view.snapshot.reset_cause as u32;
-    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang.
-    319 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 3,
+    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
+    319 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.snapshot.crash.cause as u32;
     /// Crashes since power-on.
     320 CRASH_COUNT: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,

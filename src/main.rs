@@ -11,7 +11,7 @@ use board::flash::Store;
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
-use board::{bus, clocks, crash, guard, link_task, watch};
+use board::{bus, clocks, crash, guard, link_task, options, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -47,7 +47,7 @@ async fn main(spawner: Spawner) {
     clocks::freeze_when_halted();
     board::set_priorities();
     log_boot(boot);
-    let unfit = (!clocked).then_some(Fault::NoClock);
+    let unfit = unfit(clocked);
 
     let mut store = Store::new(p.FLASH);
     let (mut record, mut sound) = load(&mut store);
@@ -134,6 +134,14 @@ fn load(store: &mut Store) -> (Record, bool) {
         Err(cause) => log_save_error(cause),
     }
     (record, sound)
+}
+
+/// Why this board must not drive a motor.
+fn unfit(clocked: bool) -> Option<Fault> {
+    if !clocked {
+        return Some(Fault::NoClock);
+    }
+    (!options::brown_out_resets()).then_some(Fault::BrownOutLevel)
 }
 
 /// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free

@@ -25,6 +25,7 @@ pub fn log_boot(boot: Boot) {
 pub fn log_unfit(fault: Fault) {
     match fault {
         Fault::NoClock => error!("no 8 MHz clock at PH0: internal oscillator, no torque until the next start"),
+        Fault::BrownOutLevel => error!("brown-out reset is not at level 3, no torque: run `cargo xtask flash`"),
         _ => error!("no torque until the next start: fault {=u8}", fault as u8),
     }
 }

@@ -14,6 +14,7 @@ pub mod flash;
 pub mod guard;
 pub mod link_task;
 pub mod log;
+pub mod options;
 pub mod pins;
 pub mod scan;
 pub mod supply;

@@ -120,7 +120,8 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
             | Fault::MissedDeadline
             | Fault::Crash
             | Fault::Runaway
-            | Fault::NoClock,
+            | Fault::NoClock
+            | Fault::BrownOutLevel,
         ) => 1 << 7,
     }
 }

@@ -32,11 +32,18 @@ pub struct Options {
     pub instructions_per_second: NonZeroU64,
     /// Bytes that stand in memory beside the image, at their addresses: a parameter sector for example.
     pub presets: Vec<(u64, Vec<u8>)>,
+    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
+    /// the factory does.
+    pub brown_out_bits: u8,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"), presets: Vec::new() }
+        Self {
+            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
+            presets: Vec::new(),
+            brown_out_bits: 0,
+        }
     }
 }
 
@@ -84,7 +91,7 @@ impl Rig {
         let image = Firmware::read(path)?;
         let images = images(&image, options)?;
         let front_end = Shared::new(world);
-        let board = FingerBoard::new(front_end.clone(), options.instructions_per_second)?;
+        let board = FingerBoard::new(front_end.clone(), options)?;
         let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
         let mut bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();

@@ -7,6 +7,7 @@ mod common;
 use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
 use fingertip::shipped::address;
 use host_tests::plant::{Setup, World};
+use rigless::emulator::{Access, AccessKind};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
 use std::sync::Mutex;
@@ -81,6 +82,36 @@ fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
     rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
     rig.run_ms(20).expect("it runs");
     assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (0, 0));
+}
+
+#[test]
+fn a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_programmed() {
+    let mut rig = running(&Options { brown_out_bits: 3, ..Options::default() });
+    assert_eq!(read_u8(&mut rig, address::FAULT), 18);
+    write_u8(&mut rig, address::CLEAR_FAULT, 1);
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), 18);
+    // What `cargo xtask flash` writes: two keys, the level, the start.
+    let writes = |stand: &mut virtual_board::stand::Stand<'_>| {
+        const OPTKEYR: u64 = 0x4002_3c08;
+        const OPTCR: u64 = 0x4002_3c14;
+        let mut write = |address, value| {
+            let access = Access::new(AccessKind::Write, address, Width::W32, value);
+            let access = access.at(stand.stop.instruction_count, stand.stop.at);
+            stand.session.access(access, stand.host);
+        };
+        for (address, value) in
+            [(OPTKEYR, 0x0819_2a3b), (OPTKEYR, 0x4c5d_6e7f), (OPTCR, 0x0fff_aae0), (OPTCR, 0x0fff_aae2)]
+        {
+            write(address, value);
+        }
+    };
+    rig.with(writes).expect("it runs");
+    rig.run_ms(1).expect("it runs");
+    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), 0);
+    rig.check_gaps().expect("no unknown gap");
 }
 
 #[test]

@@ -99,8 +99,9 @@ control_table! {
         |view, _| view.snapshot.status.mode as u32;
     /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
-    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact, 17 no clock.
-    265 FAULT: U8 ReadOnly, "" * 1, 0 to 17,
+    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact, 17 no clock, 18
+    /// brown-out level.
+    265 FAULT: U8 ReadOnly, "" * 1, 0 to 18,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
     /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known

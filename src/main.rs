@@ -11,13 +11,13 @@ use board::flash::Store;
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
+use board::watchdog::Watchdogs;
 use board::{bus, clocks, crash, guard, link_task, options, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::config::ConfigError;
 use fingertip::link::Settings;
 use fingertip::params::Params;
@@ -97,7 +97,7 @@ async fn main(spawner: Spawner) {
         bridge,
         encoder: Encoder::new(p.TIM3, p.PC6, p.PC7),
         supply: Supply::new(p.ADC3, p.PA0),
-        watchdog: IndependentWatchdog::new(p.IWDG, control::WATCHDOG_US),
+        watchdogs: Watchdogs::new(p.IWDG, p.WWDG),
         store,
         pipeline,
         unfit,

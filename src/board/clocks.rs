@@ -41,9 +41,12 @@ pub fn config(external: bool) -> Config {
     config
 }
 
-/// Halting the core in a debugger stops the watchdog and the bridge's timer; the latter lets go of the outputs.
+/// Halting the core in a debugger stops the watchdogs and the bridge's timer; the latter lets go of the outputs.
 pub fn freeze_when_halted() {
-    pac::DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
+    pac::DBGMCU.apb1fzr().modify(|w| {
+        w.set_iwdg(true);
+        w.set_wwdg(true);
+    });
     pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
 }
 

@@ -2,8 +2,6 @@
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 
-use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
@@ -19,9 +17,8 @@ use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
+use super::watchdog::Watchdogs;
 
-/// The watchdog's time by its nominal clock; 8 to 23 ms over the clock's tolerance.
-pub const WATCHDOG_US: u32 = 12_000;
 /// The first frame may come this many frame times after the start, before the guard trips.
 const FRAMES_TO_START: u32 = 4;
 const TICKS_PER_MS: u32 = guard::HZ / 1_000;
@@ -37,7 +34,7 @@ pub struct Control {
     /// The bridge's supply.
     pub supply: Supply,
     /// Fed here and nowhere else.
-    pub watchdog: IndependentWatchdog<'static, IWDG>,
+    pub watchdogs: Watchdogs,
     /// The parameters in flash.
     pub store: Store,
     /// The core.
@@ -84,7 +81,7 @@ impl State {
     }
 
     fn start(&mut self) {
-        self.parts.watchdog.unleash();
+        self.parts.watchdogs.start();
         self.restart_scan();
     }
 
@@ -162,7 +159,7 @@ impl State {
         self.report.loop_time_max = self.report.loop_time_max.max(loop_time);
         if loop_time.cycles() <= timing.deadline {
             guard::restart(completed.stamp, 1, timing);
-            parts.watchdog.pet();
+            parts.watchdogs.pet();
         } else {
             self.stop(Fault::MissedDeadline);
         }
@@ -182,7 +179,7 @@ impl State {
         self.bus.silent_ms(HEARD.get().packets);
         self.publish();
         if bridge::is_safe() {
-            self.parts.watchdog.pet();
+            self.parts.watchdogs.pet();
         }
     }
 
@@ -198,6 +195,7 @@ impl State {
         self.parts.scan.start(timing);
         self.seen = super::scan::newest().sequence;
         guard::restart(guard::now(), FRAMES_TO_START, timing);
+        self.parts.watchdogs.expect_frames(timing);
     }
 
     fn publish(&mut self) {
@@ -221,6 +219,7 @@ impl State {
         self.parts.bridge.apply(Wanted::Open);
         self.parts.scan.stop();
         guard::rest();
+        self.parts.watchdogs.allow_long();
         if !set_config(self.parts.pipeline, &params) {
             self.stop(Fault::BrokenParameters);
         }
@@ -237,8 +236,9 @@ impl State {
         }
         self.parts.scan.stop();
         guard::rest();
-        let Control { store, watchdog, .. } = &mut self.parts;
-        let saved = store.save(&record, || watchdog.pet());
+        let Control { store, watchdogs, .. } = &mut self.parts;
+        watchdogs.allow_long();
+        let saved = store.save(&record, || watchdogs.pet());
         self.restart_scan();
         SAVED.signal(saved.map_err(NotSaved::Failed));
     }

@@ -68,8 +68,8 @@ pub fn boot() -> Boot {
 
 fn reset_cause(csr: Csr) -> ResetCause {
     [
-        (csr.wdgrstf(), ResetCause::Watchdog),
-        (csr.wwdgrstf() || csr.lpwrrstf(), ResetCause::Other),
+        (csr.wdgrstf() || csr.wwdgrstf(), ResetCause::Watchdog),
+        (csr.lpwrrstf(), ResetCause::Other),
         (csr.sftrstf(), ResetCause::Software),
         (csr.porrstf(), ResetCause::PowerOn),
         (csr.borrstf(), ResetCause::BrownOut),

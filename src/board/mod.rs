@@ -19,6 +19,7 @@ pub mod pins;
 pub mod scan;
 pub mod supply;
 pub mod watch;
+pub mod watchdog;
 
 /// Sets every priority of the table in `docs/board.md`; embassy leaves most of them at the highest.
 ///

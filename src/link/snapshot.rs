@@ -68,9 +68,9 @@ pub enum ResetCause {
     Pin = 3,
     /// The firmware itself: a Reboot instruction, or the end of a crash.
     Software = 4,
-    /// The independent watchdog: the control task missed its deadline.
+    /// A watchdog: the control task hung.
     Watchdog = 5,
-    /// The window watchdog or a low-power fault.
+    /// A low-power fault.
     Other = 6,
 }
 

@@ -40,6 +40,7 @@ pub mod stand;
 pub mod streams;
 pub mod surroundings;
 pub mod trace;
+mod window_watchdog;
 pub mod wire;
 
 pub use error::Error;

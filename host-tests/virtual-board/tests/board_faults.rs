@@ -5,7 +5,7 @@
 mod common;
 
 use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
-use fingertip::shipped::address;
+use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
 use rigless::emulator::{Access, AccessKind};
 use rigless::mcu::Operate;
@@ -44,16 +44,45 @@ fn converters_stall_and_go_on() {
     });
 }
 
+/// At several instants of a frame, driven or not, and while the scan starts.
 #[test]
-fn a_core_that_hangs_is_reset_by_the_watchdog_and_scans_again() {
-    let mut rig = running(&Options::default());
+fn a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault() {
+    let mut driven = holding();
+    for off_us in [0, 30, 70] {
+        let mut rig = if off_us == 0 { running(&Options::default()) } else { holding() };
+        rig.run_until_ns(rig.now_ns() + off_us * 1_000).expect("it runs");
+        hangs(&mut rig);
+    }
+    // Parameters at which eight frames take longer than a millisecond: 50 us a row.
+    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
+    let written = driven.client(WAIT_NS, |bus| {
+        bus.write_u8(1, address::TORQUE_ENABLE, 0)?;
+        bus.write_u32(1, settle.address, 50_000).map(drop)
+    });
+    written.expect("the client runs").expect("the image obeys");
+    driven.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(&mut driven, address::FAULT), 0, "a slower scan is no hang");
+    assert_eq!(driven.resets().expect("it runs"), vec![]);
+}
+
+/// Stops the core, as in a loop with interrupts masked.
+fn hangs(rig: &mut Rig) {
+    let hung_ns = rig.now_ns();
     rig.inject(Fault::CoreHangs).expect("it runs");
-    rig.run_ms(100).expect("it runs");
+    rig.run_ms(2).expect("it runs");
     let resets = rig.resets().expect("it runs");
-    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["IWDG"]);
-    let before = frames(&mut rig);
+    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["WWDG"]);
+    let took_us = (resets[0].at_ns - hung_ns) / 1_000;
+    println!("reset {took_us} us after the hang");
+    assert!((100..=1_100).contains(&took_us), "{took_us} us");
+    assert!(!rig.with(|stand| stand.bench.bridge_edges.last().is_some_and(|edge| edge.on)).expect("it runs"));
+    rig.run_ms(20).expect("it runs");
+    let before = frames(rig);
     rig.run_ms(10).expect("it runs");
-    assert!(frames(&mut rig) > before + 90);
+    assert!(frames(rig) > before + 90);
+    // A crash, by a hang, after a watchdog's reset.
+    let causes = [address::FAULT, address::CRASH_CAUSE, address::RESET_CAUSE].map(|place| read_u8(rig, place));
+    assert_eq!(causes, [13, 3, 5]);
 }
 
 #[test]

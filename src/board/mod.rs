@@ -29,9 +29,9 @@ pub fn set_priorities() {
         (interrupt::TIM5, Priority::P0),
         (interrupt::DMA2_STREAM1, Priority::P1),
         (interrupt::DMA2_STREAM2, Priority::P1),
+        (interrupt::USART2, Priority::P1),
         (interrupt::SPI3, Priority::P2),
         (interrupt::TIM2, Priority::P5),
-        (interrupt::USART2, Priority::P6),
         (interrupt::DMA1_STREAM5, Priority::P6),
         (interrupt::DMA1_STREAM6, Priority::P6),
     ] {

@@ -39,6 +39,8 @@ pub struct Bench {
     pub latency: Latency,
     /// When the bridge went on and off.
     pub bridge_edges: Vec<BridgeEdge>,
+    /// When the transmit enable went high and low; a snapshot does not keep it.
+    pub transmit_edges: Vec<BridgeEdge>,
     /// The image's log.
     pub log: Log,
     /// What the image has sent and nobody took yet.
@@ -76,6 +78,7 @@ impl Bench {
             trace: Trace::default(),
             latency: Latency::default(),
             bridge_edges: Vec::new(),
+            transmit_edges: Vec::new(),
             log: Log::new(image),
             received: Vec::new(),
             core_held: false,
@@ -109,6 +112,10 @@ impl Bench {
             self.watch_bridge(board, at_ns);
         } else if access.address.wrapping_sub(GPIOC.base) < 0x400 {
             self.watch_bridge(board, at_ns);
+            let on = board.transmits();
+            if on != self.transmit_edges.last().is_some_and(|edge| edge.on) {
+                self.transmit_edges.push(BridgeEdge { at_ns, on });
+            }
         }
     }
 

@@ -63,6 +63,11 @@ impl FingerBoard {
         self.part.chip.usart[BUS_PORT].chip_mut().expect("the wire was attached when the board was made")
     }
 
+    /// Whether the transceiver holds the line.
+    pub fn transmits(&mut self) -> bool {
+        level(&mut self.part, PORT_C, 8) == Level::High
+    }
+
     /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it
     /// coasts.
     pub fn bridge(&mut self) -> Bridge {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, image, on_a_shared, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
@@ -82,6 +82,28 @@ fn it_answers_a_ping_at_its_baud_rate() {
         let took_ns = reply[13].at_ns - reply[0].at_ns;
         assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
     });
+}
+
+/// Also where control is at work just then: at many instants of a frame, with a contact to fit to.
+#[test]
+fn the_line_is_given_back_right_after_the_last_stop_bit() {
+    let mut rig = holding();
+    let mut late_ns = Vec::new();
+    for turn in 0..40 {
+        rig.run_until_ns(rig.now_ns() + 10_000 * (turn % 10)).expect("it runs");
+        rig.take_received().expect("it runs");
+        rig.with(|stand| stand.bench.transmit_edges.clear()).expect("it runs");
+        rig.send(&PING).expect("it runs");
+        rig.run_ms(2).expect("it runs");
+        let end_ns = rig.take_received().expect("it runs").last().expect("it answers").at_ns;
+        let edges = rig.with(|stand| std::mem::take(&mut stand.bench.transmit_edges)).expect("it runs");
+        assert_eq!(edges.iter().map(|edge| edge.on).collect::<Vec<_>>(), [true, false]);
+        assert!(edges[1].at_ns >= end_ns, "{} ns before the last stop bit's end", end_ns - edges[1].at_ns);
+        late_ns.push(edges[1].at_ns - end_ns);
+    }
+    late_ns.sort_unstable();
+    println!("given back {} to {} ns after the last stop bit, half within {}", late_ns[0], late_ns[39], late_ns[20]);
+    assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
 }
 
 #[test]

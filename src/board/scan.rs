@@ -95,6 +95,8 @@ impl Scan {
     /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         stop();
+        // First, while no converter listens: a compare that is set below the counter is a trigger.
+        set_timer(timing);
         let time = converter::sample_time(timing.sample_cycles);
         for (adc, channels) in [pac::ADC1, pac::ADC2].into_iter().zip(CHANNELS) {
             start_converter(adc, || converter::set_sequence(adc, channels, time));
@@ -109,7 +111,8 @@ impl Scan {
             interrupt::DMA2_STREAM1.enable();
             interrupt::DMA2_STREAM2.enable();
         }
-        start_timer(timing);
+        converter::stabilise();
+        start_timer();
     }
 
     /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or

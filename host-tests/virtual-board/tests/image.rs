@@ -106,6 +106,23 @@ fn the_line_is_given_back_right_after_the_last_stop_bit() {
     assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
 }
 
+/// A compare set below the counter triggers the converters once too often, where it comes before the timer starts anew
+/// and leaves them time until the first row: each row would then be read a slot late.
+#[test]
+fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
+    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
+    let mut rig = rig();
+    rig.run_until_ns(20_000_000).expect("it runs");
+    for (turn, settle_ns) in [100_000, 20_000, 90_000, 15_000, 100_000, 10_000].into_iter().enumerate() {
+        rig.run_until_ns(rig.now_ns() + 10_000 * turn as u64).expect("it runs");
+        let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, settle.address, settle_ns).map(drop));
+        written.expect("the client runs").expect("the image obeys");
+        rig.run_ms(20).expect("it runs");
+        let bad = read_u8(&mut rig, address::BAD_TAXELS);
+        assert_eq!(bad, 0, "taxels that read nothing, with {settle_ns} ns");
+    }
+}
+
 #[test]
 fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
     let mut whole = rig();

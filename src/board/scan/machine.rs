@@ -118,14 +118,24 @@ pub fn start_rows() {
     stream.cr().modify(|w| w.set_en(true));
 }
 
-/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters.
-pub fn start_timer(timing: ScanTiming) {
+/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters. Leaves the
+/// counter at 0, with the compare's output low.
+pub fn set_timer(timing: ScanTiming) {
     let timer = pac::TIM8;
     timer.arr().write(|w| w.set_arr((timing.slot.0 - 1) as u16));
     timer.ccr(0).write(|w| w.set_ccr(timing.settle.0 as u16));
-    timer.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+    timer.ccmr_output(0).write(|w| {
+        w.set_ocm(0, Ocm::PWM_MODE2);
+        w.set_ocpe(0, true);
+    });
     timer.ccer().write(|w| w.set_cce(0, true));
     timer.bdtr().write(|w| w.set_moe(true));
+    timer.egr().write(|w| w.set_ug(true));
+}
+
+/// From the first row.
+pub fn start_timer() {
+    let timer = pac::TIM8;
     timer.dier().write(|w| w.set_ude(true));
     timer.egr().write(|w| w.set_ug(true));
     timer.cr1().write(|w| w.set_cen(true));

@@ -12,7 +12,7 @@ use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
 use board::watchdog::Watchdogs;
-use board::{bus, clocks, crash, guard, link_task, options, watch};
+use board::{bus, clocks, crash, guard, link_task, options, stack, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -39,12 +39,14 @@ fn SPI3() {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    stack::guard_foot();
     let boot = crash::boot();
     let clocked = clocks::start_external();
     let p = embassy_stm32::init(clocks::config(clocked));
     let bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
     clocks::accelerate_flash();
     clocks::freeze_when_halted();
+    clocks::free_trace_pin();
     board::set_priorities();
     log_boot(boot);
     let unfit = unfit(clocked);

@@ -50,6 +50,11 @@ pub fn freeze_when_halted() {
     pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
 }
 
+/// Takes PB3, a row, back from the trace, which a debugger may have turned on: only power-off does that otherwise.
+pub fn free_trace_pin() {
+    pac::DBGMCU.cr().modify(|w| w.set_trace_ioen(false));
+}
+
 /// Turns on the flash accelerator: instruction cache, data cache and prefetch, which the reset and embassy leave off.
 /// Without it every fetch would wait for the flash, five cycles a line.
 pub fn accelerate_flash() {

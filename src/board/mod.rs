@@ -17,6 +17,7 @@ pub mod log;
 pub mod options;
 pub mod pins;
 pub mod scan;
+pub mod stack;
 pub mod supply;
 pub mod watch;
 pub mod watchdog;

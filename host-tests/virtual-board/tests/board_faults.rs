@@ -144,6 +144,21 @@ fn a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_pro
 }
 
 #[test]
+fn a_store_just_below_ram_is_a_hard_fault_there_and_then() {
+    let mut rig = running(&Options::default());
+    rig.inject(Fault::StoreBelowRam).expect("it runs");
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(rig.resets().expect("it runs").first().map(|reset| reset.cause.clone()).as_deref(), Some("software"));
+    // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
+    let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");
+    let words = move |stand: &mut virtual_board::stand::Stand<'_>| {
+        [4, 12].map(|offset| stand.host.read(record + offset, Width::W32).unwrap_or(0))
+    };
+    let [cause, pc] = rig.with(words).expect("it runs");
+    assert_eq!((cause, pc), (2, 0x0803_f008), "a hard fault at the store");
+}
+
+#[test]
 fn without_the_scans_interrupt_the_image_misses_frames_that_go_on() {
     let mut rig = running(&Options::default());
     assert_eq!(alert(&mut rig), Some(false));

@@ -15,6 +15,7 @@ use super::encoder::Encoder;
 use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
+use super::health;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
 use super::watchdog::Watchdogs;
@@ -58,6 +59,7 @@ struct State {
     parts: Control,
     frame: Frame,
     seen: u32,
+    stamp: u32,
     discard_next: bool,
     /// The scan is not to be trusted before its next start.
     lost: bool,
@@ -72,6 +74,7 @@ impl State {
             parts,
             frame: Frame::EMPTY,
             seen: 0,
+            stamp: 0,
             discard_next: true,
             lost: false,
             report: Report::default(),
@@ -110,9 +113,15 @@ impl State {
         if newest.sequence == self.seen {
             return;
         }
+        let follows = newest.sequence.wrapping_sub(self.seen) == 1;
         self.seen = newest.sequence;
+        let before = core::mem::replace(&mut self.stamp, newest.stamp);
         if core::mem::take(&mut self.discard_next) {
             return;
+        }
+        if follows {
+            let frame = guard::frame(self.parts.pipeline.config().timing);
+            health::note_interval(Stopwatch(newest.stamp.wrapping_sub(before).saturating_sub(frame)));
         }
         // A frame that is not whole counts as missed: the guard runs on.
         if self.parts.scan.copy(newest, &mut self.frame) {
@@ -174,6 +183,7 @@ impl State {
     fn without_frames(&mut self) {
         self.stop(Fault::LostFrames);
         self.lost = true;
+        super::scan::note_transfers();
         // Both keep track of counters that wrap.
         self.parts.encoder.read();
         self.bus.silent_ms(HEARD.get().packets);

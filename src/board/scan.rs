@@ -19,7 +19,8 @@ use fingertip::frame::BANKS;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 
-use super::{converter, guard, pins};
+use super::health::{self, Broken};
+use super::{converter, guard, pins, reference};
 use machine::*;
 
 /// Wakes the control task: a frame is complete or half complete, or the guard tripped.
@@ -84,6 +85,7 @@ impl Scan {
         rcc::enable_and_reset::<ADC1>();
         rcc::enable_and_reset::<ADC2>();
         converter::set_clock();
+        reference::measure();
         Self(())
     }
 
@@ -123,7 +125,11 @@ impl Scan {
         copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
-        arrived && untouched && in_step() && newest() == completed
+        let whole = arrived && untouched && in_step() && newest() == completed;
+        if !whole {
+            health::note_broken(what_broke(half));
+        }
+        whole
     }
 
     /// Replaces the slots of `frame` that the scan has already read anew.
@@ -134,6 +140,28 @@ impl Scan {
             copy_slots(half_a, usize::from(stored) / BANK_COLUMNS, frame);
         }
     }
+}
+
+/// What is wrong with a frame that is not whole.
+#[cold]
+#[inline(never)]
+fn what_broke(half: usize) -> Broken {
+    note_transfers();
+    if overrun() {
+        Broken::Overrun
+    } else if !bank_a_completed(half) {
+        Broken::Bank
+    } else if !in_step() {
+        Broken::OutOfStep
+    } else {
+        Broken::Overwritten
+    }
+}
+
+/// Counts what went wrong with the transfers since the last time.
+pub fn note_transfers() {
+    let (bus, stream) = take_errors();
+    health::note_transfers(bus, stream);
 }
 
 /// Copies the first slots of a half.

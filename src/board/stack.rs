@@ -14,6 +14,26 @@ const ATTRIBUTES: u32 = 13 << 1 | 1 | 1 << 28;
 /// On, with the usual map for all else. Off in the hard fault's handler.
 const CONTROL: u32 = 1 | 1 << 2;
 
+/// What the start-up code paints the stack with.
+const PAINT: u32 = 0xCCCC_CCCC;
+
+unsafe extern "C" {
+    /// The stack's lower end; from memory.x.
+    static _stack_end: u32;
+    /// Where the stack starts, its upper end.
+    static _stack_start: u32;
+}
+
+/// Bytes that the stack has taken at most since the reset, by the paint that is left. Reads all that is left.
+pub fn deepest() -> u16 {
+    let (mut place, top) = (&raw const _stack_end, &raw const _stack_start);
+    // SAFETY: aligned and inside the stack, which is always readable.
+    while place < top && unsafe { place.read_volatile() } == PAINT {
+        place = place.wrapping_add(1);
+    }
+    u16::try_from(top.addr() - place.addr()).unwrap_or(u16::MAX)
+}
+
 /// Closes it.
 pub fn guard_foot() {
     // SAFETY: nothing else uses these registers, and nothing of the image lies in the region.

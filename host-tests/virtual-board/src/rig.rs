@@ -7,7 +7,7 @@
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
 use crate::error::Error;
-use crate::front_end::{ScanCounts, Shared};
+use crate::front_end::{REFERENCE_V, ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::link::Listening;
 use crate::scene::finger::Finger;
@@ -46,6 +46,10 @@ impl Default for Options {
         }
     }
 }
+
+/// What the factory measured of the internal reference, and at which supply.
+const CALIBRATION: u64 = 0x1fff_7a2a;
+const CALIBRATED_AT_V: f64 = 3.3;
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
@@ -299,6 +303,8 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
+    let calibration = (REFERENCE_V / CALIBRATED_AT_V * 4096.0) as u16;
+    images.push(read(Path::new("factory"), calibration.to_le_bytes().to_vec(), Some(CALIBRATION))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }

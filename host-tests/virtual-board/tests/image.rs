@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
@@ -121,6 +121,27 @@ fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
         let bad = read_u8(&mut rig, address::BAD_TAXELS);
         assert_eq!(bad, 0, "taxels that read nothing, with {settle_ns} ns");
     }
+}
+
+#[test]
+fn the_bus_tells_how_the_board_is() {
+    with_one_that_is_up(|rig| {
+        rig.run_ms(1_100).expect("it runs");
+        assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
+        assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
+        let deepest = rig.stack_use().expect("it runs").expect("the image tells where its stack lies").used;
+        let told = u64::from(read_u16(rig, address::STACK_BYTES));
+        assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
+        let late_ns = read_u16(rig, address::FRAME_LATE_NS);
+        println!("a frame's end came {late_ns} ns late");
+        assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
+        for count in [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN] {
+            assert_eq!(read_u16(rig, count), 0);
+        }
+        for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
+            assert_eq!(read_u16(rig, count), 0);
+        }
+    });
 }
 
 #[test]

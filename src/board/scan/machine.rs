@@ -175,3 +175,19 @@ pub fn bank_a_completed(half: usize) -> bool {
 pub fn overrun() -> bool {
     [pac::ADC1, pac::ADC2].into_iter().any(|adc| adc.sr().read().ovr())
 }
+
+/// Whether a transfer failed on the memory's bus, and whether a stream failed, since the last time.
+pub fn take_errors() -> (bool, bool) {
+    let flags = pac::DMA2.isr(0).read();
+    let streams = [STREAM_A, STREAM_ROWS, STREAM_B];
+    pac::DMA2.ifcr(0).write(|w| {
+        for stream in streams {
+            w.set_teif(stream, true);
+            w.set_dmeif(stream, true);
+            w.set_feif(stream, true);
+        }
+    });
+    let any =
+        |failed: fn(&pac::dma::regs::Ixr, usize) -> bool| streams.into_iter().any(|stream| failed(&flags, stream));
+    (any(|flags, stream| flags.teif(stream)), any(|flags, stream| flags.dmeif(stream) || flags.feif(stream)))
+}

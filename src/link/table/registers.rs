@@ -236,6 +236,47 @@ control_table! {
     /// again once that is cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
+    /// The option bytes as the last reset loaded them: FLASH_OPTCR of the microcontroller.
+    484 OPTION_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.health.option_bytes;
+    /// The analogue supply at the start, by the internal reference; 0 where it is not known.
+    488 ANALOGUE_SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.analogue_mv);
+    /// The deepest that the stack has been since reset, looked up each second.
+    490 STACK_BYTES: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.stack_bytes);
+    /// The longest that a frame's end came late to the processor: behind a critical section, or behind an interrupt
+    /// that is no less urgent.
+    492 FRAME_LATE_NS: U16 ReadOnly, "ns" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.late_ns);
+    /// Frames that were there and not whole: a bank was missing. Those of missed_frames that are in none of these four
+    /// counts came and went unseen.
+    494 BANK_MISSING: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[0]);
+    /// The same: the banks were out of step with the rows.
+    496 OUT_OF_STEP: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[1]);
+    /// The same: a converter had overrun.
+    498 CONVERTER_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[2]);
+    /// The same: the next frame came over it.
+    500 OVERWRITTEN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[3]);
+    /// Errors of the scan's transfers on the memory's bus.
+    502 TRANSFER_BUS_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.transfer_errors[0]);
+    /// Errors of the scan's streams: direct mode and FIFO.
+    504 TRANSFER_STREAM_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.transfer_errors[1]);
+    /// Noise on the line of the bus.
+    506 LINE_NOISE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[0]);
+    /// Bytes without a stop bit, or with the wrong parity.
+    508 LINE_FRAMING: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[1]);
+    /// Bytes that came faster than they were taken.
+    510 LINE_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[2]);
 }
 
 /// How many registers there are.

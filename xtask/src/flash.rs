@@ -29,7 +29,7 @@ const OPTSTRT: u32 = 1 << 1;
 /// Zero is level 3: a reset below 2.7 V. The factory leaves it off.
 const BOR_LEV: u32 = 0b11 << 2;
 
-/// Builds the flash image, prints its SHA-256, writes these bytes, verifies them, sees to the option bytes and starts it.
+/// Builds the flash image, prints its SHA-256, writes and verifies it, sees to the option bytes, and starts it.
 ///
 /// # Errors
 /// The image does not build, probe-rs is missing, or there is no board.

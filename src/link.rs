@@ -11,17 +11,23 @@
 //!
 //! | subject | rule |
 //! | --- | --- |
-//! | write | all or nothing; covers whole registers: a partial one is a length error |
-//! | read | any bytes, as long as each belongs to a register: access error otherwise; 1 to 256 bytes: length error otherwise |
+//! | write | all or nothing; covers whole registers: a partial one is a length error, a gap an access error |
+//! | indirect data | read and written as the registers that the indirect addresses lead to |
+//! | read | any bytes of the table, 0 where there is no register; beyond its end an access error; 1 to 256 bytes: length error otherwise |
 //! | stored registers | written with torque off only; kept over a reset only once `save_parameters` was written |
 //! | value beyond another register's limit, parameters that contradict each other | limit error |
-//! | fault | torque enable and goal force go to 0; torque enable and goals above 0 are refused (result error) until the fault is cleared |
+//! | fault | torque enable and goal force go to 0; torque enable and goals above 0 are refused (result error) until the fault is cleared: `recover` does all that this takes in one write |
 //! | request that cannot be carried out as the loop stands | result error: a tare in a fault that is not cleared by then, a measurement of the modulus without torque or tare, a save or Factory Reset while the loop drives or tares. What comes in between shows in `tare_state`, `identify_state` and `saved_state`, also for those whom nothing is answered |
-//! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and goal force and torque enable are refused (access error) until 0 is written to it |
+//! | bus watchdog | counts from the last good instruction packet for this device, broadcasts included; on a trip it reads -1, and until 0 is written to it goals are refused (range error, as X-series servos do) and torque enable is (result error) |
+//! | torque off | takes the goal back |
+//! | before the first tare | force and all that goes by it read 0 |
 //! | damaged packet | CRC error where it seems to be for this device, silence otherwise; nothing is done |
 //! | Sync Read, Bulk Read | answered after the status packet of the device before in the list is heard; silent where that one is |
 //! | broadcast Ping | answered after 14 byte times for each lower ID |
 //! | Action | answered like a write where it names this device; `dynamixel-sdk` does not read that answer, so let it pass |
+//! | fast reads | answered in one packet to which each device adds its part; zeros, with the error, where a part cannot be read |
+//! | Clear | `02 "ERCL"` is `recover`; there is no multi-turn position to clear (`01 "DXL\""`): range error |
+//! | Control Table Backup | `01 "CTRL"` is `save_parameters`; there is no older backup to restore (`02 "CTRL"`): range error |
 //! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
 
 pub mod crc;

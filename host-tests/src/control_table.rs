@@ -4,7 +4,7 @@ use crate::units;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, Kind, READ_MAX, Register};
 use fingertip::params::Params;
-use fingertip::shipped::{REGISTERS, address};
+use fingertip::shipped::{REGISTERS, TAXELS, address};
 
 /// How this page is made anew.
 pub const COMMAND: &str = "cargo xtask docs";
@@ -13,13 +13,19 @@ pub const COMMAND: &str = "cargo xtask docs";
 pub fn markdown() -> String {
     let mut page = String::new();
     let state = address::PRESENT_MODE;
-    let state_bytes = address::LOOP_TIME_MAX_US + 2 - state;
+    let state_bytes = address::FRAME_PERIOD_NS + 4 - state;
+    let (picture, end) = (address::PICTURE_TIME_US, address::RAW_CODES.min(address::PRESSURES + 2 * TAXELS as u16) - 1);
+    let together = end + 1 - picture;
     page += &format!(
         "# Control table\n\n\
         Generated from `src/link/table/registers.rs` and `src/params.rs` by `{COMMAND}`: do not edit.\n\n\
         DYNAMIXEL Protocol 2.0. Numbers are little-endian, signed ones two's complement. One Read of {state_bytes} \
-        bytes from {state} fetches the whole state of the loop, all from one frame. A read may take any bytes that belong \
-        to registers, 1 to {READ_MAX} of them; a write covers whole registers, and either all of it happens or nothing.\n\n\
+        bytes from {state} fetches the whole state of the loop, all from one frame. A read may take any 1 to {READ_MAX} \
+        bytes of the table, and gets 0 where there is no register; a write covers whole registers, and either all of it \
+        happens or nothing.\n\n\
+        Some registers have a second name elsewhere, for drivers that cannot reach the first: 148 to 166 for those whose \
+        addresses end at 255, {picture} to {end} for those that read 255 bytes at most (state, time and all pressures in \
+        {together} bytes).\n\n\
         - **access**: R read only, RW, RW-off writable with torque off, S writable with torque off and kept in flash \
         once `save_parameters` was written, S-any the same but writable at any time.\n\
         - **one is**: what a step of the number means, which is also its resolution.\n\n"
@@ -36,7 +42,7 @@ fn errors(page: &mut String) {
         (StatusError::Result, "understood, but cannot be carried out just now"),
         (StatusError::Instruction, "no such instruction, or not under this ID"),
         (StatusError::Crc, "the packet arrived damaged"),
-        (StatusError::Range, "a value outside its register's range"),
+        (StatusError::Range, "a value outside its register's range, or a goal after the bus watchdog has tripped"),
         (StatusError::Length, "parameters missing or too many, a part of a register written, a read too long"),
         (
             StatusError::Limit,

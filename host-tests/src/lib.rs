@@ -2,18 +2,27 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+#[cfg(feature = "judges")]
 pub mod control_table;
-pub mod demo;
+#[cfg(feature = "judges")]
 pub mod emulator;
+#[cfg(feature = "judges")]
 pub mod figures;
+#[cfg(feature = "judges")]
 pub mod fit_cases;
+#[cfg(feature = "judges")]
 pub mod fit_statistics;
+#[cfg(feature = "judges")]
 pub mod fit_tables;
 pub mod heatmap;
+#[cfg(feature = "judges")]
 pub mod imports;
 pub mod kept;
+#[cfg(feature = "judges")]
 pub mod long_run;
-pub mod metrics;
+#[cfg(feature = "judges")]
+pub mod model_file;
+#[cfg(feature = "judges")]
 pub mod native;
 pub mod optimal;
 pub mod plant;
@@ -21,6 +30,7 @@ pub mod plot;
 #[cfg(feature = "judges")]
 pub mod prove;
 pub mod say;
+#[cfg(feature = "judges")]
 pub mod stimulus;
 #[cfg(feature = "judges")]
 pub mod study;

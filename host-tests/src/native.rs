@@ -1,16 +1,11 @@
 //! The same core on the host, closed over the plant: fast, and without a microcontroller in between.
 
-use crate::plant::{Bridge, Setup, World};
+use crate::plant::{Bridge, DUTY_DELAY_SLOTS, Setup, World};
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::pipeline::{self, Status};
+use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, SLOTS};
-use fingertip::units::Duty;
 use images::record::Record;
-
-/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
-/// up.
-const DUTY_DELAY_SLOTS: usize = 3;
 
 /// A board with the core running on it.
 pub struct Native {
@@ -73,7 +68,7 @@ impl Native {
         let mut record = Record { frame: self.frame, sense: self.sense, command: self.command };
         change(&mut record);
         let (_, status) = self.pipeline.step(&record.frame, &record.sense, &record.command);
-        self.next = bridge(status);
+        self.next = Bridge::of(status);
         *status
     }
 
@@ -84,14 +79,5 @@ impl Native {
             self.step();
         }
         self.command.torque = true;
-    }
-}
-
-/// What a step means at the bridge.
-pub fn bridge(status: &Status) -> Bridge {
-    match status.bridge() {
-        pipeline::Bridge::Asleep | pipeline::Bridge::Open => Bridge::Coast,
-        pipeline::Bridge::Brakes => Bridge::Driven { duty: 0.0 },
-        pipeline::Bridge::Driven(duty) => Bridge::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) },
     }
 }

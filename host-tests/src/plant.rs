@@ -25,9 +25,14 @@ pub use setup::Setup;
 use core::f64::consts::TAU;
 use drive::{Dynamics, Shaft, Source};
 use fingertip::frame::Sense;
+use fingertip::pipeline::{self, Status};
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use fingertip::units::CoreCycles;
+use fingertip::units::{CoreCycles, Duty};
 use serde::{Deserialize, Serialize};
+
+/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
+/// up.
+pub const DUTY_DELAY_SLOTS: usize = 3;
 
 /// What the bridge does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -40,6 +45,17 @@ pub enum Bridge {
         /// Share of the supply, -1 to 1; positive presses. 0 brakes.
         duty: f64,
     },
+}
+
+impl Bridge {
+    /// What a step means at the bridge.
+    pub fn of(status: &Status) -> Self {
+        match status.bridge() {
+            pipeline::Bridge::Asleep | pipeline::Bridge::Open => Self::Coast,
+            pipeline::Bridge::Brakes => Self::Driven { duty: 0.0 },
+            pipeline::Bridge::Driven(duty) => Self::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) },
+        }
+    }
 }
 
 /// What is wrong with the board.

@@ -3,11 +3,13 @@
 
 mod charts;
 mod curves;
+#[cfg(feature = "judges")]
 mod fronts;
 mod maps;
 
-pub use charts::{Panel, overview, steps};
+pub use charts::{Panel, Sample, overview, steps};
 pub use curves::{Curve, Curves, curves};
+#[cfg(feature = "judges")]
 pub use fronts::{Dot, Front, front};
 pub use maps::{Map, maps};
 

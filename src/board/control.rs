@@ -65,6 +65,7 @@ struct State {
     lost: bool,
     report: Report,
     bus: BusClock,
+    time: FrameClock,
     clear_seen: u8,
 }
 
@@ -79,6 +80,7 @@ impl State {
             lost: false,
             report: Report::default(),
             bus: BusClock::new(),
+            time: FrameClock::new(),
             clear_seen: 0,
         }
     }
@@ -165,6 +167,8 @@ impl State {
         let loop_time = Stopwatch::since(completed.stamp);
         self.report.supply_mv = sense.supply_mv;
         self.report.loop_time = loop_time;
+        self.report.frame_time_us = self.time.at_us(completed.stamp);
+        self.report.frame_ns = timing.frame_ns;
         self.report.loop_time_max = self.report.loop_time_max.max(loop_time);
         if loop_time.cycles() <= timing.deadline {
             guard::restart(completed.stamp, 1, timing);
@@ -184,9 +188,10 @@ impl State {
         self.stop(Fault::LostFrames);
         self.lost = true;
         super::scan::note_transfers();
-        // Both keep track of counters that wrap.
+        // These keep track of counters that wrap.
         self.parts.encoder.read();
         self.bus.silent_ms(HEARD.get().packets);
+        self.time.at_us(guard::now());
         self.publish();
         if bridge::is_safe() {
             self.parts.watchdogs.pet();
@@ -261,6 +266,33 @@ fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
         pipeline.configure(&config);
         true
     })
+}
+
+/// The stopwatch in microseconds, beyond its wrap.
+struct FrameClock {
+    last: u32,
+    part_ticks: u32,
+    time_us: u32,
+}
+
+impl FrameClock {
+    const fn new() -> Self {
+        Self { last: 0, part_ticks: 0, time_us: 0 }
+    }
+
+    /// The time of an instant at most half a wrap of the stopwatch later than the last one. A frame that ended before
+    /// its loss was noticed counts as from then.
+    fn at_us(&mut self, instant: u32) -> u32 {
+        let passed = instant.wrapping_sub(self.last);
+        if passed.cast_signed() < 0 {
+            return self.time_us;
+        }
+        let ticks = passed + self.part_ticks;
+        self.last = instant;
+        self.part_ticks = ticks % guard::TICKS_PER_US;
+        self.time_us = self.time_us.wrapping_add(ticks / guard::TICKS_PER_US);
+        self.time_us
+    }
 }
 
 /// How long the bus has been silent, measured where a hanging link cannot stop the clock.

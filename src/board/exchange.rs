@@ -21,6 +21,10 @@ use super::guard::Stopwatch;
 pub struct Report {
     /// The pipeline's own report.
     pub status: Status,
+    /// When the frame ended, in microseconds since control started; wraps.
+    pub frame_time_us: u32,
+    /// From frame to frame; 0 before the first.
+    pub frame_ns: u32,
     /// The bridge's supply.
     pub supply_mv: u16,
     /// From the frame's end to the new duty.

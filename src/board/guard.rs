@@ -20,6 +20,8 @@ use super::{bridge, scan};
 
 /// Ticks of the stopwatch in a second.
 pub const HZ: u32 = 84_000_000;
+/// The same in a microsecond.
+pub const TICKS_PER_US: u32 = HZ / 1_000_000;
 
 /// A time on the stopwatch: its ticks.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]

@@ -16,8 +16,6 @@ use super::health;
 use super::log::log_save_error;
 use super::scan::WAKE;
 
-const TICKS_PER_US: u32 = guard::HZ / 1_000_000;
-
 /// Runs for ever.
 #[embassy_executor::task]
 pub async fn run(bus: Bus, record: Record, boot: Boot) {
@@ -125,6 +123,8 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         status: report.status,
         supply_mv: report.supply_mv,
         tick_ms: Instant::now().as_millis() as u32,
+        frame_time_us: report.frame_time_us,
+        frame_ns: report.frame_ns,
         loop_time_us: microseconds(report.loop_time),
         loop_time_max_us: microseconds(report.loop_time_max),
         reset_cause: boot.reset,
@@ -139,5 +139,5 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
 
 /// Rounded up: a high-water mark must not look better than it is.
 fn microseconds(time: Stopwatch) -> u16 {
-    u16::try_from(time.0.div_ceil(TICKS_PER_US)).unwrap_or(u16::MAX)
+    u16::try_from(time.0.div_ceil(guard::TICKS_PER_US)).unwrap_or(u16::MAX)
 }

@@ -31,6 +31,10 @@ pub mod instruction {
     pub const FACTORY_RESET: u8 = 0x06;
     /// Resets the controller.
     pub const REBOOT: u8 = 0x08;
+    /// Clears what its parameters name: `02 "ERCL"` a fault.
+    pub const CLEAR: u8 = 0x10;
+    /// Backs up the stored registers (`01 "CTRL"`), or restores them.
+    pub const BACKUP: u8 = 0x20;
     /// Marks a device's reply.
     pub const STATUS: u8 = 0x55;
     /// Reads the same addresses of several devices.
@@ -43,6 +47,8 @@ pub mod instruction {
     pub const BULK_READ: u8 = 0x92;
     /// Writes different addresses of several devices.
     pub const BULK_WRITE: u8 = 0x93;
+    /// Like [`BULK_READ`], answered in one packet to which each device adds its part.
+    pub const FAST_BULK_READ: u8 = 0x9A;
 }
 
 /// Why an instruction was refused, with the protocol's numbers.
@@ -55,7 +61,7 @@ pub enum StatusError {
     Instruction = 2,
     /// The packet arrived damaged.
     Crc = 3,
-    /// A value lies outside its register's range.
+    /// A value lies outside its register's range, or a goal comes after the bus watchdog has tripped.
     Range = 4,
     /// Parameters are missing or too many, a write does not cover whole registers, or a read is too long.
     Length = 5,

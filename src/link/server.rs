@@ -6,7 +6,6 @@ mod execute;
 use heapless::Vec;
 
 use crate::command::Command;
-use crate::pipeline::Status;
 use crate::scan::Clocks;
 use crate::store::Record;
 use crate::units::Newtons;
@@ -75,7 +74,7 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
-///     status: Status::default(), supply_mv: 6000, tick_ms: 0, loop_time_us: 0, loop_time_max_us: 0,
+///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0, loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(), health: Default::default(),
 ///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros,
 /// };
@@ -119,7 +118,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// the rest. Do not feed what this device itself sends.
     pub fn feed(&mut self, bytes: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) -> usize {
         reply.clear();
-        self.observe(&snapshot.status);
+        self.observe(Stand::of(snapshot));
         for (place, &byte) in bytes.iter().enumerate() {
             self.state.listen(byte, snapshot, reply);
             match self.receiver.push(byte) {
@@ -171,9 +170,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     }
 
     /// A fault turns torque off and lets go; a silent bus also trips the watchdog's register.
-    fn observe(&mut self, status: &Status) {
+    fn observe(&mut self, stand: Stand) {
         let settings = &mut self.state.settings;
-        let stand = Stand::of(status);
         if stand.faulted {
             settings.command.torque = false;
             settings.command.goal = Newtons::ZERO;
@@ -190,5 +188,10 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// Whether a Reg Write waits.
     pub fn registered(&self) -> bool {
         self.registered.is_some()
+    }
+
+    /// What waits for the firmware.
+    pub fn actions(&self) -> Actions {
+        self.actions
     }
 }

@@ -7,6 +7,7 @@ use crate::store::{BAUD_RATES, Record};
 use crate::units::Newtons;
 
 use super::packet::StatusError;
+use super::table::indirect;
 
 /// Everything that a write can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +22,8 @@ pub struct Settings {
     pub watchdog_tripped: bool,
     /// How the record stands to the flash.
     pub saved: Saved,
+    /// Where the bytes of the indirect data stand; 0 is nowhere.
+    pub indirect: [u16; indirect::COUNT],
 }
 
 /// How the stored registers stand to the flash. The numbers are stable.
@@ -57,6 +60,7 @@ impl Settings {
             status_return_level: 2,
             watchdog_tripped: false,
             saved: Saved::Same,
+            indirect: [0; indirect::COUNT],
         }
     }
 

@@ -14,6 +14,10 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub supply_mv: u16,
     /// Time since reset; wraps.
     pub tick_ms: u32,
+    /// When the frame's last conversion ended, in microseconds since the controller started; wraps.
+    pub frame_time_us: u32,
+    /// From frame to frame.
+    pub frame_ns: u32,
     /// From a frame's last conversion to the new duty, last time.
     pub loop_time_us: u16,
     /// The longest of those since reset.
@@ -162,6 +166,8 @@ mod tests {
             status: Status::default(),
             supply_mv: 0,
             tick_ms: 0,
+            frame_time_us: 0,
+            frame_ns: 0,
             loop_time_us: 0,
             loop_time_max_us: 0,
             reset_cause: ResetCause::Unknown,

@@ -5,12 +5,14 @@
 //! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
 
 use crate::command::Command;
-use crate::pipeline::{Status, Taken};
+use crate::params::Params;
+use crate::pipeline::Taken;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::Newtons;
 
 use super::packet::StatusError;
 use super::settings::Actions;
+use super::snapshot::Snapshot;
 
 /// What the last snapshot told.
 #[derive(Clone, Copy, Debug, Default)]
@@ -22,17 +24,49 @@ pub(super) struct Stand {
     taken: Taken,
     mode: Mode,
     tared: bool,
+    supply_mv: u16,
+    bad_taxels: u8,
+}
+
+/// What stands in the way of recovering from a fault: it would be back at once. The numbers are stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Hindrance {
+    None = 0,
+    SupplyLow = 1,
+    SupplyHigh = 2,
+    BadTaxels = 3,
+    SaveWaits = 4,
 }
 
 impl Stand {
-    /// As a status shows it.
-    pub fn of(status: &Status) -> Self {
+    /// As a snapshot shows it.
+    pub fn of<const ROWS: usize, const COLUMNS: usize>(snapshot: &Snapshot<'_, ROWS, COLUMNS>) -> Self {
+        let status = &snapshot.status;
         Self {
             faulted: status.fault.is_some(),
             bus_silent: status.fault == Some(Fault::BusSilent),
             taken: status.taken,
             mode: status.mode,
             tared: !status.limits.has(Limits::NOT_TARED),
+            supply_mv: snapshot.supply_mv,
+            bad_taxels: status.contact.bad_taxels,
+        }
+    }
+
+    /// What stands in the way of recovering from a fault.
+    pub fn hindrance(&self, params: &Params, actions: Actions) -> Hindrance {
+        let supply_mv = i32::from(self.supply_mv);
+        if supply_mv < params.supply_min_mv {
+            Hindrance::SupplyLow
+        } else if supply_mv > params.supply_max_mv {
+            Hindrance::SupplyHigh
+        } else if i32::from(self.bad_taxels) > params.bad_taxels_max {
+            Hindrance::BadTaxels
+        } else if actions.save {
+            Hindrance::SaveWaits
+        } else {
+            Hindrance::None
         }
     }
 

@@ -6,120 +6,43 @@
 
 #[macro_use]
 mod define;
+pub mod indirect;
+mod list;
+pub mod mirrors;
 mod pictures;
+mod register;
 mod registers;
 mod values;
+mod view;
 
-use crate::contact::Contact;
-use crate::identify::{Identification, Modulus};
 use crate::params::Params;
-use crate::pipeline::Taring;
 use crate::scan::Clocks;
 
 use super::packet::StatusError;
-use super::server::{Counters, State};
 use super::settings::{Actions, Settings};
-use super::snapshot::Snapshot;
 use super::stand::Stand;
+use indirect::Part;
 
-pub use registers::{COUNT, address, registers};
+pub use list::{COUNT, registers};
+pub use register::{Access, Kind, Register};
+pub(super) use view::View;
+
+/// Where each register begins.
+pub mod address {
+    pub use super::indirect::address::*;
+    pub use super::mirrors::address::*;
+    pub use super::registers::address::*;
+}
 
 /// The longest read.
 pub const READ_MAX: u16 = 256;
-
-/// Who may write a register, and when.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    /// Nobody.
-    ReadOnly,
-    /// The host, at any time.
-    ReadWrite,
-    /// The host, while torque is off.
-    TorqueOff,
-    /// The host, while torque is off; kept in flash once `save_parameters` was written.
-    Stored,
-    /// The same at any time.
-    StoredLive,
-}
-
-/// How a register's bytes make a number, little-endian.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// 8 bits.
-    U8,
-    /// 8 bits, two's complement.
-    I8,
-    /// 16 bits.
-    U16,
-    /// 16 bits, two's complement.
-    I16,
-    /// 32 bits.
-    U32,
-    /// 32 bits, two's complement.
-    I32,
-}
-
-impl Kind {
-    /// Bytes on the bus.
-    pub const fn width(self) -> u16 {
-        match self {
-            Self::U8 | Self::I8 => 1,
-            Self::U16 | Self::I16 => 2,
-            Self::U32 | Self::I32 => 4,
-        }
-    }
-
-    /// The number that `bytes` make, or none where there are not enough of them.
-    fn decode(self, bytes: &[u8]) -> Option<i64> {
-        Some(match self {
-            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
-            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
-            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
-        })
-    }
-}
-
-/// A register as its documentation has it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Register {
-    /// The constant in [`address`], or the field of [`Params`].
-    pub name: &'static str,
-    /// Of its first byte.
-    pub address: u16,
-    /// How its bytes make a number.
-    pub kind: Kind,
-    /// How many numbers stand side by side: 1, but for the pictures of the array.
-    pub count: u16,
-    /// Who may write it.
-    pub access: Access,
-    /// Physical unit; empty where it is a plain number.
-    pub unit: &'static str,
-    /// What a step of the number means, in that unit: the resolution.
-    pub scale: u16,
-    /// The least value.
-    pub min: i64,
-    /// The largest value.
-    pub max: i64,
-    /// After a factory reset where it is stored, after a reset where it can be written.
-    pub default: Option<i64>,
-    /// What it means.
-    pub doc: &'static str,
-}
-
-impl Register {
-    /// Bytes on the bus.
-    pub const fn bytes(&self) -> u16 {
-        self.kind.width() * self.count
-    }
-}
 
 /// The part of a [`Register`] that the device needs.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     address: u16,
+    /// Where its value belongs: elsewhere for a mirror.
+    of: u16,
     count: u16,
     kind: Kind,
     access: Access,
@@ -130,61 +53,42 @@ impl Cell {
         self.kind.width() * self.count
     }
 
-    /// The cell that a byte belongs to.
-    fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Result<Self, StatusError> {
+    /// The cell that a byte belongs to; none in a gap.
+    fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Option<Self> {
         if let Some(param) = param_place(address) {
             let address = address::PARAMS + 4 * param as u16;
-            return Ok(Self { address, count: 1, kind: Kind::I32, access: Access::Stored });
+            return Some(Self { address, of: address, count: 1, kind: Kind::I32, access: Access::Stored });
         }
         let holds = |cell: &&Self| address.checked_sub(cell.address).is_some_and(|offset| offset < cell.bytes());
+        Self::all::<ROWS, COLUMNS>().find(holds).copied()
+    }
+
+    /// Where the gap ends that a byte lies in.
+    fn next<const ROWS: usize, const COLUMNS: usize>(gap: u16) -> u16 {
+        let after = Self::all::<ROWS, COLUMNS>().map(|cell| cell.address).chain([address::PARAMS]);
+        after.filter(|&address| address > gap).min().unwrap_or(u16::MAX)
+    }
+
+    /// All but the parameters.
+    fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        registers::CELLS.iter().chain(pictures).find(holds).copied().ok_or(StatusError::Access)
-    }
-}
-
-/// What a read sees.
-#[derive(Clone, Copy)]
-pub(super) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    pub state: &'a State<ROWS, COLUMNS>,
-    pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
-}
-
-impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
-    fn settings(&self) -> &'a Settings {
-        &self.state.settings
+        registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).chain(&mirrors::CELLS)
     }
 
-    fn contact(&self) -> &'a Contact {
-        &self.snapshot.status.contact
+    /// That of a register by itself, where it begins.
+    const fn of(address: u16) -> Self {
+        let Register { kind, count, access, .. } = registers::fixed(address);
+        Self { address, of: address, count, kind, access }
     }
 
-    fn identified(&self) -> Modulus {
-        self.snapshot.status.identification.result()
-    }
-
-    /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
-    fn tare_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.tare_request != status.taken.tare {
-            return Taring::Running as u32;
+    /// The element that a byte belongs to, and how many bytes of it come before.
+    fn element(&self, address: u16) -> (u16, u16) {
+        let offset = address.saturating_sub(self.address);
+        match self.kind.width() {
+            1 => (offset, 0),
+            2 => (offset / 2, offset % 2),
+            _ => (offset / 4, offset % 4),
         }
-        status.tare as u32
-    }
-
-    fn identify_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.identify_request != status.taken.identify {
-            return Identification::Running.number().into();
-        }
-        status.identification.number().into()
-    }
-
-    fn refused(&self, error: StatusError) -> u32 {
-        u32::from(self.state.counters.refused(error))
-    }
-
-    fn counters(&self) -> &'a Counters {
-        &self.state.counters
     }
 }
 
@@ -198,7 +102,7 @@ pub(super) struct Staged {
     pub clocks: &'static Clocks,
 }
 
-/// Refuses a read that is too long, or that touches a byte without a register.
+/// Refuses a read that is too long, or that goes beyond the table.
 pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
     address: u16,
     length: u16,
@@ -206,16 +110,11 @@ pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
     if !(1..=READ_MAX).contains(&length) {
         return Err(StatusError::Length);
     }
-    let end = address.checked_add(length).ok_or(StatusError::Access)?;
-    let mut at = address;
-    while at < end {
-        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
-        at = cell.address + cell.bytes();
-    }
-    Ok(())
+    let end = const { pictures::end::<ROWS, COLUMNS>() };
+    address.checked_add(length).filter(|&last| last <= end).map(|_| ()).ok_or(StatusError::Access)
 }
 
-/// Sends the bytes of a read that [`check_read`] let through.
+/// Sends the bytes of a read that [`check_read`] let through; 0 where there is no register.
 pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
     view: View<'_, ROWS, COLUMNS>,
     address: u16,
@@ -225,21 +124,20 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
     let end = address.saturating_add(length);
     let mut at = address;
     while at < end {
-        let Ok(cell) = Cell::at::<ROWS, COLUMNS>(at) else { return };
+        let Some(cell) = Cell::at::<ROWS, COLUMNS>(at) else {
+            let stop = end.min(Cell::next::<ROWS, COLUMNS>(at));
+            (at..stop).for_each(|_| put(0));
+            at = stop;
+            continue;
+        };
         let stop = end.min(cell.address + cell.bytes());
         let width = cell.kind.width();
         while at < stop {
-            let offset = at - cell.address;
-            let (element, skip) = match width {
-                1 => (offset, 0),
-                2 => (offset / 2, offset % 2),
-                _ => (offset / 4, offset % 4),
+            let (element, skip) = cell.element(at);
+            let bytes = match indirect::part(cell.of) {
+                Some(Part::Data(first)) => [view.led_to(first, element), 0, 0, 0],
+                _ => view.value(&cell, element).to_le_bytes(),
             };
-            let value = match param_place(cell.address) {
-                Some(place) => view.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32),
-                None => registers::get(view, cell.address, usize::from(element)),
-            };
-            let bytes = value.to_le_bytes();
             let take = usize::from(skip)..usize::from(width.min(skip + (stop - at)));
             for &byte in bytes.get(take).unwrap_or_default() {
                 put(byte);
@@ -262,30 +160,70 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         return Err(StatusError::Length);
     }
     let before = staged.settings.command;
-    let torque = before.torque;
     let params = staged.settings.record.params;
     let mut at = address;
     let mut rest = data;
     while !rest.is_empty() {
-        let cell = Cell::at::<ROWS, COLUMNS>(at)?;
-        match cell.access {
-            Access::ReadOnly => return Err(StatusError::Access),
-            Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
-            _ => {}
-        }
-        if at != cell.address {
-            return Err(StatusError::Length);
-        }
-        let value = cell.kind.decode(rest).ok_or(StatusError::Length)?;
-        match param_place(at) {
-            Some(place) => write_param(&mut staged.settings.record.params, place, value),
-            None => registers::set(staged, at, value)?,
-        }
-        rest = rest.get(usize::from(cell.bytes())..).ok_or(StatusError::Length)?;
-        at = at.saturating_add(cell.bytes());
+        let cell = Cell::at::<ROWS, COLUMNS>(at).ok_or(StatusError::Access)?;
+        let taken = match indirect::part(cell.of) {
+            Some(Part::Data(first)) => {
+                let element = usize::from(cell.element(at).0);
+                let targets = staged.settings.indirect;
+                let block = targets.get(first + element..first + indirect::BLOCK).unwrap_or_default();
+                write_through::<ROWS, COLUMNS>(staged, block, rest, before.torque)?
+            }
+            _ => write_element::<ROWS, COLUMNS>(staged, &cell, at, rest, before.torque)?,
+        };
+        rest = rest.get(usize::from(taken)..).ok_or(StatusError::Length)?;
+        at = at.saturating_add(taken);
     }
     staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params, staged.clocks)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
+}
+
+/// Writes the element that begins at `at`, and tells how many bytes it took.
+fn write_element<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged,
+    cell: &Cell,
+    at: u16,
+    data: &[u8],
+    torque: bool,
+) -> Result<u16, StatusError> {
+    match cell.access {
+        Access::ReadOnly => return Err(StatusError::Access),
+        Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
+        _ => {}
+    }
+    let (element, 0) = cell.element(at) else { return Err(StatusError::Length) };
+    let value = cell.kind.decode(data).ok_or(StatusError::Length)?;
+    if let Some(place) = param_place(cell.of) {
+        write_param(&mut staged.settings.record.params, place, value);
+    } else if let Some(Part::Address(first)) = indirect::part(cell.of) {
+        let target = value as u16;
+        indirect::check::<ROWS, COLUMNS>(target)?;
+        if let Some(slot) = staged.settings.indirect.get_mut(first + usize::from(element)) {
+            *slot = target;
+        }
+    } else {
+        registers::set(staged, cell.of, value)?;
+    }
+    Ok(cell.kind.width())
+}
+
+/// Writes the register that the first of these addresses leads to: the others must lead to the rest of it.
+fn write_through<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged,
+    targets: &[u16],
+    data: &[u8],
+    torque: bool,
+) -> Result<u16, StatusError> {
+    let target = targets.first().copied().filter(|&target| target != 0).ok_or(StatusError::Access)?;
+    let cell = Cell::at::<ROWS, COLUMNS>(target).ok_or(StatusError::Access)?;
+    let along = (0..cell.kind.width()).zip(targets).all(|(offset, &next)| next == target.saturating_add(offset));
+    if !along || targets.len() < usize::from(cell.kind.width()) {
+        return Err(StatusError::Length);
+    }
+    write_element::<ROWS, COLUMNS>(staged, &cell, target, data, torque)
 }
 
 /// Which parameter a byte belongs to.

@@ -1,11 +1,11 @@
-//! Whose turn it is after a Sync Read, a Bulk Read or a Fast Sync Read.
+//! Whose turn it is after a Sync Read, a Bulk Read, and the fast kinds of both.
 //!
 //! The devices answer in the order of the list. Each waits for the one before it by listening to the bus.
 
 use super::crc;
 use super::packet::{BROADCAST, HEADER, instruction};
 
-/// Bytes of a Fast Sync Read's reply before the first device's part.
+/// Bytes of the reply to a fast read before the first device's part.
 const FAST_HEAD: usize = 8;
 /// Bytes that each device adds to its data: error, ID and CRC.
 const FAST_EXTRA: u16 = 4;
@@ -41,12 +41,16 @@ pub struct Shared {
 }
 
 impl Shared {
-    /// For the device at `place` of `count` that each send `length` bytes of data; none where the packet were too long.
-    pub fn new(place: usize, count: usize, length: u16) -> Option<Self> {
-        let (place, count) = (u16::try_from(place).ok()?, u16::try_from(count).ok()?);
-        let part = length.checked_add(FAST_EXTRA)?;
-        let whole = part.checked_mul(count)?.checked_add(1)?;
-        let ahead = if place == 0 { 0 } else { part.checked_mul(place)?.checked_add(FAST_HEAD as u16)? };
+    /// For the device at `place` of those that send so many bytes of data each; none where the packet were too long.
+    pub fn new(place: usize, lengths: impl Iterator<Item = u16>) -> Option<Self> {
+        let (mut whole, mut ahead) = (1_u16, 0);
+        for (other, length) in lengths.enumerate() {
+            if other == place && place > 0 {
+                // The packet's length leaves out all before the instruction, the head does not.
+                ahead = whole.checked_add(FAST_HEAD as u16 - 1)?;
+            }
+            whole = whole.checked_add(length.checked_add(FAST_EXTRA)?)?;
+        }
         Some(Self { length: whole, heard: 0, ahead, crc: crc::START })
     }
 

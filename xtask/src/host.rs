@@ -21,8 +21,8 @@ pub struct Program {
     pub whole: bool,
 }
 
-/// The demonstration on the native core, with nothing that it does not need.
-pub const NATIVE_DEMO: Program = Program { package: "host-tests", name: "demo", whole: false };
+/// The demonstration on the native board, with nothing that it does not need.
+pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", whole: false };
 /// The emulated board without scenes and without the text of the log.
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
 /// The emulated board with all that it can.
@@ -45,7 +45,11 @@ impl Program {
     /// It does not compile.
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
-        command.args(["--bin", self.name]).args((!self.whole).then_some("--no-default-features"));
+        command.args(["--bin", self.name]);
+        if !self.whole {
+            // With the features of both in view, what the demonstration's two programs share is compiled once.
+            command.args(["--no-default-features", "--package", BOARD.package]);
+        }
         console.build(&mut command, self.name, slow(self.package))?;
         Ok(Command::new(paths::target().join(PROFILE).join(self.name)))
     }

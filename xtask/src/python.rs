@@ -21,9 +21,9 @@ pub struct Environment {
 
 const BUS: Environment = Environment {
     folder: "venv",
-    packages: &["dynamixel-sdk==4.1.0"],
-    imports: "dynamixel_sdk",
-    does: "the example and its test talk to the board by it",
+    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1"],
+    imports: "dynamixel_sdk, rustypot",
+    does: "the example and tests talk to the board by them",
 };
 
 /// Finds or makes the environment with the bus client, and returns its interpreter.

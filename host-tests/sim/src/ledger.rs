@@ -4,6 +4,7 @@ use crate::metrics::{Measured, shown};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::watch::{Cost, Summary};
+#[cfg(feature = "files")]
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 
@@ -41,6 +42,7 @@ pub fn rows(summary: &Summary) -> Vec<(&'static str, Option<u64>, f64, f64)> {
 }
 
 /// The same for scripts, without what is no effect.
+#[cfg(feature = "files")]
 pub fn json(summary: &Summary) -> Value {
     let row = |(effect, evaluations, wall_s, share_percent): (_, Option<u64>, _, _)| {
         Some(json!({ "effect": effect, "evaluations": evaluations?, "wall_s": wall_s, "share_percent": share_percent }))

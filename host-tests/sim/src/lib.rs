@@ -11,8 +11,11 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod agreement;
+#[cfg(feature = "files")]
 pub mod cli;
+pub mod demo;
 pub mod effects;
+#[cfg(feature = "files")]
 pub mod explain;
 pub mod host;
 pub mod key;
@@ -20,14 +23,20 @@ pub mod ledger;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
+#[cfg(feature = "files")]
 pub mod part;
+#[cfg(feature = "files")]
 pub mod population;
+#[cfg(feature = "files")]
 pub mod recording;
 pub mod registry;
+#[cfg(feature = "files")]
 pub mod report;
 pub mod run;
 pub mod scene;
+#[cfg(feature = "files")]
 pub mod session;
+#[cfg(feature = "files")]
 pub mod sweep;
 pub mod watch;
 pub mod world;

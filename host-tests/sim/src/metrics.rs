@@ -7,13 +7,14 @@
 mod at_goal;
 mod conduct;
 mod finger;
+mod response;
 mod slips;
 mod table;
 
 pub use at_goal::AtGoal;
 pub use conduct::Hold;
 pub use finger::Finger;
-pub(crate) use finger::newtons;
+pub use finger::newtons;
 pub use table::{BY_GOAL, METRICS};
 
 use crate::scene::Bound;

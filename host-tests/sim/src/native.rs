@@ -25,12 +25,8 @@ use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use host_tests::native::bridge;
-use host_tests::plant::Bridge;
+use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
-
-/// Slots between the end of a frame and the duty that came of it.
-const DUTY_DELAY_SLOTS: usize = 3;
 
 /// Why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -262,7 +258,7 @@ impl<E: Set> Board<E> {
         }
         let sense = self.world.sense(finger, silent_ms);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        unit.next = bridge(status);
+        unit.next = Bridge::of(status);
         if unit.command.torque {
             unit.host.read(time_s, || Reading::of(status), &mut unit.link);
         }

@@ -1,9 +1,10 @@
 //! A run with everything that watches it, and what it leaves behind.
 
-use crate::ledger::{self, Without};
+use crate::ledger;
 use crate::metrics::{Hold, Measured, Meter, Verdict, shown};
 use crate::scene::Scene;
 use crate::watch::{Controller, Step, Summary, Watch};
+#[cfg(feature = "files")]
 use serde_json::{Map, Value, json};
 use std::error::Error;
 use std::fmt::Write as _;
@@ -45,7 +46,8 @@ impl Outcome {
     }
 
     /// For scripts. The keys are stable; `null` is a metric that the run does not have, or a side that is not bounded.
-    pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
+    #[cfg(feature = "files")]
+    pub fn json(&self, scene: &Scene, board: &str, ablated: &[ledger::Without]) -> Value {
         let values = |measured: &Measured| -> Map<String, Value> {
             measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect()
         };
@@ -137,6 +139,10 @@ impl Watch for All<'_, '_> {
     fn wants_pressures(&mut self, finger: usize, time_s: f64) -> bool {
         // All are asked: who wants them may count what it asked for.
         self.others.iter_mut().fold(false, |wanted, watch| watch.wants_pressures(finger, time_s) | wanted)
+    }
+
+    fn wants_every_frame(&self) -> bool {
+        self.others.iter().any(|watch| watch.wants_every_frame())
     }
 
     fn step(&mut self, step: &Step) {

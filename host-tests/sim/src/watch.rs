@@ -61,6 +61,8 @@ pub struct Truth {
     pub current_a: f64,
     /// Supply at the bridge.
     pub supply_v: f64,
+    /// Share of the supply at the motor, -1 to 1; positive presses.
+    pub duty: f64,
     /// Temperature of the winding, where a scene heats it; 25 else.
     pub winding_c: f64,
     /// Tangential force on the object, upwards.
@@ -82,6 +84,12 @@ pub trait Watch {
 
     /// Whether this step's true pressures are wanted: they cost.
     fn wants_pressures(&mut self, _finger: usize, _time_s: f64) -> bool {
+        false
+    }
+
+    /// Whether every frame is wanted. The emulated board shows those that an answer on the bus speaks of; the others have the status of
+    /// the last answer.
+    fn wants_every_frame(&self) -> bool {
         false
     }
 

@@ -255,6 +255,7 @@ impl<E: Set> World<E> {
             speed_mm_per_s: finger.speed_mm_per_s(),
             current_a: finger.current_a(),
             supply_v: finger.supply_v(),
+            duty: finger.duty(),
             winding_c: 25.0,
             tangential_n: -finger.contact.n_per_mm_along * along.stretch_mm,
             slip_mm: along.slip_mm,

@@ -51,6 +51,7 @@ const LESS: &str = "controller.codes_per_kpa_milli=16000";
 #[rustfmt::skip]
 const BREAKERS: &[Breakers] = &[
     ("compression", &[LOW, MORE, "controller.force_max_mn=1000"]),
+    ("demo", &[LOW, MORE, "controller.inertia_ug_m2=300", "object.distance_mm=1.0", "object.distance_mm=7.0"]),
     ("everything", &[LOW, MORE, LESS, "effects.breakable_object.force_n=0.1", "effects.tangential.still=0.05", "object.distance_mm=1.0"]),
     ("grasp", &[LOW, "host.grip_friction=0.2", "object.distance_mm=0.5", "object.shake_g=0", "hand.lift_mm=12", "host.grip_most_n=0.9", "effects.tangential.still=0.1"]),
     ("hot_hour", &[LOW, LESS, "controller.codes_per_kpa_milli=24600", "effects.thermal_derating.ambient_c=25", "effects.thermal_derating.ambient_c=60"]),

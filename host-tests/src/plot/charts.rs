@@ -1,7 +1,6 @@
 //! Charts over time: the whole run, and each change of the goal at a larger scale.
 
 use super::{Area, FAINT, FONT, GOAL_INK, INK, LABEL_PX, PALE_INK, PlotError, TITLE_PX, failed, number, picture};
-use crate::metrics::Sample;
 use plotters::prelude::*;
 
 /// Points that a line has at most: two for each pixel of the widest chart.
@@ -9,6 +8,25 @@ const POINTS_MAX: usize = 1_800;
 const WIDTH_PX: u32 = 900;
 /// Width of the mean.
 const SMOOTH_S: f64 = 0.01;
+
+/// The world and the controller at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// When.
+    pub time_s: f64,
+    /// The force asked for.
+    pub goal_n: f64,
+    /// The contact force as it is.
+    pub true_force_n: f64,
+    /// The contact force as the controller senses it.
+    pub sensed_force_n: f64,
+    /// How far the tip has come.
+    pub travel_mm: f64,
+    /// Indentation of the tip.
+    pub indentation_mm: f64,
+    /// Share of the supply at the motor, -1 to 1; positive presses.
+    pub duty: f64,
+}
 
 /// A stretch of the run to look at more closely.
 #[derive(Clone, Debug)]

@@ -81,6 +81,8 @@ impl Bench {
             status: self.status,
             supply_mv: 6012,
             tick_ms: 0x1_8123,
+            frame_time_us: 0xFEDC_BA98,
+            frame_ns: 99_762,
             loop_time_us: 41,
             loop_time_max_us: 47,
             reset_cause: ResetCause::Watchdog,

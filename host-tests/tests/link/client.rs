@@ -95,12 +95,12 @@ fn a_foreign_client_understands_refusals_and_the_alert() {
     let bench = with_client(bench, |client| {
         assert!(client.ping(ID).expect("a ping").alert);
         assert_eq!(number(client.write_u8(ID, address::TORQUE_ENABLE, 1)), 1);
-        assert_eq!(number(client.transfer_single(ID, 0x10, 0, 0, |_| ()).map(|_| ())), 2);
+        assert_eq!(number(client.transfer_single(ID, 0x11, 0, 0, |_| ()).map(|_| ())), 2);
         assert_eq!(number(client.write_u32(ID, address::GOAL_FORCE_MN, 200_000)), 4);
         assert_eq!(number(client.write_u16(ID, address::GOAL_FORCE_MN, 1)), 5);
         assert_eq!(number(client.write_u32(ID, address::GOAL_FORCE_MN, 7_001)), 6);
         assert_eq!(number(client.write_u16(ID, address::MODEL_NUMBER, 1)), 7);
-        assert_eq!(number(client.read(ID, 10, 1).map(|_| ())), 7);
+        assert_eq!(number(client.read(ID, 9_999, 1).map(|_| ())), 7);
         client.factory_reset(ID, FactoryResetKind::KeepIdAndBaudRate).expect("a factory reset");
         client.reboot(ID).expect("a reboot");
     });

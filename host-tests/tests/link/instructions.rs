@@ -104,7 +104,7 @@ fn factory_reset_keeps_what_it_is_told_to() {
 #[test]
 fn unknown_instructions_are_refused() {
     let mut bench = Bench::new();
-    let known = [0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x55];
+    let known = [0x01, 0x02, 0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x55];
     for instruction in (0..=255).filter(|number| !known.contains(number)) {
         assert_eq!(bench.ask(instruction, &[]), Answer { id: ID, error: 2, data: vec![] }, "{instruction:02X}");
     }

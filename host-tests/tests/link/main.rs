@@ -3,9 +3,12 @@
 mod bench;
 mod client;
 mod document;
+mod indirect;
 mod instructions;
+mod mirrors;
 mod noise;
 mod packets;
+mod recover;
 mod requests;
 mod safety;
 mod several;

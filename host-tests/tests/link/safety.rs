@@ -83,11 +83,12 @@ fn a_tripped_watchdog_reads_minus_one_until_it_is_reset() {
     bench.set_fault(None);
     assert_eq!(bench.number(address::BUS_WATCHDOG, 1), 0xFF);
     for goal in [0, 500i32] {
-        assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal.to_le_bytes()), Err(7));
+        assert_eq!(bench.write(address::GOAL_FORCE_MN, &goal.to_le_bytes()), Err(4), "as ROBOTIS' servos answer");
+        assert_eq!(bench.write(address::SHORT_GOAL_MN, &(goal as i16).to_le_bytes()), Err(4));
     }
-    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Err(7));
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Err(1));
     assert_eq!(bench.write(address::TORQUE_ENABLE, &[0]), Ok(()));
-    assert_eq!(bench.write(address::BUS_WATCHDOG, &[5]), Err(7));
+    assert_eq!(bench.write(address::BUS_WATCHDOG, &[5]), Err(4));
     assert_eq!(bench.write(address::BUS_WATCHDOG, &[0xFF]), Err(4));
 
     assert_eq!(bench.write(address::BUS_WATCHDOG, &[0]), Ok(()));

@@ -1,4 +1,4 @@
-//! Sync, Bulk and Fast Sync instructions: several devices on one bus, each hearing what the others send.
+//! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus, each hearing what the others send.
 
 use fingertip::link::crc;
 use fingertip::shipped::address;
@@ -37,7 +37,7 @@ fn sync_read_is_answered_in_the_order_of_the_list() {
     let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data[0])).collect();
     assert_eq!(answers, [(3, 0, 103), (1, 0, 101), (2, 0, 102)]);
 
-    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[10, 0, 1, 0, 2, 1]));
+    let replies = talk(&mut devices, &packet(BROADCAST, 0x82, &[0xFF, 0x7F, 1, 0, 2, 1]));
     let answers: Vec<_> = replies.iter().map(|reply| answer(reply)).map(|a| (a.id, a.error, a.data.len())).collect();
     assert_eq!(answers, [(2, 7, 0), (1, 7, 0)], "refused in turn too");
 }
@@ -129,8 +129,76 @@ fn fast_sync_read_gives_way_to_another_packet() {
     assert!(waiting.hear(&[0; 40]).is_empty(), "the turn is over");
     // Data that cannot be read is zero, with its error; and nothing at all is sent where it would not fit.
     let mut first = device(1);
-    let reply = first.hear(&packet(BROADCAST, 0x8A, &[10, 0, 3, 0, 1])).concat();
+    let reply = first.hear(&packet(BROADCAST, 0x8A, &[0xFF, 0x7F, 3, 0, 1])).concat();
     assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
     assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 1, 1, 1])).is_empty());
     assert!(first.hear(&packet(BROADCAST, 0x8A, &[0, 0, 0xFF, 0xFF, 1])).is_empty());
+}
+
+#[test]
+fn fast_bulk_read_makes_one_packet_of_unequal_parts() {
+    let mut devices = [device(1), device(2), device(3)];
+    let (counter, id, mode) = (address::FRAME_COUNTER, address::ID, address::PRESENT_MODE);
+    for list in [
+        &[(1, counter, 4)][..],
+        &[(2, counter, 4), (3, id, 1), (1, mode, 7)],
+        &[(3, id, 1), (1, counter, 4)],
+        &[(1, mode, 62), (2, id, 3), (3, counter, 4)],
+    ] {
+        let entries: Vec<u8> = list
+            .iter()
+            .flat_map(|&(id, address, length): &(u8, u16, u16)| {
+                [&[id][..], &address.to_le_bytes(), &length.to_le_bytes()].concat()
+            })
+            .collect();
+        let wire = talk(&mut devices, &packet(BROADCAST, 0x9A, &entries)).concat();
+        let length = 1 + list.iter().map(|&(_, _, length)| usize::from(length) + 4).sum::<usize>();
+        assert_eq!(wire.len(), 7 + length, "{wire:02X?}");
+        assert_eq!(wire[..8], [0xFF, 0xFF, 0xFD, 0, 0xFE, length as u8, (length >> 8) as u8, 0x55]);
+        let mut begin = 8;
+        for &(id, address, length) in list {
+            let data = devices[usize::from(id) - 1].read(address, length).expect("within the table");
+            let end = begin + 2 + usize::from(length);
+            assert_eq!(wire[begin..begin + 2], [0, id]);
+            assert_eq!(wire[begin + 2..end], data, "of {id}");
+            assert_eq!(wire[end..end + 2], crc::update(crc::START, &wire[..end]).to_le_bytes(), "over all before it");
+            begin = end + 2;
+        }
+        // What a client checks is the whole packet, as any other.
+        let (body, checksum) = wire.split_at(wire.len() - 2);
+        assert_eq!(checksum, crc::update(crc::START, body).to_le_bytes());
+    }
+}
+
+#[test]
+fn a_part_of_a_fast_bulk_read_that_is_refused_is_zeros_and_a_packet_too_long_is_none() {
+    let mut first = device(1);
+    let reply = first.hear(&packet(BROADCAST, 0x9A, &[1, 0xFF, 0x7F, 3, 0])).concat();
+    assert_eq!(reply[8..13], [7, 1, 0, 0, 0]);
+    assert_eq!(first.refused(fingertip::link::packet::StatusError::Access), 1);
+    let too_long = [1, 0, 0, 1, 1];
+    assert!(first.hear(&packet(BROADCAST, 0x9A, &too_long)).is_empty(), "257 bytes");
+    let overflows = [[1, 7, 0, 1, 0], [2, 0, 0, 0xFF, 0xFF]].concat();
+    assert!(first.hear(&packet(BROADCAST, 0x9A, &overflows)).is_empty(), "beyond a packet's length");
+    for params in [&[1][..], &[1, 7, 0, 1], &[1, 7, 0, 1, 0, 9]] {
+        assert!(first.hear(&packet(BROADCAST, 0x9A, params)).is_empty(), "{params:?}");
+    }
+    assert!(first.hear(&packet(BROADCAST, 0x9A, &[])).is_empty(), "nobody is asked");
+    assert_eq!(first.ask(0x9A, &[1, 7, 0, 1, 0]).number(), 2, "only for all");
+    // A turn that is waited for ends with the next packet.
+    let mut waiting = device(2);
+    assert!(waiting.hear(&packet(BROADCAST, 0x9A, &[[1, 7, 0, 1, 0], [2, 7, 0, 1, 0]].concat())).is_empty());
+    assert_eq!(waiting.hear(&packet(2, 0x01, &[])).len(), 1);
+    assert!(waiting.hear(&[0; 40]).is_empty());
+}
+
+/// A driver that reads each device from its least address to its largest, as ROBOTIS' own do without indirect addresses.
+#[test]
+fn bulk_read_goes_across_gaps() {
+    let mut devices = [device(1), device(2)];
+    let entries = hex("01 40 00 FF 00  02 00 01 00 01");
+    let answers: Vec<_> =
+        talk(&mut devices, &packet(BROADCAST, 0x92, &entries)).iter().map(|reply| answer(reply)).collect();
+    assert_eq!(answers.iter().map(|a| (a.id, a.error, a.data.len())).collect::<Vec<_>>(), [(1, 0, 255), (2, 0, 256)]);
+    assert_eq!(answers[1].data[48..52], [102, 0, 0, 0], "the frame counter");
 }

@@ -6,17 +6,14 @@ use fingertip::config::{Shaped, newtons};
 use fingertip::contact::FitLevel;
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
-use fingertip::pipeline::{Bridge, Pipeline, Status};
+use fingertip::pipeline::{Pipeline, Status};
 use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
-use fingertip::units::{CoreCycles, Duty};
-use host_tests::plant::Setup;
+use fingertip::units::CoreCycles;
 use host_tests::plant::cells::Cell;
 use host_tests::plant::drive::{Dynamics, Shaft, Source};
+use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS, Setup};
 use images::record::Digest;
-
-/// Slots from a frame's end to its duty at most.
-const DUTY_DELAY_SLOTS: usize = 3;
 
 /// The finger with its controller.
 pub struct Finger<const ROWS: usize, const COLUMNS: usize> {
@@ -28,7 +25,7 @@ pub struct Finger<const ROWS: usize, const COLUMNS: usize> {
     frame: Frame<ROWS, COLUMNS>,
     shaft: Shaft,
     slot_s: f64,
-    duty: Option<f64>,
+    bridge: Bridge,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
@@ -47,7 +44,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             frame: Frame::EMPTY,
             shaft: Shaft::default(),
             slot_s: f64::from(config.timing.slot.0) / f64::from(CLOCKS.timer_hz),
-            duty: None,
+            bridge: Bridge::Coast,
         }
     }
 
@@ -63,11 +60,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
 
     fn advance(&mut self) {
         let supply = &self.setup.supply;
-        let source = self.duty.map_or(Source::OPEN, |duty| Source {
-            volts: duty * supply.source_v,
-            ohms: supply.circuit_ohm(&self.setup.motor, duty),
-            ..Source::OPEN
-        });
+        let source = match self.bridge {
+            Bridge::Coast => Source::OPEN,
+            Bridge::Driven { duty } => {
+                let ohms = supply.circuit_ohm(&self.setup.motor, duty);
+                Source { volts: duty * supply.source_v, ohms, ..Source::OPEN }
+            }
+        };
         self.shaft = Dynamics::new(&self.setup).advance(self.shaft, self.slot_s, &source);
     }
 
@@ -97,11 +96,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let slots = Shape::<ROWS, COLUMNS>::SLOTS;
         for slot in 0..slots {
             if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
-                self.duty = match self.pipeline.status().bridge() {
-                    Bridge::Asleep | Bridge::Open => None,
-                    Bridge::Brakes => Some(0.0),
-                    Bridge::Driven(duty) => Some(f64::from(duty.0) / f64::from(Duty::FULL)),
-                };
+                self.bridge = Bridge::of(self.pipeline.status());
             }
             self.advance();
             self.scan(slot);

@@ -18,6 +18,11 @@ const TOP: u16 = 4_089;
 /// A code that shows no contact, above a level of 0.
 const QUIET: u16 = 40;
 
+/// By parameters within their ranges.
+fn config<const ROWS: usize, const COLUMNS: usize>(params: &Params) -> Shaped<ROWS, COLUMNS> {
+    Shaped::<ROWS, COLUMNS>::new(params, &fingertip::shipped::CLOCKS).expect("parameters within their ranges")
+}
+
 /// The ends of what goes into the sums and the fit, with the largest sag that the shape allows.
 fn extremes<const ROWS: usize, const COLUMNS: usize>() -> Vec<Params> {
     let sag = (0..=7_600).rev().step_by(4).find(|sag| {
@@ -101,8 +106,7 @@ fn sums<const ROWS: usize, const COLUMNS: usize>(
 fn survives<const ROWS: usize, const COLUMNS: usize>() {
     let frames = frames::<ROWS, COLUMNS>();
     for params in extremes::<ROWS, COLUMNS>() {
-        let config =
-            Shaped::<ROWS, COLUMNS>::new(&params, &fingertip::shipped::CLOCKS).expect("parameters within their ranges");
+        let config = config::<ROWS, COLUMNS>(&params);
         for gain in [GAIN_MAX, 1 << 14] {
             let mut array = Array::new();
             array.calibrate(&Calibration::new(&[[gain; COLUMNS]; ROWS], &[0; ROWS]).expect("gains within their range"));
@@ -151,7 +155,7 @@ fn the_worst_frames_overflow_nothing() {
 
 /// A tare takes the same out of every taxel, also where the rows are odd.
 fn tares<const ROWS: usize, const COLUMNS: usize>() {
-    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
+    let config = config::<ROWS, COLUMNS>(&Params::DEFAULT);
     let frame = frame::<ROWS, COLUMNS>(|row, column| 40 + 3 * row as u16 + 5 * column as u16);
     let mut array = Array::new();
     let done = (1..).find(|_| {
@@ -177,7 +181,7 @@ fn a_tare_zeroes_every_taxel() {
 
 /// A taxel that is dead or saturated is left out, whichever it is, and no other.
 fn leaves_out<const ROWS: usize, const COLUMNS: usize>() {
-    let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
+    let config = config::<ROWS, COLUMNS>(&Params::DEFAULT);
     for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
         for code in [0, 4_095] {
             let spoilt = frame::<ROWS, COLUMNS>(|r, c| if (r, c) == (row, column) { code } else { 100 });
@@ -209,7 +213,7 @@ fn a_bad_taxel_is_left_out_wherever_it_is() {
 
 #[test]
 fn an_array_that_is_all_bad_counts_every_taxel() {
-    let config = Shaped::<16, 32>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
+    let config = config::<16, 32>(&Params::DEFAULT);
     let frame = frame::<16, 32>(|_, _| 4_095);
     let mut array = Array::new();
     assert_eq!(array.read(&frame, &config).bad_count, 512);
@@ -253,7 +257,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
     let cases = Cases { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Cases::default() };
     let steps = prop::collection::vec((any_frame::<ROWS, COLUMNS>(), any_sense(), 0..6_u8), 1..8);
     let test = |steps: Vec<(Frame<ROWS, COLUMNS>, Sense, u8)>| {
-        let config = Shaped::<ROWS, COLUMNS>::new(&Params::DEFAULT, &fingertip::shipped::CLOCKS).expect("the defaults");
+        let config = config::<ROWS, COLUMNS>(&Params::DEFAULT);
         let mut pipeline = Pipeline::new(&config);
         let mut command = Command { tare_request: 1, goal: newtons(2_000), ..Command::default() };
         let quiet = frame::<ROWS, COLUMNS>(|_, _| QUIET);

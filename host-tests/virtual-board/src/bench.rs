@@ -7,7 +7,6 @@ use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
 use crate::log::{Frames, Log};
 use crate::measure::{BridgeEdge, Latency};
-use crate::recorder::Recorder;
 use crate::scene::host::Host as SceneHost;
 use crate::surroundings::Surroundings;
 use crate::trace::{Record, Trace};
@@ -53,8 +52,6 @@ pub struct Bench {
     pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,
-    /// Samples the world where somebody asked for it; a snapshot does not keep it.
-    pub recorder: Option<Recorder>,
     world_ns: u64,
     bridge: Bridge,
     encoder: i32,
@@ -85,7 +82,6 @@ impl Bench {
             flash: Kept::default(),
             clock: ExternalClock::default(),
             host: None,
-            recorder: None,
             world_ns: 0,
             bridge: Bridge::Coast,
             encoder: 0,
@@ -172,9 +168,6 @@ impl Bench {
         let board = session.board_mut();
         self.watch_bridge(board, now_ns);
         self.advance_world(now_ns);
-        if let Some(recorder) = &mut self.recorder {
-            recorder.look(now_ns, &self.front_end.lock().world, self.bridge);
-        }
         self.turn_encoder(session.board_mut(), now_ns);
         for byte in session.board_mut().wire().take_received() {
             self.trace.add(byte.at_ns, Record::Sent(byte.byte));

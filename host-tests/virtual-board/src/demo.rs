@@ -1,22 +1,20 @@
 //! The demonstration: the flash image touches an object, holds the forces asked for, and lets go.
 //!
-//! The script's client sees the board only over its bus; the figures are of the simulated world's true force.
-//! A second run of the same script, cut by a snapshot and continued from it, must leave the same trace.
+//! The host sees the board only over its bus; the figures are of the simulated world's true force. A second run of the same scene must
+//! leave the same trace.
 
-pub mod bus;
 pub mod figures;
 pub mod flashable;
-pub mod play;
 pub mod screen;
 
-use crate::{Error, Options, Rig};
-use dynamixel2::TransferError;
-use figures::Figures;
-use host_tests::demo::Script;
-use host_tests::plant::{Setup, World};
-use play::{Run, Watch};
+use crate::scene::{Boards, simulate};
+use crate::{Error, Rig};
+use figures::{Counts, Figures};
+use flashable::Flashable;
 use screen::Screen;
-use std::path::{Path, PathBuf};
+use sim::demo::{self, Run, Trace};
+use sim::watch::{Step, Watch};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// What the demonstration is told.
@@ -34,20 +32,9 @@ pub enum DemoError {
     /// The board could not run.
     #[error(transparent)]
     Board(#[from] Error),
-    /// The board did not do what was asked on the bus.
-    #[error("{doing}: {why}")]
-    Bus {
-        /// What was asked.
-        doing: String,
-        /// What came back instead.
-        why: TransferError,
-    },
-    /// The board came into a state that the script does not expect.
-    #[error("{0}")]
-    Unexpected(String),
     /// The run has no figures or no pictures.
     #[error(transparent)]
-    Judged(#[from] host_tests::demo::DemoError),
+    Judged(#[from] demo::DemoError),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
@@ -67,59 +54,64 @@ pub enum DemoError {
 /// The image does not run, or does not do what it is asked.
 pub fn run(plan: &Plan) -> Result<(Figures, Run), DemoError> {
     let begun = Instant::now();
-    let script = if plan.quick { Script::quick() } else { Script::whole() };
+    let scene = demo::scene(plan.quick)?;
     let repeat = (!plan.quick).then(|| {
-        let (image, script) = (plan.image.clone(), script.clone());
-        std::thread::spawn(move || cut(&image, &script))
+        let (image, scene) = (plan.image.clone(), scene.clone());
+        std::thread::spawn(move || simulate(&image, &scene, &mut Nobody).map(|summary| summary.digest))
     });
 
-    let mut rig = power_on(&plan.image)?;
-    let flash = flashable::Flashable::of(rig.image())?;
-    flash.check_loaded(&mut rig)?;
-    let mut screen = Screen::new(script.length_ms());
-    let mut run = Run::begin(&mut rig)?;
-    for phase in &script.0 {
-        run.play(*phase, &mut rig, &mut screen)?;
-    }
-    run.end(&mut rig)?;
+    let mut boards = Boards::power_on(&plan.image, &scene)?;
+    let flash = Flashable::of(boards.rigs[0].image())?;
+    flash.check_loaded(&mut boards.rigs[0])?;
+    let from = Counts::of(&mut boards.rigs[0])?;
+    let mut watch = Seen { trace: Trace::new(&scene), screen: Screen::new(&scene) };
+    let summary = boards.run(&scene, &mut watch)?;
+    let rig: &mut Rig = &mut boards.rigs[0];
+    let to = Counts::of(rig)?;
+    let Seen { trace, screen } = watch;
     let repeated = match repeat {
         Some(repeat) => {
-            screen.waiting("the same run once more, cut by a snapshot, to compare the traces");
+            screen.waiting("the same run once more, to compare the traces");
             Some(repeat.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?)
         }
         None => None,
     };
     screen.finish();
-    let figures = Figures::of(&run, &flash, repeated, begun.elapsed())?;
+    let run = trace.finish()?;
+    let mut figures = Figures::of(&run, [&from, &to], rig)?;
+    figures.image_sha256 = flash.sha256();
+    figures.image_bytes = flash.bytes.len();
+    figures.virtual_time_s = summary.virtual_s;
+    figures.wall_time_s = begun.elapsed().as_secs_f64();
+    (figures.trace_sha256, figures.repeated_trace_sha256) = (summary.digest, repeated);
+    figures.check();
     Ok((figures, run))
 }
 
-/// The board, just powered on, the object 5 mm away.
-///
-/// # Errors
-/// The image does not start.
-pub fn power_on(image: &Path) -> Result<Rig, DemoError> {
-    Ok(Rig::new(image, World::new(&Setup::default()), &Options::default())?)
+/// Nobody watches; the board is read as often as where somebody does.
+struct Nobody;
+
+impl Watch for Nobody {
+    fn wants_every_frame(&self) -> bool {
+        true
+    }
+
+    fn step(&mut self, _: &Step) {}
 }
 
-/// The same script, cut by a snapshot half way and continued from it; returns its trace's digest.
-fn cut(image: &Path, script: &Script) -> Result<String, DemoError> {
-    let watch: &mut dyn Watch = &mut screen::Nobody;
-    let mut rig = power_on(image)?;
-    let mut run = Run::begin(&mut rig)?;
-    let (first, second) = script.0.split_at(script.0.len() / 2);
-    for phase in first {
-        run.play(*phase, &mut rig, watch)?;
+/// What is kept and what is shown.
+struct Seen {
+    trace: Trace,
+    screen: Screen,
+}
+
+impl Watch for Seen {
+    fn wants_every_frame(&self) -> bool {
+        self.trace.wants_every_frame()
     }
-    let file = image.with_extension(format!("{}.snapshot", std::process::id()));
-    rig.snapshot(&file)?;
-    drop(rig);
-    let restored = Rig::restore(image, &file, &Options::default());
-    std::fs::remove_file(&file).map_err(|source| DemoError::Write { path: file, source })?;
-    let mut rig = restored?;
-    for phase in second {
-        run.play(*phase, &mut rig, watch)?;
+
+    fn step(&mut self, step: &Step) {
+        self.trace.step(step);
+        self.screen.step(step);
     }
-    run.end(&mut rig)?;
-    Ok(run.trace_hash)
 }

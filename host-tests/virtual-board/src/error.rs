@@ -56,7 +56,6 @@ pub enum Error {
     #[error("there is no scene around the board")]
     NoScene,
     /// A scene cannot be simulated.
-    #[cfg(feature = "scenes")]
     #[error(transparent)]
     Scene(#[from] sim::SimError),
     /// The board did not do what a scene's host asked of it.

@@ -27,12 +27,10 @@ pub mod measure;
 pub mod part;
 pub mod pins;
 pub mod pwm_timer;
-pub mod recorder;
 pub mod report;
 pub mod rig;
 pub mod scan_timer;
 pub mod scan_updates;
-#[cfg_attr(not(feature = "scenes"), path = "no_scene.rs")]
 pub mod scene;
 pub mod serve;
 pub mod stack;

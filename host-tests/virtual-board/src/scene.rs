@@ -24,19 +24,20 @@ use crate::bench::Bench;
 use crate::surroundings::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
+use fingertip::params::Params;
 use fingertip::shipped::{Config, TARE_FRAMES, address};
 use fingertip::store::{self, Record};
 use host::{Host, Shown};
 use rigless::soc::Width;
 use sim::SimError;
-use sim::effects::link::Stages as _;
+use sim::effects::link::{self, Stages as _};
 use sim::effects::set::{Named, Set as _};
 use sim::scene::{Scene, controller};
 use sim::watch::{Controller, Summary, Watch};
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::mpsc::Receiver;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// One millisecond of the board: how often the host reads.
 const MS: u64 = 1_000_000;
@@ -56,73 +57,110 @@ const WATCHDOG_MS: i64 = 20;
 /// # Errors
 /// The image does not run, or what the scene asks for cannot be simulated.
 pub fn simulate(image: &Path, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
-    let begun = Instant::now();
-    let params = controller::params(scene);
-    let config = Config::shipped(&params).map_err(SimError::Controller)?;
-    let frame_ns = u64::from(config.timing.frame_ns);
-    let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
-    let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
-    let moves_from_s = -(MS as f64) * 1e-9;
-    let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
-    let options =
-        Options { presets: vec![(flash::SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() };
-    let mut rigs = Vec::new();
+    let mut boards = Boards::power_on(image, scene)?;
+    let summary = boards.run(scene, watch)?;
+    boards.rigs.iter_mut().try_for_each(Rig::check_gaps)?;
+    Ok(summary)
+}
+
+/// A scene's boards, a board for each finger.
+pub struct Boards {
+    /// In the order of the fingers.
+    pub rigs: Vec<Rig>,
+    params: Params,
     // As on the native board, all boards have the first one's clock.
-    let mut clock = Clock::new(start_ns);
-    let mut clock_link = Named::of(scene, 0).link;
-    for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {
-        let mut rig = Rig::new(image, finger, &options)?;
-        set_up(&mut rig, scene, start_ns)?;
-        let offset = frame_offset(&mut rig)?;
-        let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, frame_ns, offset);
-        rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
-        rigs.push(rig);
-    }
-    let fingers = rigs.len();
-    watch.begin(&vec![Controller { params, calibration: None }; fingers]);
-    let set_up_s = begun.elapsed().as_secs_f64();
-    let mut now_ns = start_ns - MS;
-    let mut ahead = VecDeque::new();
-    loop {
-        let time_s = clock.time_s(now_ns);
-        if time_s < scene.duration_s {
-            let second_s = clock_link.second_s(time_s);
-            clock.run_at(now_ns, second_s);
-            for (number, rig) in rigs.iter_mut().enumerate() {
-                let wants = watch.wants_pressures(number, time_s);
-                ahead.push_back(set_out(rig, now_ns, second_s, wants)?);
-            }
-            now_ns += MS;
-            // The boards go on while what they did is looked at.
-            if ahead.len() == fingers {
-                continue;
-            }
-        } else if ahead.is_empty() {
-            break;
+    clock: Clock,
+    clock_link: link::Named,
+    now_ns: u64,
+    set_up: Duration,
+}
+
+impl Boards {
+    /// Boots and tares them and enables torque: the scene begins a millisecond later.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn power_on(image: &Path, scene: &Scene) -> Result<Self, Error> {
+        let begun = Instant::now();
+        let params = controller::params(scene);
+        let config = Config::shipped(&params).map_err(SimError::Controller)?;
+        let frame_ns = u64::from(config.timing.frame_ns);
+        let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
+        let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
+        let moves_from_s = -(MS as f64) * 1e-9;
+        let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
+        let options =
+            Options { presets: vec![(flash::SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() };
+        let mut rigs = Vec::new();
+        let clock = Clock::new(start_ns);
+        for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {
+            let mut rig = Rig::new(image, finger, &options)?;
+            set_up(&mut rig, scene, start_ns)?;
+            let offset = frame_offset(&mut rig)?;
+            let host = Host::new(scene, number, Named::of(scene, number).link, start_ns, frame_ns, offset);
+            rig.with(move |stand| stand.bench.host = Some(Box::new(host)))?;
+            rigs.push(rig);
         }
-        for (rig, made) in rigs.iter_mut().zip(ahead.drain(..fingers)) {
-            rig.await_reached()?;
-            let (shown, trouble) = rig.answer(&made)?;
-            shown.iter().for_each(|shown| watch.step(&shown.step()));
-            if let Some(why) = trouble {
-                return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why: why.into() });
+        let clock_link = Named::of(scene, 0).link;
+        Ok(Self { rigs, params, clock, clock_link, now_ns: start_ns - MS, set_up: begun.elapsed() })
+    }
+
+    /// Runs the scene from its beginning to its end, once.
+    ///
+    /// # Errors
+    /// As [`simulate`].
+    pub fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, Error> {
+        let begun = Instant::now();
+        let fingers = self.rigs.len();
+        watch.begin(&vec![Controller { params: self.params, calibration: None }; fingers]);
+        if watch.wants_every_frame() {
+            for rig in &mut self.rigs {
+                rig.with(|stand| stand.bench.host.iter_mut().for_each(|host| host.show_every_frame()))?;
             }
         }
+        let mut ahead = VecDeque::new();
+        loop {
+            let time_s = self.clock.time_s(self.now_ns);
+            if time_s < scene.duration_s {
+                let second_s = self.clock_link.second_s(time_s);
+                self.clock.run_at(self.now_ns, second_s);
+                for (number, rig) in self.rigs.iter_mut().enumerate() {
+                    let wants = watch.wants_pressures(number, time_s);
+                    ahead.push_back(set_out(rig, self.now_ns, second_s, wants)?);
+                }
+                self.now_ns += MS;
+                // The boards go on while what they did is looked at.
+                if ahead.len() == fingers {
+                    continue;
+                }
+            } else if ahead.is_empty() {
+                break;
+            }
+            for (rig, made) in self.rigs.iter_mut().zip(ahead.drain(..fingers)) {
+                rig.await_reached()?;
+                let (shown, trouble) = rig.answer(&made)?;
+                shown.iter().for_each(|shown| watch.step(&shown.step()));
+                if let Some(why) = trouble {
+                    return Err(Error::Host { at_ms: rig.now_ns() as f64 * 1e-6, why: why.into() });
+                }
+            }
+        }
+        let (mut costs, mut digests) = (self.clock_link.costs().collect::<Vec<_>>(), Vec::new());
+        for rig in &mut self.rigs {
+            costs.extend(rig.finger(|finger| finger.costs())?);
+            // The host goes: the line is free for whoever asks the board next.
+            let of_link = rig.with(|stand| stand.bench.host.take().map(|host| host.costs().collect::<Vec<_>>()))?;
+            costs.extend(of_link.into_iter().flatten());
+            digests.push(rig.trace_hash()?);
+        }
+        Ok(Summary {
+            virtual_s: scene.duration_s,
+            set_up_s: self.set_up.as_secs_f64(),
+            wall_s: begun.elapsed().as_secs_f64(),
+            ledger: sim::ledger::by_effect(scene, &costs),
+            digest: digests.join(" "),
+        })
     }
-    let (mut costs, mut digests) = (clock_link.costs().collect::<Vec<_>>(), Vec::new());
-    for rig in &mut rigs {
-        rig.check_gaps()?;
-        costs.extend(rig.finger(|finger| finger.costs())?);
-        costs.extend(rig.with(|stand| stand.bench.host.as_ref().map_or(Vec::new(), |host| host.costs().collect()))?);
-        digests.push(rig.trace_hash()?);
-    }
-    Ok(Summary {
-        virtual_s: scene.duration_s,
-        set_up_s,
-        wall_s: begun.elapsed().as_secs_f64() - set_up_s,
-        ledger: sim::ledger::by_effect(scene, &costs),
-        digest: digests.join(" "),
-    })
 }
 
 /// What a millisecond gave to show, and what is wrong with the board, if anything.

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{image, scratch};
-use host_tests::demo::{figures::missed, pictures, table};
+use sim::demo::{figures::missed, pictures, table};
 use virtual_board::demo::{self, Plan};
 
 #[test]
@@ -13,10 +13,10 @@ fn every_bound_holds_and_the_pictures_are_drawn() {
     let (figures, run) = demo::run(&Plan { image: image(), quick: true }).expect("the demonstration runs");
     assert_eq!(missed(&figures.checks), 0, "\n{}", table::table(&figures.checks, &figures.forces));
     assert_eq!(figures.forces.steps.len(), 4);
-    assert_eq!(run.seen.pictures.iter().map(|picture| picture.goal_n).collect::<Vec<_>>(), [1.0, 2.0, 5.0]);
+    assert_eq!(run.pictures.iter().map(|picture| picture.goal_n).collect::<Vec<_>>(), [1.0, 2.0, 5.0]);
 
     // What the board senses is what the world has, and the circle is that of the model: r_c^2 = d (2a - d).
-    for picture in &run.seen.pictures {
+    for picture in &run.pictures {
         assert!((picture.force_n - picture.goal_n).abs() < 0.01 * picture.goal_n, "{picture:?}");
         let d = (picture.goal_n / (std::f64::consts::PI * 0.25)).sqrt();
         assert!((picture.radius_mm - (d * (20.0 - d)).sqrt()).abs() < 0.05, "{picture:?}");
@@ -25,7 +25,7 @@ fn every_bound_holds_and_the_pictures_are_drawn() {
     }
 
     let folder = scratch("pictures");
-    let drawn = pictures::draw(&run.seen, &figures.forces, &folder).expect("the pictures are drawn");
+    let drawn = pictures::draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
     for path in &drawn {
         let svg = std::fs::read_to_string(path).expect("it was written");
         assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{}", path.display());

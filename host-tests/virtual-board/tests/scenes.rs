@@ -34,9 +34,14 @@ struct Kept {
     sensed_n: f64,
     travel_max_mm: f64,
     error_n: f64,
+    every_frame: bool,
 }
 
 impl Watch for Kept {
+    fn wants_every_frame(&self) -> bool {
+        self.every_frame
+    }
+
     fn step(&mut self, step: &Step) {
         self.steps += 1;
         self.times_s.push(step.time_s);
@@ -98,6 +103,16 @@ fn a_run_repeats_and_shows_a_step_nearly_each_millisecond() {
     assert_eq!(first.goal_n, 1.0);
     // The status is of the very frame whose truth stands beside it: on the way, at 120 N/s, a frame is 12 mN.
     assert!(first.error_n < 0.012, "{} N", first.error_n);
+}
+
+#[test]
+fn every_frame_is_shown_once_where_that_is_wanted() {
+    let mut kept = Kept { every_frame: true, ..Kept::default() };
+    run(&scene(&WALL.replace("0.3", "0.1")), &mut kept);
+    // A millisecond before the start, and 0.1 s, of frames of 99.8 us.
+    assert!((1_005..=1_015).contains(&kept.steps), "{} steps", kept.steps);
+    assert!(kept.times_s.windows(2).all(|pair| (95e-6..105e-6).contains(&(pair[1] - pair[0]))));
+    assert_eq!(kept.goal_n, 1.0);
 }
 
 #[test]

@@ -14,6 +14,10 @@ use super::{Registered, State};
 
 /// Bytes of the longest status packet to a Ping, 10 bits each: what a device with a higher ID waits for.
 const PING_SLOT_BITS: u32 = 14 * 10;
+/// Clear: the fault.
+const CLEAR_FAULT: [u8; 5] = [0x02, b'E', b'R', b'C', b'L'];
+/// Control Table Backup: store.
+const STORE: [u8; 5] = [0x01, b'C', b'T', b'R', b'L'];
 
 impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// A whole packet with a good CRC.
@@ -40,6 +44,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             instruction::SYNC_READ if !own => self.sync_read(params, snapshot, reply),
             instruction::FAST_SYNC_READ if !own => self.fast_sync_read(params, snapshot, reply),
             instruction::BULK_READ if !own => self.bulk_read(params, snapshot, reply),
+            instruction::FAST_BULK_READ if !own => self.fast_bulk_read(params, snapshot, reply),
             _ => {
                 let result = self.change(packet, own);
                 self.conclude(packet, level, result, reply);
@@ -74,6 +79,8 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
                 Ok(())
             }
             instruction::ACTION | instruction::REBOOT => Err(StatusError::Length),
+            instruction::CLEAR => self.on_key(params, CLEAR_FAULT, address::RECOVER),
+            instruction::BACKUP => self.on_key(params, STORE, address::SAVE_PARAMETERS),
             instruction::SYNC_WRITE if !own => self.sync_write(params),
             instruction::BULK_WRITE if !own => self.bulk_write(params),
             _ => Err(StatusError::Instruction),
@@ -124,6 +131,13 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         let data = Vec::from_slice(data).map_err(|_| StatusError::Length)?;
         self.registered = Some(Registered { address, data });
         Ok(())
+    }
+
+    /// What has a register of its own, asked for by an option and a key against mistakes; other options are for what
+    /// there is not here.
+    fn on_key(&mut self, params: &[u8], key: [u8; 5], request: u16) -> Result<(), StatusError> {
+        let params: [u8; 5] = params.try_into().map_err(|_| StatusError::Length)?;
+        if params == key { self.write(request, &[1]) } else { Err(StatusError::Range) }
     }
 
     /// Defaults to the stored registers: 1 keeps the ID, 2 the ID and the bus speed, FF nothing, but not by broadcast.
@@ -189,14 +203,10 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     }
 
     fn bulk_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
-        let (entries, rest) = params.as_chunks::<5>();
-        if !rest.is_empty() {
-            return self.counters.count(StatusError::Length);
-        }
+        let Ok(entries) = self.counted(bulk(params)) else { return };
         let mut before = None;
-        for &[id, a, b, c, d] in entries {
+        for (id, wanted) in entries {
             if id == self.settings.record.id {
-                let wanted = Request { address: u16::from_le_bytes([a, b]), length: u16::from_le_bytes([c, d]) };
                 return self.take_turn(before, wanted, snapshot, reply);
             }
             before = Some(id);
@@ -220,12 +230,38 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     fn fast_sync_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let Ok((wanted, ids)) = self.counted(request(params).ok_or(StatusError::Length)) else { return };
         let Some(place) = ids.iter().position(|&id| id == self.settings.record.id) else { return };
-        match Shared::new(place, ids.len(), wanted.length) {
+        self.share(Shared::new(place, ids.iter().map(|_| wanted.length)), wanted, snapshot, reply);
+    }
+
+    fn fast_bulk_read(&mut self, params: &[u8], snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
+        let Ok(entries) = self.counted(bulk(params)) else { return };
+        let own = |&(_, (id, _)): &(usize, (u8, Request))| id == self.settings.record.id;
+        let Some((place, (_, wanted))) = entries.clone().enumerate().find(own) else { return };
+        self.share(Shared::new(place, entries.map(|(_, entry)| entry.length)), wanted, snapshot, reply);
+    }
+
+    /// Adds this device's part now, or when those before it have added theirs.
+    fn share(
+        &mut self,
+        shared: Option<Shared>,
+        wanted: Request,
+        snapshot: &Snapshot<'_, ROWS, COLUMNS>,
+        reply: &mut Reply,
+    ) {
+        match shared {
             None => self.counters.count(StatusError::Length),
             Some(shared) if shared.due() => self.answer_shared(shared, wanted, snapshot, reply),
             Some(shared) => self.turn = Turn::Shared(shared, wanted),
         }
     }
+}
+
+/// The entries of a bulk read: whom, and what of it.
+fn bulk(params: &[u8]) -> Result<impl Iterator<Item = (u8, Request)> + Clone, StatusError> {
+    let (entries, []) = params.as_chunks::<5>() else { return Err(StatusError::Length) };
+    Ok(entries.iter().map(|&[id, a, b, c, d]| {
+        (id, Request { address: u16::from_le_bytes([a, b]), length: u16::from_le_bytes([c, d]) })
+    }))
 }
 
 /// A 16-bit number, and what follows it.

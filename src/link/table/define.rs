@@ -29,7 +29,7 @@ macro_rules! control_table {
             pub const PARAMS: u16 = 512;
         }
 
-        const FIXED: &[Register] = &[$(Register {
+        pub(super) const FIXED: &[Register] = &[$(Register {
             name: stringify!($name),
             address: $address,
             kind: Kind::$kind,
@@ -44,8 +44,17 @@ macro_rules! control_table {
         }),*];
 
         pub(super) static CELLS: [Cell; FIXED.len()] = [
-            $(Cell { address: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
+            $(Cell { address: $address, of: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
         ];
+
+        /// The register that begins at an address.
+        pub(super) const fn fixed(address: u16) -> Register {
+            let mut place = 0;
+            while FIXED[place].address != address {
+                place += 1;
+            }
+            FIXED[place]
+        }
 
         /// The value of an element, as its low bytes; 0 where there is no such register.
         pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(

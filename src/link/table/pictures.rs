@@ -8,9 +8,11 @@ use super::{Access, Cell, Kind, Register, View};
 
 /// Where the first picture begins, whatever the shape.
 pub(super) const FIRST: u16 = 768;
+/// How many there are.
+pub(super) const COUNT: usize = 3;
 /// Name, largest value, unit and resolution of each, and what it means.
-const PICTURES: [(&str, i64, &str, u16, &str); 3] = [
-    ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row."),
+const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
+    ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row; 0 before the first tare."),
     (
         "RAW_CODES",
         4095,
@@ -25,10 +27,20 @@ pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; 3
     const { Shape::<ROWS, COLUMNS>::CHECKED };
     let taxels = Shape::<ROWS, COLUMNS>::TAXELS as u16;
     let codes = (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16;
-    let first = Cell { address: FIRST, count: taxels, kind: Kind::U16, access: Access::ReadOnly };
-    let second = Cell { address: after(&first), count: codes, ..first };
-    let third = Cell { address: after(&second), count: taxels, ..first };
+    let first = cell(FIRST, taxels);
+    let second = cell(after(&first), codes);
+    let third = cell(after(&second), taxels);
     [first, second, third]
+}
+
+const fn cell(address: u16, count: u16) -> Cell {
+    Cell { address, of: address, count, kind: Kind::U16, access: Access::ReadOnly }
+}
+
+/// Where the table ends.
+pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
+    let [_, _, last] = cells::<ROWS, COLUMNS>();
+    last.address + last.kind.width() * last.count
 }
 
 /// The next multiple of 256.
@@ -44,7 +56,7 @@ pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Reg
 
 const fn register(picture: usize, cells: &[Cell; 3]) -> Register {
     let (name, max, unit, scale, doc) = PICTURES[picture];
-    let Cell { address, count, kind, access } = cells[picture];
+    let Cell { address, count, kind, access, .. } = cells[picture];
     Register { name, address, kind, count, access, unit, scale, min: 0, max, default: None, doc }
 }
 
@@ -57,7 +69,7 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     let [pressures, codes, tare] = const { cells::<ROWS, COLUMNS>() };
     let snapshot = view.snapshot;
     let value = if address == pressures.address {
-        snapshot.pressure_10pa(element)
+        if view.tared() { snapshot.pressure_10pa(element) } else { 0 }
     } else if address == codes.address {
         snapshot.frame.code(element / COLUMNS, element % COLUMNS)
     } else if address == tare.address {

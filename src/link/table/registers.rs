@@ -2,26 +2,25 @@
 //!
 //! As [`control_table`](super::define) reads it:
 //! `address NAME: kind[count] access, unit * resolution, least to largest = default, read, write;` with the
-//! documentation above. The parameters are not listed: they follow [`Params`], from [`address::PARAMS`] on, 4 bytes
-//! each; nor are the [`super::pictures`] of the array, which go by its shape.
+//! documentation above. Not listed are the parameters, which follow [`Params`](crate::params::Params) from
+//! [`address::PARAMS`] on, 4 bytes each; the [`super::pictures`] of the array, which go by its shape; the
+//! [`super::indirect`] registers, and the [`super::mirrors`].
 //!
-//! Addresses below 256 are those of the X-series, with its meaning; 168 to 251 are left free for its indirect access.
+//! Addresses below 256 are those of the X-series, with its meaning, but for the mirrors from 148 to 167.
 
 use crate::contact::FitLevel;
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
-use crate::params::Params;
 use crate::store::Record;
 
-use super::pictures;
-use super::values::{bump, permille, set_goal, set_torque, set_watchdog, watchdog};
+use super::values::{bump, permille, set_goal, set_recover, set_torque, set_watchdog, short, watchdog};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
 const MODEL: u16 = u16::from_le_bytes(*b"FT");
 /// Counts changes of the control table that a host must know of.
-const TABLE_VERSION: u32 = 1;
+const TABLE_VERSION: u32 = 2;
 /// Ten times the major and once the minor number of the version.
 const FIRMWARE_VERSION: u8 = number(env!("CARGO_PKG_VERSION_MAJOR")) * 10 + number(env!("CARGO_PKG_VERSION_MINOR"));
 
@@ -47,7 +46,12 @@ control_table! {
     9 RETURN_DELAY_TIME: U8 Stored, "us" * 2, 0 to 254 = Record::DEFAULT.return_delay_2us,
         |view, _| u32::from(view.settings().record.return_delay_2us),
         |staged, value| { staged.settings.record.return_delay_2us = value as u8; Ok(()) };
-    /// 1 lets the bridge be driven. Goes to 0 on a fault.
+    /// 0: what an X-series servo calls current control, where the goal is an effort; here it is a force.
+    11 OPERATING_MODE: U8 TorqueOff, "" * 1, 0 to 0 = 0,
+        |_, _| 0,
+        |_, _| Ok(());
+    /// 1 lets the bridge be driven. Goes to 0 on a fault. 0 takes the goal back: the next 1 presses nothing before a
+    /// new goal.
     64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |view, _| u32::from(view.settings().command.torque),
         set_torque;
@@ -63,16 +67,27 @@ control_table! {
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, "" * 1, 0 to 255,
         |view, _| u32::from(hardware_error(view.snapshot.status.fault));
     /// The motor is stopped when the bus is silent for longer; 0 is off. Reads -1 once it tripped, until 0 is
-    /// written; until then goal force and torque enable are refused.
+    /// written; until then goals are refused with a range error, as X-series servos do, and torque enable with a
+    /// result error.
     98 BUS_WATCHDOG: I8 ReadWrite, "ms" * 20, 0 to 127 = 0,
         |view, _| watchdog(view.settings()) as u32,
         set_watchdog;
+    /// The goal force where an X-series servo has its goal current, held at its top: another name of goal_force_mn.
+    102 SHORT_GOAL_MN: I16 ReadWrite, "mN" * 1, 0 to 32_767 = 0,
+        |view, _| short(goal_mn(view.settings().command.goal)),
+        set_goal;
     /// Milliseconds since reset; wraps after 32767.
     120 REALTIME_TICK: U16 ReadOnly, "ms" * 1, 0 to 0x7FFF,
         |view, _| view.snapshot.tick_ms & 0x7FFF;
+    /// The force where an X-series servo has its present current: present_force_mn, held at its ends.
+    126 SHORT_FORCE_MN: I16 ReadOnly, "mN" * 1, -32_768 to 32_767,
+        |view, _| short(thousandths(view.contact().force.to_bits(), 16));
+    /// The supply where an X-series servo has its input voltage, and in its unit.
+    144 SHORT_SUPPLY_100MV: U16 ReadOnly, "mV" * 100, 0 to 655,
+        |view, _| u32::from(view.snapshot.supply_mv.saturating_add(50) / 100);
     /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error; one below
-    /// contact_on_mn is held as contact_on_mn, with limit 3. Goes to 0 on a fault; while that stands, other goals are
-    /// refused with a result error.
+    /// contact_on_mn is held as contact_on_mn, with limit 3. Goes to 0 on a fault and with torque_enable; while a
+    /// fault stands, other goals are refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
@@ -108,7 +123,8 @@ control_table! {
     /// only from below, 12 guard.
     266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FFF,
         |view, _| u32::from(view.snapshot.status.limits.0);
-    /// Total normal force.
+    /// Total normal force. Before the first tare nothing is known of it: this and all that goes by it read 0, and limit
+    /// 6 is set.
     268 PRESENT_FORCE_MN: I32 ReadOnly, "mN" * 1, -32_768_000 to 32_768_000,
         |view, _| thousandths(view.contact().force.to_bits(), 16) as u32;
     /// Indentation of the tip, from the force by the model.
@@ -131,7 +147,7 @@ control_table! {
         |view, _| u32::from(view.contact().confidence);
     /// Taxels left out because they are dead or saturated.
     293 BAD_TAXELS: U8 ReadOnly, "" * 1, 0 to 100,
-        |view, _| u32::from(view.contact().bad_taxels);
+        |view, _| u32::from(view.snapshot.status.contact.bad_taxels);
     /// Share of the supply at the motor; positive presses the tip into the object.
     294 DUTY_PERMILLE: I16 ReadOnly, "permille" * 1, -1000 to 1000,
         |view, _| permille(view.snapshot.status.duty) as u32;
@@ -156,22 +172,12 @@ control_table! {
     /// The longest loop time since reset.
     316 LOOP_TIME_MAX_US: U16 ReadOnly, "us" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.loop_time_max_us);
-    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6
-    /// other.
-    318 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
-        |view, _| view.snapshot.reset_cause as u32;
-    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
-    319 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 4,
-        |view, _| view.snapshot.crash.cause as u32;
-    /// Crashes since power-on.
-    320 CRASH_COUNT: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
-        |view, _| view.snapshot.crash.count;
-    /// Program counter at the last crash; 0 where it is not known.
-    324 CRASH_PC: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
-        |view, _| view.snapshot.crash.pc;
-    /// Line of the source where it panicked; 0 where it is not known.
-    328 CRASH_LINE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
-        |view, _| u32::from(view.snapshot.crash.line);
+    /// When the frame's last conversion ended, since the controller started; wraps after 71 minutes.
+    318 FRAME_TIME_US: U32 ReadOnly, "us" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.frame_time_us;
+    /// From frame to frame, by the scan's parameters.
+    322 FRAME_PERIOD_NS: U32 ReadOnly, "ns" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.frame_ns;
     /// Refused with the result error.
     330 RESULT_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| view.refused(StatusError::Result);
@@ -236,6 +242,32 @@ control_table! {
     /// again once that is cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
+    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5 watchdog, 6
+    /// other.
+    384 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
+        |view, _| view.snapshot.reset_cause as u32;
+    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
+    385 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 4,
+        |view, _| view.snapshot.crash.cause as u32;
+    /// Crashes since power-on.
+    386 CRASH_COUNT: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.crash.count;
+    /// Program counter at the last crash; 0 where it is not known.
+    390 CRASH_PC: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.crash.pc;
+    /// Line of the source where it panicked; 0 where it is not known.
+    394 CRASH_LINE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.crash.line);
+    /// 1 does what a fault asks for before torque can be enabled again: resets a tripped bus watchdog, turns torque off,
+    /// takes the goal back and clears the fault. Refused with a result error while something stands in the way: see
+    /// recover_hindrance. Reads 0.
+    396 RECOVER: U8 ReadWrite, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        set_recover;
+    /// What stands in the way of recover: 0 nothing, 1 the supply is below supply_min_mv, 2 it is above supply_max_mv, 3
+    /// more taxels are bad than bad_taxels_max, 4 a save waits.
+    397 RECOVER_HINDRANCE: U8 ReadOnly, "" * 1, 0 to 4,
+        |view, _| view.hindrance();
     /// The option bytes as the last reset loaded them: FLASH_OPTCR of the microcontroller.
     484 OPTION_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.snapshot.health.option_bytes;
@@ -278,49 +310,6 @@ control_table! {
     510 LINE_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.line_errors[2]);
 }
-
-/// How many registers there are.
-pub const COUNT: usize = FIXED.len() + Params::COUNT + 3;
-
-/// Every register of an array of this shape, in the order of the addresses; the last three are the pressures, the raw
-/// codes and the tare's.
-pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
-    let mut all = [FIXED[0]; COUNT];
-    let pictures = pictures::registers::<ROWS, COLUMNS>();
-    let (mut to, mut fixed, mut place) = (0, 0, 0);
-    while to < all.len() {
-        if fixed < FIXED.len() {
-            all[to] = FIXED[fixed];
-            fixed += 1;
-        } else if place < Params::COUNT {
-            let (name, default, min, max) = Params::RANGES[place];
-            all[to] = Register {
-                name,
-                address: address::PARAMS + 4 * place as u16,
-                kind: Kind::I32,
-                count: 1,
-                access: Access::Stored,
-                unit: "",
-                scale: 1,
-                min: min as i64,
-                max: max as i64,
-                default: Some(default as i64),
-                doc: Params::DOCS[place],
-            };
-            place += 1;
-        } else {
-            all[to] = pictures[to - FIXED.len() - Params::COUNT];
-        }
-        to += 1;
-    }
-    all
-}
-
-// The order of the addresses: what is listed, the parameters, the pictures.
-const _: () = assert!(
-    FIXED[FIXED.len() - 1].address < address::PARAMS
-        && address::PARAMS as usize + 4 * Params::COUNT <= pictures::FIRST as usize
-);
 
 /// A number of at most two digits.
 const fn number(digits: &str) -> u8 {

@@ -3,30 +3,32 @@
 use crate::config::newtons;
 use crate::link::packet::StatusError;
 use crate::link::settings::Settings;
-use crate::units::Duty;
+use crate::link::stand::Hindrance;
+use crate::units::{Duty, Newtons};
 
 use super::Staged;
 
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Torque enable: refused while a fault or a tripped watchdog stands.
+/// Torque enable: refused while a fault or a tripped watchdog stands; off takes the goal back.
 pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
     let on = value != 0;
-    if on && staged.settings.watchdog_tripped {
-        return Err(StatusError::Access);
-    }
-    if on && staged.stand.faulted {
+    if on && (staged.settings.watchdog_tripped || staged.stand.faulted) {
         return Err(StatusError::Result);
     }
-    staged.settings.command.torque = on;
+    let command = &mut staged.settings.command;
+    command.torque = on;
+    if !on {
+        command.goal = Newtons::ZERO;
+    }
     Ok(())
 }
 
 /// Goal force: refused while a tripped watchdog stands.
 pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped {
-        return Err(StatusError::Access);
+        return Err(StatusError::Range);
     }
     staged.settings.command.goal = newtons(value as i32);
     Ok(())
@@ -35,10 +37,24 @@ pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusErro
 /// Bus watchdog: 0 resets a tripped one.
 pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped && value != 0 {
-        return Err(StatusError::Access);
+        return Err(StatusError::Range);
     }
     staged.settings.watchdog_tripped = false;
     staged.settings.command.bus_watchdog_ms = value as u16 * WATCHDOG_MS;
+    Ok(())
+}
+
+/// Recover: a tripped watchdog, torque, goal and fault in one.
+pub(super) fn set_recover(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    if value == 0 || !staged.stand.faulted && !staged.settings.watchdog_tripped {
+        return Ok(());
+    }
+    if staged.stand.hindrance(&staged.settings.record.params, staged.actions) != Hindrance::None {
+        return Err(StatusError::Result);
+    }
+    set_watchdog(staged, 0)?;
+    set_torque(staged, 0)?;
+    bump(&mut staged.settings.command.clear_request, 1);
     Ok(())
 }
 
@@ -50,6 +66,11 @@ pub(super) fn watchdog(settings: &Settings) -> i32 {
 /// Makes a request: a change of the number.
 pub(super) fn bump(request: &mut u8, value: i64) {
     *request = request.wrapping_add(u8::from(value != 0));
+}
+
+/// The low bytes of a number of 16 bits, held at its ends.
+pub(super) fn short(value: i32) -> u32 {
+    value.max(i16::MIN.into()).min(i16::MAX.into()) as u32
 }
 
 /// Thousandths of the whole supply, rounded.

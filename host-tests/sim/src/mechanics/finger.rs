@@ -231,6 +231,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.circuit.source_v - self.circuit.source_ohm * self.circuit.duty * self.current_a()
     }
 
+    /// The share of the supply that the bridge gave in the last step.
+    pub fn duty(&self) -> f64 {
+        self.circuit.duty
+    }
+
     /// Kinetic energy and that of the effects on the drive, mJ.
     pub fn energy_mj(&self) -> f64 {
         let speed = self.shaft.speed_rad_per_s;

@@ -1,11 +1,11 @@
 //! What is gathered of one finger, step by step; no trace is kept, so an hour costs what a second does.
 
 use super::conduct::Conduct;
+use super::response::Response;
 use super::slips::Slips;
 use crate::watch::{Controller, Step};
 use fingertip::state::{Fault, Limits};
 use fingertip::units::{Duty, Millimetres, Newtons};
-use host_tests::metrics::Response;
 
 /// Errors of the centre count from this force on: below it there is next to nothing to see.
 const SEEN_N: f64 = 0.1;
@@ -255,7 +255,7 @@ pub(super) fn duty(duty: Duty) -> f64 {
 }
 
 /// A force as a number.
-pub(crate) fn newtons(force: Newtons) -> f64 {
+pub fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }
 

@@ -12,8 +12,6 @@ const CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(
 
 /// The records' numbers.
 const FOOTER: u8 = 2;
-const CHUNK: u8 = 6;
-const ATTACHMENT: u8 = 9;
 const DATA_END: u8 = 15;
 /// A record's number and length.
 const HEAD: usize = 9;
@@ -24,7 +22,7 @@ const FOOTER_BYTES: usize = HEAD + 20;
 /// Checks a file.
 ///
 /// # Errors
-/// It is cut off or changed; the text says where.
+/// It is cut off or changed; the text says in which part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     if !bytes.starts_with(MAGIC) {
         return Err("this is no MCAP file: it does not begin as one".into());
@@ -49,7 +47,7 @@ pub fn check(bytes: &[u8]) -> Result<(), RunError> {
         return Err("the recording has no checksum over its data: another program wrote it anew. Replay the one that it was made from".into());
     }
     if word(end, HEAD) != CRC.checksum(data) {
-        return Err(format!("the recording is damaged {}: the CRC is another", place(data)).into());
+        return Err("the recording is damaged in its messages, its metadata or the attached scene: the CRC is another. Copy it anew, or record the scene again".into());
     }
     Ok(())
 }
@@ -68,41 +66,6 @@ pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
         digest.write(text);
     }
     format!("{:032x}", digest.finish_128())
-}
-
-/// Where it is that data differ: looked for in what has a checksum of its own.
-fn place(data: &[u8]) -> String {
-    let mut at = MAGIC.len();
-    while at + HEAD <= data.len() {
-        let length = usize::try_from(number(data, at + 1)).unwrap_or(usize::MAX);
-        let Some(end) = (at + HEAD).checked_add(length).filter(|end| *end <= data.len()) else { break };
-        let whole = match data[at] {
-            CHUNK => is_whole_chunk(&data[at + HEAD..end]),
-            ATTACHMENT => is_whole_attachment(&data[at + HEAD..end]),
-            _ => true,
-        };
-        if !whole {
-            let what = if data[at] == CHUNK { "in its messages" } else { "in the attached scene" };
-            return format!("{what}, in bytes {at} to {end}");
-        }
-        at = end;
-    }
-    match at == data.len() {
-        true => "outside of its messages: in its metadata, its indexes or between".into(),
-        false => format!("in the record at byte {at}, whose length cannot be"),
-    }
-}
-
-fn is_whole_chunk(chunk: &[u8]) -> bool {
-    // Start, end and length, the checksum, the compression's name, and the records' length.
-    let name = chunk.get(28..32).map_or(0, |_| word(chunk, 28) as usize);
-    let records = 32usize.checked_add(name).and_then(|at| chunk.get(at.checked_add(8)?..));
-    name > 0 || records.is_some_and(|records| word(chunk, 24) == CRC.checksum(records))
-}
-
-fn is_whole_attachment(attachment: &[u8]) -> bool {
-    let end = attachment.len().saturating_sub(4);
-    attachment.len() > 4 && word(attachment, end) == CRC.checksum(&attachment[..end])
 }
 
 fn is_head(record: &[u8], kind: u8, length: u64) -> bool {

@@ -11,7 +11,7 @@ use fingertip::units::Duty;
 use host_tests::kept::Whole;
 use images::record::{Digest, Record};
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, McapError, McapResult, WriteOptions, Writer};
+use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter};
@@ -53,7 +53,8 @@ impl Recorder {
     /// The file cannot be made, or another process is recording there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
         let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
-        let options = WriteOptions::new().profile("").library(concat!("fingertip-sim/", env!("CARGO_PKG_VERSION")));
+        let library = concat!("fingertip-sim/", env!("CARGO_PKG_VERSION"));
+        let options = WriteOptions::new().profile("").library(library).compression(Some(Compression::Lz4));
         Ok(Self {
             path: path.into(),
             out: options.create(BufWriter::new(file))?,

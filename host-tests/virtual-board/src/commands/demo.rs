@@ -1,7 +1,7 @@
 //! `virtual-board demo`.
 
-use host_tests::demo::{figures, pictures, table};
 use host_tests::{kept, say};
+use sim::demo::{figures, pictures, table};
 use std::path::PathBuf;
 use virtual_board::demo::{self, DemoError, Plan};
 
@@ -26,7 +26,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
     // The files first: who reads the output may go away.
-    let drawn = pictures::draw(&run.seen, &figures.forces, &arguments.out);
+    let drawn = pictures::draw(&run, &figures.forces, &arguments.out);
     if let Some(path) = &arguments.json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
         let written = written.and_then(|text| kept::write(path, text + "\n"));

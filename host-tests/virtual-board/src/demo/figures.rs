@@ -1,11 +1,38 @@
 //! The demonstration's figures, each against its bound.
 
 use super::DemoError;
-use super::flashable::Flashable;
-use super::play::Run;
-use host_tests::demo::{Check, Forces};
+use crate::client::Client;
+use crate::front_end::ScanCounts;
+use crate::scene::bus::ID;
+use crate::{Error, Rig};
+use fingertip::shipped::address;
 use serde::Serialize;
-use std::time::Duration;
+use sim::demo::{Check, Forces, Run};
+
+/// An answer takes at most this long.
+const WAIT_NS: u64 = 20_000_000;
+/// The line is quiet this long after the last request.
+const QUIET_MS: u64 = 2;
+
+/// What the board has done by an instant.
+#[derive(Clone, Copy, Debug)]
+pub struct Counts {
+    at_ns: u64,
+    scans: ScanCounts,
+    instructions: u64,
+    duties: u64,
+}
+
+impl Counts {
+    /// Now.
+    ///
+    /// # Errors
+    /// The emulator stopped.
+    pub fn of(rig: &mut Rig) -> Result<Self, Error> {
+        let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames());
+        Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
+    }
+}
 
 /// All figures; the keys end with the unit.
 #[derive(Clone, Debug, Serialize)]
@@ -35,10 +62,16 @@ pub struct Figures {
     pub forces: Forces,
     /// Digest of every duty and every byte on the bus, with their times.
     pub trace_sha256: String,
-    /// The same of the second run, cut by a snapshot; none where it was left out.
+    /// The same of the second run; none where it was left out.
     pub repeated_trace_sha256: Option<String>,
     /// Every figure that has a bound.
     pub checks: Vec<Check>,
+    /// Frames that the scan finished and no duty answered.
+    #[serde(skip)]
+    unanswered: u64,
+    /// Emulator gaps that the run touched and that are not known.
+    #[serde(skip)]
+    unknown_gaps: usize,
 }
 
 /// The least and the largest.
@@ -51,64 +84,58 @@ pub struct Range {
 }
 
 impl Figures {
-    /// Takes the figures of a run.
+    /// Takes the figures of a run between two instants; what is not the run's is left to be filled in, and checked then.
     ///
     /// # Errors
-    /// The run was not what the script asked for: nothing was touched, or a force never reached.
-    pub fn of(run: &Run, flash: &Flashable, repeated: Option<String>, wall: Duration) -> Result<Self, DemoError> {
-        let forces = Forces::of(&run.seen)?;
-        let virtual_time_s = run.seen.span_s[1] - run.seen.span_s[0];
-        let frames = run.scans[1].frames - run.scans[0].frames;
-        let mut figures = Self {
-            image_sha256: flash.sha256(),
-            image_bytes: flash.bytes.len(),
-            virtual_time_s,
-            wall_time_s: wall.as_secs_f64(),
+    /// The run was not what the script asked for: nothing was touched, or a force never reached; or the board does not answer.
+    pub fn of(run: &Run, [from, to]: [&Counts; 2], rig: &mut Rig) -> Result<Self, DemoError> {
+        let forces = Forces::of(run)?;
+        let frames = to.scans.frames - from.scans.frames;
+        let latency = rig.latency()?;
+        // What the scene's host asked for last is answered by then.
+        rig.run_ms(QUIET_MS)?;
+        rig.take_received()?;
+        let answer = rig.client(WAIT_NS, |bus: &mut Client| bus.read_u16(ID, address::LOOP_TIME_MAX_US))?;
+        let loop_time = answer.map_err(|why| Error::Client(std::io::Error::other(format!("loop time: {why}"))))?;
+        // The last may be under way at either instant.
+        let unanswered = (frames + from.duties).abs_diff(to.duties).saturating_sub(2);
+        Ok(Self {
+            image_sha256: String::new(),
+            image_bytes: 0,
+            virtual_time_s: 0.0,
+            wall_time_s: 0.0,
             frames,
-            frame_rate_hz: frames as f64 / virtual_time_s,
-            missed_frames: run.polls.last().map_or(u32::MAX, |poll| poll.missed_frames),
-            latency_us: Range { least: run.latency.min_ns as f64 * 1e-3, largest: run.latency.max_ns as f64 * 1e-3 },
-            loop_time_max_us: run.loop_time_max_us,
-            instructions_a_frame: (run.instructions[1] - run.instructions[0]) as f64 / frames as f64,
+            frame_rate_hz: frames as f64 / ((to.at_ns - from.at_ns) as f64 * 1e-9),
+            missed_frames: run.missed_frames,
+            latency_us: Range { least: latency.min_ns as f64 * 1e-3, largest: latency.max_ns as f64 * 1e-3 },
+            loop_time_max_us: loop_time.data,
+            instructions_a_frame: (to.instructions - from.instructions) as f64 / frames as f64,
             forces,
-            trace_sha256: run.trace_hash.clone(),
-            repeated_trace_sha256: repeated,
+            trace_sha256: String::new(),
+            repeated_trace_sha256: None,
             checks: Vec::new(),
-        };
-        figures.checks = figures.check(run);
-        Ok(figures)
+            unanswered,
+            unknown_gaps: rig.gaps()?.iter().filter(|gap| gap.reason().is_none()).count(),
+        })
     }
 
-    fn check(&self, run: &Run) -> Vec<Check> {
+    /// Holds each figure against its bound.
+    pub fn check(&mut self) {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];
-        let count = |number: usize| Some(number as f64);
         let mut checks = vec![
             Check::new("frame rate", Some(self.frame_rate_hz), "Hz", within(5_000.0, 10_500.0)),
             Check::new("missed frames", Some(f64::from(self.missed_frames)), "", at_most(0.0)),
-            Check::new("frames without a new duty", self.unanswered(run), "", at_most(0.0)),
+            Check::new("frames without a new duty", Some(self.unanswered as f64), "", at_most(0.0)),
             Check::new("last conversion to new duty", Some(self.latency_us.largest), "us", within(1.0, 60.0)),
             Check::new("instructions a frame, all told", Some(self.instructions_a_frame), "", within(2_000.0, 8_000.0)),
-            Check::new("emulator gaps not on the allow-list", count(unknown_gaps(run)), "", at_most(0.0)),
+            Check::new("emulator gaps not on the allow-list", Some(self.unknown_gaps as f64), "", at_most(0.0)),
         ];
         checks.extend(self.forces.checks());
         if let Some(repeated) = &self.repeated_trace_sha256 {
-            let differ = count(usize::from(*repeated != self.trace_sha256));
-            checks.push(Check::new("traces that differ when repeated and cut", differ, "", at_most(0.0)));
+            let differ = Some(f64::from(u8::from(*repeated != self.trace_sha256)));
+            checks.push(Check::new("traces that differ when repeated", differ, "", at_most(0.0)));
         }
-        checks
+        self.checks = checks;
     }
-
-    /// Frames since the reset that the scan finished but no duty followed while the bridge was driven.
-    fn unanswered(&self, run: &Run) -> Option<f64> {
-        let (first, last) = (run.polls.first()?, run.polls.last()?);
-        let stepped = last.frame.wrapping_sub(first.frame);
-        let scanned = (last.at_s - first.at_s) * self.frame_rate_hz;
-        // The two polls may each be a frame early or late.
-        Some(((scanned - f64::from(stepped)).abs() - 2.0).max(0.0).floor())
-    }
-}
-
-fn unknown_gaps(run: &Run) -> usize {
-    run.gaps.iter().filter(|gap| gap.reason().is_none()).count()
 }

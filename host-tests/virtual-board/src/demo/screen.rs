@@ -1,44 +1,52 @@
 //! What is seen while it runs: a live heat map where there is a terminal, a line for each phase elsewhere.
 
-use super::bus::Poll;
-use super::play::Watch;
-use host_tests::demo::Phase;
-use host_tests::heatmap::{self, Pressures};
-use host_tests::say;
+use fingertip::pipeline::Status;
+use host_tests::{heatmap, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sim::demo::{Taxels, what};
+use sim::scene::Scene;
+use sim::watch::{Step, Watch};
 use std::io::IsTerminal;
 
 /// The brightest colour: a little above the peak at 5 N.
 const FULL_KPA: f64 = 70.0;
 
+/// The array is drawn this often, in the scene's time.
+const DRAWN_MS: u64 = 50;
+
 /// The terminal, or what stands in for it.
-#[derive(Debug)]
 pub struct Screen {
+    scene: Scene,
+    array: Taxels,
+    /// Goals that were told.
+    told: usize,
+    drawn_ms: u64,
     /// None where there is no terminal.
     bar: Option<ProgressBar>,
 }
 
-/// Nobody watches.
-#[derive(Clone, Copy, Debug)]
-pub struct Nobody;
-
 impl Screen {
-    /// A screen for a run of this virtual time.
-    pub fn new(length_ms: u64) -> Self {
+    /// A screen for a run of this scene.
+    pub fn new(scene: &Scene) -> Self {
         let bar = std::io::stdout().is_terminal().then(|| {
+            let length_ms = (scene.duration_s * 1e3) as u64;
             let bar = ProgressBar::with_draw_target(Some(length_ms), ProgressDrawTarget::stdout());
             let style = ProgressStyle::with_template("{msg}\n{bar:60} {pos} of {len} ms, virtual");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             bar
         });
-        Self { bar }
+        Self { scene: scene.clone(), array: Taxels::of(scene), told: 0, drawn_ms: 0, bar }
     }
 
     /// Says what is waited for.
-    pub fn waiting(&self, what: &str) {
+    pub fn waiting(&self, for_what: &str) {
+        self.say(format!("waiting for {for_what}"));
+    }
+
+    fn say(&self, line: String) {
         match &self.bar {
-            Some(bar) => bar.println(format!("waiting for {what}")),
-            None => say::line(format_args!("waiting for {what}")),
+            Some(bar) => bar.println(line),
+            None => say::line(line),
         }
     }
 
@@ -51,43 +59,36 @@ impl Screen {
 }
 
 impl Watch for Screen {
-    fn phase(&mut self, at_ms: u64, phase: Phase) {
-        let line = format!("{:7.3} s  goal: {}", at_ms as f64 * 1e-3, phase.what());
-        match &self.bar {
-            Some(bar) => bar.println(line),
-            None => say::line(line),
+    fn step(&mut self, step: &Step) {
+        while let Some(event) = self.scene.script.get(self.told).filter(|event| event.at_s <= step.time_s) {
+            self.say(format!("{:7.3} s  goal: {}", event.at_s, what(event.goal_n)));
+            self.told += 1;
         }
+        let now_ms = (step.time_s.max(0.0) * 1e3) as u64;
+        let Some(bar) = self.bar.as_ref().filter(|_| now_ms >= self.drawn_ms + DRAWN_MS) else { return };
+        self.drawn_ms = now_ms;
+        bar.set_position(now_ms);
+        bar.set_message(picture(&self.scene, &self.array, step, self.told));
     }
-
-    fn news(&mut self, at_ms: u64, phase: Phase, poll: &Poll, pressures: Option<&Pressures>) {
-        let Some(bar) = &self.bar else { return };
-        bar.set_position(at_ms);
-        if let Some(pressures) = pressures {
-            bar.set_message(picture(phase, poll, pressures));
-        }
-    }
-}
-
-impl Watch for Nobody {
-    fn phase(&mut self, _: u64, _: Phase) {}
-
-    fn news(&mut self, _: u64, _: Phase, _: &Poll, _: Option<&Pressures>) {}
 }
 
 /// The heat map with the figures beside it.
-fn picture(phase: Phase, poll: &Poll, pressures: &Pressures) -> String {
+fn picture(scene: &Scene, array: &Taxels, step: &Step, told: usize) -> String {
+    let Status { mode, contact, .. } = step.status;
+    let goal_n = told.checked_sub(1).map_or(0.0, |last| scene.script[last].goal_n);
+    let number = |fixed: f64, unit: &str| format!("{fixed:6.3} {unit}");
     let beside = [
         String::new(),
-        format!("mode         {}", format!("{:?}", poll.mode).to_lowercase()),
-        format!("goal         {:6.3} N", phase.goal_n()),
-        format!("force        {:6.3} N", poll.force_n),
-        format!("indentation  {:6.3} mm", poll.indentation_mm),
-        format!("radius       {:6.3} mm", poll.radius_mm),
-        format!("centre       {:6.3}, {:.3} mm", poll.centre_mm[0], poll.centre_mm[1]),
+        format!("mode         {}", format!("{mode:?}").to_lowercase()),
+        format!("goal         {}", number(goal_n, "N")),
+        format!("force        {}", number(contact.force.0.to_num(), "N")),
+        format!("indentation  {}", number(contact.indentation.0.to_num(), "mm")),
+        format!("radius       {}", number(contact.radius.0.to_num(), "mm")),
+        format!("centre       {:6.3}, {:.3} mm", contact.centre_x.0, contact.centre_y.0),
         String::new(),
         heatmap::legend(FULL_KPA),
     ];
-    let lines = heatmap::lines(pressures, FULL_KPA);
+    let lines = heatmap::lines(&array.kilopascals(step.frame), FULL_KPA);
     let both = lines.iter().zip(beside.iter().map(String::as_str).chain(std::iter::repeat("")));
     both.map(|(cells, text)| format!("  {cells}   {text}\n")).collect()
 }

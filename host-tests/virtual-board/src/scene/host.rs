@@ -32,6 +32,8 @@ const GAP_NS: u64 = 10 * BYTE_NS;
 /// A look at what the board does comes once in so many frames: an answer takes the core's time as well as the
 /// emulator's.
 const LOOK_FRAMES: u64 = 10;
+/// Where every frame is shown anyway.
+const SELDOM_NS: u64 = 10 * MS;
 /// In a long scene there are about so many looks, and more frames between them.
 const LOOKS: f64 = 4_000.0;
 /// Frames that are kept until an answer speaks of them.
@@ -106,6 +108,7 @@ pub struct Host {
     shown_ns: u64,
     /// When the last goal arrived.
     heard_ns: u64,
+    every_frame: bool,
 }
 
 impl std::fmt::Debug for Host {
@@ -142,7 +145,13 @@ impl Host {
             newest: 0,
             shown_ns: start_ns,
             heard_ns: start_ns,
+            every_frame: false,
         }
+    }
+
+    /// From now on every frame is shown, those too that no answer speaks of; so few looks do.
+    pub fn show_every_frame(&mut self) {
+        (self.every_frame, self.look_every_ns) = (true, self.look_every_ns.max(SELDOM_NS));
     }
 
     /// From an instant on a second of the board lasts so long.
@@ -189,6 +198,12 @@ impl Host {
         if self.watchdog_ns > 0 && now_ns >= self.shown_ns + self.look_every_ns {
             let newest = self.frames.back().copied();
             newest.into_iter().for_each(|seen| self.show(seen, now_ns));
+        }
+        if self.every_frame {
+            // From when the world moves on.
+            let begins_ns = self.start_ns - MS;
+            let unseen = self.frames.iter().filter(|seen| seen.number > self.newest && seen.end_ns >= begins_ns);
+            unseen.copied().collect::<Vec<_>>().into_iter().for_each(|seen| self.show(seen, now_ns));
         }
         self.send(now_ns, next_ns, wire);
     }

@@ -1,18 +1,18 @@
-//! The demonstration on the native core: `demo [--quick] [--out DIR]`.
+//! The demonstration on the native board: `demo [--quick] [--out DIR]`.
 //!
-//! The same script, plant and figures as on the flash image, without a microcontroller in between.
+//! The same scene and figures as on the flash image, without a microcontroller in between.
 
-use host_tests::demo::{DemoError, Forces, Script, figures::missed, native, pictures, table};
 use host_tests::say;
-use std::path::PathBuf;
+use sim::demo::{self, DemoError, Forces, Trace, figures::missed, pictures, table};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let mut arguments = std::env::args_os().skip(1);
-    let (mut script, mut out) = (Script::whole(), PathBuf::from("target/demo/native"));
+    let (mut quick, mut out) = (false, PathBuf::from("target/demo/native"));
     while let Some(argument) = arguments.next() {
         match (argument.to_str(), arguments.len()) {
-            (Some("--quick"), _) => script = Script::quick(),
+            (Some("--quick"), _) => quick = true,
             (Some("--out"), 1..) => out = arguments.next().unwrap_or_default().into(),
             _ => {
                 say::aside(format_args!(
@@ -23,7 +23,7 @@ fn main() -> ExitCode {
             }
         }
     }
-    let missed = run(&script, &out);
+    let missed = run(quick, &out);
     let shown = say::end();
     match missed {
         Ok(0) if shown => ExitCode::SUCCESS,
@@ -39,9 +39,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// Plays, prints the table, draws the pictures; how many bounds are missed.
-fn run(script: &Script, out: &std::path::Path) -> Result<usize, DemoError> {
-    let run = native::play(script)?;
+/// Runs the scene, prints the table, draws the pictures; how many bounds are missed.
+fn run(quick: bool, out: &Path) -> Result<usize, DemoError> {
+    let scene = demo::scene(quick)?;
+    let mut trace = Trace::new(&scene);
+    sim::simulate(&scene, &mut trace)?;
+    let run = trace.finish()?;
     let forces = Forces::of(&run)?;
     let checks = forces.checks();
     let drawn = pictures::draw(&run, &forces, out);

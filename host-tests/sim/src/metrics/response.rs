@@ -1,6 +1,9 @@
 //! How a force answers to a goal, judged sample by sample: no trace has to be kept.
 
-use super::{SETTLED_SHARE, STEADY_AFTER_S};
+/// A step counts as settled inside this share of the goal or of the step, whichever is smaller.
+const SETTLED_SHARE: f64 = 0.02;
+/// The steady error is judged from this long after the goal changed.
+const STEADY_AFTER_S: f64 = 0.1;
 
 /// The answer to one goal so far.
 #[derive(Clone, Copy, Debug, PartialEq)]

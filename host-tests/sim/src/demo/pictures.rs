@@ -1,9 +1,8 @@
 //! The demonstration's pictures.
 
 use super::{DemoError, Forces, Picture, Run};
-use crate::metrics::stretch;
-use crate::plant::Setup;
-use crate::plot::{self, Map, Panel};
+use host_tests::plant::Setup;
+use host_tests::plot::{self, Map, Panel};
 use std::path::{Path, PathBuf};
 
 /// How much of a step is shown before and after its goal.
@@ -15,15 +14,8 @@ const AFTER_MS: f64 = 60.0;
 /// # Errors
 /// A file cannot be written.
 pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
-    let origin_s = run.span_s[0];
-    let mut trace = run.trace.clone();
-    for sample in &mut trace {
-        sample.time_s -= origin_s;
-    }
-    let goals: Vec<_> = run.goals.iter().map(|(at_s, goal_n)| (at_s - origin_s, *goal_n)).collect();
-
-    let touched_s = goals.first().map_or(0.0, |(at_s, _)| *at_s) + forces.touch.touched_after_ms * 1e-3;
-    let window = |zero_s: f64| stretch(&trace, zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
+    let touched_s = run.goals.first().map_or(0.0, |asked| asked.at_s) + forces.touch.touched_after_ms * 1e-3;
+    let window = |zero_s: f64| run.between(zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
     let panel = |title, zero_s, time_optimal_ms| Panel {
         title,
         samples: window(zero_s),
@@ -32,9 +24,9 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
         time_optimal_ms,
     };
     let mut panels = vec![panel(format!("First touch, goal {} N", forces.touch.goal_n), touched_s, None)];
-    for (step, (at_s, _)) in forces.steps.iter().zip(goals.iter().skip(1)) {
+    for (step, asked) in forces.steps.iter().zip(run.goals.iter().skip(1)) {
         let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
-        panels.push(panel(title, *at_s, Some(step.time_optimal_ms)));
+        panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
     }
     let map = |picture: &Picture| Map {
         title: format!("{} N", picture.goal_n),
@@ -46,7 +38,7 @@ pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, D
     maps.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));
     let maps: Vec<_> = maps.into_iter().map(map).collect();
     let pictures = [
-        ("run.svg", plot::overview(&trace)?),
+        ("run.svg", plot::overview(&run.trace)?),
         ("steps.svg", plot::steps(&panels)?),
         ("maps.svg", plot::maps(&maps, Setup::default().array.pitch_mm)?),
     ];

@@ -1,0 +1,145 @@
+//! What ROBOTIS' own drivers expect of the bus, from the flash image: time, recovery, goals that end with torque.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::{WAIT_NS, holding, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use dynamixel2::{ReadError, TransferError};
+use fingertip::link::Reply;
+use fingertip::link::crc;
+use fingertip::link::sender::Sender;
+use fingertip::params::Params;
+use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
+use fingertip::state::{Fault, Limits, Mode};
+use host_tests::plant::{Setup, World};
+use virtual_board::{Options, Rig};
+
+fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
+    let read = rig.client(WAIT_NS, move |bus| bus.read(1, register, bytes).map(|reply| reply.data));
+    read.expect("the client runs").expect("the image answers")
+}
+
+/// State, time and pressures, in the one read that holds all of them.
+struct Seen(Vec<u8>);
+
+impl Seen {
+    fn of(rig: &mut Rig) -> Self {
+        let begin = address::PICTURE_TIME_US;
+        Self(read(rig, begin, address::PRESSURES + 2 * TAXELS as u16 - begin))
+    }
+
+    fn word(&self, register: u16) -> u32 {
+        let at = usize::from(register - address::PICTURE_TIME_US);
+        u32::from_le_bytes(self.0[at..at + 4].try_into().expect("four bytes"))
+    }
+}
+
+/// A frame's time is when it ended, by the crystal: as far from another's as their numbers say, to the microsecond.
+#[test]
+fn frames_have_true_times() {
+    let mut rig = holding();
+    let period_ns = Config::shipped(&Params::DEFAULT).expect("the defaults").timing.frame_ns;
+    assert_eq!(CLOCKS.timer_hz, 168_000_000);
+    let first = Seen::of(&mut rig);
+    assert_eq!(first.word(address::PICTURE_PERIOD_NS), period_ns);
+    for wait_ms in [1, 7, 100, 350] {
+        rig.run_ms(wait_ms).expect("it runs");
+        let later = Seen::of(&mut rig);
+        let frames = later.word(address::PICTURE_FRAME) - first.word(address::PICTURE_FRAME);
+        let time_us = later.word(address::PICTURE_TIME_US) - first.word(address::PICTURE_TIME_US);
+        let expected_us = f64::from(frames) * f64::from(period_ns) * 1e-3;
+        println!("{frames} frames: {time_us} us, by their period {expected_us:.1}");
+        assert!(frames > 9 * wait_ms as u32);
+        // Rounding of both times to 1 us, of the period to 1 ns, and the core's answer to the last conversion.
+        let tolerance_us = 2.0 + f64::from(frames) * 0.5e-3;
+        assert!((f64::from(time_us) - expected_us).abs() <= tolerance_us, "{time_us} us and {expected_us} us");
+    }
+    let force_mn = first.word(address::PICTURE_FORCE_MN);
+    assert!((980..=1_020).contains(&force_mn), "{force_mn} mN");
+}
+
+#[test]
+fn before_the_first_tare_no_force_is_told() {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.5;
+    let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    let told = |rig: &mut Rig| {
+        let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);
+        (read_u32(rig, address::PRESENT_FORCE_MN), pressures.iter().all(|&byte| byte == 0))
+    };
+    assert_eq!(told(&mut rig), (0, true));
+    assert!(Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
+    assert!(read(&mut rig, address::RAW_CODES, 2) != [0, 0], "the array itself is seen");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    assert!(!Limits(read_u16(&mut rig, address::LIMITS)).has(Limits::NOT_TARED));
+    assert!(told(&mut rig).0 <= 20, "now it is a force: none");
+}
+
+#[test]
+fn torque_off_ends_the_goal() {
+    let mut rig = holding();
+    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    assert_eq!(read_u32(&mut rig, address::GOAL_FORCE_MN), 0);
+    rig.run_ms(50).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    for _ in 0..20 {
+        rig.run_ms(10).expect("it runs");
+        let force_n = rig.world(|world| world.force_n()).expect("it runs");
+        assert!(force_n < 1.0, "{force_n} N: nothing is pressed");
+    }
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Release as u8);
+    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    assert_eq!(force_n, 0.0, "it has let go");
+    write_goal(&mut rig, 1_000);
+    rig.run_ms(200).expect("it runs");
+    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    assert!((0.98..1.02).contains(&force_n), "{force_n} N");
+}
+
+#[test]
+fn one_write_recovers_from_a_silent_bus() {
+    let mut rig = holding();
+    write_u8(&mut rig, address::BUS_WATCHDOG, 1);
+    rig.run_ms(60).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), Fault::BusSilent as u8);
+    let refused = |rig: &mut Rig, register: u16, bytes: &'static [u8]| {
+        let written = rig.client(WAIT_NS, move |bus| bus.write(1, register, bytes).map(drop));
+        match written.expect("the client runs") {
+            Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw,
+            other => panic!("not refused: {other:?}"),
+        }
+    };
+    // Range and result, with the alert.
+    assert_eq!(refused(&mut rig, address::GOAL_FORCE_MN, &[0xE8, 3, 0, 0]), 0x84);
+    assert_eq!(refused(&mut rig, address::TORQUE_ENABLE, &[1]), 0x81);
+    assert_eq!(read_u8(&mut rig, address::RECOVER_HINDRANCE), 0);
+    write_u8(&mut rig, address::RECOVER, 1);
+    rig.run_ms(2).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::BUS_WATCHDOG)), (0, 0));
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Off as u8);
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    write_goal(&mut rig, 1_000);
+    rig.run_ms(300).expect("it runs");
+    let force_n = rig.world(|world| world.force_n()).expect("it runs");
+    assert!((0.98..1.02).contains(&force_n), "{force_n} N");
+}
+
+#[test]
+fn fast_bulk_read_is_answered_in_one_packet() {
+    let mut rig = holding();
+    let mut request = Reply::new();
+    let mut sender = Sender::new(&mut request, 254, 0x9A);
+    let [low, high] = address::PRESENT_MODE.to_le_bytes();
+    [1, low, high, 62, 0].into_iter().for_each(|byte| sender.push(byte));
+    sender.finish();
+    rig.send(&request).expect("it runs");
+    rig.run_ms(5).expect("it runs");
+    let wire: Vec<u8> = rig.take_received().expect("it runs").iter().map(|timed| timed.byte).collect();
+    assert_eq!(wire[..10], [0xFF, 0xFF, 0xFD, 0, 0xFE, 67, 0, 0x55, 0, 1]);
+    let (body, checksum) = wire.split_at(wire.len() - 2);
+    assert_eq!((wire.len(), checksum), (74, &crc::update(crc::START, body).to_le_bytes()[..]));
+    assert_eq!(body[10], Mode::Force as u8);
+}

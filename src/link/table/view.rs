@@ -1,0 +1,97 @@
+//! What a read sees: the device's own state, and the picture of the loop.
+
+use crate::contact::Contact;
+use crate::identify::{Identification, Modulus};
+use crate::link::packet::StatusError;
+use crate::link::server::{Counters, State};
+use crate::link::settings::Settings;
+use crate::link::snapshot::Snapshot;
+use crate::link::stand::Stand;
+use crate::pipeline::Taring;
+use crate::state::Limits;
+
+use super::indirect::{self, Part};
+use super::{Cell, param_place, registers};
+
+/// What a read sees.
+#[derive(Clone, Copy)]
+pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+    pub state: &'a State<ROWS, COLUMNS>,
+    pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
+}
+
+impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
+    pub(super) fn settings(&self) -> &'a Settings {
+        &self.state.settings
+    }
+
+    /// Before the first tare the array's offsets look like a contact: nothing is told of it then.
+    pub(super) fn contact(&self) -> Contact {
+        if self.tared() { self.snapshot.status.contact } else { Contact::default() }
+    }
+
+    pub(super) fn tared(&self) -> bool {
+        !self.snapshot.status.limits.has(Limits::NOT_TARED)
+    }
+
+    pub(super) fn hindrance(&self) -> u32 {
+        let settings = self.settings();
+        Stand::of(self.snapshot).hindrance(&settings.record.params, self.state.actions()) as u32
+    }
+
+    /// The value of an element of a cell that is not indirect data.
+    pub(super) fn value(&self, cell: &Cell, element: u16) -> u32 {
+        if let Some(place) = param_place(cell.of) {
+            return self.settings().record.params.to_array().get(place).map_or(0, |&value| value as u32);
+        }
+        match indirect::part(cell.of) {
+            Some(Part::Address(first)) => self.indirect(first, element).into(),
+            Some(Part::Data(_)) => 0,
+            None => registers::get(*self, cell.of, usize::from(element)),
+        }
+    }
+
+    pub(super) fn indirect(&self, first: usize, element: u16) -> u16 {
+        self.settings().indirect.get(first + usize::from(element)).copied().unwrap_or(0)
+    }
+
+    /// The byte that an indirect address leads to.
+    pub(super) fn led_to(&self, first: usize, element: u16) -> u8 {
+        let target = self.indirect(first, element);
+        let cell = if target == 0 { None } else { Cell::at::<ROWS, COLUMNS>(target) };
+        let byte = cell.and_then(|cell| {
+            let (element, skip) = cell.element(target);
+            self.value(&cell, element).to_le_bytes().get(usize::from(skip)).copied()
+        });
+        byte.unwrap_or(0)
+    }
+
+    pub(super) fn identified(&self) -> Modulus {
+        self.snapshot.status.identification.result()
+    }
+
+    /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
+    pub(super) fn tare_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.tare_request != status.taken.tare {
+            return Taring::Running as u32;
+        }
+        status.tare as u32
+    }
+
+    pub(super) fn identify_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.identify_request != status.taken.identify {
+            return Identification::Running.number().into();
+        }
+        status.identification.number().into()
+    }
+
+    pub(super) fn refused(&self, error: StatusError) -> u32 {
+        u32::from(self.state.counters.refused(error))
+    }
+
+    pub(super) fn counters(&self) -> &'a Counters {
+        &self.state.counters
+    }
+}

@@ -8,16 +8,16 @@ use board::bridge::Bridge;
 use board::control::{self, Control};
 use board::encoder::Encoder;
 use board::flash::Store;
-use board::log::{log_boot, log_refusal, log_remark, log_save_error};
+use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
-use board::{bus, clocks, crash, guard, link_task, watch};
+use board::watchdog::Watchdogs;
+use board::{bus, clocks, crash, guard, link_task, options, stack, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
-use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::config::ConfigError;
 use fingertip::link::Settings;
 use fingertip::params::Params;
@@ -39,13 +39,17 @@ fn SPI3() {
 
 #[embassy_executor::main]
 async fn main(spawner: Spawner) {
+    stack::guard_foot();
     let boot = crash::boot();
-    let p = embassy_stm32::init(clocks::config());
+    let clocked = clocks::start_external();
+    let p = embassy_stm32::init(clocks::config(clocked));
     let bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
     clocks::accelerate_flash();
     clocks::freeze_when_halted();
+    clocks::free_trace_pin();
     board::set_priorities();
     log_boot(boot);
+    let unfit = unfit(clocked);
 
     let mut store = Store::new(p.FLASH);
     let (mut record, mut sound) = load(&mut store);
@@ -54,6 +58,10 @@ async fn main(spawner: Spawner) {
         sound = false;
     });
     let pipeline = unwrap!(made, "the default parameters make a configuration: a test of the core holds that");
+    if let Some(fault) = unfit {
+        log_unfit(fault);
+        pipeline.stop(fault);
+    }
     if !sound {
         pipeline.stop(Fault::BrokenParameters);
     }
@@ -91,9 +99,10 @@ async fn main(spawner: Spawner) {
         bridge,
         encoder: Encoder::new(p.TIM3, p.PC6, p.PC7),
         supply: Supply::new(p.ADC3, p.PA0),
-        watchdog: IndependentWatchdog::new(p.IWDG, control::WATCHDOG_US),
+        watchdogs: Watchdogs::new(p.IWDG, p.WWDG),
         store,
         pipeline,
+        unfit,
     };
     let bus_parts = bus::Parts {
         usart: p.USART2,
@@ -127,6 +136,14 @@ fn load(store: &mut Store) -> (Record, bool) {
         Err(cause) => log_save_error(cause),
     }
     (record, sound)
+}
+
+/// Why this board must not drive a motor.
+fn unfit(clocked: bool) -> Option<Fault> {
+    if !clocked {
+        return Some(Fault::NoClock);
+    }
+    (!options::brown_out_resets()).then_some(Fault::BrownOutLevel)
 }
 
 /// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free

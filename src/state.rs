@@ -74,6 +74,12 @@ pub enum Fault {
     Reversed = 15,
     /// The motor presses on something that the array does not see.
     Unseen = 16,
+    /// The external clock was not there at the start: what is timed is known to a few percent only. Stands until the
+    /// next start.
+    NoClock = 17,
+    /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have another
+    /// brown-out level than 3. Stands until they are programmed.
+    BrownOutLevel = 18,
 }
 
 /// What holds the loop back just now: a set of flags, stable by bit.

@@ -1,6 +1,7 @@
 //! The bus on USART2: receives into a ring by DMA, sends by DMA, and holds the transceiver's direction.
 
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
+use embassy_stm32::interrupt::typelevel::{self, Handler};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac::usart::regs::Sr;
 use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, PA2, PA3, PC8, USART2};
@@ -9,10 +10,31 @@ use embassy_stm32::{Peri, bind_interrupts, dma, pac};
 use static_cell::ConstStaticCell;
 
 bind_interrupts!(struct Irqs {
-    USART2 => usart::InterruptHandler<USART2>;
+    USART2 => GiveBack, usart::InterruptHandler<USART2>;
     DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
 });
+
+/// Gives the line back at the end of the last stop bit. The task would come after control, up to a frame later, when
+/// another device may send already.
+struct GiveBack;
+
+impl Handler<typelevel::USART2> for GiveBack {
+    unsafe fn on_interrupt() {
+        if !pac::USART2.sr().read().tc() || !pac::USART2.cr1().read().tcie() {
+            return;
+        }
+        if pac::DMA1.st(TX_STREAM).ndtr().read().ndt() == 0 {
+            pac::GPIOC.bsrr().write(|w| w.set_br(TRANSMIT_ENABLE, true));
+        } else {
+            // The DMA came late between two bytes.
+            forget_completion();
+        }
+    }
+}
+
+const TRANSMIT_ENABLE: usize = 8;
+const TX_STREAM: usize = 6;
 
 /// 1.7 ms of bytes at 3 Mbaud.
 static RING: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
@@ -72,9 +94,8 @@ impl Bus {
         self.transmit_enable.set_high();
         // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given
         // back early.
-        let mut cleared = Sr(u32::MAX);
-        cleared.set_tc(false);
-        pac::USART2.sr().write_value(cleared);
+        forget_completion();
+        cortex_m::interrupt::free(|_| pac::USART2.cr1().modify(|w| w.set_tcie(true)));
         let mut result = self.tx.write(bytes).await;
         if result.is_ok() {
             result = self.tx.flush().await;
@@ -90,4 +111,11 @@ impl Bus {
     pub fn set_baud(&mut self, baud: u32) -> Result<(), ConfigError> {
         self.rx.set_baudrate(baud)
     }
+}
+
+/// Flags of the status register are cleared by writing 0 and left alone by writing 1.
+fn forget_completion() {
+    let mut cleared = Sr(u32::MAX);
+    cleared.set_tc(false);
+    pac::USART2.sr().write_value(cleared);
 }

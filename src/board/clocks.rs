@@ -1,4 +1,7 @@
-//! The clock tree: 168 MHz from the ST-LINK's 8 MHz.
+//! The clock tree: 168 MHz from the ST-LINK's 8 MHz, or from the internal oscillator where that is not there.
+//!
+//! A clock that fails later resets the board: the clock security system raises the exception that nothing masks, and
+//! breaks TIM1 without the processor.
 
 use embassy_stm32::Config;
 use embassy_stm32::interrupt::Priority;
@@ -8,13 +11,28 @@ use embassy_stm32::rcc::{
 };
 use embassy_stm32::time::Hertz;
 
-/// HSE 8 MHz / 4 x 168 / 2 = 168 MHz for the core; APB1 at 42 MHz, APB2 at 84 MHz.
-pub fn config() -> Config {
+/// How often to look for the external clock: for some 0.4 s, at 16 MHz and about 6 cycles a look.
+const LOOKS: u32 = 1_000_000;
+
+/// Starts the external clock and its guard, and says whether it is there. Comes before `embassy_stm32::init`, which
+/// would wait for it for ever.
+pub fn start_external() -> bool {
+    pac::RCC.cr().modify(|w| w.set_hsebyp(true));
+    pac::RCC.cr().modify(|w| w.set_hseon(true));
+    let ready = (0..LOOKS).any(|_| pac::RCC.cr().read().hserdy());
+    if ready {
+        pac::RCC.cr().modify(|w| w.set_csson(true));
+    }
+    ready
+}
+
+/// HSE 8 MHz / 4 x 168 / 2 = 168 MHz for the core, or HSI 16 MHz / 8 x 168 / 2; APB1 at 42 MHz, APB2 at 84 MHz.
+pub fn config(external: bool) -> Config {
     let mut config = Config::default();
-    config.rcc.hse = Some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
-    config.rcc.pll_src = PllSource::HSE;
-    config.rcc.pll =
-        Some(Pll { prediv: PllPreDiv::DIV4, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
+    config.rcc.hse = external.then_some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
+    let (source, prediv) = if external { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
+    config.rcc.pll_src = source;
+    config.rcc.pll = Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
     config.rcc.sys = Sysclk::PLL1_P;
     config.rcc.ahb_pre = AHBPrescaler::DIV1;
     config.rcc.apb1_pre = APBPrescaler::DIV4;
@@ -23,10 +41,18 @@ pub fn config() -> Config {
     config
 }
 
-/// Halting the core in a debugger stops the watchdog and the bridge's timer; the latter lets go of the outputs.
+/// Halting the core in a debugger stops the watchdogs and the bridge's timer; the latter lets go of the outputs.
 pub fn freeze_when_halted() {
-    pac::DBGMCU.apb1fzr().modify(|w| w.set_iwdg(true));
+    pac::DBGMCU.apb1fzr().modify(|w| {
+        w.set_iwdg(true);
+        w.set_wwdg(true);
+    });
     pac::DBGMCU.apb2fzr().modify(|w| w.set_tim1(true));
+}
+
+/// Takes PB3, a row, back from the trace, which a debugger may have turned on: only power-off does that otherwise.
+pub fn free_trace_pin() {
+    pac::DBGMCU.cr().modify(|w| w.set_trace_ioen(false));
 }
 
 /// Turns on the flash accelerator: instruction cache, data cache and prefetch, which the reset and embassy leave off.

@@ -2,8 +2,6 @@
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 
-use embassy_stm32::peripherals::IWDG;
-use embassy_stm32::wdg::IndependentWatchdog;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
@@ -17,11 +15,11 @@ use super::encoder::Encoder;
 use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
+use super::health;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
+use super::watchdog::Watchdogs;
 
-/// The watchdog's time by its nominal clock; 8 to 23 ms over the clock's tolerance.
-pub const WATCHDOG_US: u32 = 12_000;
 /// The first frame may come this many frame times after the start, before the guard trips.
 const FRAMES_TO_START: u32 = 4;
 const TICKS_PER_MS: u32 = guard::HZ / 1_000;
@@ -37,11 +35,13 @@ pub struct Control {
     /// The bridge's supply.
     pub supply: Supply,
     /// Fed here and nowhere else.
-    pub watchdog: IndependentWatchdog<'static, IWDG>,
+    pub watchdogs: Watchdogs,
     /// The parameters in flash.
     pub store: Store,
     /// The core.
     pub pipeline: &'static mut Pipeline,
+    /// Why this board must not drive a motor: a fault that cannot be cleared.
+    pub unfit: Option<Fault>,
 }
 
 /// Runs for ever.
@@ -59,6 +59,7 @@ struct State {
     parts: Control,
     frame: Frame,
     seen: u32,
+    stamp: u32,
     discard_next: bool,
     /// The scan is not to be trusted before its next start.
     lost: bool,
@@ -74,6 +75,7 @@ impl State {
             parts,
             frame: Frame::EMPTY,
             seen: 0,
+            stamp: 0,
             discard_next: true,
             lost: false,
             report: Report::default(),
@@ -84,7 +86,7 @@ impl State {
     }
 
     fn start(&mut self) {
-        self.parts.watchdog.unleash();
+        self.parts.watchdogs.start();
         self.restart_scan();
     }
 
@@ -113,9 +115,15 @@ impl State {
         if newest.sequence == self.seen {
             return;
         }
+        let follows = newest.sequence.wrapping_sub(self.seen) == 1;
         self.seen = newest.sequence;
+        let before = core::mem::replace(&mut self.stamp, newest.stamp);
         if core::mem::take(&mut self.discard_next) {
             return;
+        }
+        if follows {
+            let frame = guard::frame(self.parts.pipeline.config().timing);
+            health::note_interval(Stopwatch(newest.stamp.wrapping_sub(before).saturating_sub(frame)));
         }
         // A frame that is not whole counts as missed: the guard runs on.
         if self.parts.scan.copy(newest, &mut self.frame) {
@@ -147,7 +155,13 @@ impl State {
             answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };
         let (_, status) = parts.pipeline.step(&self.frame, &sense, &command);
+        let stopped = status.mode == Mode::Fault;
         parts.bridge.apply(status.bridge());
+        if let Some(fault) = parts.unfit
+            && !stopped
+        {
+            parts.pipeline.stop(fault);
+        }
 
         let timing = parts.pipeline.config().timing;
         let loop_time = Stopwatch::since(completed.stamp);
@@ -158,7 +172,7 @@ impl State {
         self.report.loop_time_max = self.report.loop_time_max.max(loop_time);
         if loop_time.cycles() <= timing.deadline {
             guard::restart(completed.stamp, 1, timing);
-            parts.watchdog.pet();
+            parts.watchdogs.pet();
         } else {
             self.stop(Fault::MissedDeadline);
         }
@@ -173,13 +187,14 @@ impl State {
     fn without_frames(&mut self) {
         self.stop(Fault::LostFrames);
         self.lost = true;
+        super::scan::note_transfers();
         // These keep track of counters that wrap.
         self.parts.encoder.read();
         self.bus.silent_ms(HEARD.get().packets);
         self.time.at_us(guard::now());
         self.publish();
         if bridge::is_safe() {
-            self.parts.watchdog.pet();
+            self.parts.watchdogs.pet();
         }
     }
 
@@ -195,6 +210,7 @@ impl State {
         self.parts.scan.start(timing);
         self.seen = super::scan::newest().sequence;
         guard::restart(guard::now(), FRAMES_TO_START, timing);
+        self.parts.watchdogs.expect_frames(timing);
     }
 
     fn publish(&mut self) {
@@ -218,6 +234,7 @@ impl State {
         self.parts.bridge.apply(Wanted::Open);
         self.parts.scan.stop();
         guard::rest();
+        self.parts.watchdogs.allow_long();
         if !set_config(self.parts.pipeline, &params) {
             self.stop(Fault::BrokenParameters);
         }
@@ -234,8 +251,9 @@ impl State {
         }
         self.parts.scan.stop();
         guard::rest();
-        let Control { store, watchdog, .. } = &mut self.parts;
-        let saved = store.save(&record, || watchdog.pet());
+        let Control { store, watchdogs, .. } = &mut self.parts;
+        watchdogs.allow_long();
+        let saved = store.save(&record, || watchdogs.pet());
         self.restart_scan();
         SAVED.signal(saved.map_err(NotSaved::Failed));
     }

@@ -10,6 +10,11 @@ pub fn set_clock() {
     pac::ADC123_COMMON.ccr().modify(|w| w.set_adcpre(Adcpre::DIV4));
 }
 
+/// A converter wants 3 us from power-up to its first conversion (DS10693, t_STAB).
+pub fn stabilise() {
+    cortex_m::asm::delay(3 * 168);
+}
+
 /// The register's code for a sampling time that `ScanTiming` let through; the longest for any other.
 pub const fn sample_time(cycles: u16) -> SampleTime {
     match cycles {

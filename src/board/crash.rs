@@ -68,8 +68,8 @@ pub fn boot() -> Boot {
 
 fn reset_cause(csr: Csr) -> ResetCause {
     [
-        (csr.wdgrstf(), ResetCause::Watchdog),
-        (csr.wwdgrstf() || csr.lpwrrstf(), ResetCause::Other),
+        (csr.wdgrstf() || csr.wwdgrstf(), ResetCause::Watchdog),
+        (csr.lpwrrstf(), ResetCause::Other),
         (csr.sftrstf(), ResetCause::Software),
         (csr.porrstf(), ResetCause::PowerOn),
         (csr.borrstf(), ResetCause::BrownOut),
@@ -105,7 +105,7 @@ impl Record {
     }
 
     fn crash(&self) -> Crash {
-        let cause = [CrashCause::Panic, CrashCause::HardFault, CrashCause::Hang]
+        let cause = [CrashCause::Panic, CrashCause::HardFault, CrashCause::Hang, CrashCause::Clock]
             .into_iter()
             .find(|cause| *cause as u32 == self.cause)
             .unwrap_or(CrashCause::None);
@@ -138,6 +138,14 @@ fn panic(info: &PanicInfo) -> ! {
 #[cortex_m_rt::exception]
 unsafe fn DefaultHandler(_number: i16) {
     panic!();
+}
+
+/// The external clock failed: nothing else raises this exception. The core runs on from the internal oscillator at
+/// 16 MHz, and the failure has broken TIM1 already.
+#[cortex_m_rt::exception]
+unsafe fn NonMaskableInt() -> ! {
+    bridge::make_safe();
+    end(CrashCause::Clock, 0, 0)
 }
 
 /// Gives the handler a stack of its own where the fault was the stack's overflow, and passes on the exception's frame.

@@ -35,8 +35,7 @@ impl Stopwatch {
 
     /// From a frame's end to the end of the time in which the next one is to be answered.
     const fn to_next_answer(timing: ScanTiming) -> Self {
-        let frame = timing.frame().0 / (CLOCKS.timer_hz / HZ);
-        Self(frame + timing.deadline.0 / (CLOCKS.core_hz / HZ))
+        Self(frame(timing) + timing.deadline.0 / (CLOCKS.core_hz / HZ))
     }
 
     /// The same time in cycles of the core.
@@ -49,6 +48,11 @@ const COMPARE_1: usize = 0;
 
 static TRIPPED: AtomicBool = AtomicBool::new(false);
 static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
+
+/// A frame's time on the stopwatch.
+pub const fn frame(timing: ScanTiming) -> u32 {
+    timing.frame().0 / (CLOCKS.timer_hz / HZ)
+}
 
 /// Starts the stopwatch; the guard waits for [`restart`].
 pub fn start(_timer: Peri<'static, TIM5>) {

@@ -12,6 +12,7 @@ use super::bus::Bus;
 use super::crash::{self, Boot};
 use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
+use super::health;
 use super::log::log_save_error;
 use super::scan::WAKE;
 
@@ -42,6 +43,7 @@ impl LinkTask {
                     self.answer(received.get(..count).unwrap_or_default(), &mut reply).await;
                 }
                 Err(cause) => {
+                    health::note_line(cause);
                     // The first of a row: a line at the wrong speed would fill the log.
                     if core::mem::take(&mut self.line_good) {
                         warn!("bus: {}", cause);
@@ -127,6 +129,7 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         loop_time_max_us: microseconds(report.loop_time_max),
         reset_cause: boot.reset,
         crash: boot.crash,
+        health: health::health(),
         frame,
         taxels,
         pascals_per_sum_q32: *pascals_per_sum_q32,

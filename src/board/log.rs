@@ -6,6 +6,7 @@ use defmt::{error, info, warn};
 use fingertip::config::ConfigError;
 use fingertip::params::ParamError;
 use fingertip::scan::ScanError;
+use fingertip::state::Fault;
 use fingertip::store::Remark;
 
 use super::crash::Boot;
@@ -17,6 +18,15 @@ pub fn log_boot(boot: Boot) {
     let crash = boot.crash;
     if boot.crashed {
         warn!("the last run crashed: cause {=u8}, line {=u16}, pc {=u32:#x}", crash.cause as u8, crash.line, crash.pc);
+    }
+}
+
+/// Why the board must not drive a motor.
+pub fn log_unfit(fault: Fault) {
+    match fault {
+        Fault::NoClock => error!("no 8 MHz clock at PH0: internal oscillator, no torque until the next start"),
+        Fault::BrownOutLevel => error!("brown-out reset is not at level 3, no torque: run `cargo xtask flash`"),
+        _ => error!("no torque until the next start: fault {=u8}", fault as u8),
     }
 }
 

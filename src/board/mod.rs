@@ -12,12 +12,17 @@ pub mod encoder;
 pub mod exchange;
 pub mod flash;
 pub mod guard;
+pub mod health;
 pub mod link_task;
 pub mod log;
+pub mod options;
 pub mod pins;
+pub mod reference;
 pub mod scan;
+pub mod stack;
 pub mod supply;
 pub mod watch;
+pub mod watchdog;
 
 /// Sets every priority of the table in `docs/board.md`; embassy leaves most of them at the highest.
 ///
@@ -27,9 +32,9 @@ pub fn set_priorities() {
         (interrupt::TIM5, Priority::P0),
         (interrupt::DMA2_STREAM1, Priority::P1),
         (interrupt::DMA2_STREAM2, Priority::P1),
+        (interrupt::USART2, Priority::P1),
         (interrupt::SPI3, Priority::P2),
         (interrupt::TIM2, Priority::P5),
-        (interrupt::USART2, Priority::P6),
         (interrupt::DMA1_STREAM5, Priority::P6),
         (interrupt::DMA1_STREAM6, Priority::P6),
     ] {

@@ -19,7 +19,8 @@ use fingertip::frame::BANKS;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 
-use super::{converter, guard, pins};
+use super::health::{self, Broken};
+use super::{converter, guard, pins, reference};
 use machine::*;
 
 /// Wakes the control task: a frame is complete or half complete, or the guard tripped.
@@ -84,6 +85,7 @@ impl Scan {
         rcc::enable_and_reset::<ADC1>();
         rcc::enable_and_reset::<ADC2>();
         converter::set_clock();
+        reference::measure();
         Self(())
     }
 
@@ -95,6 +97,8 @@ impl Scan {
     /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         stop();
+        // First, while no converter listens: a compare that is set below the counter is a trigger.
+        set_timer(timing);
         let time = converter::sample_time(timing.sample_cycles);
         for (adc, channels) in [pac::ADC1, pac::ADC2].into_iter().zip(CHANNELS) {
             start_converter(adc, || converter::set_sequence(adc, channels, time));
@@ -109,7 +113,8 @@ impl Scan {
             interrupt::DMA2_STREAM1.enable();
             interrupt::DMA2_STREAM2.enable();
         }
-        start_timer(timing);
+        converter::stabilise();
+        start_timer();
     }
 
     /// Copies the frame, or says that it is not whole: a bank is missing, the banks and the rows are out of step, or
@@ -120,7 +125,11 @@ impl Scan {
         copy_slots(half, SLOTS, frame);
         frame.sequence = completed.sequence;
         let untouched = [STREAM_A, STREAM_B].into_iter().all(|stream| written_half(stream) != half);
-        arrived && untouched && in_step() && newest() == completed
+        let whole = arrived && untouched && in_step() && newest() == completed;
+        if !whole {
+            health::note_broken(what_broke(half));
+        }
+        whole
     }
 
     /// Replaces the slots of `frame` that the scan has already read anew.
@@ -131,6 +140,28 @@ impl Scan {
             copy_slots(half_a, usize::from(stored) / BANK_COLUMNS, frame);
         }
     }
+}
+
+/// What is wrong with a frame that is not whole.
+#[cold]
+#[inline(never)]
+fn what_broke(half: usize) -> Broken {
+    note_transfers();
+    if overrun() {
+        Broken::Overrun
+    } else if !bank_a_completed(half) {
+        Broken::Bank
+    } else if !in_step() {
+        Broken::OutOfStep
+    } else {
+        Broken::Overwritten
+    }
+}
+
+/// Counts what went wrong with the transfers since the last time.
+pub fn note_transfers() {
+    let (bus, stream) = take_errors();
+    health::note_transfers(bus, stream);
 }
 
 /// Copies the first slots of a half.

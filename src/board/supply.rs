@@ -24,8 +24,7 @@ impl Supply {
             w.set_adon(true);
             w.set_eocs(Eocs::EACH_CONVERSION);
         });
-        // The converter wants 3 us from power-up to its first conversion.
-        cortex_m::asm::delay(3 * 168);
+        converter::stabilise();
         start();
         Self(())
     }

@@ -6,10 +6,13 @@ use embassy_time::Timer;
 use fingertip::state::Mode;
 
 use super::exchange::{HEARD, REPORT};
+use super::{health, stack};
 
 const PERIOD_MS: u64 = 20;
 /// 5 Hz.
 const BLINK_PERIODS: u32 = 5;
+/// Each second.
+const STACK_PERIODS: u32 = 50;
 
 /// On with torque, fast blink on fault, off otherwise.
 #[embassy_executor::task]
@@ -28,6 +31,9 @@ pub async fn run(mut led: Output<'static>) {
         if status.missed_frames != missed_frames {
             missed_frames = status.missed_frames;
             warn!("{=u32} frames missed", missed_frames);
+        }
+        if period.is_multiple_of(STACK_PERIODS) {
+            health::set_stack_bytes(stack::deepest());
         }
         let blink = (period / BLINK_PERIODS).is_multiple_of(2);
         let on = if status.mode == Mode::Fault { blink } else { HEARD.get().command.torque };

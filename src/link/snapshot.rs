@@ -26,6 +26,8 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub reset_cause: ResetCause,
     /// The last crash on record.
     pub crash: Crash,
+    /// How the board is.
+    pub health: Health,
     /// The frame that the status was made from.
     pub frame: &'a Frame<ROWS, COLUMNS>,
     /// What its taxels read above tare, sixteenths of a corrected code.
@@ -57,6 +59,26 @@ fn saturate(value: i32) -> u16 {
     value.max(0).min(i32::from(u16::MAX)) as u16
 }
 
+/// How the board is, since the last reset. Counts hold at their top.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Health {
+    /// The option bytes as the last reset loaded them, in the microcontroller's own order.
+    pub option_bytes: u32,
+    /// The analogue supply at the start; 0 where it is not known.
+    pub analogue_mv: u16,
+    /// The deepest that the stack has been.
+    pub stack_bytes: u16,
+    /// The longest that a frame's end came late to the processor: critical sections, and interrupts no less urgent.
+    pub late_ns: u16,
+    /// Frames that were there and not whole, by what was wrong first: a bank was missing, the banks were out of step
+    /// with the rows, a converter had overrun, or the next frame came over it.
+    pub broken_frames: [u16; 4],
+    /// Errors of the scan's transfers: on the memory's bus, and of the stream itself.
+    pub transfer_errors: [u16; 2],
+    /// Errors on the line of the bus: noise, framing, overrun.
+    pub line_errors: [u16; 3],
+}
+
 /// Why the microcontroller started. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -72,9 +94,9 @@ pub enum ResetCause {
     Pin = 3,
     /// The firmware itself: a Reboot instruction, or the end of a crash.
     Software = 4,
-    /// The independent watchdog: the control task missed its deadline.
+    /// A watchdog: the control task hung.
     Watchdog = 5,
-    /// The window watchdog or a low-power fault.
+    /// A low-power fault.
     Other = 6,
 }
 
@@ -91,6 +113,8 @@ pub enum CrashCause {
     HardFault = 2,
     /// It hung until the watchdog's reset.
     Hang = 3,
+    /// The external clock failed.
+    Clock = 4,
 }
 
 /// The crash record, which survives a reset.
@@ -121,7 +145,9 @@ pub fn hardware_error(fault: Option<Fault>) -> u8 {
             | Fault::BrokenParameters
             | Fault::MissedDeadline
             | Fault::Crash
-            | Fault::Runaway,
+            | Fault::Runaway
+            | Fault::NoClock
+            | Fault::BrownOutLevel,
         ) => 1 << 7,
     }
 }
@@ -146,6 +172,7 @@ mod tests {
             loop_time_max_us: 0,
             reset_cause: ResetCause::Unknown,
             crash: Crash::default(),
+            health: Health::default(),
             frame: &Frame::EMPTY,
             taxels: &taxels,
             pascals_per_sum_q32: 8 << 32,

@@ -4,7 +4,7 @@ use fingertip::command::Command;
 use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
-use fingertip::link::{Crash, CrashCause, Reply, ResetCause};
+use fingertip::link::{Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
@@ -87,6 +87,15 @@ impl Bench {
             loop_time_max_us: 47,
             reset_cause: ResetCause::Watchdog,
             crash: Crash { cause: CrashCause::Panic, line: 321, count: 7, pc: 0x0800_1234 },
+            health: Health {
+                option_bytes: 0x0fff_aae1,
+                analogue_mv: 3_301,
+                stack_bytes: 15_080,
+                late_ns: 412,
+                broken_frames: [1, 2, 3, 4],
+                transfer_errors: [5, 6],
+                line_errors: [7, 8, 9],
+            },
             frame: &self.frame,
             taxels: &self.taxels,
             pascals_per_sum_q32: 10 << 32,

@@ -60,6 +60,8 @@ fn every_fault_has_a_bit() {
         (Fault::Runaway, 7),
         (Fault::Reversed, 3),
         (Fault::Unseen, 6),
+        (Fault::NoClock, 7),
+        (Fault::BrownOutLevel, 7),
     ];
     for (fault, bit) in faults {
         bench.set_fault(Some(fault));

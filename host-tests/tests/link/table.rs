@@ -67,7 +67,7 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
 #[test]
 fn the_last_fault_and_the_last_limit_are_in_the_table() {
     let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
-    assert_eq!(largest(address::FAULT), Fault::Unseen as i64);
+    assert_eq!(largest(address::FAULT), Fault::BrownOutLevel as i64);
     assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::GUARD) - 1);
 }
 
@@ -127,6 +127,19 @@ fn each_figure_stands_where_the_page_says() {
         (address::CRASH_COUNT, 4, 7),
         (address::CRASH_PC, 4, 0x0800_1234),
         (address::CRASH_LINE, 2, 321),
+        (address::OPTION_BYTES, 4, 0x0fff_aae1),
+        (address::ANALOGUE_SUPPLY_MV, 2, 3_301),
+        (address::STACK_BYTES, 2, 15_080),
+        (address::FRAME_LATE_NS, 2, 412),
+        (address::BANK_MISSING, 2, 1),
+        (address::OUT_OF_STEP, 2, 2),
+        (address::CONVERTER_OVERRUN, 2, 3),
+        (address::OVERWRITTEN, 2, 4),
+        (address::TRANSFER_BUS_ERRORS, 2, 5),
+        (address::TRANSFER_STREAM_ERRORS, 2, 6),
+        (address::LINE_NOISE, 2, 7),
+        (address::LINE_FRAMING, 2, 8),
+        (address::LINE_OVERRUN, 2, 9),
         (address::FRAME_TIME_US, 4, 0xFEDC_BA98),
         (address::FRAME_PERIOD_NS, 4, 99_762),
         (address::FIT_LEVEL, 1, 2),

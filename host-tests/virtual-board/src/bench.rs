@@ -1,6 +1,7 @@
 //! The bench beside the emulator: steps the world, watches the bridge, the bus and the log.
 
 use crate::board::FingerBoard;
+use crate::clock::ExternalClock;
 use crate::flash::Kept;
 use crate::front_end::{FrontEnd, Shared};
 use crate::image::Firmware;
@@ -37,6 +38,8 @@ pub struct Bench {
     pub latency: Latency,
     /// When the bridge went on and off.
     pub bridge_edges: Vec<BridgeEdge>,
+    /// When the transmit enable went high and low; a snapshot does not keep it.
+    pub transmit_edges: Vec<BridgeEdge>,
     /// The image's log.
     pub log: Log,
     /// What the image has sent and nobody took yet.
@@ -45,6 +48,8 @@ pub struct Bench {
     pub core_held: bool,
     /// What the image wrote to the flash.
     pub flash: Kept,
+    /// The external clock; a snapshot does not keep it.
+    pub clock: ExternalClock,
     /// The host of a scene, once the board is set up.
     pub host: Option<Box<SceneHost>>,
     world_ns: u64,
@@ -70,10 +75,12 @@ impl Bench {
             trace: Trace::default(),
             latency: Latency::default(),
             bridge_edges: Vec::new(),
+            transmit_edges: Vec::new(),
             log: Log::new(image),
             received: Vec::new(),
             core_held: false,
             flash: Kept::default(),
+            clock: ExternalClock::default(),
             host: None,
             world_ns: 0,
             bridge: Bridge::Coast,
@@ -101,6 +108,10 @@ impl Bench {
             self.watch_bridge(board, at_ns);
         } else if access.address.wrapping_sub(GPIOC.base) < 0x400 {
             self.watch_bridge(board, at_ns);
+            let on = board.transmits();
+            if on != self.transmit_edges.last().is_some_and(|edge| edge.on) {
+                self.transmit_edges.push(BridgeEdge { at_ns, on });
+            }
         }
     }
 
@@ -165,6 +176,7 @@ impl Bench {
         if session.resets().len() != self.resets {
             self.resets = session.resets().len();
             self.log.restart();
+            self.clock.restarted(host);
             if std::mem::take(&mut self.core_held) {
                 host.hold(false);
             }

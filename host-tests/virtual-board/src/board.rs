@@ -2,6 +2,7 @@
 
 use crate::front_end::Shared;
 use crate::part::Part;
+use crate::rig::Options;
 use crate::wire::Wire;
 use host_tests::plant::Bridge;
 use rigless::device::Level;
@@ -11,6 +12,7 @@ use rigless::machine::{Board, Target};
 use rigless::mcu::{Mcu, Operate};
 use rigless::snapshot::store;
 use rigless::soc::Error;
+use rigless::soc::stm32f427::generated::flash::{Register, optcr};
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
 use std::num::{NonZeroU32, NonZeroU64};
@@ -45,17 +47,25 @@ impl FingerBoard {
     ///
     /// # Errors
     /// The part's description does not fit this crate: another release of `rigless`.
-    pub fn new(front_end: Shared, instructions_per_second: NonZeroU64) -> Result<Self, Error> {
+    pub fn new(front_end: Shared, options: &Options) -> Result<Self, Error> {
         let mut part = Part::new(front_end)?;
         part.chip.rcc.attach_crystals(HSE_HZ, 0);
         part.chip.set_supply(VDD_MV);
         part.chip.usart[BUS_PORT].attach(Wire::default());
-        Ok(Self { part, instructions_per_second })
+        let (flash, registers) = part.chip.program();
+        let loaded = optcr::BOR_LEV.set(registers.get(Register::Optcr), options.brown_out_bits.into());
+        flash.keep_options(loaded, registers.get(Register::Optcr1), registers);
+        Ok(Self { part, instructions_per_second: options.instructions_per_second })
     }
 
     /// The host's end of the bus.
     pub fn wire(&mut self) -> &mut Wire {
         self.part.chip.usart[BUS_PORT].chip_mut().expect("the wire was attached when the board was made")
+    }
+
+    /// Whether the transceiver holds the line.
+    pub fn transmits(&mut self) -> bool {
+        level(&mut self.part, PORT_C, 8) == Level::High
     }
 
     /// What the bridge makes of its inputs: IN1 and IN2 averaged over the PWM period, asleep or with both low it

@@ -13,6 +13,11 @@ const DMA1_S5CR: u64 = 0x4002_6088;
 const DMA1_S5M0AR: u64 = 0x4002_6094;
 const STREAM_5_FLAGS: u64 = 0x3d << 6;
 const ENABLE: u64 = 1;
+/// DMA2 stream 1's vector, and flash that no image takes.
+const HALFWAY_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 57);
+const FREE_FLASH: u64 = 0x0803_f000;
+/// movw r0, #0xfffc; movt r0, #0x1fff; str r0, [r0]; bx lr.
+const STORE_BELOW_RAM: [u64; 6] = [0xf64f, 0x70fc, 0xf6c1, 0x70ff, 0x6000, 0x4770];
 /// Where nothing answers.
 const NOWHERE: u64 = 0xd000_0000;
 
@@ -27,6 +32,11 @@ pub enum Fault {
     ScanInterruptLost,
     /// The core stands still, as in a loop with interrupts off. It goes on after the next reset.
     CoreHangs,
+    /// The external clock stops, and is not there at a start. The emulated part has no exception that nothing masks:
+    /// its handler is entered as the frame guard's interrupt, which has the highest priority.
+    ClockLost,
+    /// The scan's half-frame interrupt stores a word just below RAM, as a stack that runs over does.
+    StoreBelowRam,
     /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of
     /// the driver.
     BusMemoryLost,
@@ -46,6 +56,15 @@ impl Fault {
             Self::ScanInterruptLost => session.board().part.front_end().lock().scan_interrupt_lost = defect,
             Self::BridgeFault => session.board_mut().part.set_bridge_well(stop.at, !defect),
             Self::CoreHangs => host.hold(defect),
+            Self::ClockLost => {}
+            Self::StoreBelowRam if defect => {
+                for (place, halfword) in STORE_BELOW_RAM.into_iter().enumerate() {
+                    host.program(FREE_FLASH + 2 * place as u64, Width::W16, halfword)
+                        .expect("the flash can be programmed");
+                }
+                host.program(HALFWAY_VECTOR, Width::W32, FREE_FLASH | 1).expect("the flash can be programmed");
+            }
+            Self::StoreBelowRam => {}
             Self::BusMemoryLost if defect => {
                 let mut access = |kind, address, value| {
                     let access = Access::new(kind, address, Width::W32, value).at(stop.instruction_count, stop.at);
@@ -86,6 +105,9 @@ impl Rig {
             fault.apply(defect, stand.session, stand.host, stand.stop);
             if fault == Fault::CoreHangs {
                 stand.bench.core_held = defect;
+            }
+            if fault == Fault::ClockLost {
+                stand.bench.clock.set_lost(defect, stand.session, stand.host, stand.stop);
             }
             if fault == Fault::BridgeFault {
                 let at_ns = stand.bench.next_ns;

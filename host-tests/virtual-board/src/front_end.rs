@@ -13,6 +13,9 @@ const ROWS: usize = 10;
 const COLUMN_INPUTS: [[usize; 5]; 2] = [[1, 4, 6, 7, 15], [10, 11, 12, 13, 14]];
 /// The third converter's input behind the supply's divider.
 const SUPPLY_INPUT: usize = 0;
+/// The internal reference's input, the first converter's, and its voltage.
+const REFERENCE_INPUT: (usize, usize) = (0, 17);
+pub const REFERENCE_V: f64 = 1.21;
 /// The supply's divider.
 const SUPPLY_RATIO: f64 = 11.0;
 /// Codes of the converter.
@@ -202,6 +205,7 @@ impl FrontEnd {
                         }
                     }
                 }
+                _ if (converter, input) == REFERENCE_INPUT => word(REFERENCE_V),
                 None if input == SUPPLY_INPUT => word(self.world.supply_v() / SUPPLY_RATIO),
                 _ => 0,
             };

@@ -10,6 +10,7 @@
 pub mod bench;
 pub mod board;
 pub mod client;
+mod clock;
 pub mod converter;
 pub mod demo;
 pub mod error;
@@ -37,6 +38,7 @@ pub mod stand;
 pub mod streams;
 pub mod surroundings;
 pub mod trace;
+mod window_watchdog;
 pub mod wire;
 
 pub use error::Error;

@@ -1,6 +1,7 @@
 //! The STM32F427 of `rigless` with what the image needs beyond it.
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
+//! - The window watchdog, see [`WindowWatchdog`].
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
 use crate::board::BUS_PORT;
@@ -10,10 +11,12 @@ use crate::front_end::Shared;
 use crate::pwm_timer::PwmTimer;
 use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
+use crate::window_watchdog::WindowWatchdog;
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::rcc::{Register, apb1enr, csr};
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::tim::Channel;
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, SERIAL_INTERFACES};
@@ -23,6 +26,7 @@ use serde::{Deserialize, Serialize};
 
 /// What the buses run at out of reset: the internal oscillator.
 const RESET_HZ: u64 = 16_000_000;
+const WINDOW_WATCHDOG: &str = "WWDG";
 /// TIM3 in the part's list of timers.
 const TIM3: usize = 1;
 
@@ -38,6 +42,7 @@ enum Model {
     PwmTimer,
     ScanTimer,
     Streams,
+    WindowWatchdog,
     /// Nobody: the image does not use the SPIs, and they would hear every request of the scan.
     None,
 }
@@ -60,6 +65,7 @@ pub struct Part {
     pwm_timer: PwmTimer,
     scan_timer: ScanTimer,
     streams: Streams,
+    window_watchdog: WindowWatchdog,
     inputs: Inputs,
     front_end: Shared,
     layout: Bus,
@@ -71,7 +77,7 @@ pub struct Part {
 
 store!(Part {
     values: [inputs],
-    parts: [chip, converters, pwm_timer, scan_timer, streams],
+    parts: [chip, converters, pwm_timer, scan_timer, streams, window_watchdog],
     built: [front_end, layout, laying_out, wiring, pwm_slot],
 });
 
@@ -90,6 +96,7 @@ impl Part {
         wiring[pwm_slot] = Model::PwmTimer;
         wiring[chip.bus().slot("TIM8")?] = Model::ScanTimer;
         wiring[chip.bus().slot("DMA2")?] = Model::Streams;
+        wiring[chip.bus().slot(WINDOW_WATCHDOG)?] = Model::WindowWatchdog;
         for name in SERIAL_INTERFACES {
             wiring[chip.bus().slot(name)?] = Model::None;
         }
@@ -100,6 +107,7 @@ impl Part {
             pwm_timer: PwmTimer::new(RESET_HZ),
             scan_timer: ScanTimer::new(RESET_HZ, front_end.clone()),
             streams: Streams::new(front_end.clone()),
+            window_watchdog: WindowWatchdog::default(),
             inputs: Inputs { quarter: 0, bridge_well: true },
             front_end,
             layout,
@@ -163,6 +171,17 @@ impl Part {
         });
     }
 
+    /// The crate's part knows of one watchdog: the flag of the other is put in its place.
+    fn reset_chip(&mut self, at: VirtualNanos, cause: ResetCause) {
+        if cause != ResetCause::Model(WINDOW_WATCHDOG) {
+            return self.chip.reset(at, cause);
+        }
+        self.chip.reset(at, ResetCause::Model("IWDG"));
+        let (_, registers) = self.chip.clocks();
+        let flags = csr::WDGRSTF.set(registers.get(Register::Csr), 0);
+        registers.set(Register::Csr, csr::WWDGRSTF.set(flags, 1));
+    }
+
     fn drive_inputs(&mut self, at: VirtualNanos) {
         self.set_bridge_well(at, self.inputs.bridge_well);
         self.drive_encoder(at);
@@ -188,7 +207,8 @@ impl Mcu for Part {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        self.chip.reset(at, cause);
+        self.reset_chip(at, cause);
+        self.window_watchdog = WindowWatchdog::default();
         self.streams = Streams::new(self.front_end.clone());
         self.converters = Self::converters(&self.front_end);
         self.pwm_timer = PwmTimer::new(RESET_HZ);
@@ -210,6 +230,12 @@ impl Mcu for Part {
             Some(Model::PwmTimer) => Some(&mut self.pwm_timer),
             Some(Model::ScanTimer) => Some(&mut self.scan_timer),
             Some(Model::Streams) => Some(&mut self.streams),
+            Some(Model::WindowWatchdog) => {
+                let (clocks, registers) = self.chip.clocks();
+                let enabled = apb1enr::WWDGEN.is_set(registers.get(Register::Apb1enr));
+                self.window_watchdog.set_clock(clocks.pclk1(registers));
+                enabled.then_some(&mut self.window_watchdog as &mut dyn ErasedDevice)
+            }
             Some(Model::None) => None,
             Some(Model::Chip) | None => return self.chip.split(slot),
         };

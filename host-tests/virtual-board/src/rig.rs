@@ -7,7 +7,7 @@
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
 use crate::error::Error;
-use crate::front_end::{ScanCounts, Shared};
+use crate::front_end::{REFERENCE_V, ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::link::Listening;
 use crate::scene::finger::Finger;
@@ -32,13 +32,24 @@ pub struct Options {
     pub instructions_per_second: NonZeroU64,
     /// Bytes that stand in memory beside the image, at their addresses: a parameter sector for example.
     pub presets: Vec<(u64, Vec<u8>)>,
+    /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
+    /// the factory does.
+    pub brown_out_bits: u8,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"), presets: Vec::new() }
+        Self {
+            instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
+            presets: Vec::new(),
+            brown_out_bits: 0,
+        }
     }
 }
+
+/// What the factory measured of the internal reference, and at which supply.
+const CALIBRATION: u64 = 0x1fff_7a2a;
+const CALIBRATED_AT_V: f64 = 3.3;
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
@@ -84,7 +95,7 @@ impl Rig {
         let image = Firmware::read(path)?;
         let images = images(&image, options)?;
         let front_end = Shared::new(world);
-        let board = FingerBoard::new(front_end.clone(), options.instructions_per_second)?;
+        let board = FingerBoard::new(front_end.clone(), options)?;
         let mut session = Session::new(Box::new(board), 0, VirtualNanos(STEP_NS)).map_err(failure(0))?;
         let mut bench = Bench::new(front_end, &image);
         let (orders, ordered) = mpsc::channel();
@@ -292,6 +303,8 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
+    let calibration = (REFERENCE_V / CALIBRATED_AT_V * 4096.0) as u16;
+    images.push(read(Path::new("factory"), calibration.to_le_bytes().to_vec(), Some(CALIBRATION))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }

@@ -9,7 +9,7 @@ use crate::scan_updates::Updates;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::soc::RegisterSpec;
-use rigless::soc::stm32f427::generated::tim1::cr1;
+use rigless::soc::stm32f427::generated::tim1::{ccer, ccmr1_output, cr1};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim, UPDATE_REQUEST};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
@@ -17,6 +17,7 @@ use serde::{Deserialize, Serialize};
 /// The request output on which the rising edge of channel 1's reference is announced: beyond the timer's own.
 pub const COMPARE_1: usize = 32;
 
+const PWM_MODE_2: u64 = 0b111;
 const CHANNEL_1: Channel = Channel::new(1).expect("timers have a channel 1");
 
 /// TIM8 of the part.
@@ -60,6 +61,19 @@ impl ScanTimer {
         scan.edge_ns = (ticks * 1_000_000_000).div_ceil(self.clock_hz.max(1));
         registers.set(Register::Ccr1, 0);
         true
+    }
+
+    /// The compare without preload counts at once, also while the counter stands: set below it, channel 1's reference
+    /// rises. The crate's timer looks again only when it runs.
+    fn compare_standing(&self, compare: u64, registers: &RegisterFile, context: &mut DeviceContext<'_>) {
+        let mode = registers.get(Register::Ccmr1Output);
+        let immediate = !ccmr1_output::OC1PE.is_set(mode) && ccmr1_output::OC1M.get(mode) == PWM_MODE_2;
+        let stands = !cr1::CEN.is_set(registers.get(Register::Cr1)) && ccer::CC1E.is_set(registers.get(Register::Ccer));
+        let count = Device::peek(&self.timer, Register::Cnt, registers, context.now());
+        let count = count.unwrap_or(registers.get(Register::Cnt));
+        if immediate && stands && self.reference == Level::Low && count >= compare {
+            context.request(COMPARE_1, Level::High);
+        }
     }
 
     fn forget(&mut self) {
@@ -152,6 +166,9 @@ impl Device for ScanTimer {
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let taken = register == Register::Ccr1 && self.take_edge(value, registers);
+        if register == Register::Ccr1 && !taken {
+            self.compare_standing(value, registers, context);
+        }
         Device::write(&mut self.timer, register, if taken { 0 } else { value }, registers, context);
         self.announce(registers, context);
         self.follow(registers, context);

@@ -111,6 +111,7 @@ impl Driver<FingerBoard> for Hall {
             Settled::Access { access, .. } => {
                 self.bench.accessed(session.board_mut(), &access);
                 self.bench.flash.stored(session, host, &access);
+                self.bench.clock.accessed(session, host, &access);
             }
             // A run from a snapshot comes back first to where it was taken, inside that halt.
             Settled::Stop(stop) if !self.begun && stop.at.0 >= self.bench.next_ns && session.until().0 <= stop.at.0 => {

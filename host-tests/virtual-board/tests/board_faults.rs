@@ -4,8 +4,10 @@
 
 mod common;
 
-use common::{WAIT_NS, image, on_a_shared, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
+use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
+use rigless::emulator::{Access, AccessKind};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
 use std::sync::Mutex;
@@ -42,16 +44,118 @@ fn converters_stall_and_go_on() {
     });
 }
 
+/// At several instants of a frame, driven or not, and while the scan starts.
 #[test]
-fn a_core_that_hangs_is_reset_by_the_watchdog_and_scans_again() {
-    let mut rig = running(&Options::default());
+fn a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault() {
+    let mut driven = holding();
+    for off_us in [0, 30, 70] {
+        let mut rig = if off_us == 0 { running(&Options::default()) } else { holding() };
+        rig.run_until_ns(rig.now_ns() + off_us * 1_000).expect("it runs");
+        hangs(&mut rig);
+    }
+    // Parameters at which eight frames take longer than a millisecond: 50 us a row.
+    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
+    let written = driven.client(WAIT_NS, |bus| {
+        bus.write_u8(1, address::TORQUE_ENABLE, 0)?;
+        bus.write_u32(1, settle.address, 50_000).map(drop)
+    });
+    written.expect("the client runs").expect("the image obeys");
+    driven.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(&mut driven, address::FAULT), 0, "a slower scan is no hang");
+    assert_eq!(driven.resets().expect("it runs"), vec![]);
+}
+
+/// Stops the core, as in a loop with interrupts masked.
+fn hangs(rig: &mut Rig) {
+    let hung_ns = rig.now_ns();
     rig.inject(Fault::CoreHangs).expect("it runs");
-    rig.run_ms(100).expect("it runs");
+    rig.run_ms(2).expect("it runs");
     let resets = rig.resets().expect("it runs");
-    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["IWDG"]);
-    let before = frames(&mut rig);
+    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["WWDG"]);
+    let took_us = (resets[0].at_ns - hung_ns) / 1_000;
+    println!("reset {took_us} us after the hang");
+    assert!((100..=1_100).contains(&took_us), "{took_us} us");
+    assert!(!rig.with(|stand| stand.bench.bridge_edges.last().is_some_and(|edge| edge.on)).expect("it runs"));
+    rig.run_ms(20).expect("it runs");
+    let before = frames(rig);
     rig.run_ms(10).expect("it runs");
-    assert!(frames(&mut rig) > before + 90);
+    assert!(frames(rig) > before + 90);
+    // A crash, by a hang, after a watchdog's reset.
+    let causes = [address::FAULT, address::CRASH_CAUSE, address::RESET_CAUSE].map(|place| read_u8(rig, place));
+    assert_eq!(causes, [13, 3, 5]);
+}
+
+#[test]
+fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
+    let mut rig = holding();
+    let lost_ns = rig.now_ns();
+    rig.inject(Fault::ClockLost).expect("it runs");
+    rig.run_ms(150).expect("it runs");
+    let edges = rig.with(|stand| stand.bench.bridge_edges.clone()).expect("it runs");
+    let last = edges.last().expect("the bridge was driven");
+    assert!(!last.on && last.at_ns <= lost_ns + 20_000, "{last:?} after {lost_ns} ns");
+    let resets = rig.resets().expect("it runs");
+    assert_eq!(resets.iter().map(|reset| reset.cause.as_str()).collect::<Vec<_>>(), ["software"]);
+    assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 4);
+    // It scans at its rate, answers, and cannot be brought to drive.
+    assert_eq!(read_u8(&mut rig, address::FAULT), 17);
+    write_u8(&mut rig, address::CLEAR_FAULT, 1);
+    rig.run_ms(2).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (17, 5));
+    let before = frames(&mut rig);
+    rig.run_ms(100).expect("it runs");
+    let after = frames(&mut rig);
+    assert!((1_000..=1_005).contains(&(after - before)), "{} frames in 100 ms", after - before);
+    // With its clock it starts as ever.
+    rig.mend(Fault::ClockLost).expect("it runs");
+    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (0, 0));
+}
+
+#[test]
+fn a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_programmed() {
+    let mut rig = running(&Options { brown_out_bits: 3, ..Options::default() });
+    assert_eq!(read_u8(&mut rig, address::FAULT), 18);
+    write_u8(&mut rig, address::CLEAR_FAULT, 1);
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), 18);
+    // What `cargo xtask flash` writes: two keys, the level, the start.
+    let writes = |stand: &mut virtual_board::stand::Stand<'_>| {
+        const OPTKEYR: u64 = 0x4002_3c08;
+        const OPTCR: u64 = 0x4002_3c14;
+        let mut write = |address, value| {
+            let access = Access::new(AccessKind::Write, address, Width::W32, value);
+            let access = access.at(stand.stop.instruction_count, stand.stop.at);
+            stand.session.access(access, stand.host);
+        };
+        for (address, value) in
+            [(OPTKEYR, 0x0819_2a3b), (OPTKEYR, 0x4c5d_6e7f), (OPTCR, 0x0fff_aae0), (OPTCR, 0x0fff_aae2)]
+        {
+            write(address, value);
+        }
+    };
+    rig.with(writes).expect("it runs");
+    rig.run_ms(1).expect("it runs");
+    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), 0);
+    rig.check_gaps().expect("no unknown gap");
+}
+
+#[test]
+fn a_store_just_below_ram_is_a_hard_fault_there_and_then() {
+    let mut rig = running(&Options::default());
+    rig.inject(Fault::StoreBelowRam).expect("it runs");
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(rig.resets().expect("it runs").first().map(|reset| reset.cause.clone()).as_deref(), Some("software"));
+    // The patch outlives the reset, so the board cannot come up to be asked: its record says where it was.
+    let record = rig.image().item("crash", "RECORD").expect("the image has a crash record");
+    let words = move |stand: &mut virtual_board::stand::Stand<'_>| {
+        [4, 12].map(|offset| stand.host.read(record + offset, Width::W32).unwrap_or(0))
+    };
+    let [cause, pc] = rig.with(words).expect("it runs");
+    assert_eq!((cause, pc), (2, 0x0803_f008), "a hard fault at the store");
 }
 
 #[test]

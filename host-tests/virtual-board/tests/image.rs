@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{WAIT_NS, holding, image, on_a_shared, scratch};
+use common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use host_tests::plant::{Setup, World};
@@ -81,6 +81,66 @@ fn it_answers_a_ping_at_its_baud_rate() {
         // 14 bytes of 10 bits at 1 Mbaud, from the end of the first to the end of the last.
         let took_ns = reply[13].at_ns - reply[0].at_ns;
         assert!((129_000..=131_000).contains(&took_ns), "{took_ns} ns");
+    });
+}
+
+/// Also where control is at work just then: at many instants of a frame, with a contact to fit to.
+#[test]
+fn the_line_is_given_back_right_after_the_last_stop_bit() {
+    let mut rig = holding();
+    let mut late_ns = Vec::new();
+    for turn in 0..40 {
+        rig.run_until_ns(rig.now_ns() + 10_000 * (turn % 10)).expect("it runs");
+        rig.take_received().expect("it runs");
+        rig.with(|stand| stand.bench.transmit_edges.clear()).expect("it runs");
+        rig.send(&PING).expect("it runs");
+        rig.run_ms(2).expect("it runs");
+        let end_ns = rig.take_received().expect("it runs").last().expect("it answers").at_ns;
+        let edges = rig.with(|stand| std::mem::take(&mut stand.bench.transmit_edges)).expect("it runs");
+        assert_eq!(edges.iter().map(|edge| edge.on).collect::<Vec<_>>(), [true, false]);
+        assert!(edges[1].at_ns >= end_ns, "{} ns before the last stop bit's end", end_ns - edges[1].at_ns);
+        late_ns.push(edges[1].at_ns - end_ns);
+    }
+    late_ns.sort_unstable();
+    println!("given back {} to {} ns after the last stop bit, half within {}", late_ns[0], late_ns[39], late_ns[20]);
+    assert!(late_ns[39] <= 5_000, "{} ns", late_ns[39]);
+}
+
+/// A compare set below the counter triggers the converters once too often, where it comes before the timer starts anew
+/// and leaves them time until the first row: each row would then be read a slot late.
+#[test]
+fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
+    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
+    let mut rig = rig();
+    rig.run_until_ns(20_000_000).expect("it runs");
+    for (turn, settle_ns) in [100_000, 20_000, 90_000, 15_000, 100_000, 10_000].into_iter().enumerate() {
+        rig.run_until_ns(rig.now_ns() + 10_000 * turn as u64).expect("it runs");
+        let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, settle.address, settle_ns).map(drop));
+        written.expect("the client runs").expect("the image obeys");
+        rig.run_ms(20).expect("it runs");
+        let bad = read_u8(&mut rig, address::BAD_TAXELS);
+        assert_eq!(bad, 0, "taxels that read nothing, with {settle_ns} ns");
+    }
+}
+
+#[test]
+fn the_bus_tells_how_the_board_is() {
+    with_one_that_is_up(|rig| {
+        rig.run_ms(1_100).expect("it runs");
+        assert_eq!(read_u32(rig, address::OPTION_BYTES) & 0xffff_fffe, 0x0fff_aae0);
+        assert!((3_295..=3_305).contains(&read_u16(rig, address::ANALOGUE_SUPPLY_MV)));
+        let deepest = rig.stack_use().expect("it runs").expect("the image tells where its stack lies").used;
+        let told = u64::from(read_u16(rig, address::STACK_BYTES));
+        assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
+        let late_ns = read_u16(rig, address::FRAME_LATE_NS);
+        println!("a frame's end came {late_ns} ns late");
+        assert!((1..5_000).contains(&late_ns), "{late_ns} ns");
+        for count in [address::BANK_MISSING, address::OUT_OF_STEP, address::CONVERTER_OVERRUN, address::OVERWRITTEN] {
+            assert_eq!(read_u16(rig, count), 0);
+        }
+        for count in [address::TRANSFER_BUS_ERRORS, address::TRANSFER_STREAM_ERRORS, address::LINE_FRAMING] {
+            assert_eq!(read_u16(rig, count), 0);
+        }
     });
 }
 

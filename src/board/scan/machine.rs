@@ -118,14 +118,24 @@ pub fn start_rows() {
     stream.cr().modify(|w| w.set_en(true));
 }
 
-/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters.
-pub fn start_timer(timing: ScanTiming) {
+/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters. Leaves the
+/// counter at 0, with the compare's output low.
+pub fn set_timer(timing: ScanTiming) {
     let timer = pac::TIM8;
     timer.arr().write(|w| w.set_arr((timing.slot.0 - 1) as u16));
     timer.ccr(0).write(|w| w.set_ccr(timing.settle.0 as u16));
-    timer.ccmr_output(0).write(|w| w.set_ocm(0, Ocm::PWM_MODE2));
+    timer.ccmr_output(0).write(|w| {
+        w.set_ocm(0, Ocm::PWM_MODE2);
+        w.set_ocpe(0, true);
+    });
     timer.ccer().write(|w| w.set_cce(0, true));
     timer.bdtr().write(|w| w.set_moe(true));
+    timer.egr().write(|w| w.set_ug(true));
+}
+
+/// From the first row.
+pub fn start_timer() {
+    let timer = pac::TIM8;
     timer.dier().write(|w| w.set_ude(true));
     timer.egr().write(|w| w.set_ug(true));
     timer.cr1().write(|w| w.set_cen(true));
@@ -164,4 +174,20 @@ pub fn bank_a_completed(half: usize) -> bool {
 /// A converter that was not read in time stops asking for DMA.
 pub fn overrun() -> bool {
     [pac::ADC1, pac::ADC2].into_iter().any(|adc| adc.sr().read().ovr())
+}
+
+/// Whether a transfer failed on the memory's bus, and whether a stream failed, since the last time.
+pub fn take_errors() -> (bool, bool) {
+    let flags = pac::DMA2.isr(0).read();
+    let streams = [STREAM_A, STREAM_ROWS, STREAM_B];
+    pac::DMA2.ifcr(0).write(|w| {
+        for stream in streams {
+            w.set_teif(stream, true);
+            w.set_dmeif(stream, true);
+            w.set_feif(stream, true);
+        }
+    });
+    let any =
+        |failed: fn(&pac::dma::regs::Ixr, usize) -> bool| streams.into_iter().any(|stream| failed(&flags, stream));
+    (any(|flags, stream| flags.teif(stream)), any(|flags, stream| flags.dmeif(stream) || flags.feif(stream)))
 }

@@ -114,8 +114,9 @@ control_table! {
         |view, _| view.snapshot.status.mode as u32;
     /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
-    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact.
-    265 FAULT: U8 ReadOnly, "" * 1, 0 to 16,
+    /// missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact, 17 no clock, 18
+    /// brown-out level.
+    265 FAULT: U8 ReadOnly, "" * 1, 0 to 18,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
     /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known
@@ -249,8 +250,8 @@ control_table! {
     /// other.
     384 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
         |view, _| view.snapshot.reset_cause as u32;
-    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang.
-    385 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 3,
+    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
+    385 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.snapshot.crash.cause as u32;
     /// Crashes since power-on.
     386 CRASH_COUNT: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
@@ -271,6 +272,47 @@ control_table! {
     /// more taxels are bad than bad_taxels_max, 4 a save waits.
     397 RECOVER_HINDRANCE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.hindrance();
+    /// The option bytes as the last reset loaded them: FLASH_OPTCR of the microcontroller.
+    484 OPTION_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.health.option_bytes;
+    /// The analogue supply at the start, by the internal reference; 0 where it is not known.
+    488 ANALOGUE_SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.analogue_mv);
+    /// The deepest that the stack has been since reset, looked up each second.
+    490 STACK_BYTES: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.stack_bytes);
+    /// The longest that a frame's end came late to the processor: behind a critical section, or behind an interrupt
+    /// that is no less urgent.
+    492 FRAME_LATE_NS: U16 ReadOnly, "ns" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.late_ns);
+    /// Frames that were there and not whole: a bank was missing. Those of missed_frames that are in none of these four
+    /// counts came and went unseen.
+    494 BANK_MISSING: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[0]);
+    /// The same: the banks were out of step with the rows.
+    496 OUT_OF_STEP: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[1]);
+    /// The same: a converter had overrun.
+    498 CONVERTER_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[2]);
+    /// The same: the next frame came over it.
+    500 OVERWRITTEN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.broken_frames[3]);
+    /// Errors of the scan's transfers on the memory's bus.
+    502 TRANSFER_BUS_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.transfer_errors[0]);
+    /// Errors of the scan's streams: direct mode and FIFO.
+    504 TRANSFER_STREAM_ERRORS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.transfer_errors[1]);
+    /// Noise on the line of the bus.
+    506 LINE_NOISE: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[0]);
+    /// Bytes without a stop bit, or with the wrong parity.
+    508 LINE_FRAMING: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[1]);
+    /// Bytes that came faster than they were taken.
+    510 LINE_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.snapshot.health.line_errors[2]);
 }
 
 /// A number of at most two digits.

@@ -1,0 +1,63 @@
+//! The clock that the ST-LINK feeds to PH0, and its loss.
+//!
+//! The crate's clock tree switches over as the clock security system does, and breaks TIM1, but it cannot raise the
+//! exception that nothing masks. Its handler is entered as the frame guard's interrupt, which has the highest priority.
+//! Nor does the tree know of an oscillator that never gets ready: its enable is taken back as soon as it is set.
+
+use crate::board::FingerBoard;
+use rigless::device::{DeviceContext, RegisterFile};
+use rigless::emulator::{Access, AccessKind, Host, InterruptLine, Stop};
+use rigless::session::Session;
+use rigless::soc::Width;
+use rigless::soc::stm32f427::generated::RCC;
+use rigless::soc::stm32f427::generated::rcc::{Register, cr};
+use rigless::soc::stm32f427::peripherals::rcc::Rcc;
+
+const NMI_VECTOR: u64 = 0x0800_0008;
+/// TIM5's.
+const GUARD_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 50);
+const GUARD_LINE: InterruptLine = InterruptLine::new(50).expect("there are more lines");
+
+/// Whether it is there.
+#[derive(Clone, Debug, Default)]
+pub struct ExternalClock {
+    lost: bool,
+    /// The guard's vector, while another stands in its place.
+    vector: Option<u64>,
+}
+
+impl ExternalClock {
+    /// It stops, or is there again for the next start.
+    pub fn set_lost(&mut self, lost: bool, session: &mut Session<FingerBoard>, host: &mut dyn Host, stop: Stop) {
+        self.lost = lost;
+        let guarded = |clocks: &mut Rcc, registers: &mut RegisterFile, context: &mut DeviceContext<'_>| {
+            let guarded = cr::CSSON.is_set(registers.get(Register::Cr));
+            clocks.fail_hse(registers, context);
+            guarded
+        };
+        if lost && session.board_mut().part.chip.drive_clocks(stop.at, guarded) {
+            let [handler, guard] =
+                [NMI_VECTOR, GUARD_VECTOR].map(|vector| host.read(vector, Width::W32).expect("the vectors are flash"));
+            self.vector = Some(guard);
+            host.program(GUARD_VECTOR, Width::W32, handler).expect("the flash can be programmed");
+            session.pulse(GUARD_LINE, host);
+        }
+    }
+
+    /// The core touched a register.
+    pub fn accessed(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, access: &Access) {
+        let control = self.lost && access.kind == AccessKind::Write && access.address == RCC.base;
+        if control && cr::HSEON.is_set(access.value) {
+            let off = cr::HSEON.set(access.value, 0);
+            let again = Access::new(AccessKind::Write, RCC.base, Width::W32, off);
+            session.access(again.at(access.instruction_count, access.virtual_time), host);
+        }
+    }
+
+    /// The part was reset.
+    pub fn restarted(&mut self, host: &mut dyn Host) {
+        if let Some(vector) = self.vector.take() {
+            host.program(GUARD_VECTOR, Width::W32, vector).expect("the flash can be programmed");
+        }
+    }
+}

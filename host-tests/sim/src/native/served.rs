@@ -163,6 +163,8 @@ impl<E: Set> Bus<E> {
                 status: *pipeline.status(),
                 supply_mv: self.board.world.sense(finger, 0).supply_mv,
                 tick_ms: ((at_s - device.started_s) * 1e3) as u64 as u32,
+                frame_time_us: ((self.board.clock.since(self.board.start) - device.started_s) * 1e6) as u64 as u32,
+                frame_ns: pipeline.config().timing.frame_ns,
                 loop_time_us: 0,
                 loop_time_max_us: 0,
                 reset_cause: device.reset,

@@ -9,7 +9,7 @@ fn main() {
     println!("from typing import NamedTuple\n\n");
     println!("class Register(NamedTuple):\n    \"\"\"Where a register is, and how its bytes make numbers.\"\"\"\n");
     println!("    name: str  # its unit at the end");
-    println!("    address: int\n    width: int  # bytes of a number\n    count: int  # numbers side by side");
+    println!("    address: int\n    width: int  # bytes of a number\n    numbers: int  # side by side");
     println!("    signed: bool\n    scale: int  # what a step of the number means, in its unit");
     println!("    stored: bool  # kept over a reset once it is saved\n    least: int\n    largest: int\n\n");
     let python = |flag: bool| if flag { "True" } else { "False" };

@@ -33,14 +33,13 @@ def main() -> None:
                     print(f"stopped by {state.fault.name}")
                     try:
                         finger.recover()
+                        # A fault lets go and the tare stays: nothing else is to be set up anew.
+                        finger.press(arguments.newtons)
+                        recovered += 1
                     except FingertipError as why:
                         # What causes it is still there: later perhaps.
                         print(why)
                         time.sleep(0.5)
-                        continue
-                    recovered += 1
-                    # A fault lets go and the tare stays: nothing else is to be set up anew.
-                    finger.press(arguments.newtons)
                 time.sleep(0.05)
         finally:
             if not finger.state().fault:

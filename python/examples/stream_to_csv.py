@@ -33,7 +33,7 @@ def main() -> None:
             with open(arguments.file, "w", newline="") as file:
                 table = csv.writer(file)
                 table.writerow(COLUMNS)
-                for state in finger.stream(arguments.rate_hz, arguments.seconds):
+                for state in finger.stream(arguments.rate_hz, arguments.seconds, pressures=False):
                     row = [getattr(state, name) for name in COLUMNS]
                     row[0] = f"{state.time_s:.6f}"
                     table.writerow([int(cell) if isinstance(cell, int) else cell for cell in row])

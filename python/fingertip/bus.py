@@ -3,7 +3,7 @@
 import time
 from typing import Any, List, Optional, Type
 
-from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler
+from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler  # type: ignore[import-untyped]
 
 from .registers import Register
 
@@ -91,11 +91,11 @@ class Bus:
 
     def read(self, register: Register) -> int:
         """The number of a register, in the unit that its name ends with."""
-        return numbers(register, self.read_bytes(register.address, register.width * register.count))[0]
+        return numbers(register, self.read_bytes(register.address, register.width * register.numbers))[0]
 
     def read_all(self, register: Register) -> List[int]:
         """The numbers of a register that has many."""
-        return numbers(register, self.read_bytes(register.address, register.width * register.count))
+        return numbers(register, self.read_bytes(register.address, register.width * register.numbers))
 
     def write(self, register: Register, value: int) -> None:
         """Sets a register, in the unit that its name ends with."""
@@ -118,5 +118,5 @@ class Bus:
 def numbers(register: Register, data: bytes) -> List[int]:
     """What bytes come to."""
     width = register.width
-    words = [data[at : at + width] for at in range(0, width * register.count, width)]
+    words = [data[at : at + width] for at in range(0, width * register.numbers, width)]
     return [int.from_bytes(word, "little", signed=register.signed) * register.scale for word in words]

@@ -12,7 +12,7 @@ class Register(NamedTuple):
     name: str  # its unit at the end
     address: int
     width: int  # bytes of a number
-    count: int  # numbers side by side
+    numbers: int  # side by side
     signed: bool
     scale: int  # what a step of the number means, in its unit
     stored: bool  # kept over a reset once it is saved

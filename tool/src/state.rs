@@ -167,7 +167,7 @@ impl Clock {
         let passed_us = self.last_us.map_or(0, |last_us| time_us.wrapping_sub(last_us));
         self.last_us = Some(time_us);
         self.total_us += u64::from(passed_us);
-        self.total_us as f64 * 1e-6
+        self.total_us as f64 / 1e6
     }
 }
 

@@ -83,8 +83,10 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
-    client.set(address::TORQUE_ENABLE, 1)?;
-    client.set(address::GOAL_FORCE_MN, goal_mn)?;
+    // Some faults show only once torque is on: then it is not the goal that is wrong.
+    if let Err(why) = client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, goal_mn)) {
+        return no_fault(client).and(Err(why));
+    }
     let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), None::<Held>);
     loop {
         let state = State::read(client)?;

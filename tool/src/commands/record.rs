@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 
 /// So many reads in a row that fail end it.
 const LOST_MAX: u64 = 20;
+/// What is later is not made up for.
+const LATE_MAX: Duration = Duration::from_millis(100);
 
 /// What to record.
 #[derive(Debug, clap::Args)]
@@ -151,8 +153,8 @@ fn take(
             }
             Err(why) => return Ok((counts, Some(why))),
         }
-        // A state that came late does not make the next ones come all at once.
-        due = (due + period).max(Instant::now().checked_sub(period).unwrap_or(due));
+        // The rate holds on average: a state that came late is made up for, where it was not too late.
+        due = (due + period).max(Instant::now().checked_sub(LATE_MAX).unwrap_or(due));
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
     Ok((counts, None))

@@ -52,6 +52,8 @@ struct Device {
     /// How many good packets there were, and when that last changed.
     packets: (u32, f64),
     broken: Option<Broken>,
+    /// As the controller sensed it last.
+    supply_mv: u16,
     reboot_s: Option<f64>,
 }
 
@@ -114,6 +116,7 @@ impl<E: Set> Bus<E> {
             let params = &unit.pipeline.config().params;
             let scanned =
                 device.broken.as_mut().is_none_or(|broken| broken.change(&mut unit.frame, &mut sense, params));
+            device.supply_mv = sense.supply_mv;
             let status = if scanned {
                 unit.pipeline.step(&unit.frame, &sense, &device.server.command()).1
             } else {
@@ -161,7 +164,7 @@ impl<E: Set> Bus<E> {
             tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
             let snapshot = Snapshot {
                 status: *pipeline.status(),
-                supply_mv: self.board.world.sense(finger, 0).supply_mv,
+                supply_mv: device.supply_mv,
                 tick_ms: ((at_s - device.started_s) * 1e3) as u64 as u32,
                 frame_time_us: ((self.board.clock.since(self.board.start) - device.started_s) * 1e6) as u64 as u32,
                 frame_ns: pipeline.config().timing.frame_ns,
@@ -199,6 +202,7 @@ impl Device {
             encoder_start: 0,
             packets: (0, started_s),
             broken: None,
+            supply_mv: 0,
             reboot_s: None,
         }
     }

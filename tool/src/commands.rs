@@ -1,6 +1,7 @@
 //! The commands, one module each.
 
 pub mod info;
+pub mod latency;
 pub mod params;
 pub mod press;
 pub mod record;

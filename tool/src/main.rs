@@ -3,7 +3,7 @@
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
-use fingertip_cli::commands::{info, params, press, record, recover, scan, tare, view};
+use fingertip_cli::commands::{info, latency, params, press, record, recover, scan, tare, view};
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -54,6 +54,8 @@ enum Command {
     Press(press::Args),
     /// Clear what stopped the motor, and say what stands in the way
     Recover,
+    /// Measure how long answers take: reads without a pause
+    Latency(latency::Args),
     /// Print a shell's completions
     #[command(
         after_help = "Example:\n  fingertip completions bash > ~/.local/share/bash-completion/completions/fingertip"
@@ -89,6 +91,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
         Command::Recover => recover::run(&mut connect()?, cli.json),
+        Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
         Command::Completions { shell } => {
             let mut text = Vec::new();
             clap_complete::generate(*shell, &mut Cli::command(), "fingertip", &mut text);

@@ -211,6 +211,14 @@ fn a_recording_that_is_interrupted_is_whole() {
 }
 
 #[test]
+fn answers_are_measured() {
+    let finger = Served::begin("wall");
+    let measured = finger.json(&["latency", "--seconds", "0.2"]);
+    assert_eq!((&measured["unanswered"], &measured["return_delay_us"]), (&0.into(), &500.into()));
+    assert!(measured["reads"].as_u64() > Some(0) && measured["median_ms"].as_f64() > Some(0.0), "{measured}");
+}
+
+#[test]
 fn a_view_needs_a_terminal_and_shells_get_completions() {
     let finger = Served::begin("wall");
     assert!(finger.refused(&["view"]).contains("`fingertip record`"));

@@ -1,5 +1,6 @@
 //! What bytes go through: a serial port, a pseudo-terminal, or TCP to a served finger.
 
+use rustix::fs::{FlockOperation, flock};
 use serial2::SerialPort;
 use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
@@ -37,7 +38,11 @@ impl Line {
             stream.set_nodelay(true)?;
             return Ok(Self::Tcp(stream));
         }
-        Ok(Self::Serial(SerialPort::open(port, baud)?))
+        let serial = SerialPort::open(port, baud)?;
+        // Two hosts on one line take each other's answers.
+        flock(&serial, FlockOperation::NonBlockingLockExclusive)
+            .map_err(|_| io::Error::new(ErrorKind::ResourceBusy, "another program has it open"))?;
+        Ok(Self::Serial(serial))
     }
 
     /// Changes the speed, where there is one.

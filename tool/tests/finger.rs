@@ -36,6 +36,16 @@ fn who_is_not_there_is_told() {
     assert!(why.contains("at 115200 baud"), "{why}");
     let why = finger.refused(&["--port", "/nowhere", "info"]);
     assert!(why.contains("cannot open /nowhere"), "{why}");
+    // One line has one host.
+    let mut first = finger.start(&["record", &finger.file("first.csv")]);
+    while fs::metadata(finger.file("first.csv.new")).is_err() {
+        std::thread::yield_now();
+    }
+    let why = finger.refused(&["info"]);
+    assert!(why.contains("another program has it open"), "{why}");
+    Served::interrupt(&first);
+    assert!(first.wait().expect("it ends").success());
+    finger.done(&["info"]);
     let why = Served::nobody(&["info"]);
     assert!(why.contains("--port") && why.contains("FINGERTIP_PORT"), "{why}");
 }
@@ -189,7 +199,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     let file = finger.file("stopped.csv");
     let mut child = finger.start(&["record", &file]);
     // Until something is on its way.
-    while !fs::metadata(format!("{file}.new")).is_ok() {
+    while fs::metadata(format!("{file}.new")).is_err() {
         std::thread::yield_now();
     }
     Served::interrupt(&child);
@@ -201,7 +211,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     // One whose line is lost keeps what it had, and says why it ends.
     let lost = finger.file("lost.csv");
     let child = finger.start(&["record", "--timeout-ms", "1", &lost]);
-    while !fs::metadata(format!("{lost}.new")).is_ok() {
+    while fs::metadata(format!("{lost}.new")).is_err() {
         std::thread::yield_now();
     }
     finger.end();

@@ -19,7 +19,7 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, Config, Pipeline, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::{Record, settle};
-use host_tests::native::bridge;
+use host_tests::plant::Bridge;
 use object::Object;
 use std::collections::VecDeque;
 
@@ -123,7 +123,7 @@ impl<E: Set> Bus<E> {
                 unit.pipeline.stop(Fault::LostFrames);
                 unit.pipeline.status()
             };
-            unit.next = bridge(status);
+            unit.next = Bridge::of(status);
         }
     }
 

@@ -3,7 +3,7 @@
     pip install dynamixel-sdk
     python force.py --port /dev/ttyACM0 --newtons 1.5
 
-The port is that of the board, or what `cargo xtask demo --serve` prints.
+The port is that of the board, or what `cargo xtask serve` prints.
 """
 
 import argparse

@@ -28,9 +28,23 @@ impl Lock {
     /// # Errors
     /// Another process has it, which the text names, or the folder cannot be written.
     pub fn take(path: &Path) -> io::Result<Self> {
+        Self::take_or(path, |who, lock| {
+            format!(
+                "{} is being written by {who}, which holds {}: wait for it, or name another folder with --out",
+                path.display(),
+                lock.display()
+            )
+        })
+    }
+
+    /// The same, where who has it and by which file is told in other words.
+    ///
+    /// # Errors
+    /// As [`Lock::take`].
+    pub fn take_or(path: &Path, taken: impl Fn(&str, &Path) -> String) -> io::Result<Self> {
         Self::get(path, |file, lock| match file.try_lock() {
             Ok(()) => Ok(()),
-            Err(TryLockError::WouldBlock) => Err(io::Error::new(io::ErrorKind::WouldBlock, taken(path, file, lock))),
+            Err(TryLockError::WouldBlock) => Err(io::Error::new(io::ErrorKind::WouldBlock, taken(&holder(file), lock))),
             Err(TryLockError::Error(error)) => Err(error),
         })
     }
@@ -89,19 +103,14 @@ impl Drop for Lock {
     }
 }
 
-/// Says who has a lock.
-fn taken(path: &Path, file: &mut File, lock: &Path) -> String {
+/// Who has a lock.
+fn holder(file: &mut File) -> String {
     let mut text = String::new();
     // Some systems do not let others read what is locked.
     let _ = file.read_to_string(&mut text);
-    let who = text.split(' ').next().filter(|id| !id.is_empty()).map_or("another process".into(), |id| {
+    text.split(' ').next().filter(|id| !id.is_empty()).map_or("another process".into(), |id| {
         if id == process::id().to_string() { "this process itself".into() } else { format!("process {id}") }
-    });
-    format!(
-        "{} is being written by {who}, which holds {}: wait for it, or name another folder with --out",
-        path.display(),
-        lock.display()
-    )
+    })
 }
 
 /// A file that is there once it is finished. One that is dropped before leaves what was there as it was.

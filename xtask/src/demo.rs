@@ -8,27 +8,17 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     cargo xtask demo\n  \
-    cargo xtask demo --json target/demo.json --out target/pictures\n  \
-    cargo xtask demo --serve --tcp 7000    (then talk to it with any DYNAMIXEL client)")]
+    cargo xtask demo --json target/demo.json --out target/pictures")]
 pub struct Args {
     /// Write the figures to this file, as JSON
-    #[arg(long, value_name = "FILE", conflicts_with = "serve")]
+    #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Write the pictures to this folder
-    #[arg(long, value_name = "DIR", conflicts_with = "serve")]
+    #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Hold each force for a shorter time, and leave out the second run
-    #[arg(long, conflicts_with = "serve")]
-    quick: bool,
-    /// Keep the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
     #[arg(long)]
-    serve: bool,
-    /// Serve behind this TCP port of this machine; 0 takes any that is free
-    #[arg(long, value_name = "PORT", requires = "serve", conflicts_with = "pty")]
-    tcp: Option<u16>,
-    /// Make a symbolic link of this name to the pseudo-terminal
-    #[arg(long, value_name = "PATH", requires = "serve")]
-    pty: Option<PathBuf>,
+    quick: bool,
 }
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
@@ -36,20 +26,15 @@ pub struct Args {
 /// # Errors
 /// Something does not build, or the demonstration misses what it must show.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    if !args.serve {
-        native(args, console)?;
-    }
+    native(args, console)?;
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
     let mut command = host::BOARD.build(console)?;
-    command.arg(if args.serve { "serve" } else { "demo" }).arg("--image").arg(&image.elf);
-    for (flag, value) in [("--json", &args.json), ("--out", &args.out), ("--pty", &args.pty)] {
+    command.args(["demo", "--image"]).arg(&image.elf);
+    for (flag, value) in [("--json", &args.json), ("--out", &args.out)] {
         if let Some(path) = value {
             command.arg(flag).arg(std::path::absolute(path)?);
         }
-    }
-    if let Some(port) = args.tcp {
-        command.arg("--tcp").arg(port.to_string());
     }
     command.args(args.quick.then_some("--quick"));
     console.run(&mut command)

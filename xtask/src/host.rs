@@ -23,6 +23,8 @@ pub struct Program {
 
 /// The demonstration on the native board, with nothing that it does not need.
 pub const NATIVE_DEMO: Program = Program { package: "sim", name: "demo", whole: false };
+/// The native core behind a port.
+pub const SERVE: Program = Program { package: "serve", name: "serve", whole: true };
 /// The emulated board without scenes and without the text of the log.
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
 /// The emulated board with all that it can.

@@ -19,6 +19,7 @@ mod progress;
 mod proof;
 mod python;
 mod qemu;
+mod serve;
 mod sim;
 mod size;
 mod stages;
@@ -76,6 +77,12 @@ enum Command {
         after_help = "Examples:\n  cargo xtask sensor fit cycles.csv --judge others.csv --json fit.json\n  cargo xtask sensor fit --help    (all that it takes)"
     )]
     Sensor(sim::Args),
+    /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
+    )]
+    Serve(sim::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -132,6 +139,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sweep(args) => sim::sweep(args, console),
         Command::Population(args) => sim::population(args, toolchain, console),
         Command::Sensor(args) => sim::sensor(args, console),
+        Command::Serve(args) => serve::run(args, toolchain, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),

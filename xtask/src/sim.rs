@@ -13,7 +13,7 @@ use std::process::{Command, exit};
 pub struct Args {
     /// See `--help`
     #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
-    arguments: Vec<String>,
+    pub arguments: Vec<String>,
 }
 
 /// Runs a scene, on the board that is asked for.
@@ -67,7 +67,10 @@ fn wants_image(arguments: &[String]) -> bool {
 }
 
 /// Runs a program where the user is; this process ends as it does.
-fn start(command: &mut Command) -> Result<()> {
+///
+/// # Errors
+/// It cannot be started.
+pub fn start(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| format!("cannot start {}", console::show(command)))?;
     if !status.success() {
         exit(status.code().unwrap_or(2));

@@ -37,6 +37,12 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         host::test(&mut command, console)
     });
+    stages.stage("Python package on a served finger", |console| {
+        let python = python::ensure(console)?;
+        let mut command = host::cargo("test", "serve");
+        command.args(["--test", "python"]).env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
+        host::test(&mut command, console)
+    });
     stages.stage("reports in a browser", |console| {
         let program = browser::ensure(console)?;
         host::test(host::cargo("test", "browser").env("FINGERTIP_CHROMIUM", &program), console)

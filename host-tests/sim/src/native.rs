@@ -5,6 +5,7 @@
 
 mod clock;
 mod digest;
+pub mod served;
 
 use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
@@ -191,6 +192,14 @@ impl<E: Set> Board<E> {
 
     /// Scans one frame of each finger and takes its control step.
     fn frame(&mut self, watch: &mut dyn Watch) {
+        self.scan();
+        for finger in 0..self.units.len() {
+            self.control(finger, watch);
+        }
+    }
+
+    /// Scans one frame of each finger while the world moves on.
+    fn scan(&mut self) {
         let time_s = self.time_s();
         let second_s = self.units[0].link.second_s(time_s);
         let slot_s = self.slot_s * second_s;
@@ -201,9 +210,6 @@ impl<E: Set> Board<E> {
                 }
             }
             self.slots(slot, slot_s);
-        }
-        for finger in 0..self.units.len() {
-            self.control(finger, watch);
         }
     }
 

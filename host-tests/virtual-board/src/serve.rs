@@ -1,72 +1,92 @@
-//! The board kept alive for any client of the bus: behind a pseudo-terminal or a TCP port, no faster than real time.
-
-mod port;
-
-pub use port::{Place, Port};
+//! The emulated board as a finger that is served: no faster than real time, and often slower.
 
 use crate::{Error, Rig};
-use port::Event;
-use std::sync::mpsc::{RecvTimeoutError, Sender};
-use std::time::{Duration, Instant};
+use fingertip::shipped::address;
+use serve::Finger;
 
-/// Virtual time between two looks at the port.
-const TICK: Duration = Duration::from_millis(1);
-/// A board that is farther behind does not try to catch up.
-const BEHIND_MAX: Duration = Duration::from_millis(100);
+/// The image is up by then.
+const BOOT_MS: u64 = 20;
+/// Its address on the bus, and how long it may take to answer.
+const ID: u8 = 1;
+const WAIT_NS: u64 = 20_000_000;
+/// A tare takes less.
+const TARE_MS: u64 = 300;
+/// Its torque is on for so long, with no force asked for.
+const TORQUE_MS: u64 = 20;
 
-/// Stops the board from another thread.
-#[derive(Clone, Debug)]
-pub struct Stop(Sender<Event>);
+/// A board behind a port.
+pub struct Board(Rig);
 
-impl Stop {
-    /// The board stops at its next look at the port; one that has stopped already does nothing.
-    pub fn stop(&self) {
-        let _ = self.0.send(Event::Stop);
+impl Board {
+    /// Lets a board start, then has it do all that a client may ask of it: what the emulator runs for the first time it
+    /// compiles, for up to 200 ms, and clients do not wait that long. Ends with a reboot.
+    ///
+    /// # Errors
+    /// It does not answer, or the emulator stopped.
+    pub fn warm(mut rig: Rig) -> Result<Self, Error> {
+        rig.run_ms(BOOT_MS)?;
+        let state = (address::PRESENT_MODE, address::LOOP_TIME_US + 2 - address::PRESENT_MODE);
+        let warmed = rig.client(WAIT_NS, |bus| {
+            bus.ping(ID)?;
+            bus.read(ID, state.0, state.1)?;
+            bus.read(ID, address::PRESSURES, 200)?;
+            bus.sync_read_u32(&[ID], address::PRESENT_FORCE_MN)?;
+            bus.reg_write_u8(ID, address::STATUS_RETURN_LEVEL, 2)?;
+            bus.action(ID)?;
+            bus.write_u32(ID, address::PARAMS, bus_default())?;
+            // Refused, as it is not tared: that takes its way too.
+            let _ = bus.write_u8(ID, address::IDENTIFY, 1);
+            bus.write_u8(ID, address::TARE, 1)
+        })?;
+        warmed.map_err(silent)?;
+        rig.run_ms(TARE_MS)?;
+        let warmed = rig.client(WAIT_NS, |bus| {
+            bus.write_u8(ID, address::TORQUE_ENABLE, 1)?;
+            bus.write_u32(ID, address::GOAL_FORCE_MN, 0)
+        })?;
+        warmed.map_err(silent)?;
+        rig.run_ms(TORQUE_MS)?;
+        let warmed = rig.client(WAIT_NS, |bus| {
+            bus.write_u8(ID, address::TORQUE_ENABLE, 0)?;
+            bus.write_u8(ID, address::CLEAR_FAULT, 1)?;
+            bus.reboot(ID)
+        })?;
+        warmed.map_err(silent)?;
+        rig.run_ms(BOOT_MS)?;
+        rig.client(WAIT_NS, |bus| bus.ping(ID))?.map_err(silent)?;
+        Ok(Self(rig))
     }
 }
 
-/// What a board did while it was served.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Served {
-    /// Virtual time.
-    pub virtual_s: f64,
-    /// Real time.
-    pub wall_s: f64,
-    /// Bytes from clients.
-    pub received: u64,
-    /// Bytes to them.
-    pub sent: u64,
+/// Something that may be written to the first parameter: what it has.
+fn bus_default() -> u32 {
+    fingertip::params::Params::DEFAULT.tip_radius_um as u32
 }
 
-/// Runs the board until it is stopped.
-///
-/// # Errors
-/// The emulator stopped.
-pub fn serve(rig: &mut Rig, port: &mut Port) -> Result<Served, Error> {
-    let (begun, begun_ns) = (Instant::now(), rig.now_ns());
-    let (mut received, mut sent) = (0, 0);
-    let mut due = begun;
-    loop {
-        match port.next(due.saturating_duration_since(Instant::now())) {
-            Ok(Event::Bytes(bytes)) => {
-                received += bytes.len() as u64;
-                rig.send(&bytes)?;
-                continue;
-            }
-            Ok(Event::Client(client)) => {
-                port.attach(client);
-                continue;
-            }
-            Ok(Event::Stop) | Err(RecvTimeoutError::Disconnected) => break,
-            Err(RecvTimeoutError::Timeout) => {}
-        }
-        rig.run_until_ns(rig.now_ns() + TICK.as_nanos() as u64)?;
-        let bytes: Vec<u8> = rig.take_received()?.iter().map(|timed| timed.byte).collect();
-        sent += bytes.len() as u64;
-        // A client that went away does not stop the board.
-        let _ = port.write_all(&bytes);
-        due = (due + TICK).max(Instant::now().checked_sub(BEHIND_MAX).unwrap_or(due));
+fn silent(why: impl std::fmt::Display) -> Error {
+    Error::Client(std::io::Error::other(format!("the board does not answer: {why}")))
+}
+
+impl Finger for Board {
+    type Error = Error;
+
+    fn now_s(&self) -> f64 {
+        self.0.now_ns() as f64 * 1e-9
     }
-    let virtual_s = (rig.now_ns() - begun_ns) as f64 * 1e-9;
-    Ok(Served { virtual_s, wall_s: begun.elapsed().as_secs_f64(), received, sent })
+
+    fn run_until(&mut self, time_s: f64) -> Result<(), Error> {
+        self.0.run_until_ns((time_s * 1e9) as u64)
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        self.0.send(bytes)
+    }
+
+    fn answer(&mut self) -> Result<Vec<u8>, Error> {
+        Ok(self.0.take_received()?.iter().map(|timed| timed.byte).collect())
+    }
+
+    fn command(&mut self, _text: &str) -> Result<String, String> {
+        Err("the emulated board takes no commands: `cargo xtask serve` without --board virtual does".into())
+    }
 }

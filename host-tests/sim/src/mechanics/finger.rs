@@ -161,6 +161,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         (self.before, self.rad_per_s2, self.winding_a, self.tip_mm) = (self.shaft, 0.0, 0.0, travel_mm);
     }
 
+    /// Puts the object's surface where the tip meets it at this travel.
+    pub fn place_object(&mut self, distance_mm: f64) {
+        self.setup.wall.distance_mm = distance_mm;
+    }
+
     /// Sets its speed.
     pub fn launch(&mut self, mm_per_s: f64) {
         self.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;

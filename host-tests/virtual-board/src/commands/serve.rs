@@ -1,17 +1,16 @@
 //! `virtual-board serve`.
 
-use fingertip::shipped::address;
 use host_tests::plant::{Setup, World};
+use host_tests::say;
+use serve::{Place, Port};
 use std::io::Write as _;
 use std::path::PathBuf;
-use virtual_board::serve::{Place, Port, serve};
+use std::time::Duration;
+use virtual_board::serve::Board;
 use virtual_board::{Error, Options, Rig};
 
-/// The image is up by then.
-const BOOT_MS: u64 = 20;
-/// Its address on the bus, and how long it may take to answer.
-const ID: u8 = 1;
-const WAIT_NS: u64 = 20_000_000;
+/// After which time an answer is told as late: the shortest time-out of the clients that are known.
+const LATE: Duration = Duration::from_millis(10);
 
 /// What to serve and where.
 #[derive(Debug, clap::Args)]
@@ -32,27 +31,16 @@ pub struct Arguments {
 
 /// Serves the board until Ctrl-C.
 pub fn run(arguments: &Arguments) -> Result<(), Error> {
+    let place = arguments.tcp.map_or_else(|| Place::Pty(arguments.pty.clone()), Place::Tcp);
     let mut setup = Setup::default();
     setup.wall.distance_mm = arguments.distance_mm;
-    let mut rig = Rig::new(&arguments.image, World::new(&setup), &Options::default())?;
-    // Up, and compiled by the emulator as far as an answer takes, before anybody can ask: clients do not wait long.
-    rig.run_ms(BOOT_MS)?;
-    let up = rig.client(WAIT_NS, |bus| {
-        bus.ping(ID)?;
-        bus.read_u32(ID, address::PRESENT_FORCE_MN)?;
-        bus.write_u32(ID, address::GOAL_FORCE_MN, 0)
-    })?;
-    up.map_err(|why| Error::Client(std::io::Error::other(format!("the board does not answer: {why}"))))?;
-    let place = arguments.tcp.map_or_else(|| Place::Pty(arguments.pty.clone()), Place::Tcp);
+    let mut board = Board::warm(Rig::new(&arguments.image, World::new(&setup), &Options::default())?)?;
     let mut port = Port::open(&place)?;
     let stop = port.stopper();
     ctrlc::set_handler(move || stop.stop()).map_err(|why| Error::Client(std::io::Error::other(why)))?;
-    println!("serving  {} (DYNAMIXEL Protocol 2.0, 1 Mbaud, ID 1; Ctrl-C ends)", port.name());
+    say::line(format_args!("serving  {} (DYNAMIXEL Protocol 2.0, 1 Mbaud, ID 1; Ctrl-C ends)", port.name()));
     std::io::stdout().flush()?;
-    let served = serve(&mut rig, &mut port)?;
-    println!(
-        "served   {:.1} s of virtual time in {:.1} s, {} bytes in, {} out",
-        served.virtual_s, served.wall_s, served.received, served.sent
-    );
+    let served = serve::serve(&mut board, &mut port, LATE, true)?;
+    say::line(served.text());
     Ok(())
 }

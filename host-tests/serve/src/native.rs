@@ -1,0 +1,52 @@
+//! The native core and link with a scene's world.
+
+use crate::Finger;
+use sim::effects::set::Set;
+use sim::native::served::Bus;
+use std::convert::Infallible;
+
+/// The fingers of a scene.
+pub struct Native<E: Set>(pub Bus<E>);
+
+impl<E: Set> Finger for Native<E> {
+    type Error = Infallible;
+
+    fn now_s(&self) -> f64 {
+        self.0.now_s()
+    }
+
+    fn run_until(&mut self, time_s: f64) -> Result<(), Infallible> {
+        // Whole frames, the last of which ends by then.
+        while self.0.now_s() + self.0.frame_s() <= time_s {
+            self.0.frame();
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), Infallible> {
+        self.0.hear(bytes);
+        Ok(())
+    }
+
+    fn answer(&mut self) -> Result<Vec<u8>, Infallible> {
+        // An answer leaves with the frame in which it is due, not with the one behind it.
+        let by_s = self.0.now_s() + self.0.frame_s();
+        let mut bytes = Vec::new();
+        while let Some(answer) = self.0.answer(by_s) {
+            bytes.extend(answer.bytes);
+        }
+        Ok(bytes)
+    }
+
+    fn due_s(&self) -> Option<f64> {
+        self.0.due_s()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        Some(self.0.baud())
+    }
+
+    fn command(&mut self, text: &str) -> Result<String, String> {
+        self.0.command(text)
+    }
+}

@@ -1,0 +1,152 @@
+//! How a served finger keeps pace with the clock, and how soon it answers.
+
+use std::fmt::Write as _;
+use std::time::{Duration, Instant};
+
+/// A finger that is farther behind does not try to catch up.
+const BEHIND_MAX_S: f64 = 0.1;
+/// It is said to be behind where it does less of real time than this.
+const KEEPS_UP: f64 = 0.98;
+/// How often it is looked at, and how often it is said while it stays so.
+const LOOK: Duration = Duration::from_secs(1);
+const LOOKS_BETWEEN: u32 = 5;
+
+/// What a finger did while it was served.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Served {
+    /// Its own time.
+    pub virtual_s: f64,
+    /// Real time.
+    pub wall_s: f64,
+    /// Bytes from clients.
+    pub received: u64,
+    /// Bytes to them.
+    pub sent: u64,
+    /// Answers, and how many of them were late.
+    pub answers: u64,
+    /// See there.
+    pub late: u64,
+    /// The longest time between a request and its answer, less the answer's own delay.
+    pub longest_s: f64,
+}
+
+/// A finger's time against the clock.
+#[derive(Debug)]
+pub struct Pace {
+    begun: Instant,
+    begun_s: f64,
+    /// Given up where it was too far behind.
+    lost_s: f64,
+    late: Duration,
+    always: bool,
+    asked: Option<Instant>,
+    all: Served,
+    look: Look,
+    /// Looks until it is said again; 0 where it keeps up.
+    silent: u32,
+}
+
+/// What happened since the last look.
+#[derive(Debug)]
+struct Look {
+    at: Instant,
+    virtual_s: f64,
+    late: u64,
+    longest_s: f64,
+}
+
+impl Look {
+    fn at(virtual_s: f64) -> Self {
+        Self { at: Instant::now(), virtual_s, late: 0, longest_s: 0.0 }
+    }
+}
+
+impl Pace {
+    /// Begins now, at this time of the finger.
+    pub fn new(begun_s: f64, late: Duration, always: bool) -> Self {
+        let begun = Instant::now();
+        let look = Look::at(begun_s);
+        Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), look, silent: 0 }
+    }
+
+    /// What the finger's time would be where it kept up.
+    pub fn clock_s(&mut self, now_s: f64) -> f64 {
+        let clock_s = self.begun_s + self.begun.elapsed().as_secs_f64() - self.lost_s;
+        let beyond_s = clock_s - now_s - BEHIND_MAX_S;
+        if beyond_s > 0.0 {
+            self.lost_s += beyond_s;
+            return clock_s - beyond_s;
+        }
+        clock_s
+    }
+
+    /// When the clock will show a time of the finger.
+    pub fn until(&self, time_s: Option<f64>) -> Option<Instant> {
+        time_s.map(|time_s| self.begun + Duration::from_secs_f64((time_s - self.begun_s + self.lost_s).max(0.0)))
+    }
+
+    /// Bytes came in.
+    pub fn asked(&mut self, bytes: usize) {
+        self.all.received += bytes as u64;
+        self.asked = Some(Instant::now());
+    }
+
+    /// An answer left.
+    pub fn answered(&mut self, bytes: usize) {
+        self.all.sent += bytes as u64;
+        // What comes in pieces counts by the first.
+        let Some(asked) = self.asked.take() else { return };
+        self.all.answers += 1;
+        let took = asked.elapsed();
+        self.look.longest_s = self.look.longest_s.max(took.as_secs_f64());
+        self.all.longest_s = self.all.longest_s.max(took.as_secs_f64());
+        if took > self.late {
+            self.all.late += 1;
+            self.look.late += 1;
+        }
+    }
+
+    /// What is to be said of the time since the last look, where it is time to look.
+    pub fn tell(&mut self, now_s: f64) -> Option<String> {
+        let wall_s = self.look.at.elapsed();
+        if wall_s < LOOK {
+            return None;
+        }
+        let look = std::mem::replace(&mut self.look, Look::at(now_s));
+        let ratio = (now_s - look.virtual_s) / wall_s.as_secs_f64();
+        let well = ratio >= KEEPS_UP && look.late == 0;
+        if well && !self.always {
+            let was_behind = std::mem::take(&mut self.silent) > 0;
+            return was_behind.then(|| format!("pace     {ratio:.2} of real time again"));
+        }
+        self.silent = self.silent.checked_sub(1).unwrap_or(LOOKS_BETWEEN);
+        if self.silent != LOOKS_BETWEEN {
+            return None;
+        }
+        let mut text = format!("pace     {ratio:.2} of real time");
+        if look.late > 0 {
+            let (late, allowed_ms, longest_ms) = (look.late, self.late.as_secs_f64() * 1e3, look.longest_s * 1e3);
+            // Writing to a string does not fail.
+            let _ = write!(text, "; {late} answers later than {allowed_ms:.1} ms, the longest took {longest_ms:.1} ms");
+        }
+        Some(text)
+    }
+
+    /// All of it.
+    pub fn end(&self, now_s: f64) -> Served {
+        Served { virtual_s: now_s - self.begun_s, wall_s: self.begun.elapsed().as_secs_f64(), ..self.all }
+    }
+}
+
+impl Served {
+    /// For people.
+    pub fn text(&self) -> String {
+        let Self { virtual_s, wall_s, received, sent, answers, late, longest_s } = self;
+        format!(
+            "served   {virtual_s:.1} s of virtual time in {wall_s:.1} s: {:.2} of real time\n         {received} bytes in, \
+             {sent} out, {answers} answers, {late} of them late, the longest after {:.1} ms",
+            virtual_s / wall_s,
+            longest_s * 1e3
+        )
+    }
+}

@@ -1,0 +1,92 @@
+//! The Python package and its examples on a served finger.
+//!
+//! `FINGERTIP_PYTHON` names a Python with `dynamixel-sdk`; `cargo xtask test` makes it and sets it.
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Stdio};
+
+/// As patient as it takes on the slowest machine.
+const PATIENCE_MS: &str = "600000";
+
+/// A served finger, stopped when dropped.
+struct Served {
+    child: Child,
+    side: ChildStdin,
+    said: BufReader<std::process::ChildStdout>,
+    port: String,
+}
+
+impl Served {
+    fn begin() -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_serve"));
+        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
+        let side = child.stdin.take().expect("it was asked for");
+        let mut said = BufReader::new(child.stdout.take().expect("it was asked for"));
+        let mut lines = [String::new(), String::new()];
+        for line in &mut lines {
+            said.read_line(line).expect("it says where it is");
+        }
+        let port = lines[0].split_whitespace().nth(1).expect("it says where it is").to_owned();
+        Self { child, side, said, port }
+    }
+
+    fn command(&mut self, text: &str) {
+        writeln!(self.side, "{text}").expect("it listens");
+        self.said.read_line(&mut String::new()).expect("it answers");
+    }
+
+    /// What an example says.
+    fn example(&self, name: &str, arguments: &[&str]) -> String {
+        let root = Path::new(env!("FINGERTIP_ROOT"));
+        let python = std::env::var_os("FINGERTIP_PYTHON").expect("`cargo xtask test` sets FINGERTIP_PYTHON");
+        let mut command = Command::new(PathBuf::from(python));
+        command.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", root.join("python"));
+        command.arg(root.join("python/examples").join(name)).args(["--port", &self.port, "--timeout-ms", PATIENCE_MS]);
+        let output = command.args(arguments).output().expect("Python starts");
+        let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        assert!(output.status.success(), "{name}: {said}{complained}");
+        said.into_owned()
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // One that has ended already needs no more.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+#[test]
+#[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
+fn the_examples_stream_show_set_and_recover() {
+    let mut served = Served::begin();
+    let file = std::env::temp_dir().join(format!("fingertip-python-{}.csv", std::process::id()));
+    let path = file.to_str().expect("a plain path");
+    served.example("stream_to_csv.py", &["--seconds", "1", "--rate-hz", "200", "--press", "1.5", path]);
+    let text = std::fs::read_to_string(&file).expect("it was written");
+    std::fs::remove_file(&file).expect("it is there");
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
+        .collect();
+    for pair in rows.windows(2) {
+        // Time is that of the frames: 99.786 us each.
+        let (frames, time_s) = (pair[1][1] - pair[0][1], pair[1][0] - pair[0][0]);
+        assert!(frames > 0.0 && (time_s - frames * 99.786e-6).abs() < 2e-6, "{frames} frames in {time_s} s");
+    }
+    let held = rows.last().expect("some states");
+    assert!((held[2] - 1.5).abs() < 0.02, "{held:?}");
+
+    let map = served.example("heat_map.py", &["--seconds", "0.1"]);
+    assert!(map.contains("0.000 N  OFF"), "{map}");
+    let shown = served.example("parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
+    assert!(shown.contains("300000  (was 250000)") && shown.contains("50  (was 40)"), "{shown}");
+
+    served.command("fault supply-low");
+    served.command("mend");
+    let recovered = served.example("recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);
+    assert!(recovered.ends_with("times\n"), "{recovered}");
+}

@@ -1,0 +1,212 @@
+//! The program behind its port: judged by bytes and words, never by the clock.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdin, Command, Output, Stdio};
+
+use serial2::SerialPort;
+
+/// As patient as it takes on the slowest machine.
+const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3600);
+const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
+/// What the letters FT and the firmware's version come to.
+const PONG: [u8; 12] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00, b'F', b'T', 0x01];
+
+fn program(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_serve"));
+    command.args(arguments);
+    command
+}
+
+/// A served finger, stopped when dropped.
+struct Served {
+    child: Child,
+    name: String,
+    side: Option<ChildStdin>,
+    said: BufReader<std::process::ChildStdout>,
+}
+
+impl Served {
+    fn begin(arguments: &[&str]) -> Self {
+        let mut command = program(arguments);
+        let mut child =
+            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+        let (side, said) = (child.stdin.take(), BufReader::new(child.stdout.take().expect("it was asked for")));
+        let mut served = Self { child, name: String::new(), side, said };
+        let line = served.line();
+        served.name = line.split_whitespace().nth(1).unwrap_or_else(|| panic!("says where it is: {line:?}")).to_owned();
+        assert!(served.line().starts_with("scene    "));
+        served
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.said.read_line(&mut line).expect("a line");
+        line
+    }
+
+    /// Has a command carried out, and hears of it.
+    fn ask(&mut self, command: &str) -> String {
+        writeln!(self.side.as_mut().expect("it was asked for"), "{command}").expect("it listens");
+        self.line()
+    }
+
+    /// Ctrl-C: how it ended, what it said last, and what it complained of.
+    fn interrupt(mut self) -> (bool, String, String) {
+        let pid = i32::try_from(self.child.id()).expect("a process number");
+        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+        let (mut last, mut complained) = (String::new(), String::new());
+        self.said.read_to_string(&mut last).expect("words");
+        let stderr = self.child.stderr.as_mut().expect("it was asked for");
+        stderr.read_to_string(&mut complained).expect("words");
+        (self.child.wait().expect("it ends").success(), last, complained)
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // One that has ended already needs no more.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn link(name: &str) -> PathBuf {
+    std::env::temp_dir().join(format!("fingertip-served-{}-{name}", std::process::id()))
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+fn terminal(served: &Served, baud: u32) -> SerialPort {
+    let mut port = SerialPort::open(&served.name, baud).expect("it is there");
+    port.set_read_timeout(PATIENCE).expect("a time-out");
+    port
+}
+
+fn pings(port: &SerialPort) {
+    port.write_all(&PING).expect("it listens");
+    let mut reply = [0; 14];
+    port.read_exact(&mut reply).expect("it answers");
+    assert_eq!(reply[..12], PONG);
+}
+
+fn refused(output: &Output) -> String {
+    assert_eq!(output.status.code(), Some(2));
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn a_link_is_served_by_one_and_gone_with_it() {
+    let path = link("one");
+    // What an earlier run left behind is replaced.
+    std::os::unix::fs::symlink("/dev/null", &path).expect("a link");
+    let served = Served::begin(&["--pty", text(&path)]);
+    assert_eq!(Path::new(&served.name), path);
+    let second = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
+    let holder = format!("process {} serves a finger at {}", served.child.id(), path.display());
+    assert!(second.contains(&holder) && second.contains("name another link"), "{second}");
+    // The first one is as it was.
+    pings(&terminal(&served, 1_000_000));
+    pings(&terminal(&served, 1_000_000));
+    let (well, last, complained) = served.interrupt();
+    assert!(well, "{complained}");
+    assert!(last.starts_with("served ") && last.contains("20 bytes in, 28 out, 2 answers"), "{last}");
+    assert!(!path.is_symlink(), "the link is gone");
+    assert!(!host_tests::kept::beside(&path, "lock").exists(), "the lock is gone");
+}
+
+#[test]
+fn a_file_is_no_link() {
+    let path = link("file");
+    std::fs::write(&path, "mine").expect("a file");
+    let why = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
+    assert!(why.contains(&format!("cannot make the link {}", path.display())), "{why}");
+    assert_eq!(std::fs::read_to_string(&path).expect("it is there"), "mine");
+    std::fs::remove_file(&path).expect("it is there");
+}
+
+#[test]
+fn another_speed_is_not_heard() {
+    let served = Served::begin(&[]);
+    let port = terminal(&served, 57_600);
+    port.write_all(&PING).expect("a terminal takes it");
+    // It is told of what it does not hear, in its own time: then the answer is to the second alone.
+    let mut served = served;
+    let mut line = String::new();
+    let mut complaints = BufReader::new(served.child.stderr.take().expect("it was asked for"));
+    complaints.read_line(&mut line).expect("a line");
+    while !line.contains("unheard") {
+        line.clear();
+        complaints.read_line(&mut line).expect("a line");
+    }
+    assert!(line.contains("a client sends at 57600 baud, the finger listens at 1000000"), "{line}");
+    drop(port);
+    pings(&terminal(&served, 1_000_000));
+}
+
+#[test]
+fn tcp_takes_one_client_after_another_and_says_so() {
+    let served = Served::begin(&["--tcp", "0"]);
+    let ping = |client: &mut TcpStream| {
+        client.write_all(&PING).expect("it listens");
+        let mut reply = [0; 14];
+        client.read_exact(&mut reply).expect("it answers");
+        assert_eq!(reply[..12], PONG);
+    };
+    let mut first = TcpStream::connect(&served.name).expect("it listens");
+    ping(&mut first);
+    let mut words = String::new();
+    TcpStream::connect(&served.name).expect("it listens").read_to_string(&mut words).expect("words, and an end");
+    assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("one client at a time\n"), "{words}");
+    ping(&mut first);
+    drop(first);
+    // It may be told of the first one's end behind the second one's coming.
+    loop {
+        let mut next = TcpStream::connect(&served.name).expect("it listens");
+        let mut reply = [0; 14];
+        if next.write_all(&PING).is_ok() && next.read_exact(&mut reply).is_ok() && reply[..12] == PONG {
+            break;
+        }
+    }
+    let (well, _, complained) = served.interrupt();
+    assert!(well && complained.contains("refused "), "{complained}");
+}
+
+#[test]
+fn what_is_there_is_told() {
+    let why = refused(&program(&["wal"]).output().expect("it starts"));
+    assert!(why.contains("no scene wal") && why.contains("did you mean `wall`?") && why.contains("raspberry"), "{why}");
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("some port is free");
+    let port = taken.local_addr().expect("it is bound").port();
+    let why = refused(&program(&["--tcp", &port.to_string()]).output().expect("it starts"));
+    assert!(why.contains(&format!("cannot open TCP port {port}")), "{why}");
+}
+
+#[test]
+fn commands_change_the_scene() {
+    let mut served = Served::begin(&[]);
+    assert_eq!(served.ask("move 3"), "the object moves to 3.00 mm at 20.000 mm/s\n");
+    assert_eq!(served.ask("remove"), "the object is taken away\n");
+    assert!(served.ask("state").starts_with("finger 1: Off: travel 0.000 mm, true force 0.000 N"));
+    assert_eq!(served.line(), "the object is away\n");
+    assert_eq!(served.ask("put"), "the object is at 5.00 mm\n");
+    assert_eq!(served.ask("fault bridge"), "finger 1: bridge from now on; `mend` ends it\n");
+    assert!(served.ask("fault").contains("row-stuck, array-frozen"));
+    assert_eq!(served.ask("mend"), "all is mended\n");
+    for wrong in ["move far", "fault nothing", "fault bridge 2", "jump"] {
+        writeln!(served.side.as_mut().expect("it was asked for"), "{wrong}").expect("it listens");
+    }
+    assert!(served.ask("help").starts_with("remove "));
+    // Without anybody at its side it serves on.
+    served.side = None;
+    pings(&terminal(&served, 1_000_000));
+    let (well, _, complained) = served.interrupt();
+    assert!(well);
+    for wrong in ["MM of `far`", "no fault `nothing`", "no finger `2`: 1 to 1", "`jump` is no command"] {
+        assert!(complained.contains(wrong), "{complained}");
+    }
+}

@@ -1,0 +1,18 @@
+"""A fingertip force controller on its bus, by ROBOTIS' package `dynamixel-sdk`.
+
+    from fingertip import Fingertip
+
+    with Fingertip("/dev/ttyACM0") as finger:
+        finger.tare()                    # nothing may touch the tip
+        finger.press(1.5)                # approaches, touches, holds 1.5 N
+        print(finger.state().force_n)
+        finger.release()                 # lets go, torque off
+
+Times are the controller's own; registers and their units are in `fingertip.registers`.
+"""
+
+from . import registers
+from .bus import Bus, FingertipError, NoAnswer, Refused
+from .finger import Fault, Fingertip, Mode, State
+
+__all__ = ["Bus", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "State", "registers"]

@@ -1,0 +1,209 @@
+"""What one does with a fingertip."""
+
+import time
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Dict, Iterator, List, Mapping, Optional
+
+from . import registers as reg
+from .bus import Bus, FingertipError, NoAnswer, Refused, numbers
+
+_MODEL = 21574  # the letters FT
+_TARING, _TARED = 1, 2
+_SAME, _CHANGED = 0, 1
+_NOT_TARED, _TARED_TOUCHING = 1 << 6, 1 << 10
+_FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES
+_PARAMETERS = [register for register in reg.ALL if register.stored and register.address >= reg.TIP_RADIUS_UM.address]
+_PATIENCE_S = 10.0
+
+
+class Mode(IntEnum):
+    """What the controller is doing."""
+
+    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY = range(7)
+
+
+class Fault(IntEnum):
+    """Why the motor was stopped."""
+
+    NONE, LOST_FRAMES, ARRAY_BROKEN, ROW_STUCK, ARRAY_FROZEN, ENCODER_FROZEN, OVER_FORCE, BUS_SILENT = range(8)
+    BROKEN_PARAMETERS, SUPPLY_LOW, SUPPLY_HIGH, BRIDGE, MISSED_DEADLINE, CRASH, RUNAWAY, REVERSED, UNSEEN = range(8, 17)
+
+
+@dataclass(frozen=True)
+class State:
+    """The state of the loop, all of it from one frame."""
+
+    time_s: float  # by the controller's clock, from the first state that this object read
+    frame: int
+    force_n: float
+    goal_n: float
+    centre_x_mm: float
+    centre_y_mm: float
+    indentation_mm: float
+    travel_mm: float
+    speed_mm_per_s: float
+    duty: float  # share of the supply, -1 to 1
+    mode: Mode
+    fault: Fault
+    limits: int  # a bit each
+    pressures_kpa: List[List[float]]  # row by row; none where they were not read
+
+
+class Fingertip(Bus):
+    """A fingertip controller."""
+
+    def __init__(self, port: str, device_id: int = 1, baud: int = 1_000_000, timeout_ms: float = 100.0):
+        super().__init__(port, device_id, baud, timeout_ms)
+        self._last_us: Optional[int] = None
+        self._time_us = 0
+        try:
+            model = self.ping()
+            if model != _MODEL:
+                raise FingertipError(f"ID {device_id} on {port} is no fingertip: its model number is {model}")
+            self._columns = self.read(reg.MODEL_INFORMATION) >> 8 & 0xFF
+        except FingertipError:
+            self.close()
+            raise
+
+    def __enter__(self) -> "Fingertip":
+        return self
+
+    def state(self, pressures: bool = True) -> State:
+        """Reads state and time in one packet, with the pressures or without: that is five times as short."""
+        end = _LAST.address + _LAST.width * _LAST.numbers if pressures else _LAST.address
+        data = self.read_bytes(_FIRST.address, end - _FIRST.address)
+
+        def at(register: reg.Register) -> int:
+            return numbers(register, data[register.address - _FIRST.address :])[0]
+
+        pascals = numbers(_LAST, data[_LAST.address - _FIRST.address :]) if pressures else []
+        rows = [pascals[at : at + self._columns] for at in range(0, len(pascals), self._columns)]
+        return State(
+            time_s=self._beyond_wrap(at(reg.PICTURE_TIME_US)),
+            frame=at(reg.PICTURE_FRAME),
+            force_n=at(reg.PICTURE_FORCE_MN) * 1e-3,
+            goal_n=at(reg.PICTURE_GOAL_MN) * 1e-3,
+            centre_x_mm=at(reg.PICTURE_CENTRE_X_UM) * 1e-3,
+            centre_y_mm=at(reg.PICTURE_CENTRE_Y_UM) * 1e-3,
+            indentation_mm=at(reg.PICTURE_INDENTATION_UM) * 1e-3,
+            travel_mm=at(reg.PICTURE_TRAVEL_UM) * 1e-3,
+            speed_mm_per_s=at(reg.PICTURE_SPEED_UM_PER_S) * 1e-3,
+            duty=at(reg.PICTURE_DUTY_PERMILLE) * 1e-3,
+            mode=Mode(at(reg.PICTURE_MODE)),
+            fault=Fault(at(reg.PICTURE_FAULT)),
+            limits=at(reg.PICTURE_LIMITS),
+            pressures_kpa=[[pascal * 1e-3 for pascal in row] for row in rows],
+        )
+
+    def stream(
+        self, rate_hz: float = 200.0, seconds: Optional[float] = None, pressures: bool = True
+    ) -> Iterator[State]:
+        """States in turn, each of another frame; those that got no answer are left out, ten in a row end it."""
+        due, missed, frame, first_s = time.monotonic(), 0, None, None
+        while True:
+            try:
+                state = self.state(pressures)
+                missed = 0
+            except NoAnswer:
+                missed += 1
+                if missed >= 10:
+                    raise
+                continue
+            first_s = state.time_s if first_s is None else first_s
+            if seconds is not None and state.time_s - first_s > seconds:
+                return
+            if state.frame != frame:
+                frame = state.frame
+                yield state
+            # The rate holds on average: a state that came late is made up for, up to a tenth of a second.
+            due = max(due + 1.0 / rate_hz, time.monotonic() - 0.1)
+            time.sleep(max(0.0, due - time.monotonic()))
+
+    def tare(self) -> None:
+        """Measures every taxel's zero, with torque off; nothing may touch the tip."""
+        self.write(reg.TORQUE_ENABLE, 0)
+        self.write(reg.TARE, 1)
+        state = self._wait(reg.TARE_STATE, _TARING)
+        if state != _TARED:
+            raise FingertipError(f"the tare came to nothing: fault {self.read(reg.FAULT)}")
+        if self.read(reg.LIMITS) & _TARED_TOUCHING:
+            raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
+
+    def press(self, newtons: float) -> None:
+        """Asks for a force: the tip approaches, touches and holds it. Returns at once."""
+        if self.read(reg.LIMITS) & _NOT_TARED:
+            raise FingertipError("the tip is not tared since the controller started: free it and call tare()")
+        self.write(reg.TORQUE_ENABLE, 1)
+        self.write(reg.GOAL_FORCE_MN, round(1000 * newtons))
+
+    def release(self) -> None:
+        """Lets go, and turns torque off once the tip is clear."""
+        if self.read(reg.TORQUE_ENABLE):
+            self.write(reg.GOAL_FORCE_MN, 0)
+            until = time.monotonic() + _PATIENCE_S
+            while time.monotonic() < until:
+                state = self.state()
+                if state.fault or state.mode == Mode.RELEASE and abs(state.speed_mm_per_s) < 1.0 and state.force_n < 0.01:
+                    break
+                time.sleep(0.01)
+        self.write(reg.TORQUE_ENABLE, 0)
+
+    def recover(self) -> Fault:
+        """Clears what stopped the motor; torque is off then, and the goal 0. Returns what it was."""
+        fault = Fault(self.read(reg.FAULT))
+        try:
+            self.write(reg.RECOVER, 1)
+        except Refused as why:
+            hindrance = self.read(reg.RECOVER_HINDRANCE)
+            words = {1: "the supply is low", 2: "the supply is high", 3: "too many taxels are bad", 4: "a save waits"}
+            raise FingertipError(f"{fault.name} cannot be cleared: {words.get(hindrance, why)}") from why
+        if self._wait(reg.FAULT, int(fault)) if fault else 0:
+            raise FingertipError(f"{Fault(self.read(reg.FAULT)).name} stands again: what causes it is still there")
+        return fault
+
+    def parameters(self) -> Dict[str, int]:
+        """All parameters by name, in the units that the names end with."""
+        first, last = _PARAMETERS[0], _PARAMETERS[-1]
+        data = self.read_bytes(first.address, last.address + last.width - first.address)
+        return {register.name: numbers(register, data[register.address - first.address :])[0] for register in _PARAMETERS}
+
+    def set_parameters(self, values: Mapping[str, int], save: bool = False) -> None:
+        """Sets parameters with torque off: all of them or none, as they go out in one packet."""
+        all_values = self.parameters()
+        for name, value in values.items():
+            known = [register for register in _PARAMETERS if register.name == name]
+            if not known:
+                raise ValueError(f"no parameter {name}: there are {', '.join(all_values)}")
+            if not known[0].least <= value <= known[0].largest:
+                raise ValueError(f"{name} of {value}: {known[0].least} to {known[0].largest} are allowed")
+            all_values[name] = value
+        data = b"".join(
+            all_values[register.name].to_bytes(register.width, "little", signed=register.signed)
+            for register in _PARAMETERS
+        )
+        self.write_bytes(_PARAMETERS[0].address, data, f"set {', '.join(values)}")
+        if save:
+            self.save()
+
+    def save(self) -> None:
+        """Keeps the parameters over a reset."""
+        self.write(reg.SAVE_PARAMETERS, 1)
+        if self._wait(reg.SAVED_STATE, _CHANGED) != _SAME:
+            raise FingertipError("the save failed: the flash holds what it did")
+
+    def _wait(self, register: reg.Register, while_it_is: int) -> int:
+        """Reads a register until it is something else, or the time is over."""
+        until = time.monotonic() + _PATIENCE_S
+        value = self.read(register)
+        while value == while_it_is and time.monotonic() < until:
+            time.sleep(0.002)
+            value = self.read(register)
+        return value
+
+    def _beyond_wrap(self, time_us: int) -> float:
+        """Seconds since the first state; the controller's microseconds wrap after 71 minutes."""
+        if self._last_us is not None:
+            self._time_us += (time_us - self._last_us) & 0xFFFFFFFF
+        self._last_us = time_us
+        return self._time_us / 1e6

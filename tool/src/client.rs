@@ -1,0 +1,253 @@
+//! The bus's host: an instruction out, its answer in.
+
+use crate::error::Error;
+use crate::line::Line;
+use crate::table::{self, Value};
+use fingertip::link::Reply;
+use fingertip::link::packet::{BROADCAST, instruction};
+use fingertip::link::receiver::{Event, Receiver};
+use fingertip::link::sender::Sender;
+use fingertip::link::table::Register;
+use std::time::{Duration, Instant};
+
+/// The alert's bit of a status packet's error.
+const ALERT: u8 = 0x80;
+/// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
+const PING_BITS: u32 = 14 * 10;
+
+/// How to reach a controller.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Reach {
+    /// Serial port, pseudo-terminal, or tcp:ADDRESS:PORT of a served finger
+    #[arg(long, short, global = true, env = "FINGERTIP_PORT")]
+    pub port: Option<String>,
+    /// Bus speed
+    #[arg(long, short, global = true, default_value_t = 1_000_000)]
+    pub baud: u32,
+    /// The controller's address on the bus
+    #[arg(long, short, global = true, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=252))]
+    pub id: u8,
+    /// How long to wait for an answer
+    #[arg(long, global = true, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
+    pub timeout_ms: u64,
+}
+
+/// A controller on the bus.
+#[derive(Debug)]
+pub struct Client {
+    line: Line,
+    port: String,
+    baud: u32,
+    /// Its address.
+    pub id: u8,
+    timeout: Duration,
+    /// An answer was not waited for: it may come yet.
+    owed: bool,
+}
+
+/// What a Ping tells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pong {
+    /// Who answered.
+    pub id: u8,
+    /// The model's number.
+    pub model: u16,
+    /// The firmware's.
+    pub firmware: u8,
+}
+
+impl Client {
+    /// Opens the port; asks nothing yet.
+    ///
+    /// # Errors
+    /// There is no such port.
+    pub fn open(reach: &Reach) -> Result<Self, Error> {
+        let port = reach.port.clone().ok_or(Error::NoPort)?;
+        let line = Line::open(&port, reach.baud).map_err(|why| Error::Open { port: port.clone(), why })?;
+        let timeout = Duration::from_millis(reach.timeout_ms);
+        Ok(Self { line, port, baud: reach.baud, id: reach.id, timeout, owed: false })
+    }
+
+    /// Opens the port and sees to it that a fingertip of a known table answers.
+    ///
+    /// # Errors
+    /// None answers, or it is another device.
+    pub fn connect(reach: &Reach) -> Result<Self, Error> {
+        let mut client = Self::open(reach)?;
+        let pong = client.ping()?;
+        if i64::from(pong.model) != table::model() {
+            return Err(format!("ID {} is no fingertip: its model number is {}", client.id, pong.model).into());
+        }
+        Ok(client)
+    }
+
+    /// The port's name.
+    pub fn port(&self) -> &str {
+        &self.port
+    }
+
+    /// The bus speed.
+    pub fn baud(&self) -> u32 {
+        self.baud
+    }
+
+    /// Goes on at another speed.
+    ///
+    /// # Errors
+    /// The port does not go at it.
+    pub fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
+        self.line.set_baud(baud).map_err(|why| Error::Open { port: format!("{} at {baud} baud", self.port), why })?;
+        self.baud = baud;
+        Ok(())
+    }
+
+    /// Waits differently long.
+    pub fn set_timeout(&mut self, timeout: Duration) -> Duration {
+        std::mem::replace(&mut self.timeout, timeout)
+    }
+
+    /// Asks who is there.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn ping(&mut self) -> Result<Pong, Error> {
+        let data = self.ask("ping", instruction::PING, &[], 3)?;
+        Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
+    }
+
+    /// Asks all who are there.
+    ///
+    /// # Errors
+    /// The port is lost.
+    pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
+        self.send(BROADCAST, instruction::PING, &[])?;
+        let slots = Duration::from_secs_f64(f64::from(u32::from(BROADCAST) * PING_BITS) / f64::from(self.baud));
+        let until = Instant::now() + self.timeout + slots;
+        let (mut receiver, mut found) = (Receiver::new(), Vec::new());
+        while let Some(left) = until.checked_duration_since(Instant::now()) {
+            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
+            for byte in bytes {
+                if receiver.push(byte) == Some(Event::Packet) && receiver.packet().instruction == instruction::STATUS {
+                    let packet = receiver.packet();
+                    if let [_, low, high, firmware] = *packet.params {
+                        found.push(Pong { id: packet.id, model: u16::from_le_bytes([low, high]), firmware });
+                    }
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// Reads bytes of the table.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, Error> {
+        let doing = format!("read {}", table::place(address));
+        let params = [address.to_le_bytes(), length.to_le_bytes()].concat();
+        self.ask(&doing, instruction::READ, &params, usize::from(length))
+    }
+
+    /// Reads registers side by side, from the first to the last.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn block(&mut self, first: u16, last: u16) -> Result<table::Block, Error> {
+        let end = table::register_at(last).map_or(last + 1, table::end);
+        Ok(table::Block { first, bytes: self.read(first, end - first)? })
+    }
+
+    /// Reads a register of one number.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn number(&mut self, address: u16) -> Result<i64, Error> {
+        Ok(self.block(address, address)?.number(address))
+    }
+
+    /// Writes bytes of the table.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), Error> {
+        let doing = format!("write {}", table::place(address));
+        self.ask(&doing, instruction::WRITE, &[&address.to_le_bytes(), data].concat(), 0).map(drop)
+    }
+
+    /// Writes a register of one number.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn set(&mut self, address: u16, value: i64) -> Result<(), Error> {
+        let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
+        self.set_register(register, value)
+    }
+
+    /// The same.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn set_register(&mut self, register: &Register, value: i64) -> Result<(), Error> {
+        let data = table::encode(register, value);
+        let doing = format!("set {} to {}", table::name(register), Value { register, value });
+        self.ask(&doing, instruction::WRITE, &[&register.address.to_le_bytes()[..], &data].concat(), 0).map(drop)
+    }
+
+    /// Sends an instruction and waits for its answer: `length` bytes behind the error.
+    fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
+        self.send(self.id, instruction, params)?;
+        let until = Instant::now() + self.timeout;
+        let mut receiver = Receiver::new();
+        let damaged = |what| Error::Damaged { doing: doing.into(), id: self.id, what };
+        while let Some(left) = until.checked_duration_since(Instant::now()) {
+            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
+            for byte in bytes {
+                match receiver.push(byte) {
+                    Some(Event::Packet) => {}
+                    Some(Event::BadCrc) => return Err(damaged("its check sum is wrong")),
+                    _ => continue,
+                }
+                let packet = receiver.packet();
+                // On a line that echoes, the instruction comes back too.
+                if packet.id != self.id || packet.instruction != instruction::STATUS {
+                    continue;
+                }
+                let Some((&error, data)) = packet.params.split_first() else { return Err(damaged("it is empty")) };
+                let number = error & !ALERT;
+                if number != 0 {
+                    return Err(Error::Refused { doing: doing.into(), id: self.id, number });
+                }
+                if data.len() != length {
+                    self.owed = true;
+                    return Err(damaged("it has another length than what was asked for"));
+                }
+                return Ok(data.to_vec());
+            }
+        }
+        self.owed = true;
+        Err(Error::Silent {
+            doing: doing.into(),
+            id: self.id,
+            port: self.port.clone(),
+            baud: self.baud,
+            waited_ms: self.timeout.as_millis(),
+        })
+    }
+
+    fn send(&mut self, id: u8, instruction: u8, params: &[u8]) -> Result<(), Error> {
+        // The protocol does not number its packets: a late answer would be taken for the next one.
+        if std::mem::take(&mut self.owed) {
+            while !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty() {}
+        }
+        self.line.discard();
+        let mut packet = Reply::new();
+        let mut sender = Sender::new(&mut packet, id, instruction);
+        params.iter().for_each(|byte| sender.push(*byte));
+        sender.finish();
+        self.line.write(&packet).map_err(|why| self.lost(why))
+    }
+
+    fn lost(&self, why: std::io::Error) -> Error {
+        Error::Port { port: self.port.clone(), why }
+    }
+}

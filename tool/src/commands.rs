@@ -1,0 +1,79 @@
+//! The commands, one module each.
+
+pub mod info;
+pub mod latency;
+pub mod params;
+pub mod press;
+pub mod record;
+pub mod recover;
+pub mod scan;
+pub mod tare;
+pub mod view;
+
+use crate::{Client, Error, table};
+use serde_json::Value;
+use std::io::{self, Write as _};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Says a line. Who closed the output wanted no more of it.
+pub fn say(text: impl std::fmt::Display) {
+    let _ = writeln!(io::stdout(), "{text}");
+}
+
+/// Says a line beside the results.
+pub fn aside(text: impl std::fmt::Display) {
+    let _ = writeln!(io::stderr(), "{text}");
+}
+
+/// Says an answer for scripts.
+fn say_json(value: &Value) {
+    say(serde_json::to_string_pretty(value).unwrap_or_default());
+}
+
+/// Set by Ctrl-C and by the end of a terminal.
+#[derive(Clone, Debug)]
+pub struct Interrupt(Arc<AtomicBool>);
+
+impl Interrupt {
+    /// From now on they end nothing by themselves.
+    ///
+    /// # Errors
+    /// The system does not tell of them.
+    pub fn catch() -> Result<Self, Error> {
+        let flag = Arc::new(AtomicBool::new(false));
+        let set = flag.clone();
+        ctrlc::set_handler(move || set.store(true, Ordering::Relaxed))
+            .map_err(|why| format!("cannot wait for Ctrl-C: {why}"))?;
+        Ok(Self(flag))
+    }
+
+    /// Whether it is time to end.
+    pub fn came(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Reads a register until it is as wanted, or the time is over. The last number.
+fn wait_for(client: &mut Client, address: u16, within: Duration, wanted: impl Fn(i64) -> bool) -> Result<i64, Error> {
+    let until = Instant::now() + within;
+    loop {
+        let number = client.number(address)?;
+        if wanted(number) || Instant::now() >= until {
+            return Ok(number);
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Fails where a fault stands, and says how to go on.
+fn no_fault(client: &mut Client) -> Result<(), Error> {
+    let fault = client.number(fingertip::shipped::address::FAULT)?;
+    if fault == 0 { Ok(()) } else { Err(stopped(fault)) }
+}
+
+fn stopped(fault: i64) -> Error {
+    let words = table::meaning(fingertip::shipped::address::FAULT, fault);
+    format!("the motor was stopped by fault {fault} ({words}): mend what caused it, then `fingertip recover`").into()
+}

@@ -1,0 +1,60 @@
+//! A backup: TOML, a line each with its meaning.
+
+use super::Value;
+use crate::table::{self, name};
+use crate::{Client, Error};
+use fingertip::shipped::address;
+use std::fmt::Write as _;
+use std::fs::{self, OpenOptions};
+use std::io::{ErrorKind, Write as _};
+use std::path::Path;
+use toml_edit::Document;
+
+const TABLE: &str = "parameters";
+
+/// Writes it, whole or not at all.
+pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Value]) -> Result<(), Error> {
+    let failed = |why: std::io::Error| Error::file("write", path, why);
+    let information = client.number(address::MODEL_INFORMATION)?;
+    let pong = client.ping()?;
+    let mut text = format!(
+        "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
+         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\n[{TABLE}]\n",
+        pong.firmware,
+        information >> 16
+    );
+    for (register, value) in values {
+        let doc = register.doc.trim();
+        // Writing to a string does not fail.
+        let _ = writeln!(text, "{} = {value}  # {doc} {} to {}.", name(register), register.min, register.max);
+    }
+    if path.exists() && !force {
+        return Err(format!("{} is there already: --force writes over it", path.display()).into());
+    }
+    let mut part = path.file_name().unwrap_or_default().to_owned();
+    part.push(".new");
+    let part = path.with_file_name(part);
+    let mut file = OpenOptions::new().create(true).truncate(true).write(true).open(&part).map_err(failed)?;
+    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(failed)?;
+    fs::rename(&part, path).map_err(failed)
+}
+
+/// Reads it.
+pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
+    let text = fs::read_to_string(path).map_err(|why| match why.kind() {
+        ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
+        _ => Error::file("read", path, why),
+    })?;
+    let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
+    let table = document.get(TABLE).and_then(|item| item.as_table());
+    let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{TABLE}]")))?;
+    let (mut values, mut wrong) = (Vec::new(), Vec::new());
+    for (key, item) in table.iter() {
+        match (table::find(key), item.as_integer()) {
+            (Ok(register), Some(value)) => values.push((register, value)),
+            (Ok(_), None) => wrong.push(format!("{key} is no whole number")),
+            (Err(why), _) => wrong.push(why),
+        }
+    }
+    if wrong.is_empty() { Ok(values) } else { Err(Error::file("read", path, wrong.join("; "))) }
+}

@@ -1,0 +1,100 @@
+//! What can go wrong: what it was, where, and what to do about it.
+
+use crate::table::meaning_of_error;
+
+/// A command could not be carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The port cannot be opened.
+    #[error("cannot open {port}: {why}{}", ports_there())]
+    Open {
+        /// As it was asked for.
+        port: String,
+        /// The system's reason.
+        why: std::io::Error,
+    },
+    /// No port was named.
+    #[error("no port: name one with --port, or in FINGERTIP_PORT{}", ports_there())]
+    NoPort,
+    /// The port was lost.
+    #[error("{port}: {why}; is it still connected?")]
+    Port {
+        /// Its name.
+        port: String,
+        /// The system's reason.
+        why: std::io::Error,
+    },
+    /// There was no answer.
+    #[error(
+        "{doing}: no answer of ID {id} on {port} at {baud} baud within {waited_ms} ms; `fingertip scan` looks for it, \
+         --timeout-ms waits longer"
+    )]
+    Silent {
+        /// What was asked.
+        doing: String,
+        /// Of whom.
+        id: u8,
+        /// Where.
+        port: String,
+        /// At which speed.
+        baud: u32,
+        /// For how long.
+        waited_ms: u128,
+    },
+    /// The answer was no good.
+    #[error("{doing}: a damaged answer of ID {id} ({what}); is the line noisy, or are there two devices with this ID?")]
+    Damaged {
+        /// What was asked.
+        doing: String,
+        /// Of whom.
+        id: u8,
+        /// What is wrong with it.
+        what: &'static str,
+    },
+    /// The controller refused.
+    #[error("{doing}: refused by ID {id} with error {number}: {}", meaning_of_error(*number))]
+    Refused {
+        /// What was asked.
+        doing: String,
+        /// Of whom.
+        id: u8,
+        /// Its number.
+        number: u8,
+    },
+    /// Something else; the text says it all.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl Error {
+    /// Whether the controller refused with this number.
+    pub fn refused_with(&self, wanted: u8) -> bool {
+        matches!(self, Self::Refused { number, .. } if *number == wanted)
+    }
+
+    /// A file that cannot be read or written.
+    pub fn file(doing: &str, path: &std::path::Path, why: impl std::fmt::Display) -> Self {
+        Self::Other(format!("cannot {doing} {}: {why}", path.display()))
+    }
+}
+
+impl From<String> for Error {
+    fn from(text: String) -> Self {
+        Self::Other(text)
+    }
+}
+
+impl From<&str> for Error {
+    fn from(text: &str) -> Self {
+        Self::Other(text.into())
+    }
+}
+
+/// The serial ports of this machine, for people.
+fn ports_there() -> String {
+    let ports = crate::line::ports();
+    if ports.is_empty() {
+        return "; this machine has no serial port (a simulated finger: `cargo xtask serve`)".into();
+    }
+    format!("; serial ports that are there: {}", ports.join(", "))
+}

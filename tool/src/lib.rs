@@ -1,0 +1,14 @@
+//! A fingertip controller from the host's side: the bus, the registers by name, and what `fingertip` does with them.
+//!
+//! [`Client`] talks DYNAMIXEL Protocol 2.0 by the core's own packets; [`table`] finds registers and what their numbers
+//! mean in the core's own control table. So neither can differ from the firmware of the same version.
+
+pub mod client;
+pub mod commands;
+pub mod error;
+pub mod line;
+pub mod state;
+pub mod table;
+
+pub use client::Client;
+pub use error::Error;

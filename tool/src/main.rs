@@ -1,0 +1,102 @@
+//! `fingertip`: a fingertip controller from the host's side.
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+use clap_complete::Shell;
+use fingertip_cli::client::Reach;
+use fingertip_cli::commands::{info, latency, params, press, record, recover, scan, tare, view};
+use fingertip_cli::{Client, Error};
+use std::io::{self, Write as _};
+use std::process::ExitCode;
+
+/// Finds, watches, records, sets up and moves a fingertip controller on its bus.
+///
+/// Names carry their units: force_mn is in mN. Exit code 0: done; 1: refused, or it did not come about; 2: not
+/// understood.
+#[derive(Parser)]
+#[command(
+    name = "fingertip",
+    version,
+    arg_required_else_help = true,
+    after_help = "Examples:\n  \
+        fingertip scan\n  \
+        fingertip --port /dev/ttyACM0 info\n  \
+        export FINGERTIP_PORT=/tmp/finger    (a simulated one: cargo xtask serve --pty /tmp/finger)\n  \
+        fingertip tare && fingertip press 1.5\n  \
+        fingertip view\n  \
+        fingertip record --seconds 10 --rate-hz 200 force.csv"
+)]
+struct Cli {
+    #[command(flatten)]
+    reach: Reach,
+    /// Answer in JSON, for scripts
+    #[arg(long, global = true)]
+    json: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Look for controllers: on all ports or the one named, at all speeds
+    Scan(scan::Args),
+    /// Tell what the controller is and how it stands
+    Info,
+    /// Watch map, force, goal, mode and faults live
+    View(view::Args),
+    /// Record states with the controller's own times, as CSV or MCAP
+    Record(record::Args),
+    /// Read, write, save, back up and restore the parameters
+    #[command(subcommand)]
+    Params(params::Command),
+    /// Measure the zero of every taxel; nothing may touch the tip
+    Tare(tare::Args),
+    /// Touch, hold a force for a while, let go
+    Press(press::Args),
+    /// Clear what stopped the motor, and say what stands in the way
+    Recover,
+    /// Measure how long answers take: reads without a pause
+    Latency(latency::Args),
+    /// Print a shell's completions
+    #[command(
+        after_help = "Example:\n  fingertip completions bash > ~/.local/share/bash-completion/completions/fingertip"
+    )]
+    Completions {
+        /// Which shell
+        shell: Shell,
+    },
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = run(&cli);
+    // Who closed the output wanted no more of it.
+    let _ = io::stdout().flush();
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            let _ = writeln!(io::stderr(), "fingertip: {why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<(), Error> {
+    let connect = || Client::connect(&cli.reach);
+    match &cli.command {
+        Command::Scan(args) => scan::run(args, &cli.reach, cli.json),
+        Command::Info => info::run(&mut connect()?, cli.json),
+        Command::View(args) => view::run(args, &mut connect()?),
+        Command::Record(args) => record::run(args, &mut connect()?, cli.json),
+        Command::Params(command) => params::run(command, &mut connect()?, cli.json),
+        Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
+        Command::Press(args) => press::run(args, &mut connect()?, cli.json),
+        Command::Recover => recover::run(&mut connect()?, cli.json),
+        Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
+        Command::Completions { shell } => {
+            let mut text = Vec::new();
+            clap_complete::generate(*shell, &mut Cli::command(), "fingertip", &mut text);
+            fingertip_cli::commands::say(String::from_utf8_lossy(&text).trim_end());
+            Ok(())
+        }
+    }
+}

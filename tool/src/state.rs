@@ -1,0 +1,199 @@
+//! The state of the loop, all of it from one frame.
+
+use crate::client::Client;
+use crate::error::Error;
+use crate::table::{self, Block};
+use fingertip::shipped::{COLUMNS, ROWS, address};
+use serde_json::{Map, Value, json};
+
+/// The registers of the state, side by side: with the goal, and without the pressures.
+const FIRST: u16 = address::GOAL_FORCE_MN;
+const LAST: u16 = address::FRAME_PERIOD_NS;
+/// The state before the pressures, and these.
+const PICTURE: u16 = address::PICTURE_TIME_US;
+
+/// The state of the loop at a frame, in the units of the bus.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State {
+    /// When the frame ended, by the controller's clock; wraps after 71 minutes.
+    pub time_us: u32,
+    /// See the control table for each.
+    pub frame: i64,
+    /// mN.
+    pub goal_mn: i64,
+    /// mN.
+    pub force_mn: i64,
+    /// um.
+    pub indentation_um: i64,
+    /// um.
+    pub centre_x_um: i64,
+    /// um.
+    pub centre_y_um: i64,
+    /// um.
+    pub travel_um: i64,
+    /// um/s.
+    pub speed_um_per_s: i64,
+    /// Thousandths of the supply.
+    pub duty_permille: i64,
+    /// A mode's number.
+    pub mode: i64,
+    /// A fault's number; 0 is none.
+    pub fault: i64,
+    /// A limit each bit.
+    pub limits: i64,
+    /// Of 255.
+    pub confidence: i64,
+    /// From frame to frame.
+    pub period_ns: i64,
+    /// Pa, row by row, where they were read.
+    pub pressures_pa: Vec<i64>,
+}
+
+impl State {
+    /// Reads it, in one packet.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn read(client: &mut Client) -> Result<Self, Error> {
+        Ok(Self::of(&client.block(FIRST, LAST)?))
+    }
+
+    /// Reads it with the pressures, in one packet.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn read_picture(client: &mut Client) -> Result<Self, Error> {
+        let block = client.block(PICTURE, address::PRESSURES)?;
+        // The mirrors have the registers' names at other places.
+        let at = |address: u16| block.number(address);
+        Ok(Self {
+            time_us: at(address::PICTURE_TIME_US) as u32,
+            frame: at(address::PICTURE_FRAME),
+            goal_mn: at(address::PICTURE_GOAL_MN),
+            force_mn: at(address::PICTURE_FORCE_MN),
+            indentation_um: at(address::PICTURE_INDENTATION_UM),
+            centre_x_um: at(address::PICTURE_CENTRE_X_UM),
+            centre_y_um: at(address::PICTURE_CENTRE_Y_UM),
+            travel_um: at(address::PICTURE_TRAVEL_UM),
+            speed_um_per_s: at(address::PICTURE_SPEED_UM_PER_S),
+            duty_permille: at(address::PICTURE_DUTY_PERMILLE),
+            mode: at(address::PICTURE_MODE),
+            fault: at(address::PICTURE_FAULT),
+            limits: at(address::PICTURE_LIMITS),
+            confidence: at(address::PICTURE_CONFIDENCE),
+            period_ns: at(address::PICTURE_PERIOD_NS),
+            pressures_pa: block.numbers(address::PRESSURES),
+        })
+    }
+
+    fn of(block: &Block) -> Self {
+        let at = |address: u16| block.number(address);
+        Self {
+            time_us: at(address::FRAME_TIME_US) as u32,
+            frame: at(address::FRAME_COUNTER),
+            goal_mn: at(address::GOAL_FORCE_MN),
+            force_mn: at(address::PRESENT_FORCE_MN),
+            indentation_um: at(address::INDENTATION_UM),
+            centre_x_um: at(address::CENTRE_X_UM),
+            centre_y_um: at(address::CENTRE_Y_UM),
+            travel_um: at(address::TRAVEL_UM),
+            speed_um_per_s: at(address::SPEED_UM_PER_S),
+            duty_permille: at(address::DUTY_PERMILLE),
+            mode: at(address::PRESENT_MODE),
+            fault: at(address::FAULT),
+            limits: at(address::LIMITS),
+            confidence: at(address::CONFIDENCE),
+            period_ns: at(address::FRAME_PERIOD_NS),
+            pressures_pa: Vec::new(),
+        }
+    }
+
+    /// The mode in words.
+    pub fn mode_name(&self) -> String {
+        table::meaning(address::PRESENT_MODE, self.mode)
+    }
+
+    /// The fault in words; none where there is none.
+    pub fn fault_name(&self) -> Option<String> {
+        (self.fault != 0).then(|| table::meaning(address::FAULT, self.fault))
+    }
+
+    /// The limits in words.
+    pub fn limit_names(&self) -> Vec<String> {
+        table::bits(address::LIMITS, self.limits)
+    }
+
+    /// Each number with its name, in the order in which it is written; the pressures apart.
+    pub fn numbers(&self) -> [(&'static str, i64); 14] {
+        [
+            ("frame", self.frame),
+            ("mode", self.mode),
+            ("fault", self.fault),
+            ("limits", self.limits),
+            ("goal_mn", self.goal_mn),
+            ("force_mn", self.force_mn),
+            ("indentation_um", self.indentation_um),
+            ("centre_x_um", self.centre_x_um),
+            ("centre_y_um", self.centre_y_um),
+            ("travel_um", self.travel_um),
+            ("speed_um_per_s", self.speed_um_per_s),
+            ("duty_permille", self.duty_permille),
+            ("confidence_255", self.confidence),
+            ("period_ns", self.period_ns),
+        ]
+    }
+
+    /// For scripts: numbers by name, and the words for mode, fault and limits.
+    pub fn json(&self) -> Map<String, Value> {
+        let mut all: Map<String, Value> =
+            self.numbers().into_iter().map(|(name, value)| (name.to_owned(), json!(value))).collect();
+        all.insert("mode_name".into(), json!(self.mode_name()));
+        all.insert("fault_name".into(), json!(self.fault_name()));
+        all.insert("limit_names".into(), json!(self.limit_names()));
+        all
+    }
+}
+
+/// The controller's time beyond its wrap, from the first state on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Clock {
+    last_us: Option<u32>,
+    total_us: u64,
+}
+
+impl Clock {
+    /// Seconds since the first state; states come in order, an hour apart at most.
+    pub fn time_s(&mut self, time_us: u32) -> f64 {
+        let passed_us = self.last_us.map_or(0, |last_us| time_us.wrapping_sub(last_us));
+        self.last_us = Some(time_us);
+        self.total_us += u64::from(passed_us);
+        self.total_us as f64 / 1e6
+    }
+}
+
+/// Rows and columns that this program knows.
+pub const SHAPE: [usize; 2] = [ROWS, COLUMNS];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_goes_on_beyond_its_wrap() {
+        let mut clock = Clock::default();
+        let times = [u32::MAX - 999, u32::MAX, 999_000];
+        assert_eq!(times.map(|time_us| clock.time_s(time_us)), [0.0, 0.000_999, 1.0]);
+    }
+
+    #[test]
+    fn words_come_out_of_the_table() {
+        let state = State { mode: 2, fault: 16, limits: 1 << 6 | 1 << 12, ..State::default() };
+        assert_eq!(state.mode_name(), "approach");
+        assert_eq!(state.fault_name().as_deref(), Some("unseen contact"));
+        assert_eq!(state.limit_names(), ["not tared", "guard"]);
+        assert_eq!(State::default().fault_name(), None);
+        for number in 1..=16 {
+            assert!(!table::meaning(address::FAULT, number).starts_with("number"), "{number}");
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Registers by name, and what their numbers mean: all out of the core's own table.
+
+use fingertip::link::table::{Access, Kind, Register};
+use fingertip::shipped::{REGISTERS, address};
+use std::fmt;
+
+/// Registers side by side, as they were read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Block {
+    /// Where it begins.
+    pub first: u16,
+    /// As they came.
+    pub bytes: Vec<u8>,
+}
+
+impl Block {
+    /// The number at an address; 0 where the block does not hold it.
+    pub fn number(&self, address: u16) -> i64 {
+        let register = register_at(address);
+        let offset = usize::from(address.wrapping_sub(self.first));
+        register.and_then(|register| decode(register.kind, self.bytes.get(offset..)?)).unwrap_or(0)
+    }
+
+    /// The numbers of a picture.
+    pub fn numbers(&self, address: u16) -> Vec<i64> {
+        let Some(register) = register_at(address) else { return Vec::new() };
+        let width = register.kind.width();
+        let offset = usize::from(address.wrapping_sub(self.first));
+        let bytes = self.bytes.get(offset..).unwrap_or_default();
+        let words = bytes.chunks_exact(usize::from(width)).take(usize::from(register.count));
+        words.map(|word| decode(register.kind, word).unwrap_or(0) * i64::from(register.scale)).collect()
+    }
+}
+
+/// A number with its unit, for people.
+pub struct Value<'a> {
+    /// Whose.
+    pub register: &'a Register,
+    /// As it stands on the bus.
+    pub value: i64,
+}
+
+impl fmt::Display for Value<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.value)
+    }
+}
+
+/// The name as it is asked for: small letters, the unit at its end.
+pub fn name(register: &Register) -> String {
+    register.name.to_lowercase()
+}
+
+/// The register that begins at an address.
+pub fn register_at(address: u16) -> Option<&'static Register> {
+    REGISTERS.iter().find(|register| register.address == address)
+}
+
+/// The first address behind a register.
+pub fn end(register: &Register) -> u16 {
+    register.address + register.kind.width() * register.count
+}
+
+/// An address for people.
+pub fn place(address: u16) -> String {
+    register_at(address).map_or_else(|| format!("address {address}"), name)
+}
+
+/// A register by its name.
+///
+/// # Errors
+/// There is none; the text tells one that is alike.
+pub fn find(wanted: &str) -> Result<&'static Register, String> {
+    let found = REGISTERS.iter().find(|register| register.name.eq_ignore_ascii_case(wanted));
+    found.ok_or_else(|| {
+        let wanted = wanted.to_lowercase();
+        let mut near: Vec<String> = REGISTERS.iter().filter(|r| is_stored(r)).map(name).collect();
+        near.retain(|known| known.contains(&wanted) || wanted.contains(known.as_str()) || begins_alike(known, &wanted));
+        let near = if near.is_empty() { String::new() } else { format!("; did you mean {}?", near.join(" or ")) };
+        format!("no register `{wanted}`{near} (`fingertip params get` lists those that are stored)")
+    })
+}
+
+fn begins_alike(a: &str, b: &str) -> bool {
+    let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
+    same >= 4
+}
+
+/// Whether it outlives a reset once it is saved.
+pub fn is_stored(register: &Register) -> bool {
+    matches!(register.access, Access::Stored | Access::StoredLive)
+}
+
+/// All that are.
+pub fn stored() -> impl Iterator<Item = &'static Register> {
+    REGISTERS.iter().filter(|register| is_stored(register))
+}
+
+/// A number as it goes over the bus.
+pub fn encode(register: &Register, value: i64) -> Vec<u8> {
+    value.to_le_bytes()[..usize::from(register.kind.width())].to_vec()
+}
+
+fn decode(kind: Kind, bytes: &[u8]) -> Option<i64> {
+    Some(match kind {
+        Kind::U8 => i64::from(*bytes.first()?),
+        Kind::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+        Kind::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+        Kind::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+        Kind::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+        Kind::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+    })
+}
+
+/// The model number of a fingertip.
+pub fn model() -> i64 {
+    register_at(address::MODEL_NUMBER).map_or(0, |register| register.min)
+}
+
+/// What a number of a register means, by the register's own documentation: `2 approach` there is "approach" here.
+pub fn meaning(address: u16, number: i64) -> String {
+    let doc = register_at(address).map_or("", |register| register.doc);
+    let numbered = doc.split([',', '.', ':', ';']).map(str::trim);
+    let found = numbered.filter_map(|part| part.split_once(' ')).find(|(digits, _)| digits.parse() == Ok(number));
+    found.map_or_else(|| format!("number {number}"), |(_, words)| words.trim().into())
+}
+
+/// What the bits of a register mean that are set.
+pub fn bits(address: u16, number: i64) -> Vec<String> {
+    (0..32).filter(|bit| number >> bit & 1 == 1).map(|bit| meaning(address, bit)).collect()
+}
+
+/// What an error of a status packet means.
+pub fn meaning_of_error(number: u8) -> &'static str {
+    match number {
+        1 => "it was understood, but cannot be carried out as the loop stands now",
+        2 => "it knows no such instruction",
+        3 => "the packet arrived damaged: is the line noisy?",
+        4 => "a value outside of its register's range",
+        5 => "the data do not cover whole registers",
+        6 => "a value beyond what other registers allow",
+        7 => {
+            "the register cannot be written, or not while torque is on (`fingertip press` and `torque_enable` turn it on)"
+        }
+        _ => "an error that this program does not know",
+    }
+}

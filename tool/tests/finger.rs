@@ -1,0 +1,237 @@
+//! Every command against a served finger: the native core and link behind a pseudo-terminal. Judged by words, bytes and
+//! counts, never by the clock.
+
+mod served;
+
+use served::Served;
+use std::collections::BTreeMap;
+use std::fs;
+
+#[test]
+fn it_is_found_and_tells_what_it_is() {
+    let finger = Served::begin("wall");
+    let found = finger.json(&["scan", "--speeds", "57600,1000000"]);
+    let expected = serde_json::json!([{
+        "port": finger.port, "baud": 1_000_000, "id": 1, "model_number": 21574, "firmware_version": 1, "fingertip": true,
+    }]);
+    assert_eq!(found, expected);
+    let nothing = finger.refused(&["scan", "--speeds", "115200"]);
+    assert!(nothing.contains("nothing answers") && nothing.contains("at 115200 baud"), "{nothing}");
+
+    let info = finger.json(&["info"]);
+    assert_eq!((info["rows"].as_i64(), info["columns"].as_i64()), (Some(10), Some(10)));
+    assert_eq!((info["mode_name"].as_str(), &info["fault_name"]), (Some("off"), &serde_json::Value::Null));
+    assert_eq!(info["limit_names"], serde_json::json!(["not tared"]));
+    assert_eq!(info["return_delay_us"], 500);
+    let text = finger.done(&["info"]);
+    assert!(text.contains("limits    not tared") && text.contains("reset_cause            1 (power-on)"), "{text}");
+}
+
+#[test]
+fn who_is_not_there_is_told() {
+    let finger = Served::begin("wall");
+    let why = finger.refused(&["--id", "3", "--timeout-ms", "10", "info"]);
+    assert!(why.contains("ping: no answer of ID 3") && why.contains("fingertip scan"), "{why}");
+    let why = finger.refused(&["--baud", "115200", "--timeout-ms", "10", "info"]);
+    assert!(why.contains("at 115200 baud"), "{why}");
+    let why = finger.refused(&["--port", "/nowhere", "info"]);
+    assert!(why.contains("cannot open /nowhere"), "{why}");
+    // One line has one host.
+    let mut first = finger.start(&["record", &finger.file("first.csv")]);
+    while fs::metadata(finger.file("first.csv.new")).is_err() {
+        std::thread::yield_now();
+    }
+    let why = finger.refused(&["info"]);
+    assert!(why.contains("another program has it open"), "{why}");
+    Served::interrupt(&first);
+    assert!(first.wait().expect("it ends").success());
+    finger.done(&["info"]);
+    let why = Served::nobody(&["info"]);
+    assert!(why.contains("--port") && why.contains("FINGERTIP_PORT"), "{why}");
+}
+
+#[test]
+fn it_tares_presses_and_lets_go() {
+    let finger = Served::begin("wall");
+    let why = finger.refused(&["press", "1"]);
+    assert!(why.contains("not tared") && why.contains("`fingertip tare`"), "{why}");
+    let tared = finger.json(&["tare"]);
+    assert_eq!((&tared["tared"], &tared["touched"]), (&true.into(), &false.into()));
+    let held = finger.json(&["press", "1.5", "--seconds", "0.3", "--within-s", "3600"]);
+    let mean_mn = held["mean_mn"].as_f64().expect("a number");
+    assert!((1_470.0..=1_530.0).contains(&mean_mn) && held["held_s"].as_f64() >= Some(0.3), "{held}");
+    let info = finger.json(&["info"]);
+    assert_eq!((&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"]), (&0.into(), &0.into(), &0.into()));
+    let why = finger.refused(&["press", "9"]);
+    assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
+    let why = finger.refused(&["press", "0"]);
+    assert!(why.contains("0.001 to 150 N"), "{why}");
+    finger.command("remove");
+    let why = finger.refused(&["press", "1", "--within-s", "0.5"]);
+    assert!(why.contains("not reached") && why.contains("mode approach"), "{why}");
+    assert_eq!(finger.json(&["info"])["torque_enable"], 0, "torque is off all the same");
+}
+
+#[test]
+fn a_fault_is_told_and_cleared() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    finger.command("fault supply-low");
+    let why = finger.refused(&["press", "1", "--within-s", "3600"]);
+    assert!(why.contains("fault 9 (supply low)") && why.contains("`fingertip recover`"), "{why}");
+    let why = finger.refused(&["recover"]);
+    assert!(why.contains("cannot be cleared: the supply is below supply_min_mv"), "{why}");
+    let why = finger.refused(&["tare"]);
+    assert!(why.contains("fault 9"), "{why}");
+    finger.command("mend");
+    finger.command("state");
+    let cleared = finger.json(&["recover"]);
+    assert_eq!((&cleared["fault"], &cleared["fault_name"]), (&9.into(), &"supply low".into()));
+    let again = finger.done(&["recover"]);
+    assert!(again.starts_with("there was nothing to recover from"), "{again}");
+    finger.done(&["press", "0.5", "--seconds", "0.1", "--within-s", "3600"]);
+}
+
+#[test]
+fn parameters_are_set_all_or_none_and_saved() {
+    let finger = Served::begin("wall");
+    let get = |names: &[&str]| finger.json(&[&["params", "get"], names].concat());
+    let all = get(&[]);
+    assert_eq!(all.as_object().map(serde_json::Map::len), Some(34));
+    finger.done(&["params", "set", "modulus_pa=300000", "fit_level=3", "--save"]);
+    assert_eq!(get(&["modulus_pa", "fit_level"]), serde_json::json!({ "modulus_pa": 300_000, "fit_level": 3 }));
+    assert_eq!(finger.json(&["info"])["saved_state"], 0);
+
+    // What is wrong with one leaves the others as they were.
+    for (values, why) in [
+        (&["tip_radius_um=9000", "modulus_pa=4"][..], "modulus_pa of 4: 20000 to 2000000"),
+        (&["tip_radius_um=9000", "contact_on_mn=10"], "contact_off_mn of 15"),
+        (&["tip_radius_um=9000", "goal_force_mn=5"], "goal_force_mn is no parameter"),
+        (&["tip_radius_um=9000", "radius=5"], "no register `radius`; did you mean tip_radius_um?"),
+        (&["tip_radius_um=9000", "modulus_pa=soft"], "`soft` is no whole number"),
+        (&["tip_radius_um"], "NAME=VALUE is asked for"),
+    ] {
+        let said = finger.refused(&[&["params", "set"], values].concat());
+        assert!(said.contains(why), "{said}");
+    }
+    assert_eq!(get(&["tip_radius_um"]), serde_json::json!({ "tip_radius_um": 10_000 }));
+    // Two that contradict each other one after the other go together.
+    finger.done(&["params", "set", "contact_on_mn=10", "contact_off_mn=5"]);
+    let said = finger.done(&["params", "set", "contact_on_mn=10"]);
+    assert!(said.contains("nothing differs"), "{said}");
+
+    // Another address and speed are followed.
+    let moved = finger.done(&["params", "set", "id=7", "baud_rate=4"]);
+    assert!(moved.contains("id: 1 -> 7") && moved.contains("baud_rate: 3 -> 4"), "{moved}");
+    finger.done(&["--id", "7", "--baud", "2000000", "params", "set", "id=1", "baud_rate=3"]);
+    assert_eq!(get(&["id"]), serde_json::json!({ "id": 1 }));
+}
+
+#[test]
+fn a_backup_is_restored_whole() {
+    let finger = Served::begin("wall");
+    let file = finger.file("backup.toml");
+    finger.done(&["params", "set", "modulus_pa=300000", "fit_level=4"]);
+    finger.done(&["params", "backup", &file]);
+    let why = finger.refused(&["params", "backup", &file]);
+    assert!(why.contains("is there already: --force"), "{why}");
+    finger.done(&["params", "backup", "--force", &file]);
+    finger.done(&["params", "set", "modulus_pa=200000", "fit_level=1", "clearance_um=500"]);
+    let differing: BTreeMap<String, serde_json::Value> =
+        serde_json::from_value(finger.json(&["params", "diff", &file])).expect("a map");
+    assert_eq!(differing.keys().collect::<Vec<_>>(), ["clearance_um", "fit_level", "modulus_pa"]);
+    finger.done(&["params", "restore", &file]);
+    assert_eq!(finger.json(&["params", "diff", &file]), serde_json::json!({}));
+
+    // A damaged file changes nothing, and all that is wrong with it is told.
+    let text = fs::read_to_string(&file).expect("it was written");
+    for (from, to, why) in [
+        ("modulus_pa = 300000", "modulus_pa = 3", "modulus_pa of 3"),
+        ("modulus_pa = 300000", "modulus_pb = 3", "no register `modulus_pb`"),
+        ("[parameters]", "[params]", "no table [parameters]"),
+        ("modulus_pa = ", "modulus_pa ", "cannot read"),
+    ] {
+        fs::write(&file, text.replace(from, to).replace("fit_level = 4", "fit_level = 2")).expect("a file");
+        let said = finger.refused(&["params", "restore", &file]);
+        assert!(said.contains(why), "{said}");
+        let now = finger.json(&["params", "get", "modulus_pa", "fit_level"]);
+        assert_eq!(now, serde_json::json!({ "modulus_pa": 300_000, "fit_level": 4 }));
+    }
+    assert!(finger.refused(&["params", "restore", "/nowhere.toml"]).contains("/nowhere.toml"));
+}
+
+#[test]
+fn states_are_recorded_with_the_controllers_times() {
+    let finger = Served::begin("wall");
+    let file = finger.file("force.csv");
+    let done = finger.json(&["record", "--seconds", "0.5", "--rate-hz", "200", "--pressures", &file]);
+    let text = fs::read_to_string(&file).expect("it was written");
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
+        .collect();
+    assert!(text.starts_with("time_s,frame,mode,fault,limits,goal_mn,force_mn,"));
+    assert_eq!(text.lines().next().map(|head| head.split(',').count()), Some(115));
+    assert_eq!((rows.len() as u64, done["states"].as_u64()), (rows.len() as u64, Some(rows.len() as u64)));
+    assert!(rows.len() > 1 && rows.iter().all(|row| row.len() == 115));
+    for pair in rows.windows(2) {
+        // Time is that of the frames: 99.786 us each, cut to microseconds.
+        let (frames, time_s) = (pair[1][1] - pair[0][1], pair[1][0] - pair[0][0]);
+        assert!(frames > 0.0 && (time_s - frames * 99.786e-6).abs() < 2e-6, "{frames} frames in {time_s} s");
+    }
+    let mcap = finger.file("force.mcap");
+    let done = finger.json(&["record", "--seconds", "0.2", "--pressures", &mcap]);
+    let bytes = fs::read(&mcap).expect("it was written");
+    let messages: Vec<_> =
+        mcap::MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole")).collect();
+    assert_eq!(messages.len() as u64, 2 * done["states"].as_u64().expect("a number"));
+    assert_eq!(messages[0].channel.topic, "/finger0/scalars");
+    assert_eq!(messages[0].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("fingertip.Scalars"));
+    assert_eq!(messages[1].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("foxglove.RawImage"));
+    assert!(finger.refused(&["record", "force.txt"]).contains(".csv or .mcap"));
+    assert!(finger.refused(&["record", "/nowhere/force.csv"]).contains("cannot write /nowhere/force.csv"));
+}
+
+#[test]
+fn a_recording_that_is_interrupted_is_whole() {
+    let finger = Served::begin("wall");
+    let file = finger.file("stopped.csv");
+    let mut child = finger.start(&["record", &file]);
+    // Until something is on its way.
+    while fs::metadata(format!("{file}.new")).is_err() {
+        std::thread::yield_now();
+    }
+    Served::interrupt(&child);
+    assert!(child.wait().expect("it ends").success());
+    let text = fs::read_to_string(&file).expect("it is there");
+    assert!(text.ends_with('\n') && text.starts_with("time_s,"));
+    assert!(!fs::exists(format!("{file}.new")).expect("a folder"));
+
+    // One whose line is lost keeps what it had, and says why it ends.
+    let lost = finger.file("lost.csv");
+    let child = finger.start(&["record", "--timeout-ms", "1", &lost]);
+    while fs::metadata(format!("{lost}.new")).is_err() {
+        std::thread::yield_now();
+    }
+    finger.end();
+    let output = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+}
+
+#[test]
+fn answers_are_measured() {
+    let finger = Served::begin("wall");
+    let measured = finger.json(&["latency", "--seconds", "0.2"]);
+    assert_eq!((&measured["unanswered"], &measured["return_delay_us"]), (&0.into(), &500.into()));
+    assert!(measured["reads"].as_u64() > Some(0) && measured["median_ms"].as_f64() > Some(0.0), "{measured}");
+}
+
+#[test]
+fn a_view_needs_a_terminal_and_shells_get_completions() {
+    let finger = Served::begin("wall");
+    assert!(finger.refused(&["view"]).contains("`fingertip record`"));
+    let words = finger.done(&["completions", "bash"]);
+    assert!(words.contains("complete -F _fingertip") && words.contains("backup"), "no completions");
+}

@@ -1,0 +1,167 @@
+//! A finger that is served from a thread, and `fingertip` set on it.
+
+use serve::native::Native;
+use serve::{Place, Port, Stop};
+use sim::effects::set::Named;
+use sim::native::served::Bus;
+use std::cell::RefCell;
+use std::path::PathBuf;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Patience on the slowest machine, where an answer is expected.
+const PATIENCE: &str = "600000";
+
+pub struct Served {
+    pub port: String,
+    folder: PathBuf,
+    stop: Stop,
+    commands: Sender<(String, Sender<Result<String, String>>)>,
+    thread: RefCell<Option<JoinHandle<()>>>,
+}
+
+/// A finger that does what it is told between two looks at it.
+struct Told {
+    native: Native<Named>,
+    commands: Receiver<(String, Sender<Result<String, String>>)>,
+}
+
+impl serve::Finger for Told {
+    type Error = std::convert::Infallible;
+
+    fn now_s(&self) -> f64 {
+        self.native.now_s()
+    }
+
+    fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
+        while let Ok((command, answer)) = self.commands.try_recv() {
+            let done = self.native.command(&command);
+            // What was broken or mended acts on the next frames; whoever asks then finds it so.
+            (0..20).for_each(|_| self.native.0.frame());
+            answer.send(done).expect("somebody waits for it");
+        }
+        self.native.run_until(time_s)
+    }
+
+    fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.native.hear(bytes)
+    }
+
+    fn answer(&mut self) -> Result<Vec<u8>, Self::Error> {
+        self.native.answer()
+    }
+
+    fn due_s(&self) -> Option<f64> {
+        self.native.due_s()
+    }
+
+    fn baud(&self) -> Option<u32> {
+        self.native.baud()
+    }
+
+    fn command(&mut self, text: &str) -> Result<String, String> {
+        self.native.command(text)
+    }
+}
+
+impl Served {
+    pub fn begin(scene: &str) -> Self {
+        let scene = sim::cli::load(scene, &[], None).expect("a scene");
+        let mut port = Port::open(&Place::Pty(None)).expect("a pseudo-terminal");
+        let (name, stop) = (port.name().to_owned(), port.stopper());
+        let (commands, commanded) = channel();
+        let thread = std::thread::spawn(move || {
+            let native = Native(Bus::new(&scene).expect("a world"));
+            let mut told = Told { native, commands: commanded };
+            let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
+            served.map(drop).unwrap_or_else(|never| match never {});
+        });
+        let folder =
+            std::env::temp_dir().join(format!("fingertip-cli-{}-{}", std::process::id(), name.replace('/', "-")));
+        std::fs::create_dir_all(&folder).expect("a folder");
+        Self { port: name, folder, stop, commands, thread: RefCell::new(Some(thread)) }
+    }
+
+    /// Has something done at its side.
+    pub fn command(&self, text: &str) -> String {
+        let (answer, answered) = channel();
+        self.commands.send((text.into(), answer)).expect("it is served");
+        answered.recv().expect("it is served").expect("a command")
+    }
+
+    /// Stops serving it.
+    pub fn end(&self) {
+        self.stop.stop();
+        if let Some(thread) = self.thread.borrow_mut().take() {
+            thread.join().expect("it did not panic");
+        }
+    }
+
+    /// A file of this test.
+    pub fn file(&self, name: &str) -> String {
+        self.folder.join(name).display().to_string()
+    }
+
+    pub fn start(&self, arguments: &[&str]) -> Child {
+        self.fingertip(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
+    }
+
+    fn fingertip(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
+        command.env("FINGERTIP_PORT", &self.port).args(arguments);
+        if !arguments.contains(&"--timeout-ms") && !arguments.contains(&"scan") {
+            command.args(["--timeout-ms", PATIENCE]);
+        }
+        command
+    }
+
+    /// What it says where it does what is asked.
+    pub fn done(&self, arguments: &[&str]) -> String {
+        said(&self.fingertip(arguments).output().expect("it starts"))
+    }
+
+    /// The same in JSON.
+    pub fn json(&self, arguments: &[&str]) -> serde_json::Value {
+        let text = self.done(&[arguments, &["--json"]].concat());
+        serde_json::from_str(&text).unwrap_or_else(|why| panic!("{why}: {text}"))
+    }
+
+    /// What it complains of where it does not.
+    pub fn refused(&self, arguments: &[&str]) -> String {
+        complained(&self.fingertip(arguments).output().expect("it starts"))
+    }
+
+    /// The same without a port.
+    pub fn nobody(arguments: &[&str]) -> String {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
+        complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
+    }
+
+    /// Ctrl-C.
+    pub fn interrupt(child: &Child) {
+        let pid = i32::try_from(child.id()).expect("a process number");
+        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.stop();
+        let _ = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
+fn said(output: &Output) -> String {
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{out}{err}");
+    out.into_owned()
+}
+
+fn complained(output: &Output) -> String {
+    let (out, err) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(1), "{out}{err}");
+    err.into_owned()
+}

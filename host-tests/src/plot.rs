@@ -41,7 +41,11 @@ const TITLE_PX: u32 = 15;
 const INK: RGBColor = RGBColor(20, 40, 90);
 const PALE_INK: RGBColor = RGBColor(185, 195, 215);
 const GOAL_INK: RGBColor = RGBColor(200, 110, 0);
+const SECOND_INK: RGBColor = RGBColor(0, 130, 120);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
+
+/// The library draws on whole pixels, on which a slow line looks like steps: charts are drawn larger by this, and shown smaller.
+const FINE: u32 = 10;
 
 /// A number on an axis, without needless digits.
 fn number(value: &f64) -> String {
@@ -59,4 +63,18 @@ fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotE
         area.present().map_err(failed)?;
     }
     Ok(svg)
+}
+
+/// As [`picture`], drawn [`FINE`] times as large: what is drawn in it counts in these parts of a pixel.
+fn fine_picture(
+    (width, height): (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>,
+) -> Result<String, PlotError> {
+    let (wide, high) = (FINE * width, FINE * height);
+    let svg = picture((wide, high), draw)?;
+    Ok(svg.replacen(
+        &format!("width=\"{wide}\" height=\"{high}\""),
+        &format!("width=\"{width}\" height=\"{height}\""),
+        1,
+    ))
 }

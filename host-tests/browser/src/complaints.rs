@@ -13,6 +13,8 @@ pub struct Look {
     pub dark: bool,
     /// Whether it is a phone.
     pub phone: bool,
+    /// Whether scripts run.
+    pub scripts: bool,
 }
 
 /// Parts that a report has.
@@ -26,6 +28,11 @@ const LETTERS: f64 = 500.0;
 const QUESTIONS: &str = r#"(() => {
   const shown = element => { const r = element.getBoundingClientRect(); return r.width > 0 && r.height > 0; };
   const all = selector => [...document.querySelectorAll(selector)];
+  // A grid alone paints some hundred dots in each of its lines; a canvas that nothing was drawn on none.
+  const painted = canvas => {
+    const dots = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    return dots.reduce((sum, part, n) => sum + (n % 4 === 3 && part > 0), 0) > 1000;
+  };
   const scale = svg => svg.getBoundingClientRect().width / svg.viewBox.baseVal.width;
   const letters = all('.plot svg').filter(shown).flatMap(svg =>
     [...svg.querySelectorAll('text')].map(text => parseFloat(getComputedStyle(text).fontSize) * scale(svg)));
@@ -42,9 +49,13 @@ const QUESTIONS: &str = r#"(() => {
     simulated: document.body.innerText.includes('Simulated'),
     sections: all('section').filter(shown).map(section => section.id),
     overflow: document.documentElement.scrollWidth - document.documentElement.clientWidth,
-    plots: all('.plot svg').filter(shown).length,
-    lines: all('.plot svg polyline').length,
-    maps: all('.maps svg').filter(shown).length,
+    plots: all('.plot .still svg').filter(shown).length,
+    lines: all('.plot .still svg polyline').length,
+    charts: all('.plot .drawn canvas').filter(shown).filter(painted).length,
+    bars: all('.strip svg').filter(shown).length,
+    controls: all('#player, #choose').filter(shown).length,
+    maps: all('.maps figure').filter(shown).length,
+    scales: all('.scale').filter(shown).length,
     nameless: all('[role=img]').filter(image => !image.getAttribute('aria-label')).length,
     smallest_px: letters.length ? Math.min(...letters) : 0,
     outside: outside,
@@ -53,33 +64,47 @@ const QUESTIONS: &str = r#"(() => {
   };
 })()"#;
 
-/// Opens a page so, takes a picture of it, and tells all that is wrong with it.
+/// Has the browser show pages so from here on.
 ///
 /// # Errors
-/// The browser fails, or the picture cannot be written.
-pub fn complaints(
-    browser: &mut Browser,
-    address: &str,
-    look: Look,
-    picture: &Path,
-) -> Result<Vec<String>, BrowserError> {
+/// The browser fails.
+pub fn look(browser: &mut Browser, look: Look) -> Result<(), BrowserError> {
     let scheme = if look.dark { "dark" } else { "light" };
     let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
     browser.call("Emulation.setEmulatedMedia", json!({ "features": features }))?;
     let (width, height) = if look.phone { (390, 844) } else { (1280, 900) };
     let metrics = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": look.phone });
     browser.call("Emulation.setDeviceMetricsOverride", metrics)?;
+    browser.call("Emulation.setTouchEmulationEnabled", json!({ "enabled": look.phone }))?;
+    browser.call("Emulation.setScriptExecutionDisabled", json!({ "value": !look.scripts }))?;
+    Ok(())
+}
+
+/// Takes a picture of the whole page.
+///
+/// # Errors
+/// The browser fails, or the picture cannot be written.
+pub fn shoot(browser: &mut Browser, picture: &Path) -> Result<(), BrowserError> {
+    let shot = browser.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }))?;
+    Ok(fs::write(picture, BASE64_STANDARD.decode(shot["data"].as_str().unwrap_or_default())?)?)
+}
+
+/// Opens a page so, takes a picture of it, and tells all that is wrong with it.
+///
+/// # Errors
+/// The browser fails, or the picture cannot be written.
+pub fn complaints(browser: &mut Browser, address: &str, so: Look, picture: &Path) -> Result<Vec<String>, BrowserError> {
+    look(browser, so)?;
     browser.open(address)?;
     let page = browser.evaluate(QUESTIONS)?;
-    let shot = browser.call("Page.captureScreenshot", json!({ "format": "png", "captureBeyondViewport": true }))?;
-    fs::write(picture, BASE64_STANDARD.decode(shot["data"].as_str().unwrap_or_default())?)?;
-    let mut found = of_events(browser.events(), address);
-    found.extend(of_page(&page, look));
+    shoot(browser, picture)?;
+    let mut found = events(browser, address);
+    found.extend(of_page(&page, so));
     Ok(found)
 }
 
-/// Errors and warnings on the console, and whatever is fetched beside the page.
-fn of_events(events: &[Value], address: &str) -> Vec<String> {
+/// Errors and warnings on the console since the page was opened, and whatever was fetched beside it.
+pub fn events(browser: &Browser, address: &str) -> Vec<String> {
     let complaint = |event: &Value| {
         let params = &event["params"];
         match event["method"].as_str()? {
@@ -97,7 +122,7 @@ fn of_events(events: &[Value], address: &str) -> Vec<String> {
             _ => None,
         }
     };
-    events.iter().filter_map(complaint).collect()
+    browser.events().iter().filter_map(complaint).collect()
 }
 
 fn of_page(page: &Value, look: Look) -> Vec<String> {
@@ -116,11 +141,21 @@ fn of_page(page: &Value, look: Look) -> Vec<String> {
         check(sections.iter().any(|id| id == section), format!("the section `{section}` is missing"));
     }
     check(number("overflow") <= 0.0, format!("the page is {} px too wide", number("overflow")));
-    check(number("plots") >= 4.0, format!("{} plots are shown", number("plots")));
-    check(number("lines") >= 4.0, format!("{} lines are drawn", number("lines")));
-    check(number("maps") >= 5.0, format!("{} pressure maps are shown", number("maps")));
+    if look.scripts {
+        check(number("charts") >= 4.0, format!("{} plots are shown", number("charts")));
+        check(number("plots") == 0.0, format!("{} plots are there twice", number("plots")));
+        check(number("maps") >= 2.0, format!("{} pressure maps are shown", number("maps")));
+        check(number("controls") == 2.0, format!("{} of 2 controls are shown", number("controls")));
+    } else {
+        check(number("plots") >= 4.0, format!("{} plots are shown", number("plots")));
+        check(number("lines") >= 4.0, format!("{} lines are drawn", number("lines")));
+        check(number("maps") >= 5.0, format!("{} pressure maps are shown", number("maps")));
+        check(number("controls") == 0.0, "controls are shown that do nothing".into());
+        check(number("smallest_px") >= LETTER_PX, format!("letters in plots are {} px high", number("smallest_px")));
+    }
+    check(number("bars") >= 2.0, format!("{} modes are shown", number("bars")));
+    check(number("scales") >= 1.0, "the maps have no scale".into());
     check(number("nameless") == 0.0, format!("{} pictures have no words", number("nameless")));
-    check(number("smallest_px") >= LETTER_PX, format!("letters in plots are {} px high", number("smallest_px")));
     check(page["outside"] == json!([]), format!("letters are cut off: {}", page["outside"]));
     let [paper, ink] = ["page", "text"].map(|name| brightness(page[name].as_str().unwrap_or_default()));
     let right = if look.dark { paper < 0.2 && ink > 0.7 } else { paper > 0.8 && ink < 0.3 };

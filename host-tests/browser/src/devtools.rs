@@ -99,12 +99,15 @@ impl Browser {
         Ok(())
     }
 
-    /// Works an expression out on the page.
+    /// Works an expression out on the page; a promise, once it is kept.
     ///
     /// # Errors
     /// It throws.
     pub fn evaluate(&mut self, expression: &str) -> Result<Value, BrowserError> {
-        let answer = self.call("Runtime.evaluate", json!({ "expression": expression, "returnByValue": true }))?;
+        let answer = self.call(
+            "Runtime.evaluate",
+            json!({ "expression": expression, "returnByValue": true, "awaitPromise": true }),
+        )?;
         match answer.get("exceptionDetails") {
             Some(details) => Err(format!("{expression}: {details}").into()),
             None => Ok(answer["result"]["value"].clone()),

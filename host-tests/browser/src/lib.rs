@@ -3,6 +3,8 @@
 
 mod complaints;
 mod devtools;
+mod hand;
 
-pub use complaints::{Look, complaints};
+pub use complaints::{Look, complaints, events, look, shoot};
 pub use devtools::{Browser, BrowserError};
+pub use hand::Place;

@@ -30,6 +30,9 @@ pub struct Args {
     /// Writes the recording and the report here
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Lays the run of another report over this one in the report
+    #[arg(long, value_name = "REPORT", requires = "out")]
+    pub over: Option<PathBuf>,
     /// Records the scalars of each N-th control step; what the core needs for a replay is always whole
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..))]
     pub every: u64,

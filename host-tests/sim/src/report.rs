@@ -1,12 +1,18 @@
 //! A run as one page of HTML: no network, no other file, light and dark, for a screen and a phone.
 
+mod data;
+mod effects;
+mod groups;
 mod page;
 mod plots;
+mod pressures;
+mod states;
+mod strip;
 mod trace;
 
 pub use page::page;
 pub use plots::around;
-pub use trace::{Trace, Track, Tracks};
+pub use trace::{Instant, Kept, Trace, Track, Tracks};
 
 use crate::ledger::Without;
 use crate::run::Outcome;
@@ -25,4 +31,10 @@ pub struct Report<'a> {
     pub trace: &'a Trace,
     /// What each effect was worth, where that was asked for.
     pub ablated: &'a [Without],
+    /// Another run, drawn over this one.
+    pub over: Option<&'a Over>,
 }
+
+/// The run in another report.
+#[derive(Clone, Debug)]
+pub struct Over(serde_json::Value);

@@ -6,7 +6,7 @@ use crate::ledger;
 use crate::native;
 use crate::part::cannot_write;
 use crate::recording::{Recorder, replay};
-use crate::report::{Report, Trace, page};
+use crate::report::{Over, Report, Trace, page};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::watch::Watch;
@@ -24,6 +24,8 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
         Board::Virtual => "virtual",
         Board::Both => "virtual, compared with native",
     };
+    // What cannot be read is told before the run.
+    let over = args.over.as_deref().map(Over::read).transpose()?;
     let mut trace = Trace::new(scene.duration_s);
     let mut agreement = None;
     if args.board == Board::Both {
@@ -66,7 +68,8 @@ pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunErro
     }
     let json = || format!("{:#}\n", outcome.json(scene, name, &ablated));
     let json = args.json.as_ref().map_or(Ok(()), |path| write(path, &json()));
-    let report = Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated };
+    let report =
+        Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated, over: over.as_ref() };
     let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), &page(&report)?));
     // One that cannot be written leaves the others there.
     let failed: Vec<String> =

@@ -1,6 +1,9 @@
 //! Charts over time: the whole run, and each change of the goal at a larger scale.
 
-use super::{Area, FAINT, FONT, GOAL_INK, INK, LABEL_PX, PALE_INK, PlotError, TITLE_PX, failed, number, picture};
+use super::{
+    Area, FAINT, FINE, FONT, GOAL_INK, INK, LABEL_PX, PALE_INK, PlotError, SECOND_INK, TITLE_PX, failed, fine_picture,
+    number,
+};
 use plotters::prelude::*;
 
 /// Points that a line has at most: two for each pixel of the widest chart.
@@ -49,7 +52,7 @@ pub struct Panel<'a> {
 /// The trace is empty.
 pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
     let end_s = trace.last().ok_or_else(|| PlotError("the trace is empty".into()))?.time_s;
-    picture((WIDTH_PX, 640), |area| {
+    fine_picture((WIDTH_PX, 640), |area| {
         let panels = area.split_evenly((3, 1));
         let points = |value: fn(&Sample) -> f64| thinned(trace.iter().map(|s| (s.time_s, value(s))).collect());
         let force = points(|s| s.true_force_n);
@@ -86,7 +89,7 @@ pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
         return Err(PlotError("a panel has no samples".into()));
     }
     let rows = panels.len().div_ceil(2);
-    picture((WIDTH_PX, 260 * rows as u32), |area| {
+    fine_picture((WIDTH_PX, 260 * rows as u32), |area| {
         for (panel, area) in panels.iter().zip(area.split_evenly((rows, 2))) {
             draw_panel(panel, &area)?;
         }
@@ -141,11 +144,11 @@ impl Frame<'_> {
     ) -> Result<(), PlotError> {
         let ([left, right], [low, high]) = (self.x_range, self.range);
         let context = ChartBuilder::on(area)
-            .margin(8)
-            .margin_right(18)
-            .caption(self.title, (FONT, TITLE_PX))
-            .x_label_area_size(36)
-            .y_label_area_size(52)
+            .margin(8 * FINE)
+            .margin_right(18 * FINE)
+            .caption(self.title, (FONT, TITLE_PX * FINE))
+            .x_label_area_size(36 * FINE)
+            .y_label_area_size(52 * FINE)
             .build_cartesian_2d(left..right, low..high)
             .map_err(failed)?;
         let mut chart = Chart { context, range: self.range };
@@ -153,8 +156,10 @@ impl Frame<'_> {
             .context
             .configure_mesh()
             .light_line_style(TRANSPARENT)
-            .bold_line_style(FAINT)
-            .label_style((FONT, LABEL_PX))
+            .bold_line_style(FAINT.stroke_width(FINE))
+            .axis_style(BLACK.stroke_width(FINE))
+            .set_all_tick_mark_size(5 * FINE)
+            .label_style((FONT, LABEL_PX * FINE))
             .x_desc(self.x)
             .y_desc(self.unit)
             .x_label_formatter(&number)
@@ -169,11 +174,16 @@ impl Frame<'_> {
 
 impl Chart<'_, '_> {
     pub fn solid(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
-        self.line(points, ink.stroke_width(2))
+        self.line(points, ink.stroke_width(2 * FINE))
     }
 
     pub fn pale(&mut self, points: &Points) -> Result<(), PlotError> {
-        self.line(points, PALE_INK.stroke_width(1))
+        self.line(points, PALE_INK.stroke_width(FINE))
+    }
+
+    /// A thin line in a second colour, to lie on top of another.
+    pub fn second(&mut self, points: &Points) -> Result<(), PlotError> {
+        self.line(points, SECOND_INK.stroke_width(FINE))
     }
 
     fn line(&mut self, points: &Points, style: ShapeStyle) -> Result<(), PlotError> {
@@ -181,7 +191,7 @@ impl Chart<'_, '_> {
     }
 
     pub fn dashed(&mut self, points: &Points, ink: RGBColor) -> Result<(), PlotError> {
-        let line = DashedLineSeries::new(points.iter().copied(), 7, 4, ink.stroke_width(2));
+        let line = DashedLineSeries::new(points.iter().copied(), 7 * FINE, 4 * FINE, ink.stroke_width(2 * FINE));
         self.context.draw_series(line).map(drop).map_err(failed)
     }
 
@@ -189,20 +199,20 @@ impl Chart<'_, '_> {
     fn dots(&mut self, points: &Points) -> Result<(), PlotError> {
         let mut last = f64::NAN;
         let fresh = points.iter().filter(|(_, value)| core::mem::replace(&mut last, *value) != *value);
-        let dots = fresh.map(|point| Circle::new(*point, 2, INK.stroke_width(1)));
+        let dots = fresh.map(|point| Circle::new(*point, 2 * FINE, INK.stroke_width(FINE)));
         self.context.draw_series(dots).map(drop).map_err(failed)
     }
 
     /// A circle at each point.
     pub fn circles(&mut self, points: &Points) -> Result<(), PlotError> {
-        let circles = points.iter().map(|point| Circle::new(*point, 4, BLACK.stroke_width(1)));
+        let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
         self.context.draw_series(circles).map(drop).map_err(failed)
     }
 
     /// A dotted upright line.
     fn upright(&mut self, x: f64) -> Result<(), PlotError> {
         let [low, high] = self.range;
-        let line = DashedLineSeries::new([(x, low), (x, high)], 2, 3, BLACK.stroke_width(1));
+        let line = DashedLineSeries::new([(x, low), (x, high)], 2 * FINE, 3 * FINE, BLACK.stroke_width(FINE));
         self.context.draw_series(line).map(drop).map_err(failed)
     }
 }

@@ -1,7 +1,7 @@
 //! Curves and points over a quantity, one panel beside the other.
 
 use super::charts::Frame;
-use super::{GOAL_INK, INK, PlotError, picture};
+use super::{GOAL_INK, INK, PlotError, fine_picture};
 
 /// What is drawn in a panel.
 #[derive(Clone, Debug)]
@@ -10,6 +10,8 @@ pub enum Curve {
     Solid(Vec<(f64, f64)>),
     /// A thin, pale line through points.
     Pale(Vec<(f64, f64)>),
+    /// A thin line in a second colour through points.
+    Second(Vec<(f64, f64)>),
     /// A dashed line through points.
     Dashed(Vec<(f64, f64)>),
     /// A circle at each point.
@@ -41,7 +43,7 @@ pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, Plo
     if panels.is_empty() {
         return Err(PlotError("there is no panel".into()));
     }
-    picture((panel_px.0 * panels.len() as u32, panel_px.1), |area| {
+    fine_picture((panel_px.0 * panels.len() as u32, panel_px.1), |area| {
         for (panel, area) in panels.iter().zip(area.split_evenly((1, panels.len()))) {
             let Curves { title, x, y, x_range, y_range, curves } = panel;
             let frame = Frame { title, x, unit: y, x_range: *x_range, range: *y_range };
@@ -49,6 +51,7 @@ pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, Plo
                 curves.iter().try_for_each(|curve| match curve {
                     Curve::Solid(points) => chart.solid(points, INK),
                     Curve::Pale(points) => chart.pale(points),
+                    Curve::Second(points) => chart.second(points),
                     Curve::Dashed(points) => chart.dashed(points, GOAL_INK),
                     Curve::Circles(points) => chart.circles(points),
                 })

@@ -17,8 +17,10 @@ pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
         best: by.is_none() && point.competes(),
         own: point.firmware,
     };
+    // Not every kernel has a way that the firmware goes.
+    let square = if points.iter().any(|point| point.firmware) { ", the square is the firmware's" } else { "" };
     front(&Front {
-        title: &format!("{}: filled points are the front, the square is the firmware's", kernel.title),
+        title: &format!("{}: filled points are the front{square}", kernel.title),
         x: "estimated cycles on a Cortex-M4F, median, without wait states",
         y: &format!("largest {}", kernel.error),
         dots: points

@@ -1,19 +1,35 @@
 //! The page's parts.
 
-use super::{Report, Tracks, plots};
-use crate::ledger::{difference, differences, rows};
-use crate::metrics::{METRICS, Verdict, shown};
+use super::data::{self, BEGIN};
+use super::groups::{Group, groups};
+use super::plots::{self, Plot};
+use super::{Report, Tracks, effects, pressures, strip};
+use crate::metrics::{Metric, Verdict, shown};
 use crate::run::{RunError, asked};
-use host_tests::heatmap::Pressures;
 use host_tests::plot::PlotError;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+/// Nothing but what is in the page, whatever is in it.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+/// Kept beside this as it was published, with its licence.
+const LIBRARY: &str = include_str!("uplot/uPlot.iife.min.js");
+const LIBRARY_STYLE: &str = include_str!("uplot/uPlot.min.css");
+const LICENSE: &str = include_str!("uplot/LICENSE");
+/// The page's own scripts, in order.
+const SCRIPTS: [&str; 5] = [
+    include_str!("script/view.js"),
+    include_str!("script/plots.js"),
+    include_str!("script/maps.js"),
+    include_str!("script/over.js"),
+    include_str!("script/main.js"),
+];
 
 /// The page.
 ///
 /// # Errors
 /// A plot cannot be drawn.
 pub fn page(report: &Report) -> Result<String, RunError> {
-    let Report { scene, board, outcome, trace, .. } = report;
+    let Report { scene, board, outcome, trace, over, .. } = report;
     let summary = &outcome.summary;
     let fingers: Result<Vec<Markup>, PlotError> =
         trace.fingers.iter().enumerate().map(|(n, tracks)| finger(n, tracks, trace.fingers.len() > 1)).collect();
@@ -22,9 +38,10 @@ pub fn page(report: &Report) -> Result<String, RunError> {
         html lang="en" {
             head {
                 meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (scene.name) ": simulated run" }
-                style { (PreEscaped(include_str!("style.css"))) }
+                style { (PreEscaped(LIBRARY_STYLE)) (PreEscaped(include_str!("style.css"))) }
             }
             body {
                 header {
@@ -37,11 +54,15 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                 }
                 main {
                     section id="bounds" { h2 { "What must hold" } (bounds(&outcome.verdicts)) }
-                    section id="plots" { h2 { "Over time" } @for finger in fingers? { (finger) } }
+                    section id="plots" {
+                        h2 { "Over time" }
+                        (player())
+                        @for finger in fingers? { (finger) }
+                    }
                     section id="metrics" { h2 { "Metrics" } (metrics(report)) }
                     section id="ledger" {
                         h2 { "What each effect cost" }
-                        (ledger(report))
+                        (effects::ledger(report))
                         p.note {
                             (shown(Some(summary.virtual_s))) " s simulated in " (shown(Some(summary.wall_s)))
                             " s, behind " (shown(Some(summary.set_up_s))) " s to power up and tare. Digest "
@@ -49,14 +70,46 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                         }
                     }
                     @if !report.ablated.is_empty() {
-                        section id="ablation" { h2 { "What each effect changes" } (ablation(report)) }
+                        section id="ablation" { h2 { "What each effect changes" } (effects::ablation(report)) }
                     }
                     section id="scene" { h2 { "The scene" } pre tabindex="0" { code { (scene.text) } } }
                 }
+                (PreEscaped(BEGIN)) (PreEscaped(data::embedded(&data::data(report)))) (PreEscaped("</script>"))
+                @if let Some(over) = over {
+                    script type="application/json" id="over" { (PreEscaped(data::embedded(&over.0))) }
+                }
+                script { (PreEscaped(format!("/*\n{LICENSE}*/\n{LIBRARY}"))) }
+                script { (PreEscaped(format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.concat()))) }
             }
         }
     };
     Ok(page.into_string())
+}
+
+/// What the script moves through time with; without it there is none.
+fn player() -> Markup {
+    html! {
+        div id="player" hidden {
+            div.controls {
+                button id="play" type="button" { "Play" }
+                input id="time" type="range" min="0" max="1000" value="0" step="1" aria-label="Time";
+                output id="now" for="time" {}
+                button id="whole" type="button" disabled { "Whole run" }
+            }
+        }
+        div id="choose" hidden {
+            p.note {
+                "Drag across a plot to zoom all of them, double-click for the whole run. "
+                "A play takes ten seconds, however long what is shown is."
+            }
+            p {
+                label for="other" { "Lay the run of another report over this one: " }
+                input id="other" type="file" accept=".html,text/html";
+                button id="alone" type="button" hidden { "Take it away" }
+            }
+            p id="over-note" role="status" {}
+        }
+    }
 }
 
 fn verdict_line(verdicts: &[Verdict]) -> Markup {
@@ -71,113 +124,108 @@ fn verdict_line(verdicts: &[Verdict]) -> Markup {
     }
 }
 
+/// Those that are broken, then, folded where there are such, those that are held.
 fn bounds(verdicts: &[Verdict]) -> Markup {
+    let (held, broken): (Vec<_>, Vec<_>) = verdicts.iter().partition(|verdict| verdict.held);
     html! {
         @if verdicts.is_empty() { p { "Nothing: the scene has no bounds." } }
-        @else {
-            div.scroll tabindex="0" { table {
-                thead { tr { th scope="col" { "metric" } th scope="col" { "asked" } th.number scope="col" { "measured" } th scope="col" { "" } } }
-                tbody { @for verdict in verdicts { tr {
-                    td { code { (verdict.bound.metric) } }
-                    td.asked { (asked(verdict.bound.min, verdict.max)) }
-                    td.number { (shown(verdict.value)) }
-                    td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
-                } } }
-            } }
+        @if !broken.is_empty() { (table_of_bounds(&broken)) }
+        @if !held.is_empty() {
+            details open[broken.is_empty()] {
+                summary { (held.len()) " held" }
+                (table_of_bounds(&held))
+            }
         }
     }
 }
 
+fn table_of_bounds(verdicts: &[&Verdict]) -> Markup {
+    html! {
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "metric" } th scope="col" { "asked" }
+                th.number scope="col" { "measured" } th scope="col" { "" }
+            } }
+            tbody { @for verdict in verdicts { tr {
+                td { code { (verdict.bound.metric) } }
+                td.asked { (asked(verdict.bound.min, verdict.max)) }
+                td.number { (shown(verdict.value)) }
+                td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
+            } } }
+        } }
+    }
+}
+
+/// The plots as they are without a script, which takes their places; beside them the array.
 fn finger(number: usize, tracks: &Tracks, several: bool) -> Result<Markup, PlotError> {
-    let plots = plots::all(tracks)?;
-    let full_kpa = tracks.maps.iter().flat_map(|(_, map)| map.iter().flatten()).copied().fold(1.0, f64::max);
+    let times = tracks.time.means();
+    let drawn: Result<Vec<_>, PlotError> =
+        plots::all(tracks).into_iter().map(|plot| plots::drawn(&plot, &times).map(|svg| (plot, svg))).collect();
     Ok(html! {
-        @if several { h3 { "Finger " (number) } }
-        @for plot in &plots {
-            figure.plot {
-                @for (svg, class) in plot.svgs.iter().zip(["wide", "narrow"]) {
-                    div class=(class) role="img" aria-label=(plot.about) { (PreEscaped(svg)) }
+        div.finger data-finger=(number) {
+            @if several { h3 { "Finger " (number) } }
+            div.plots {
+                @for (Plot { title, about, .. }, svg) in &drawn? {
+                    figure.plot data-title=(title) {
+                        div.still role="img" aria-label=(about) { (PreEscaped(svg)) }
+                        figcaption { (about) }
+                    }
                 }
-                figcaption { (plot.about) }
+                figure.plot data-title="strip" {
+                    h3 { "Mode, faults and limits" }
+                    (strip::strip(&tracks.strip(), &times))
+                    figcaption { "What occurred, however short, is as wide as a nine-hundredth of the run." }
+                }
+            }
+            div.array {
+                h3 { "Pressure on the array" }
+                (pressures::pressures(tracks))
             }
         }
-        h3 { "Pressure on the array" }
-        p.note { "True mean pressure on each taxel; full colour is " (format!("{full_kpa:.1}")) " kPa." }
-        div.maps { @for (time_s, map) in &tracks.maps { (pressures(*time_s, map, full_kpa)) } }
     })
 }
 
-fn pressures(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
-    let peak = format!("{:.1}", map.iter().flatten().copied().fold(0.0, f64::max));
-    let time = shown(Some((time_s * 1e3).round() / 1e3));
-    let about = format!("Pressure map at {time} s, at most {peak} kPa");
-    // The last row on top, as everywhere.
-    let cells =
-        map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
+/// The metrics by group: those with a broken bound first and open.
+fn metrics(report: &Report) -> Markup {
+    let verdicts = &report.outcome.verdicts;
     html! {
-        figure {
-            svg viewBox="0 0 10 10" role="img" aria-label=(about) shape-rendering="crispEdges" {
-                @for (x, y, kpa) in cells.filter(|(.., kpa)| **kpa > 0.0) {
-                    rect x=(x) y=(y) width="1" height="1" fill-opacity=(format!("{:.3}", kpa / full_kpa)) {}
+        @for Group { title, metrics, broken } in groups(verdicts) {
+            details.group open[broken > 0] {
+                summary {
+                    (title)
+                    @if broken > 0 { " " span.broken { (broken) " broken" } }
                 }
+                (table_of(report, &metrics))
             }
-            figcaption { (time) " s, " (peak) " kPa" }
         }
     }
 }
 
-fn metrics(report: &Report) -> Markup {
+fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
     let measured = &report.outcome.measured;
     let fingers = report.trace.fingers.len();
     let columns = if fingers > 1 { 0..fingers } else { 0..0 };
+    let is_broken =
+        |name: &str| report.outcome.verdicts.iter().any(|verdict| verdict.bound.metric == name && !verdict.held);
+    let value = |name: &str| {
+        html! {
+            @if is_broken(name) { span.broken { (shown(measured.get(name))) } } @else { (shown(measured.get(name))) }
+        }
+    };
     html! {
         div.scroll tabindex="0" { table.metrics[columns.is_empty()] {
             thead { tr {
                 th scope="col" { "metric" } th.number scope="col" { "value" }
                 @for finger in columns.clone() { th.number scope="col" { "finger " (finger) } }
-                th scope="col" { "what it is" }
+                th.about scope="col" { "what it is" }
             } }
-            tbody { @for metric in METRICS { tr {
+            tbody { @for metric in metrics { tr data-metric=(metric.name) {
                 td { code { (metric.name) } }
-                td.number { (shown(measured.get(metric.name))) }
+                td.number { (value(metric.name)) }
                 @for finger in columns.clone() {
-                    td.number { (shown(measured.get(&format!("finger{finger}.{}", metric.name)))) }
+                    td.number { (value(&format!("finger{finger}.{}", metric.name))) }
                 }
                 td.about { (metric.about) }
-            } } }
-        } }
-    }
-}
-
-fn ledger(report: &Report) -> Markup {
-    html! {
-        div.scroll tabindex="0" { table {
-            thead { tr {
-                th scope="col" { "effect" } th.number scope="col" { "evaluations" }
-                th.number scope="col" { "time, s" } th.number scope="col" { "share, %" }
-            } }
-            tbody { @for (effect, evaluations, seconds, percent) in rows(&report.outcome.summary) { tr {
-                td { (effect) }
-                td.number { @if let Some(evaluations) = evaluations { (evaluations) } }
-                td.number { (format!("{seconds:.4}")) }
-                td.number { (format!("{percent:.1}")) }
-            } } }
-        } }
-    }
-}
-
-fn ablation(report: &Report) -> Markup {
-    html! {
-        p.note { "What each effect adds to a metric: the run as it is, less a run without the effect." }
-        div.scroll tabindex="0" { table {
-            thead { tr {
-                th scope="col" { "metric" } th.number scope="col" { "all effects" }
-                @for without in report.ablated { th.number scope="col" { (without.effect) } }
-            } }
-            tbody { @for (name, value, others) in differences(&report.outcome.measured, report.ablated) { tr {
-                td { code { (name) } }
-                td.number { (shown(value)) }
-                @for other in others { td.number { (difference(value, other)) } }
             } } }
         } }
     }

@@ -1,34 +1,83 @@
-//! A report's plots: each drawn twice, wide and narrow, so that its letters can be read on a screen and on a phone.
+//! A report's plots: what they show, and each as it is drawn where no script runs.
 
-use super::trace::{Track, Tracks};
+use super::trace::{Kept, Track, Tracks};
 use host_tests::plot::{Curve, Curves, PlotError, curves};
+use serde::Serialize;
 
-/// Width and height of a plot on a screen and on a phone.
-const SIZES_PX: [(u32, u32); 2] = [(860, 230), (360, 220)];
+/// Width and height of a plot without a script: as wide as leaves its letters to be read on a phone.
+const SIZE_PX: (u32, u32) = (400, 200);
+
+/// How a line is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Style {
+    /// Solid, with a pale band from the least to the largest value behind it.
+    Main,
+    /// Thin, in a second colour, on top.
+    Second,
+    /// Dashed.
+    Goal,
+}
+
+/// A line of a plot.
+#[derive(Clone, Debug)]
+pub struct Line {
+    /// What it is.
+    pub label: &'static str,
+    /// How it is drawn.
+    pub style: Style,
+    /// What it was in each stretch of the finger's time.
+    pub kept: Vec<Option<Kept>>,
+}
 
 /// A plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
+    /// What it shows, in a word or two: two runs' plots of the same title lie over each other.
+    pub title: &'static str,
+    /// Of its values.
+    pub unit: &'static str,
     /// What it shows, in a line: the caption, and the text for who does not see it.
     pub about: String,
-    /// The wide and the narrow drawing.
-    pub svgs: [String; 2],
+    /// The lines; the first is the main one.
+    pub lines: Vec<Line>,
 }
 
 /// All plots of a finger.
-///
-/// # Errors
-/// One cannot be drawn.
-pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
-    let Tracks { goal, force, sensed, indentation, duty, current, supply, winding, slip, height, .. } = tracks;
+pub fn all(tracks: &Tracks) -> Vec<Plot> {
+    let Tracks { goal, force, sensed, control_error, sensing_error, .. } = tracks;
+    let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;
     let Tracks { force_difference, travel_difference, .. } = tracks;
-    let force = [Curve::Pale(sensed.points()), Curve::Dashed(steps(&goal.points())), Curve::Solid(force.points())];
-    let force_about = "True force (solid), sensed force (pale), goal (dashed)";
+    let line = |label, style, track: &Track| Line { label, style, kept: track.along(&tracks.time) };
+    // Within a stretch a goal has no mean: it is what was asked for last.
+    let mut goal_line = line("goal", Style::Goal, goal);
+    goal_line.kept.iter_mut().flatten().for_each(|kept| kept.mean = kept.last);
+    let one = |title, unit, track| Plot {
+        title,
+        unit,
+        about: format!("{title}: its mean (solid), from the least to the largest (pale), in {unit}"),
+        lines: vec![line(title, Style::Main, track)],
+    };
+    let smooth = |title, unit, track: &Track| {
+        let mut line = line(title, Style::Main, track);
+        line.kept.iter_mut().flatten().zip(track.smooth()).for_each(|(kept, mean)| kept.mean = mean);
+        let about = format!(
+            "{title}: its mean over a hundredth of the run (solid), from the least to the largest (pale), in {unit}"
+        );
+        Plot { title, unit, about, lines: vec![line] }
+    };
     let mut plots = vec![
-        plot("Contact force", "N", force_about, force.into())?,
-        line("Indentation of the tip", "mm", indentation)?,
-        with_mean("Duty of the bridge", "%", duty)?,
-        with_mean("Current in the winding", "A", current)?,
+        Plot {
+            title: "Contact force",
+            unit: "N",
+            about: "True force (solid), sensed force (thin, on top), goal (dashed), in N".into(),
+            lines: vec![line("true", Style::Main, force), goal_line, line("sensed", Style::Second, sensed)],
+        },
+        one("True force less the goal", "mN", control_error),
+        one("Sensed less the true force", "mN", sensing_error),
+        one("Indentation of the tip", "mm", indentation),
+        smooth("Duty of the bridge", "%", duty),
+        smooth("Current in the winding", "A", current),
     ];
     // What a scene does not move is not drawn.
     for (title, unit, track) in [
@@ -39,38 +88,43 @@ pub fn all(tracks: &Tracks) -> Result<Vec<Plot>, PlotError> {
         ("True force less the native board's", "N", force_difference),
         ("Travel less the native board's", "mm", travel_difference),
     ] {
-        let points = track.points();
-        if points.iter().any(|(_, value)| *value != points[0].1) {
-            plots.push(line(title, unit, track)?);
+        if track.moves() {
+            plots.push(one(title, unit, track));
         }
     }
-    Ok(plots)
+    plots
 }
 
-fn line(title: &str, unit: &'static str, track: &Track) -> Result<Plot, PlotError> {
-    plot(title, unit, title, vec![Curve::Solid(track.points())])
-}
-
-/// For what changes from step to step.
-fn with_mean(title: &str, unit: &'static str, track: &Track) -> Result<Plot, PlotError> {
-    let about = format!("{title}: as it was (pale) and its mean over a hundredth of the run");
-    plot(title, unit, &about, vec![Curve::Pale(track.points()), Curve::Solid(track.means())])
-}
-
-fn plot(title: &str, y: &'static str, about: &str, lines: Vec<Curve>) -> Result<Plot, PlotError> {
+/// A plot without a script.
+///
+/// # Errors
+/// It cannot be drawn.
+pub fn drawn(plot: &Plot, times: &[f64]) -> Result<String, PlotError> {
+    let lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
     let (x_range, y_range) = ranges(&lines);
-    let panel = Curves { title: title.into(), x: "time, s", y, x_range, y_range, curves: lines };
-    let [wide, narrow] = SIZES_PX;
-    Ok(Plot {
-        about: format!("{about}, in {y}, over time in s"),
-        svgs: [curves(core::slice::from_ref(&panel), wide)?, curves(&[panel], narrow)?],
-    })
+    let panel = Curves { title: plot.title.into(), x: "time, s", y: plot.unit, x_range, y_range, curves: lines };
+    curves(&[panel], SIZE_PX)
+}
+
+fn curves_of(line: &Line, times: &[f64]) -> Vec<Curve> {
+    let kept = || times.iter().zip(&line.kept).filter_map(|(time_s, kept)| Some((*time_s, (*kept)?)));
+    let means = || kept().map(|(time_s, kept)| (time_s, kept.mean)).collect::<Vec<_>>();
+    let band = || kept().flat_map(|(time_s, Kept { low, high, .. })| [(time_s, low), (time_s, high)]).collect();
+    match line.style {
+        Style::Main => vec![Curve::Pale(band()), Curve::Solid(means())],
+        Style::Second => vec![Curve::Second(means())],
+        Style::Goal => vec![Curve::Dashed(steps(&means()))],
+    }
 }
 
 /// From 0 to the end, and around all values with a little air; 0 is in sight where it is not far.
 fn ranges(lines: &[Curve]) -> ([f64; 2], [f64; 2]) {
     let points = lines.iter().flat_map(|curve| match curve {
-        Curve::Solid(points) | Curve::Pale(points) | Curve::Dashed(points) | Curve::Circles(points) => points,
+        Curve::Solid(points)
+        | Curve::Pale(points)
+        | Curve::Second(points)
+        | Curve::Dashed(points)
+        | Curve::Circles(points) => points,
     });
     let (mut end, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
     for (x, y) in points {

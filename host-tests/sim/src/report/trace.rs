@@ -1,92 +1,123 @@
-//! What a report draws, gathered while the run goes on: a bounded number of points, whatever the run's length.
+//! What a report draws, gathered while the run goes on: a bounded number of stretches, whatever the run's length.
 
+use super::states::{States, Strip};
 use crate::agreement::Path;
 use crate::metrics::newtons;
 use crate::watch::{Step, Watch};
+use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use fingertip::units::Duty;
 use host_tests::heatmap::Pressures;
 
-/// Stretches of time in which the least and the largest value are kept.
-const STRETCHES: f64 = 900.0;
-/// How many of them a mean is taken over.
-const STRETCHES_OF_A_MEAN: u64 = 9;
+/// Stretches of time; of each the least, the largest and the mean value are kept.
+const STRETCHES: u64 = 900;
+/// Over how many of them a mean is taken of what changes from step to step.
+const OF_A_MEAN: usize = 9;
 /// Pressure maps of a run.
-const MAPS: usize = 10;
+const MAPS: usize = 150;
 
-/// A stretch of time under way.
+/// A quantity in a stretch of time.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     number: u64,
-    low: (f64, f64),
-    high: (f64, f64),
+    low: f64,
+    high: f64,
+    last: f64,
+    sum: f64,
+    count: f64,
 }
 
-/// A quantity's points: the least and the largest of each stretch, in order of time.
+/// A quantity over time.
 #[derive(Clone, Debug, Default)]
-pub struct Track {
-    points: Vec<(f64, f64)>,
-    /// Sum of the times, sum of the values and number of the points of each longer stretch.
-    sums: Vec<(f64, f64, f64)>,
-    stretch: Option<Stretch>,
+pub struct Track(Vec<Stretch>);
+
+/// What a quantity was in a stretch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Kept {
+    /// The least.
+    pub low: f64,
+    /// The largest.
+    pub high: f64,
+    /// The mean.
+    pub mean: f64,
+    /// The last.
+    pub last: f64,
 }
 
 impl Track {
-    fn add(&mut self, stretch: u64, time_s: f64, value: f64) {
-        let point = (time_s, value);
-        let longer = (stretch / STRETCHES_OF_A_MEAN) as usize;
-        if self.sums.len() <= longer {
-            self.sums.resize(longer + 1, (0.0, 0.0, 0.0));
-        }
-        let (times, values, count) = self.sums[longer];
-        self.sums[longer] = (times + time_s, values + value, count + 1.0);
-        match &mut self.stretch {
-            Some(Stretch { number, low, high }) if *number == stretch => {
-                if value < low.1 {
-                    *low = point;
-                }
-                if value > high.1 {
-                    *high = point;
-                }
+    fn add(&mut self, number: u64, value: f64) {
+        match self.0.last_mut() {
+            Some(last) if last.number == number => {
+                last.low = last.low.min(value);
+                last.high = last.high.max(value);
+                last.last = value;
+                last.sum += value;
+                last.count += 1.0;
             }
-            _ => {
-                self.close();
-                self.stretch = Some(Stretch { number: stretch, low: point, high: point });
-            }
+            _ => self.0.push(Stretch { number, low: value, high: value, last: value, sum: value, count: 1.0 }),
         }
     }
 
-    fn close(&mut self) {
-        let Some(Stretch { low, high, .. }) = self.stretch.take() else { return };
-        let (first, second) = if low.0 <= high.0 { (low, high) } else { (high, low) };
-        self.points.push(first);
-        if second.0 > first.0 {
-            self.points.push(second);
-        }
+    /// What it was in each stretch that another track has; none where it has none there.
+    pub fn along(&self, other: &Self) -> Vec<Option<Kept>> {
+        let at = |number| self.0.binary_search_by_key(&number, |stretch| stretch.number).ok().map(|at| self.0[at]);
+        let kept = |stretch: Stretch| {
+            let Stretch { low, high, last, sum, count, .. } = stretch;
+            Kept { low, high, mean: sum / count, last }
+        };
+        other.0.iter().map(|stretch| at(stretch.number).map(kept)).collect()
     }
 
-    /// The mean of each longer stretch.
-    pub fn means(&self) -> Vec<(f64, f64)> {
-        let mean = |(times, values, count): (f64, f64, f64)| (times / count, values / count);
-        self.sums.iter().copied().filter(|(.., count)| *count > 0.0).map(mean).collect()
+    /// Its mean in each stretch.
+    pub fn means(&self) -> Vec<f64> {
+        self.0.iter().map(|stretch| stretch.sum / stretch.count).collect()
     }
 
-    /// All of them.
-    pub fn points(&self) -> Vec<(f64, f64)> {
-        let mut whole = self.clone();
-        whole.close();
-        whole.points
+    /// The means over several stretches around each; at the ends over as many, so that none is of a few values.
+    pub fn smooth(&self) -> Vec<f64> {
+        let all = self.0.len();
+        let wide = OF_A_MEAN.min(all);
+        let mean = |at: usize| {
+            let from = at.saturating_sub(wide / 2).min(all - wide);
+            let (sum, count) = self.0[from..from + wide]
+                .iter()
+                .fold((0.0, 0.0), |(s, c), stretch| (s + stretch.sum, c + stretch.count));
+            sum / count
+        };
+        (0..all).map(mean).collect()
     }
+
+    /// Whether it was ever other than it was first.
+    pub fn moves(&self) -> bool {
+        self.0.first().is_some_and(|first| self.0.iter().any(|at| [at.low, at.high] != [first.low; 2]))
+    }
+}
+
+/// The array at an instant.
+#[derive(Clone, Debug)]
+pub struct Instant {
+    /// When.
+    pub time_s: f64,
+    /// True mean pressures.
+    pub true_kpa: Pressures,
+    /// The taxels' codes, less those of the scene's first frame.
+    pub codes: [[i32; COLUMNS]; ROWS],
 }
 
 /// What is drawn of a finger.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
+    /// Time, s.
+    pub time: Track,
     /// The force asked for, N.
     pub goal: Track,
     /// The true force, N.
     pub force: Track,
     /// The sensed force, N.
     pub sensed: Track,
+    /// The true force less the goal, mN.
+    pub control_error: Track,
+    /// The sensed less the true force, mN.
+    pub sensing_error: Track,
     /// Indentation, mm.
     pub indentation: Track,
     /// Duty, %.
@@ -105,8 +136,17 @@ pub struct Tracks {
     pub force_difference: Track,
     /// The travel beside the other board's, mm.
     pub travel_difference: Track,
-    /// True pressures at instants.
-    pub maps: Vec<(f64, Pressures)>,
+    /// The array at instants.
+    pub instants: Vec<Instant>,
+    states: Vec<States>,
+    first: Option<Frame>,
+}
+
+impl Tracks {
+    /// Modes, faults and limits.
+    pub fn strip(&self) -> Strip {
+        Strip::of(&self.states)
+    }
 }
 
 /// Watches a run for a report.
@@ -130,8 +170,14 @@ impl Trace {
     }
 
     fn map_is_due(&self, finger: usize, time_s: f64) -> bool {
-        let taken = self.fingers.get(finger).map_or(0, |tracks| tracks.maps.len());
-        taken < MAPS && time_s >= self.duration_s * (taken as f64 + 0.5) / MAPS as f64
+        let taken = self.fingers.get(finger).map_or(0, |tracks| tracks.instants.len());
+        taken < MAPS && time_s >= self.duration_s * taken as f64 / MAPS as f64
+    }
+
+    /// Of which stretch a time is: one behind the end is of the last.
+    fn stretch(&self, time_s: f64) -> u64 {
+        let share = if self.duration_s > 0.0 { time_s / self.duration_s } else { 0.0 };
+        ((STRETCHES as f64 * share) as u64).min(STRETCHES - 1)
     }
 }
 
@@ -146,16 +192,18 @@ impl Watch for Trace {
             return;
         }
         let due = self.map_is_due(step.finger, time_s);
+        let stretch = self.stretch(time_s);
         if self.fingers.len() <= step.finger {
             self.fingers.resize_with(step.finger + 1, Tracks::default);
         }
-        let share = if self.duration_s > 0.0 { time_s / self.duration_s } else { 0.0 };
-        let stretch = (STRETCHES * share) as u64;
         let tracks = &mut self.fingers[step.finger];
+        let (goal_n, sensed_n) = (newtons(step.command.goal), newtons(status.contact.force));
         for (track, value) in [
-            (&mut tracks.goal, newtons(step.command.goal)),
+            (&mut tracks.goal, goal_n),
             (&mut tracks.force, truth.force_n),
-            (&mut tracks.sensed, newtons(status.contact.force)),
+            (&mut tracks.sensed, sensed_n),
+            (&mut tracks.control_error, 1e3 * (truth.force_n - goal_n)),
+            (&mut tracks.sensing_error, 1e3 * (sensed_n - truth.force_n)),
             (&mut tracks.indentation, truth.indentation_mm),
             (&mut tracks.duty, 100.0 * f64::from(status.duty.0) / f64::from(Duty::FULL)),
             (&mut tracks.current, truth.current_a),
@@ -163,15 +211,24 @@ impl Watch for Trace {
             (&mut tracks.winding, truth.winding_c),
             (&mut tracks.slip, truth.slip_mm),
             (&mut tracks.height, truth.object_mm[1]),
+            (&mut tracks.time, time_s),
         ] {
-            track.add(stretch, time_s, value);
+            track.add(stretch, value);
         }
         if let Some([force_n, travel_mm]) = self.other.as_ref().and_then(|other| other.difference(step)) {
-            tracks.force_difference.add(stretch, time_s, force_n);
-            tracks.travel_difference.add(stretch, time_s, travel_mm);
+            tracks.force_difference.add(stretch, force_n);
+            tracks.travel_difference.add(stretch, travel_mm);
+        }
+        // As many as there are stretches in the track of times.
+        tracks.states.resize(tracks.time.0.len(), States::default());
+        if let Some(states) = tracks.states.last_mut() {
+            states.add(status);
         }
         if due {
-            tracks.maps.push((time_s, truth.pressures_kpa));
+            let first = *tracks.first.get_or_insert(*step.frame);
+            let code = |row, column| i32::from(step.frame.code(row, column)) - i32::from(first.code(row, column));
+            let codes = core::array::from_fn(|row| core::array::from_fn(|column| code(row, column)));
+            tracks.instants.push(Instant { time_s, true_kpa: truth.pressures_kpa, codes });
         }
     }
 }
@@ -180,16 +237,48 @@ impl Watch for Trace {
 mod tests {
     use super::*;
 
+    fn of(values: impl IntoIterator<Item = (u64, f64)>) -> Track {
+        let mut track = Track::default();
+        values.into_iter().for_each(|(stretch, value)| track.add(stretch, value));
+        track
+    }
+
     #[test]
     fn a_track_keeps_each_spike_and_the_order() {
-        let mut track = Track::default();
-        for n in 0..10_000 {
-            let value = if n == 7_777 { 5.0 } else { f64::from(n % 3) };
-            track.add(n as u64 / 100, f64::from(n), value);
+        let value = |n: u64| if n == 7_777 { 5.0 } else { (n % 3) as f64 };
+        let track = of((0..10_000).map(|n| (n / 100, value(n))));
+        let time = of((0..10_000).map(|n| (n / 100, n as f64)));
+        let kept = track.along(&time);
+        assert_eq!(kept.len(), 100);
+        for (n, kept) in kept.iter().enumerate() {
+            let Kept { low, high, .. } = kept.unwrap();
+            assert_eq!([low, high], [0.0, if n == 77 { 5.0 } else { 2.0 }], "{n}");
         }
-        let points = track.points();
-        assert_eq!(points.len(), 200);
-        assert!(points.contains(&(7_777.0, 5.0)));
-        assert!(points.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(time.means().is_sorted());
+    }
+
+    #[test]
+    fn what_comes_at_the_very_end_is_no_stretch_of_its_own() {
+        let trace = Trace::new(0.9);
+        assert_eq!([0.0, 0.8999, 0.9, 1.0].map(|time_s| trace.stretch(time_s)), [0, 899, 899, 899]);
+    }
+
+    #[test]
+    fn a_mean_at_an_end_is_over_as_many_values_as_any_other() {
+        // 10 and -10 in turn; 100 is the last.
+        let track = of((0..900).map(|n| (n, if n == 899 { 100.0 } else { [10.0, -10.0][n as usize % 2] })));
+        let smooth = track.smooth();
+        assert_eq!(smooth.len(), 900);
+        assert!(smooth[..895].iter().all(|mean| mean.abs() < 1.2), "{smooth:?}");
+        assert!(smooth[895..].iter().all(|mean| (mean - 100.0 / 9.0).abs() < 1e-9), "{:?}", &smooth[890..]);
+        assert_eq!(of([(0, 1.0), (1, 3.0)]).smooth(), [2.0, 2.0]);
+        assert!(of([]).smooth().is_empty());
+    }
+
+    #[test]
+    fn a_track_that_begins_later_has_nothing_before() {
+        let kept = of([(2, 1.0), (2, 3.0)]).along(&of([(0, 0.0), (2, 0.2)]));
+        assert_eq!(kept, [None, Some(Kept { low: 1.0, high: 3.0, mean: 2.0, last: 3.0 })]);
+        assert!(!of([(0, 1.0), (1, 1.0)]).moves() && of([(0, 1.0), (0, 2.0)]).moves());
     }
 }

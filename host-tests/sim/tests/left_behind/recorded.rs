@@ -6,7 +6,7 @@ use mcap::records::Metadata;
 use mcap::{MessageStream, Writer};
 use sim::metrics::shown;
 use sim::recording::{Recorder, check, replay};
-use sim::report::{Report, Trace, page};
+use sim::report::{Instant, Report, Trace, page};
 use sim::run::run;
 use sim::{cli, native};
 use std::fs;
@@ -57,8 +57,8 @@ fn two_fingers_are_measured_recorded_and_drawn_each() {
     assert!(one > 0.9 && other > 0.9, "{one} {other}");
     assert_eq!(value("energy_j"), value("finger0.energy_j") + value("finger1.energy_j"));
 
-    let page =
-        page(&Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[] }).unwrap();
+    let report = Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[], over: None };
+    let page = page(&report).unwrap();
     assert!(page.contains("Finger 0") && page.contains("Finger 1") && page.contains(">finger 1</th>"));
 
     // Each has its own, wherever it is shown.
@@ -70,11 +70,13 @@ fn two_fingers_are_measured_recorded_and_drawn_each() {
     let bytes = fs::read(&path).unwrap();
     for (number, peak_n) in [one, other].into_iter().enumerate() {
         let tracks = &trace.fingers[number];
-        assert_eq!(tracks.force.points().iter().map(|(_, force_n)| *force_n).fold(0.0, f64::max), peak_n);
-        assert_eq!(tracks.maps.len(), 10);
+        let forces = tracks.force.along(&tracks.time);
+        assert_eq!(forces.iter().flatten().map(|kept| kept.high).fold(0.0, f64::max), peak_n);
+        assert_eq!(tracks.instants.len(), 150);
         let sum = |map: &[[f64; 10]; 10]| map.iter().flatten().sum::<f64>() * 1.5 * 1.5 * 1e-3;
-        let (time_s, last) = tracks.maps.last().unwrap();
-        let (_, force_n) = tracks.force.points().into_iter().rfind(|(at_s, _)| at_s <= time_s).unwrap();
+        let Instant { time_s, true_kpa: last, .. } = tracks.instants.last().unwrap();
+        let at = tracks.time.means().iter().rposition(|at_s| at_s <= time_s).unwrap();
+        let force_n = forces[at].unwrap().mean;
         assert!((sum(last) / force_n - 1.0).abs() < 0.01, "{} for {force_n} N", sum(last));
         let topic = format!("/finger{number}/scalars");
         let messages = MessageStream::new(&bytes).unwrap().map(Result::unwrap);

@@ -3,18 +3,25 @@
 //!
 //! The pictures that it takes lie in `target/tmp`.
 
+mod used;
+
 use browser::{Browser, Look, complaints};
 use sim::report::{Report, Trace, page};
-use sim::run::run;
+use sim::run::{Outcome, run};
+use sim::scene::Scene;
 use sim::{cli, ledger, native};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const LOOKS: [Look; 4] = [
-    Look { dark: false, phone: false },
-    Look { dark: true, phone: false },
-    Look { dark: false, phone: true },
-    Look { dark: true, phone: true },
+const SCREEN: Look = Look { dark: false, phone: false, scripts: true };
+const PHONE: Look = Look { phone: true, ..SCREEN };
+const LOOKS: [Look; 6] = [
+    SCREEN,
+    Look { dark: true, ..SCREEN },
+    PHONE,
+    Look { dark: true, ..PHONE },
+    Look { scripts: false, ..SCREEN },
+    Look { dark: true, scripts: false, ..PHONE },
 ];
 
 /// A folder, and a browser with a new profile in it.
@@ -42,20 +49,28 @@ fn a_report_of_two_fingers_has_nothing_wrong() {
     nothing_is_wrong("grasp");
 }
 
-fn nothing_is_wrong(name: &str) {
-    let (folder, mut browser) = browser(name);
+/// A scene, what it looked like, and how it went.
+fn ran(name: &str) -> (Scene, Trace, Outcome) {
     let scene = format!("{}/host-tests/sim/tests/left_behind/{name}.toml", env!("FINGERTIP_ROOT"));
     let scene = cli::load(&scene, &[], None).unwrap();
     let mut trace = Trace::new(scene.duration_s);
     let outcome = run(&scene, &native::board, &mut [&mut trace]).unwrap();
+    (scene, trace, outcome)
+}
+
+fn nothing_is_wrong(name: &str) {
+    let (folder, mut browser) = browser(name);
+    let (scene, trace, outcome) = ran(name);
     let ablated = ledger::ablate(&scene, &native::board).unwrap();
-    let report = Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated };
+    let report =
+        Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated, over: None };
     let path = folder.join("report.html");
     fs::write(&path, page(&report).unwrap()).unwrap();
     for look in LOOKS {
         let [scheme, device] =
             [["light", "dark"][usize::from(look.dark)], ["screen", "phone"][usize::from(look.phone)]];
-        let picture = folder.join(format!("{device}-{scheme}.png"));
+        let still = if look.scripts { "" } else { "-still" };
+        let picture = folder.join(format!("{device}-{scheme}{still}.png"));
         let found = complaints(&mut browser, &address(&path), look, &picture).unwrap();
         assert!(found.is_empty(), "{look:?}:\n{}", found.join("\n"));
         assert!(fs::metadata(&picture).unwrap().len() > 20_000, "{} shows next to nothing", picture.display());
@@ -85,4 +100,8 @@ fn whatever_is_wrong_is_found() {
     assert!(bright.contains("rgb(255, 255, 255)"), "{bright}");
     let nameless = found(light, "<!doctype html><div role='img'></div>");
     assert!(nameless.contains("1 pictures have no words"), "{nameless}");
+    let blank = "<!doctype html><div class=plot><div class=drawn><canvas></canvas></div></div><div id=player>x</div>";
+    assert!(found(light, blank).contains("0 plots are shown"), "a canvas with nothing on it counts as a plot");
+    let still = found(Look { scripts: false, ..SCREEN }, blank);
+    assert!(still.contains("controls are shown that do nothing") && still.contains("0 lines are drawn"), "{still}");
 }

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use crate::watch::Truth;
 use broken::Broken;
 pub use broken::Kind;
-use fingertip::link::{Crash, Reply, ResetCause};
+use fingertip::link::{Crash, Health, Reply, ResetCause};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, Config, Pipeline, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
@@ -172,6 +172,8 @@ impl<E: Set> Bus<E> {
                 loop_time_max_us: 0,
                 reset_cause: device.reset,
                 crash: Crash::default(),
+                // There is no board.
+                health: Health::default(),
                 frame: &unit.frame,
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,

@@ -3,6 +3,7 @@
 
 mod served;
 
+use fingertip::params::Params;
 use served::Served;
 use std::collections::BTreeMap;
 use std::fs;
@@ -97,7 +98,7 @@ fn parameters_are_set_all_or_none_and_saved() {
     let finger = Served::begin("wall");
     let get = |names: &[&str]| finger.json(&[&["params", "get"], names].concat());
     let all = get(&[]);
-    assert_eq!(all.as_object().map(serde_json::Map::len), Some(34));
+    assert_eq!(all.as_object().map(serde_json::Map::len), Some(Params::COUNT + 4), "and four beside them");
     finger.done(&["params", "set", "modulus_pa=300000", "fit_level=3", "--save"]);
     assert_eq!(get(&["modulus_pa", "fit_level"]), serde_json::json!({ "modulus_pa": 300_000, "fit_level": 3 }));
     assert_eq!(finger.json(&["info"])["saved_state"], 0);

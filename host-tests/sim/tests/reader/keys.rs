@@ -53,10 +53,10 @@ fn the_unit_shown_is_the_one_that_the_name_ends_with() {
         ("%", "percent"),
         ("^", ""),
     ];
-    const SHORT: [&str; 32] = [
+    const SHORT: [&str; 33] = [
         "at", "axis", "dead", "drop", "fast", "from", "gain", "gear", "goal", "grip", "hold", "inl", "lift", "lost",
         "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag", "slew", "step", "tau",
-        "x", "y", "zero",
+        "time", "x", "y", "zero",
     ];
     const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
     let mut compound = 0;

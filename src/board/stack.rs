@@ -24,14 +24,32 @@ unsafe extern "C" {
     static _stack_start: u32;
 }
 
-/// Bytes that the stack has taken at most since the reset, by the paint that is left. Reads all that is left.
-pub fn deepest() -> u16 {
-    let (mut place, top) = (&raw const _stack_end, &raw const _stack_start);
-    // SAFETY: aligned and inside the stack, which is always readable.
-    while place < top && unsafe { place.read_volatile() } == PAINT {
-        place = place.wrapping_add(1);
+/// Words of paint in a look: some 20 us.
+const PIECE: usize = 512;
+
+/// The paint that is left, looked at piece by piece: all of it at once would hold the bus up.
+#[derive(Default)]
+pub struct Paint {
+    /// Found whole so far, from the lower end.
+    words: usize,
+}
+
+impl Paint {
+    /// Looks at the next piece. Where it comes to the end of the paint: the bytes that the stack has taken at most since
+    /// the reset.
+    pub fn look(&mut self) -> Option<u16> {
+        let (end, top) = (&raw const _stack_end, &raw const _stack_start);
+        for _ in 0..PIECE {
+            let place = end.wrapping_add(self.words);
+            // SAFETY: aligned and inside the stack, which is always readable.
+            if place >= top || unsafe { place.read_volatile() } != PAINT {
+                self.words = 0;
+                return Some(u16::try_from(top.addr() - place.addr()).unwrap_or(u16::MAX));
+            }
+            self.words += 1;
+        }
+        None
     }
-    u16::try_from(top.addr() - place.addr()).unwrap_or(u16::MAX)
 }
 
 /// Closes it.

@@ -11,14 +11,13 @@ use super::{health, stack};
 const PERIOD_MS: u64 = 20;
 /// 5 Hz.
 const BLINK_PERIODS: u32 = 5;
-/// Each second.
-const STACK_PERIODS: u32 = 50;
 
 /// On with torque, fast blink on fault, off otherwise.
 #[embassy_executor::task]
 pub async fn run(mut led: Output<'static>) {
     let mut last = (Mode::Off, None);
     let mut missed_frames = 0;
+    let mut paint = stack::Paint::default();
     for period in 0u32.. {
         let status = REPORT.get().status;
         if (status.mode, status.fault) != last {
@@ -32,8 +31,8 @@ pub async fn run(mut led: Output<'static>) {
             missed_frames = status.missed_frames;
             warn!("{=u32} frames missed", missed_frames);
         }
-        if period.is_multiple_of(STACK_PERIODS) {
-            health::set_stack_bytes(stack::deepest());
+        if let Some(bytes) = paint.look() {
+            health::set_stack_bytes(bytes);
         }
         let blink = (period / BLINK_PERIODS).is_multiple_of(2);
         let on = if status.mode == Mode::Fault { blink } else { HEARD.get().command.torque };

@@ -52,7 +52,7 @@ fn said(rig: &mut Rig) -> (u8, bool, u16) {
 }
 
 #[test]
-fn the_highest_effort_is_held_back_before_a_deadline_is_missed() {
+fn the_highest_fit_level_is_held_back_before_a_deadline_is_missed() {
     let mut rig = holding_over_the_edge();
     let (in_use, held_back, before_us) = said(&mut rig);
     assert_eq!((in_use, held_back), (FitLevel::default() as u8, false), "the default has its time");
@@ -89,7 +89,7 @@ fn the_highest_effort_is_held_back_before_a_deadline_is_missed() {
 }
 
 #[test]
-fn slower_frames_leave_room_for_the_highest_effort() {
+fn slower_frames_leave_room_for_the_highest_fit_level() {
     let mut rig = holding_over_the_edge();
     write_u8(&mut rig, address::FIT_LEVEL, 5);
     rig.run_ms(100).expect("it runs");
@@ -112,7 +112,7 @@ fn slower_frames_leave_room_for_the_highest_effort() {
 }
 
 #[test]
-fn a_change_of_effort_does_not_stop_the_scan() {
+fn a_change_of_the_fit_level_does_not_stop_the_scan() {
     let mut rig = holding_over_the_edge();
     let frame_ns = 99_750;
     let (from_ns, from) = (rig.now_ns(), read_u32(&mut rig, address::FRAME_COUNTER));

@@ -42,7 +42,7 @@ SHORT_SUPPLY_100MV = Register("short_supply_100mv", 144, 2, 1, False, 100, False
 MIRROR_GOAL_MN = Register("mirror_goal_mn", 148, 4, 1, True, 1, False, 0, 150000)
 MIRROR_FORCE_MN = Register("mirror_force_mn", 152, 4, 1, True, 1, False, -32768000, 32768000)
 MIRROR_MODE = Register("mirror_mode", 156, 1, 1, False, 1, False, 0, 6)
-MIRROR_FAULT = Register("mirror_fault", 157, 1, 1, False, 1, False, 0, 16)
+MIRROR_FAULT = Register("mirror_fault", 157, 1, 1, False, 1, False, 0, 18)
 MIRROR_LIMITS = Register("mirror_limits", 158, 2, 1, False, 1, False, 0, 8191)
 MIRROR_TIME_US = Register("mirror_time_us", 160, 4, 1, False, 1, False, 0, 4294967295)
 MIRROR_TARE = Register("mirror_tare", 164, 1, 1, False, 1, False, 0, 1)
@@ -56,7 +56,7 @@ CLEAR_FAULT = Register("clear_fault", 261, 1, 1, False, 1, False, 0, 1)
 SAVE_PARAMETERS = Register("save_parameters", 262, 1, 1, False, 1, False, 0, 1)
 SAVED_STATE = Register("saved_state", 263, 1, 1, False, 1, False, 0, 2)
 PRESENT_MODE = Register("present_mode", 264, 1, 1, False, 1, False, 0, 6)
-FAULT = Register("fault", 265, 1, 1, False, 1, False, 0, 16)
+FAULT = Register("fault", 265, 1, 1, False, 1, False, 0, 18)
 LIMITS = Register("limits", 266, 2, 1, False, 1, False, 0, 8191)
 PRESENT_FORCE_MN = Register("present_force_mn", 268, 4, 1, True, 1, False, -32768000, 32768000)
 INDENTATION_UM = Register("indentation_um", 272, 4, 1, True, 1, False, 0, 16000)
@@ -95,8 +95,9 @@ IDENTIFY_REFUSAL = Register("identify_refusal", 366, 1, 1, False, 1, False, 0, 1
 FIT_LEVEL = Register("fit_level", 367, 1, 1, False, 1, True, 0, 5)
 FIT_LEVEL_IN_USE = Register("fit_level_in_use", 368, 1, 1, False, 1, False, 0, 5)
 TARE_STATE = Register("tare_state", 369, 1, 1, False, 1, False, 0, 3)
+PRESENT_CREEP_MN = Register("present_creep_mn", 372, 4, 1, True, 1, False, 0, 32768000)
 RESET_CAUSE = Register("reset_cause", 384, 1, 1, False, 1, False, 0, 6)
-CRASH_CAUSE = Register("crash_cause", 385, 1, 1, False, 1, False, 0, 3)
+CRASH_CAUSE = Register("crash_cause", 385, 1, 1, False, 1, False, 0, 4)
 CRASH_COUNT = Register("crash_count", 386, 4, 1, False, 1, False, 0, 4294967295)
 CRASH_PC = Register("crash_pc", 390, 4, 1, False, 1, False, 0, 4294967295)
 CRASH_LINE = Register("crash_line", 394, 2, 1, False, 1, False, 0, 65535)
@@ -104,6 +105,19 @@ RECOVER = Register("recover", 396, 1, 1, False, 1, False, 0, 1)
 RECOVER_HINDRANCE = Register("recover_hindrance", 397, 1, 1, False, 1, False, 0, 4)
 INDIRECT_ADDRESS_29 = Register("indirect_address_29", 400, 2, 28, False, 1, False, 0, 65535)
 INDIRECT_DATA_29 = Register("indirect_data_29", 456, 1, 28, False, 1, False, 0, 255)
+OPTION_BYTES = Register("option_bytes", 484, 4, 1, False, 1, False, 0, 4294967295)
+ANALOGUE_SUPPLY_MV = Register("analogue_supply_mv", 488, 2, 1, False, 1, False, 0, 65535)
+STACK_BYTES = Register("stack_bytes", 490, 2, 1, False, 1, False, 0, 65535)
+FRAME_LATE_NS = Register("frame_late_ns", 492, 2, 1, False, 1, False, 0, 65535)
+BANK_MISSING = Register("bank_missing", 494, 2, 1, False, 1, False, 0, 65535)
+OUT_OF_STEP = Register("out_of_step", 496, 2, 1, False, 1, False, 0, 65535)
+CONVERTER_OVERRUN = Register("converter_overrun", 498, 2, 1, False, 1, False, 0, 65535)
+OVERWRITTEN = Register("overwritten", 500, 2, 1, False, 1, False, 0, 65535)
+TRANSFER_BUS_ERRORS = Register("transfer_bus_errors", 502, 2, 1, False, 1, False, 0, 65535)
+TRANSFER_STREAM_ERRORS = Register("transfer_stream_errors", 504, 2, 1, False, 1, False, 0, 65535)
+LINE_NOISE = Register("line_noise", 506, 2, 1, False, 1, False, 0, 65535)
+LINE_FRAMING = Register("line_framing", 508, 2, 1, False, 1, False, 0, 65535)
+LINE_OVERRUN = Register("line_overrun", 510, 2, 1, False, 1, False, 0, 65535)
 TIP_RADIUS_UM = Register("tip_radius_um", 512, 4, 1, True, 1, True, 4000, 16000)
 MODULUS_PA = Register("modulus_pa", 516, 4, 1, True, 1, True, 20000, 2000000)
 PITCH_UM = Register("pitch_um", 520, 4, 1, True, 1, True, 500, 4000)
@@ -134,6 +148,9 @@ FORCE_FAULT_MN = Register("force_fault_mn", 616, 4, 1, True, 1, True, 100, 20000
 FORCE_MAX_MN = Register("force_max_mn", 620, 4, 1, True, 1, True, 50, 150000)
 SUPPLY_MIN_MV = Register("supply_min_mv", 624, 4, 1, True, 1, True, 1000, 48000)
 SUPPLY_MAX_MV = Register("supply_max_mv", 628, 4, 1, True, 1, True, 2000, 60000)
+CURVE_PERMILLE = Register("curve_permille", 632, 4, 1, True, 1, True, 0, 8000)
+CREEP_PERMILLE = Register("creep_permille", 636, 4, 1, True, 1, True, 0, 300)
+CREEP_TIME_MS = Register("creep_time_ms", 640, 4, 1, True, 1, True, 500, 600000)
 PICTURE_TIME_US = Register("picture_time_us", 720, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FRAME = Register("picture_frame", 724, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FORCE_MN = Register("picture_force_mn", 728, 4, 1, True, 1, False, -32768000, 32768000)
@@ -147,7 +164,7 @@ PICTURE_PERIOD_NS = Register("picture_period_ns", 756, 4, 1, False, 1, False, 0,
 PICTURE_DUTY_PERMILLE = Register("picture_duty_permille", 760, 2, 1, True, 1, False, -1000, 1000)
 PICTURE_LIMITS = Register("picture_limits", 762, 2, 1, False, 1, False, 0, 8191)
 PICTURE_MODE = Register("picture_mode", 764, 1, 1, False, 1, False, 0, 6)
-PICTURE_FAULT = Register("picture_fault", 765, 1, 1, False, 1, False, 0, 16)
+PICTURE_FAULT = Register("picture_fault", 765, 1, 1, False, 1, False, 0, 18)
 PICTURE_TARE_STATE = Register("picture_tare_state", 766, 1, 1, False, 1, False, 0, 3)
 PICTURE_CONFIDENCE = Register("picture_confidence", 767, 1, 1, False, 1, False, 0, 255)
 PRESSURES = Register("pressures", 768, 2, 100, False, 10, False, 0, 65535)
@@ -230,6 +247,7 @@ ALL = (
     FIT_LEVEL,
     FIT_LEVEL_IN_USE,
     TARE_STATE,
+    PRESENT_CREEP_MN,
     RESET_CAUSE,
     CRASH_CAUSE,
     CRASH_COUNT,
@@ -239,6 +257,19 @@ ALL = (
     RECOVER_HINDRANCE,
     INDIRECT_ADDRESS_29,
     INDIRECT_DATA_29,
+    OPTION_BYTES,
+    ANALOGUE_SUPPLY_MV,
+    STACK_BYTES,
+    FRAME_LATE_NS,
+    BANK_MISSING,
+    OUT_OF_STEP,
+    CONVERTER_OVERRUN,
+    OVERWRITTEN,
+    TRANSFER_BUS_ERRORS,
+    TRANSFER_STREAM_ERRORS,
+    LINE_NOISE,
+    LINE_FRAMING,
+    LINE_OVERRUN,
     TIP_RADIUS_UM,
     MODULUS_PA,
     PITCH_UM,
@@ -269,6 +300,9 @@ ALL = (
     FORCE_MAX_MN,
     SUPPLY_MIN_MV,
     SUPPLY_MAX_MV,
+    CURVE_PERMILLE,
+    CREEP_PERMILLE,
+    CREEP_TIME_MS,
     PICTURE_TIME_US,
     PICTURE_FRAME,
     PICTURE_FORCE_MN,

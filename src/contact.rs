@@ -93,7 +93,7 @@ fn hides<const ROWS: usize, const COLUMNS: usize>(
     false
 }
 
-/// 255 at no residual, falling to 0 at [`RESIDUAL_MAX`]; what the converter's steps leave does not count.
+/// 255 at no residual, falling to 0 at `RESIDUAL_MAX`; what the converter's steps leave does not count.
 pub fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scale: &Scale) -> u8 {
     let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
     // Squares count fewer bits than a share's square.

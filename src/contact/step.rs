@@ -20,7 +20,7 @@ const CENTRE_STEP: i32 = 1 << 21;
 /// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
-/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less [`Bits::ALL`] bits: 2^-24 of
+/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less `Bits::ALL` bits: 2^-24 of
 /// ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Misfit {
@@ -83,7 +83,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
     pub const ALL: u32 = Self::TAXEL + Self::ROW;
 }
 
-/// The normal equations, Q26 less [`Bits::ALL`]: Q22 of ten rows and columns.
+/// The normal equations, Q26 less `Bits::ALL`: Q22 of ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Equations<const ROWS: usize, const COLUMNS: usize> {
     matrix: [i32; 6],

@@ -95,7 +95,7 @@ impl Browser {
         self.call("DOM.setFileInputFiles", files).map(drop)
     }
 
-    /// Waits until an expression holds on the page, looked at with each picture that it draws, [`PICTURES`] at most.
+    /// Waits until an expression holds on the page, looked at with each picture that it draws, `PICTURES` at most.
     ///
     /// # Errors
     /// It never holds, or throws.

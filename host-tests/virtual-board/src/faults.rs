@@ -16,7 +16,7 @@ const ENABLE: u64 = 1;
 /// DMA2 stream 1's vector, and flash that no image takes.
 const HALFWAY_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 57);
 const FREE_FLASH: u64 = 0x0803_f000;
-/// movw r0, #0xfffc; movt r0, #0x1fff; str r0, [r0]; bx lr.
+/// `movw r0, #0xfffc; movt r0, #0x1fff; str r0, [r0]; bx lr`.
 const STORE_BELOW_RAM: [u64; 6] = [0xf64f, 0x70fc, 0xf6c1, 0x70ff, 0x6000, 0x4770];
 /// Where nothing answers.
 const NOWHERE: u64 = 0xd000_0000;

@@ -1,7 +1,7 @@
 //! The STM32F427 of `rigless` with what the image needs beyond it.
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
-//! - The window watchdog, see [`WindowWatchdog`].
+//! - The window watchdog, see `WindowWatchdog`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
 use crate::board::BUS_PORT;

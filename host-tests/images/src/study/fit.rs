@@ -3,8 +3,7 @@
 use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
-use fingertip::contact::Contact;
-use fingertip::contact::{self, FitLevel};
+use fingertip::contact::{Contact, FitLevel};
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use images::single::{self, Refined};

@@ -86,13 +86,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
 
     /// Bits dropped from the force of a sixteenth of a code, so that its product with the largest sum fits 64 bits:
     /// with the largest pitch and the front end's least gain that force is 2^38.04 in its unit, and a taxel shows at
-    /// most 2^17.6 sixteenths.
+    /// most 2^17.6 sixteenths. Codes that the converter does not have may wrap it.
     const FORCE_DROP: u32 = if ROWS * COLUMNS <= 128 { 0 } else { 4 };
 
     /// The sum as a force: the taxels' area times their pressure, never below zero, and stopped at the type's end.
     #[inline(always)]
     pub fn force(&self, config: &Config) -> Newtons {
-        let product = i64::from(self.sum.max(0)) * (config.newtons_per_sum_q48 >> Self::FORCE_DROP);
+        let product = i64::from(self.sum.max(0)).wrapping_mul(config.newtons_per_sum_q48 >> Self::FORCE_DROP);
         let upper = product >> (32 - Self::FORCE_DROP);
         // Of so few taxels it is below 2^31.
         let force_bits = if Self::FORCE_DROP == 0 { upper as i32 } else { upper.min(i32::MAX.into()) as i32 };

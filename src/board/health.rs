@@ -86,7 +86,7 @@ pub fn set_stack_bytes(bytes: u16) {
 
 /// All of it, for the bus.
 pub fn health() -> Health {
-    let late_ns = u64::from(LATE.load(Ordering::Relaxed)) * 1_000 / u64::from(guard::HZ / 1_000_000);
+    let late_ns = u64::from(LATE.load(Ordering::Relaxed)) * 1_000 / u64::from(guard::TICKS_PER_US);
     Health {
         option_bytes: options::loaded(),
         analogue_mv: ANALOGUE_MV.load(Ordering::Relaxed),

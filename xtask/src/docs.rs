@@ -12,11 +12,10 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the package and its example that print their text.
-const GENERATED: [(&str, (&str, &str)); 7] = [
+const GENERATED: [(&str, (&str, &str)); 6] = [
     ("docs/control-table.md", ("host-tests", "control-table")),
     ("docs/scenes.md", ("sim", "scenes-page")),
     ("docs/pictures/imports.svg", ("host-tests", "imports")),
-    ("examples/python/registers.py", ("host-tests", "registers-python")),
     ("examples/dynamixel/fingertip.model", ("host-tests", "model-file")),
     ("examples/dynamixel/fingertip_direct.model", ("host-tests", "model-file-direct")),
     ("python/fingertip/registers.py", ("host-tests", "python-package")),

@@ -16,8 +16,8 @@ import rustypot
 from dynamixel_easy_sdk.connector import Connector
 from dynamixel_easy_sdk.data_types import OperatingMode
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "examples" / "python"))
-import registers as reg  # noqa: E402
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "python"))
+from fingertip import registers as reg  # noqa: E402
 
 ID, BAUD = 1, 1_000_000
 ok = dynamixel_sdk.COMM_SUCCESS

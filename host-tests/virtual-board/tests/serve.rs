@@ -54,9 +54,10 @@ fn the_python_example_touches_holds_and_lets_go() {
     let board = Board::serve(&["--pty", link.to_str().expect("a plain path")]);
     assert_eq!(Path::new(&board.name), link);
 
-    let example = Path::new(env!("FINGERTIP_ROOT")).join("examples/python/force.py");
+    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
+    let example = package.join("examples/force.py");
     let mut python = Command::new(named("FINGERTIP_PYTHON"));
-    python.env("PYTHONDONTWRITEBYTECODE", "1").arg(example).arg("--port").arg(&link);
+    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", package).arg(example).arg("--port").arg(&link);
     // As patient as it takes on the slowest machine: two hours mean that the board hangs.
     let output = python
         .args(["--newtons", "1.5", "--readings", "200", "--patience-ms", "7200000"])

@@ -1,6 +1,6 @@
-"""Command a force over the bus, with ROBOTIS' package `dynamixel-sdk`.
+"""Command a force over the bus, with ROBOTIS' package `dynamixel-sdk` and the registers by name.
 
-    pip install dynamixel-sdk
+    pip install ./python
     python force.py --port /dev/ttyACM0 --newtons 1.5
 
 The port is that of the board, or what `cargo xtask serve` prints.
@@ -11,7 +11,7 @@ import sys
 
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler, PortHandler
 
-import registers as reg
+from fingertip import registers as reg
 
 BAUD = 1_000_000
 MODES = ["off", "tare", "approach", "force", "release", "fault", "identify"]
@@ -46,14 +46,14 @@ class Fingertip:
         return model
 
     def read(self, register):
-        size = register.width * register.count
+        size = register.width * register.numbers
         data, result, error = self.packets.readTxRx(self.port, self.id, register.address, size)
         self.check(f"read {register.address}", result, error)
         values = [
             int.from_bytes(bytes(data[at : at + register.width]), "little", signed=register.signed)
             for at in range(0, size, register.width)
         ]
-        return values if register.count > 1 else values[0]
+        return values if register.numbers > 1 else values[0]
 
     def write(self, register, value):
         data = list(value.to_bytes(register.width, "little", signed=register.signed))

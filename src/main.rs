@@ -42,7 +42,7 @@ async fn main(spawner: Spawner) {
     stack::guard_foot();
     let boot = crash::boot();
     let clocked = clocks::start_external();
-    let p = embassy_stm32::init(clocks::config(clocked));
+    let p = clocks::init(clocked);
     let bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
     clocks::accelerate_flash();
     clocks::freeze_when_halted();

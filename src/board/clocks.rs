@@ -3,19 +3,20 @@
 //! A clock that fails later resets the board: the clock security system raises the exception that nothing masks, and
 //! breaks TIM1 without the processor.
 
-use embassy_stm32::Config;
+use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::pac;
 use embassy_stm32::rcc::{
     AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
 };
 use embassy_stm32::time::Hertz;
+use embassy_stm32::{Config, Peripherals};
 
 /// How often to look for the external clock: for some 0.4 s, at 16 MHz and about 6 cycles a look.
 const LOOKS: u32 = 1_000_000;
 
-/// Starts the external clock and its guard, and says whether it is there. Comes before `embassy_stm32::init`, which
-/// would wait for it for ever.
+/// Starts the external clock and its guard, and says whether it is there. Comes before [`init`], which would wait for
+/// it for ever.
 pub fn start_external() -> bool {
     pac::RCC.cr().modify(|w| w.set_hsebyp(true));
     pac::RCC.cr().modify(|w| w.set_hseon(true));
@@ -27,7 +28,7 @@ pub fn start_external() -> bool {
 }
 
 /// HSE 8 MHz / 4 x 168 / 2 = 168 MHz for the core, or HSI 16 MHz / 8 x 168 / 2; APB1 at 42 MHz, APB2 at 84 MHz.
-pub fn config(external: bool) -> Config {
+fn config(external: bool) -> Config {
     let mut config = Config::default();
     config.rcc.hse = external.then_some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
     let (source, prediv) = if external { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
@@ -39,6 +40,20 @@ pub fn config(external: bool) -> Config {
     config.rcc.apb2_pre = APBPrescaler::DIV2;
     config.dma_interrupt_priority = Priority::P6;
     config
+}
+
+/// Sets the clocks and takes the peripherals.
+///
+/// The time driver zeroes its counter by an update, which may leave the flags of compares at 0: that of the half turn
+/// would be counted as one. The clock would be 65.5 ms ahead and, from each half turn until its interrupt has run, fall
+/// back by as much: an alarm set in there comes 65.5 ms late.
+pub fn init(external: bool) -> Peripherals {
+    cortex_m::interrupt::free(|_| {
+        let peripherals = embassy_stm32::init(config(external));
+        pac::TIM2.sr().write(|_| ());
+        NVIC::unpend(pac::Interrupt::TIM2);
+        peripherals
+    })
 }
 
 /// Halting the core in a debugger stops the watchdogs and the bridge's timer; the latter lets go of the outputs.

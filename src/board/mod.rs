@@ -26,7 +26,7 @@ pub mod watchdog;
 
 /// Sets every priority of the table in `docs/board.md`; embassy leaves most of them at the highest.
 ///
-/// Comes after `embassy_stm32::init`, which sets those of the time driver and of all DMA streams itself.
+/// Comes after [`clocks::init`], which sets those of the time driver and of all DMA streams itself.
 pub fn set_priorities() {
     for (interrupt, priority) in [
         (interrupt::TIM5, Priority::P0),

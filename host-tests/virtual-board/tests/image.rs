@@ -70,6 +70,19 @@ fn it_boots_and_frames_arrive_at_the_scans_rate() {
 }
 
 #[test]
+fn its_clock_begins_at_zero_and_never_falls_back() {
+    // A turn of the timer behind the clock is 65.536 ms.
+    let mut rig = rig();
+    rig.run_until_ns(20_000_000).expect("it runs");
+    for _ in 0..400 {
+        let true_ms = rig.now_ns() / 1_000_000;
+        let tick_ms = u64::from(read_u16(&mut rig, address::REALTIME_TICK));
+        assert!((true_ms.saturating_sub(5)..=true_ms + 1).contains(&tick_ms), "{tick_ms} ms at {true_ms} ms");
+        rig.run_until_ns(rig.now_ns() + 170_000).expect("it runs");
+    }
+}
+
+#[test]
 fn it_answers_a_ping_at_its_baud_rate() {
     with_one_that_is_up(|rig| {
         rig.send(&PING).expect("it runs");

@@ -97,6 +97,13 @@ impl Job {
         command
     }
 
+    /// The same, where Ctrl-C ends it also when these tests run in the background of a script, which ignores that.
+    pub fn in_front(&self) -> Command {
+        let mut command = Command::new("env");
+        command.arg("--default-signal=INT").arg(self.program).args(&self.words);
+        command
+    }
+
     /// The same under a limit of its files' size. Beyond it the system kills it, or lets it live with a write that
     /// failed.
     pub fn limited(&self, bytes: u64, lives: bool) -> Command {

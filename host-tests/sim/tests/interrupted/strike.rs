@@ -1,16 +1,13 @@
 //! Ways to interrupt a command. Each strikes at a number of bytes, never after a time.
 
 use crate::jobs::Job;
+use rustix::process::{Pid, Signal, kill_process};
 use std::fs::{self, File};
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
-
-const SIGINT: i32 = 2;
-const SIGKILL: i32 = 9;
-const SIGXFSZ: i32 = 25;
 
 /// What happens to a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -52,7 +49,7 @@ pub fn strike(job: &Job, kind: Kind, at: u64) -> bool {
     match kind {
         Kind::CutWrite => {
             let status = quiet(job.limited(at, false)).status().unwrap();
-            status.signal() == Some(SIGXFSZ)
+            status.signal() == Some(Signal::XFSZ.as_raw())
         }
         Kind::FullDisk => {
             let output = job.limited(at, true).output().unwrap();
@@ -66,8 +63,8 @@ pub fn strike(job: &Job, kind: Kind, at: u64) -> bool {
                 code => panic!("{} ended with {code:?}: {told}", job.name),
             }
         }
-        Kind::Killed => signalled(job, at, SIGKILL),
-        Kind::CtrlC => signalled(job, at, SIGINT),
+        Kind::Killed => signalled(job, at, Signal::KILL),
+        Kind::CtrlC => signalled(job, at, Signal::INT),
         Kind::ClosedPipe => closed_pipe(job, at),
         Kind::FullOutput => {
             let full = File::options().write(true).open("/dev/full").unwrap();
@@ -101,29 +98,29 @@ fn reached(child: &mut Child, job: &Job, bytes: u64) -> bool {
     }
 }
 
-fn signal(child: &Child, name: &str) {
-    let id = child.id().to_string();
-    assert!(quiet(Command::new("kill")).args([name, &id]).status().unwrap().success() || name == "-INT");
+/// A child that nobody has waited for can be signalled, also when it has ended.
+fn signal(child: &Child, signal: Signal) {
+    kill_process(Pid::from_child(child), signal).unwrap();
 }
 
-fn signalled(job: &Job, at: u64, number: i32) -> bool {
-    let mut child = quiet(job.command()).spawn().unwrap();
+fn signalled(job: &Job, at: u64, kind: Signal) -> bool {
+    let mut child = quiet(job.in_front()).spawn().unwrap();
     if reached(&mut child, job, at) {
-        match number {
-            SIGKILL => child.kill().unwrap(),
-            _ => signal(&child, "-INT"),
-        }
+        signal(&child, kind);
     }
-    child.wait().unwrap().signal() == Some(number)
+    child.wait().unwrap().signal() == Some(kind.as_raw())
 }
 
+/// Who reads goes away at once, or after some bytes: by then a quick command may have written all.
 fn closed_pipe(job: &Job, at: u64) -> bool {
-    let mut child = job.command().stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    let mut pipe = child.stdout.take().unwrap();
-    let mut bytes = vec![0; (at % 40) as usize];
-    // Fewer bytes than the command says: the pipe is closed within its text.
-    let _ = pipe.read(&mut bytes);
-    drop(pipe);
+    let (pipe, end) = std::io::pipe().unwrap();
+    let mut stays = (!at.is_multiple_of(2)).then_some(pipe);
+    let child = job.command().stdout(end).stderr(Stdio::piped()).spawn().unwrap();
+    if let Some(pipe) = &mut stays {
+        // Fewer bytes than the command says: the pipe is closed within its text.
+        let _ = pipe.read(&mut vec![0; (at % 40) as usize]);
+    }
+    drop(stays);
     let output = child.wait_with_output().unwrap();
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code().is_some_and(|code| code < 2), "{}: {told}", job.name);
@@ -149,10 +146,10 @@ fn two(job: &Job, kill: bool) -> bool {
     if !reached(first, job, 1) {
         return false;
     }
-    signal(first, "-STOP");
+    signal(first, Signal::STOP);
     if !job.growing.exists() {
         // It had come to its end meanwhile.
-        signal(first, "-CONT");
+        signal(first, Signal::CONT);
         first.wait().unwrap();
         return false;
     }
@@ -165,7 +162,7 @@ fn two(job: &Job, kill: bool) -> bool {
         first.wait().unwrap();
         job.check_parts("the first was killed");
     } else {
-        signal(first, "-CONT");
+        signal(first, Signal::CONT);
         assert!(first.wait().unwrap().code().is_some_and(|code| code < 2));
         job.check_left("a second was refused");
     }

@@ -7,6 +7,7 @@ pub mod press;
 pub mod record;
 pub mod recover;
 pub mod scan;
+pub mod stream;
 pub mod tare;
 pub mod view;
 

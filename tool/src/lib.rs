@@ -7,6 +7,7 @@ pub mod client;
 pub mod commands;
 pub mod error;
 pub mod line;
+pub mod messages;
 pub mod state;
 pub mod table;
 

@@ -3,7 +3,7 @@
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
-use fingertip_cli::commands::{info, latency, params, press, record, recover, scan, tare, view};
+use fingertip_cli::commands::{info, latency, params, press, record, recover, scan, stream, tare, view};
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -43,6 +43,8 @@ enum Command {
     Info,
     /// Watch map, force, goal, mode and faults live
     View(view::Args),
+    /// Stream states live to Foxglove, over a WebSocket
+    Stream(stream::Args),
     /// Record states with the controller's own times, as CSV or MCAP
     Record(record::Args),
     /// Read, write, save, back up and restore the parameters
@@ -86,6 +88,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Scan(args) => scan::run(args, &cli.reach, cli.json),
         Command::Info => info::run(&mut connect()?, cli.json),
         Command::View(args) => view::run(args, &mut connect()?),
+        Command::Stream(args) => stream::run(args, &mut connect()?),
         Command::Record(args) => record::run(args, &mut connect()?, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),

@@ -27,8 +27,9 @@ pub fn run(choice: Choice) -> Result<()> {
         }
         Ok(())
     });
-    stages.stage("lints, plugin", |console| {
-        console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))
+    stages.stage("lints, what is built where it is asked for", |console| {
+        console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))?;
+        console.run(&mut clippy(&["--package", "fingertip-cli", "--features", "foxglove", "--all-targets"]))
     });
     stages.stage("lints, microcontroller", |console| {
         let toolchain = toolchain::ensure(choice, console)?;

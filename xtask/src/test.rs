@@ -43,6 +43,10 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
         command.args(["--test", "python"]).env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
         host::test(&mut command, console)
     });
+    stages.stage("stream to Foxglove", |console| {
+        let mut command = host::cargo("test", "fingertip-cli");
+        host::test(command.args(["--features", "foxglove", "--test", "stream"]), console)
+    });
     stages.stage("reports in a browser", |console| {
         let program = browser::ensure(console)?;
         host::test(host::cargo("test", "browser").env("FINGERTIP_CHROMIUM", &program), console)

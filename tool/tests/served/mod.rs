@@ -1,4 +1,5 @@
 //! A finger that is served from a thread, and `fingertip` set on it.
+#![allow(dead_code, reason = "each test takes what it needs")]
 
 use serve::native::Native;
 use serve::{Place, Port, Stop};

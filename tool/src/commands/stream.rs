@@ -1,0 +1,36 @@
+//! `fingertip stream`.
+
+#[cfg(feature = "foxglove")]
+mod server;
+
+use crate::{Client, Error};
+
+/// Where to stream to.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  \
+    fingertip stream    (in Foxglove: Open connection, Foxglove WebSocket, ws://localhost:8765)")]
+pub struct Args {
+    /// Address to listen on; 0.0.0.0 lets other machines in
+    #[arg(long, default_value = "127.0.0.1")]
+    listen: String,
+    /// TCP port to listen on; 0 takes a free one
+    #[arg(long, default_value_t = 8765)]
+    tcp: u16,
+    /// States a second
+    #[arg(long, default_value_t = 60.0)]
+    rate_hz: f64,
+}
+
+/// Streams until Ctrl-C.
+///
+/// # Errors
+/// The port is taken, or this build cannot.
+pub fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
+    #[cfg(feature = "foxglove")]
+    return server::run(args, client);
+    #[cfg(not(feature = "foxglove"))]
+    {
+        let _ = (args, client);
+        Err("this build does not stream: `cargo install --path tool --features foxglove` makes one that does".into())
+    }
+}

@@ -1,0 +1,128 @@
+//! A state as messages for what shows recordings: the topics and the names of the scenes', so that what shows those shows
+//! these. The numbers are `fingertip.Scalars`, the pressures a picture in grey.
+
+use crate::state::{SHAPE, State};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
+use serde_json::{Map, Value, json};
+
+/// The names of a scene's scalars that a controller knows, and what they are.
+const SCALARS: [(&str, &str); 13] = [
+    ("time_s", "The controller's time from the first state"),
+    ("goal_n", "The force asked for"),
+    ("sensed_force_n", "Normal force as the controller senses it"),
+    ("indentation_mm", "Indentation of the tip, by the model"),
+    ("travel_mm", "Way of the tip since torque was enabled"),
+    ("speed_mm_per_s", "Speed of the tip"),
+    ("duty_percent", "Share of the supply at the motor; positive presses"),
+    ("centre_x_mm", "Sensed centre of the contact along the columns"),
+    ("centre_y_mm", "Sensed centre of the contact along the rows"),
+    ("confidence_percent", "Confidence that the contact is a tip on a plane"),
+    ("mode", "Mode, by its number on the bus"),
+    ("fault", "Fault, by its number on the bus; 0 is none"),
+    ("limits", "Limits, a bit each as on the bus"),
+];
+/// Pa for a grey level: that of the scenes, 8 codes at 24 codes for a kPa.
+const PA_PER_GREY: i64 = 333;
+
+/// A kind of message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Topic {
+    /// The numbers.
+    Scalars,
+    /// The pressures.
+    Image,
+}
+
+impl Topic {
+    /// Its name for a controller.
+    pub fn name(self, id: u8) -> String {
+        let kind = match self {
+            Self::Scalars => "scalars",
+            Self::Image => "image",
+        };
+        format!("/finger{}/{kind}", id.saturating_sub(1))
+    }
+
+    /// Its schema's name.
+    pub fn schema_name(self) -> &'static str {
+        match self {
+            Self::Scalars => "fingertip.Scalars",
+            Self::Image => "foxglove.RawImage",
+        }
+    }
+
+    /// Its schema, as JSON Schema.
+    pub fn schema(self) -> Vec<u8> {
+        let schema = match self {
+            Self::Scalars => scalars_schema(),
+            Self::Image => image_schema(),
+        };
+        schema.to_string().into_bytes()
+    }
+
+    /// A state's message, in JSON.
+    pub fn message(self, time_s: f64, state: &State) -> Vec<u8> {
+        let message = match self {
+            Self::Scalars => scalars(time_s, state),
+            Self::Image => image(time_s, state),
+        };
+        message.to_string().into_bytes()
+    }
+}
+
+fn scalars(time_s: f64, state: &State) -> Value {
+    let thousandth = |value: i64| value as f64 * 1e-3;
+    let values = [
+        json!(time_s),
+        json!(thousandth(state.goal_mn)),
+        json!(thousandth(state.force_mn)),
+        json!(thousandth(state.indentation_um)),
+        json!(thousandth(state.travel_um)),
+        json!(thousandth(state.speed_um_per_s)),
+        json!(state.duty_permille as f64 * 0.1),
+        json!(thousandth(state.centre_x_um)),
+        json!(thousandth(state.centre_y_um)),
+        json!(state.confidence as f64 / 2.55),
+        json!(state.mode),
+        json!(state.fault),
+        json!(state.limits),
+    ];
+    let names = SCALARS.iter().map(|(name, _)| (*name).to_owned());
+    Value::Object(names.zip(values).collect::<Map<_, _>>())
+}
+
+fn image(time_s: f64, state: &State) -> Value {
+    let [rows, columns] = SHAPE;
+    let grey = |pa: &i64| (pa / PA_PER_GREY).clamp(0, 255) as u8;
+    // The last row on top.
+    let data: Vec<u8> = state.pressures_pa.chunks(columns).rev().flatten().map(grey).collect();
+    json!({
+        "timestamp": { "sec": time_s as u64, "nsec": (time_s.fract() * 1e9) as u32 },
+        "frame_id": "array", "width": columns, "height": rows, "encoding": "mono8", "step": columns,
+        "data": BASE64_STANDARD.encode(data),
+    })
+}
+
+fn scalars_schema() -> Value {
+    let number = |about: &str| json!({ "type": "number", "description": about });
+    let properties: Map<_, _> = SCALARS.iter().map(|(name, about)| ((*name).to_owned(), number(about))).collect();
+    json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
+}
+
+/// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it.
+fn image_schema() -> Value {
+    let count = json!({ "type": "integer", "minimum": 0 });
+    json!({
+        "title": "foxglove.RawImage",
+        "type": "object",
+        "properties": {
+            "timestamp": { "type": "object", "title": "time", "properties": { "sec": count, "nsec": count } },
+            "frame_id": { "type": "string" },
+            "width": count,
+            "height": count,
+            "encoding": { "type": "string" },
+            "step": count,
+            "data": { "type": "string", "contentEncoding": "base64" },
+        },
+    })
+}

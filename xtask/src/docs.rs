@@ -12,9 +12,10 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the package and its example that print their text.
-const GENERATED: [(&str, (&str, &str)); 6] = [
+const GENERATED: [(&str, (&str, &str)); 7] = [
     ("docs/control-table.md", ("host-tests", "control-table")),
     ("docs/scenes.md", ("sim", "scenes-page")),
+    ("docs/budget.md", ("sim", "budget-page")),
     ("docs/pictures/imports.svg", ("host-tests", "imports")),
     ("examples/dynamixel/fingertip.model", ("host-tests", "model-file")),
     ("examples/dynamixel/fingertip_direct.model", ("host-tests", "model-file-direct")),

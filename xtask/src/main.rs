@@ -71,6 +71,12 @@ enum Command {
         after_help = "Examples:\n  cargo xtask population ordinary --fingers 100\n  cargo xtask population --help    (all that it takes)"
     )]
     Population(sim::Args),
+    /// Say how much of the force's error each weakness of a usual finger makes
+    #[command(
+        disable_help_flag = true,
+        after_help = "Examples:\n  cargo xtask budget --fingers 300\n  cargo xtask budget --help    (all that it takes)"
+    )]
+    Budget(sim::Args),
     /// Fit a real sensor's characteristic or creep to recordings, and judge it on others
     #[command(
         disable_help_flag = true,
@@ -138,6 +144,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sim(args) => sim::sim(args, toolchain, console),
         Command::Sweep(args) => sim::sweep(args, console),
         Command::Population(args) => sim::population(args, toolchain, console),
+        Command::Budget(args) => sim::budget(args, console),
         Command::Sensor(args) => sim::sensor(args, console),
         Command::Serve(args) => serve::run(args, toolchain, console),
         Command::Test(args) => test::run(args, toolchain),

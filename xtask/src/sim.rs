@@ -40,6 +40,14 @@ pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<
     on_board("population", args, choice, console)
 }
 
+/// Says what makes the force wrong.
+///
+/// # Errors
+/// As [`sim`].
+pub fn budget(args: &Args, console: &mut Console) -> Result<()> {
+    start(host::Program::sim("budget").build(console)?.args(&args.arguments))
+}
+
 /// Fits a sensor to recordings.
 ///
 /// # Errors

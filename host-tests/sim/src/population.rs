@@ -3,6 +3,7 @@
 //! A population's file is a scene whose values may be drawn, each finger anew. Its bounds are the envelope: what each
 //! finger promises. A finger is a scene like any other, so what is found can be run again by itself.
 
+pub mod budget;
 pub mod cli;
 mod draw;
 mod expression;

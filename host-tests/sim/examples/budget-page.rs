@@ -1,0 +1,14 @@
+//! Prints `docs/budget.md`: what makes the force wrong.
+
+use sim::native;
+use sim::population::budget::Budget;
+
+/// Enough that the larger causes come in the same order with other draws.
+const FINGERS: usize = 24;
+
+fn main() {
+    match Budget::of(FINGERS, &native::board) {
+        Ok(budget) => print!("{}", budget.page()),
+        Err(why) => panic!("{why}"),
+    }
+}

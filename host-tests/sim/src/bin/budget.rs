@@ -1,0 +1,29 @@
+//! `budget`: what makes the force wrong, by fingers without one cause at a time.
+
+use clap::Parser;
+use host_tests::say;
+use sim::native;
+use sim::population::budget::Budget;
+use std::process::ExitCode;
+
+/// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1 and 5 N.
+#[derive(Debug, Parser)]
+#[command(name = "budget", version, after_help = "Example:\n  budget --fingers 300")]
+struct Args {
+    /// How many fingers, each run 14 times
+    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]
+    fingers: u32,
+}
+
+fn main() -> ExitCode {
+    match Budget::of(Args::parse().fingers as usize, &native::board) {
+        Ok(budget) => {
+            say::text(budget.page());
+            ExitCode::SUCCESS
+        }
+        Err(why) => {
+            say::aside(why);
+            ExitCode::from(2)
+        }
+    }
+}

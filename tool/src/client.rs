@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 const ALERT: u8 = 0x80;
 /// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
 const PING_BITS: u32 = 14 * 10;
+/// No bus is slower: all IDs would take minutes to answer.
+pub const BAUD_MIN: i64 = 1_200;
 
 /// How to reach a controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -22,7 +24,7 @@ pub struct Reach {
     #[arg(long, short, global = true, env = "FINGERTIP_PORT")]
     pub port: Option<String>,
     /// Bus speed
-    #[arg(long, short, global = true, default_value_t = 1_000_000)]
+    #[arg(long, short, global = true, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
     pub baud: u32,
     /// The controller's address on the bus
     #[arg(long, short, global = true, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=252))]

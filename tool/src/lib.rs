@@ -8,6 +8,7 @@ pub mod commands;
 pub mod error;
 pub mod line;
 pub mod messages;
+pub mod numbers;
 pub mod state;
 pub mod table;
 

@@ -2,7 +2,7 @@
 
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
 use crate::state::{Clock, State};
-use crate::{Client, Error};
+use crate::{Client, Error, numbers};
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
@@ -23,12 +23,13 @@ const WATCHDOG_UNIT_MS: i64 = 20;
 #[command(after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10")]
 pub struct Args {
     /// Force to hold, N
+    #[arg(value_parser = numbers::newtons)]
     newtons: f64,
     /// How long to hold it
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 2.0, value_parser = numbers::seconds)]
     seconds: f64,
     /// How long the approach may take until the force is held
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 

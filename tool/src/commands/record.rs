@@ -5,7 +5,7 @@ mod mcap;
 
 use super::{Interrupt, aside, say_json};
 use crate::state::{Clock, State};
-use crate::{Client, Error};
+use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
 use std::fs::{self, File};
@@ -28,10 +28,10 @@ pub struct Args {
     /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV
     file: PathBuf,
     /// For how long; without it, until Ctrl-C
-    #[arg(long)]
+    #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
     /// How many states a second to ask for; 0 asks as fast as answers come
-    #[arg(long, default_value_t = 200.0)]
+    #[arg(long, default_value_t = 200.0, value_parser = numbers::rate_hz_or_all)]
     rate_hz: f64,
     /// With the pressure of each taxel
     #[arg(long)]
@@ -119,7 +119,7 @@ fn take(
     interrupt: &Interrupt,
     sink: &mut dyn Sink,
 ) -> Result<(Counts, Option<Error>), Error> {
-    let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz.min(1e6)) } else { Duration::ZERO };
+    let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
     let (mut counts, mut clock, mut frame, mut row) = (Counts::default(), Clock::default(), None, 0);
     let mut due = Instant::now();
     while !interrupt.came() {

@@ -1,6 +1,8 @@
 //! A finger that is served from a thread, and `fingertip` set on it.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+use fingertip::link::Reply;
+use fingertip::link::sender;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
 use sim::effects::set::Named;
@@ -38,7 +40,14 @@ impl serve::Finger for Told {
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
-            let done = self.native.command(&command);
+            let done = match command.strip_prefix("raw ") {
+                // As another host on the bus would.
+                Some(number) => {
+                    self.native.0.hear(&instruction(number.parse().expect("an instruction's number")));
+                    Ok(String::new())
+                }
+                None => self.native.command(&command),
+            };
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
             (0..20).for_each(|_| self.native.0.frame());
             answer.send(done).expect("somebody waits for it");
@@ -140,6 +149,18 @@ impl Served {
         complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
     }
 
+    /// What it complains of where it does not understand.
+    pub fn not_understood(arguments: &[&str]) -> String {
+        let output = Command::new(env!("CARGO_BIN_EXE_fingertip"))
+            .env("FINGERTIP_PORT", "/nowhere")
+            .args(arguments)
+            .output()
+            .expect("it starts");
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
+        err
+    }
+
     /// Ctrl-C.
     pub fn interrupt(child: &Child) {
         let pid = i32::try_from(child.id()).expect("a process number");
@@ -153,6 +174,13 @@ impl Drop for Served {
         self.stop.stop();
         let _ = std::fs::remove_dir_all(&self.folder);
     }
+}
+
+/// An instruction to ID 1, without parameters.
+fn instruction(number: u8) -> Vec<u8> {
+    let mut packet = Reply::new();
+    sender::Sender::new(&mut packet, 1, number).finish();
+    packet.to_vec()
 }
 
 fn said(output: &Output) -> String {

@@ -1,6 +1,8 @@
 //! Every command against a served finger: the native core and link behind a pseudo-terminal. Judged by words, bytes and
 //! counts, never by the clock.
 
+mod attacked;
+#[path = "../served/mod.rs"]
 mod served;
 
 use fingertip::params::Params;

@@ -155,7 +155,7 @@ fn take(
         }
         // The rate holds on average: a state that came late is made up for, where it was not too late.
         due = (due + period).max(Instant::now().checked_sub(LATE_MAX).unwrap_or(due));
-        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        interrupt.pause(due);
     }
     Ok((counts, None))
 }

@@ -52,7 +52,7 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
             }
         }
         due = (due + period).max(Instant::now().checked_sub(period).unwrap_or(due));
-        sleep(due.saturating_duration_since(Instant::now()));
+        interrupt.pause(due);
     }
     server.stop().wait_blocking();
     Ok(())

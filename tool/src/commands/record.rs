@@ -4,7 +4,7 @@ mod csv;
 mod mcap;
 
 use super::{Interrupt, aside, say_json};
-use crate::state::{Clock, State};
+use crate::state::{ANEW, Clock, State};
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
@@ -127,7 +127,7 @@ fn take(
         match read {
             Ok(state) => {
                 row = 0;
-                let time_s = clock.time_s(state.time_us);
+                let Some(time_s) = clock.time_s(&state) else { return Ok((counts, Some(ANEW.into()))) };
                 if args.seconds.is_some_and(|seconds| time_s > seconds) {
                     break;
                 }

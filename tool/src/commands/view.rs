@@ -48,7 +48,11 @@ impl Seen {
     pub fn take(&mut self, read: Result<State, Error>) {
         match read {
             Ok(state) => {
-                let time_s = self.clock.time_s(state.time_us);
+                let time_s = self.clock.time_s(&state).unwrap_or_else(|| {
+                    // The past is another run's.
+                    self.past.clear();
+                    self.clock.time_s(&state).unwrap_or_default()
+                });
                 self.past.push_back((time_s, state.force_mn, state.goal_mn));
                 while self.past.front().is_some_and(|(at_s, ..)| time_s - at_s > PAST_S) {
                     self.past.pop_front();

@@ -1,7 +1,9 @@
 //! What a host's program must not do, whatever it is asked and whatever happens to the controller meanwhile.
 
 use crate::served::Served;
+use fingertip::link::packet::instruction::REBOOT;
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
 
 #[test]
 fn numbers_that_are_none_are_not_understood() {
@@ -43,4 +45,40 @@ fn a_pause_between_states_ends_at_once() {
     Served::interrupt(&child);
     assert!(child.wait().expect("it ends").success());
     assert!(fs::read_to_string(&file).expect("it is there").starts_with("time_s,"));
+}
+
+#[test]
+fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let file = finger.file("again.csv");
+    let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
+    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+        std::thread::yield_now();
+    }
+    finger.command(&format!("raw {REBOOT}"));
+    let output = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the recording ends after") && said.contains("started anew"), "{said}");
+    // What it had is whole, and its times are.
+    let text = fs::read_to_string(&file).expect("it is there");
+    let times: Vec<f64> =
+        text.lines().skip(1).map(|row| row.split(',').next().expect("a cell").parse().expect("a time")).collect();
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times.last() < Some(&4_000.0), "{:?}", times.last());
+
+    finger.done(&["tare"]);
+    let mut child = finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
+    let mut reader = BufReader::new(child.stderr.take().expect("it was asked for"));
+    let mut line = String::new();
+    while !line.starts_with("force") {
+        line.clear();
+        reader.read_line(&mut line).expect("it says how it stands");
+    }
+    finger.command(&format!("raw {REBOOT}"));
+    let mut rest = String::new();
+    reader.read_to_string(&mut rest).expect("it says why it ends");
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(1), "{rest}{}", String::from_utf8_lossy(&output.stdout));
+    assert!(rest.contains("started anew"), "{rest}");
 }

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::link::Reply;
+use fingertip::link::packet::BROADCAST;
 use fingertip::link::sender;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
@@ -176,10 +177,10 @@ impl Drop for Served {
     }
 }
 
-/// An instruction to ID 1, without parameters.
+/// An instruction to all, which nobody answers, without parameters.
 fn instruction(number: u8) -> Vec<u8> {
     let mut packet = Reply::new();
-    sender::Sender::new(&mut packet, 1, number).finish();
+    sender::Sender::new(&mut packet, BROADCAST, number).finish();
     packet.to_vec()
 }
 

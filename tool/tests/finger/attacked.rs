@@ -82,3 +82,18 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     assert_eq!(output.status.code(), Some(1), "{rest}{}", String::from_utf8_lossy(&output.stdout));
     assert!(rest.contains("started anew"), "{rest}");
 }
+
+#[test]
+fn a_register_that_is_named_twice_changes_nothing() {
+    let finger = Served::begin("wall");
+    let before = finger.json(&["params", "get"]);
+    let why = finger.refused(&["params", "set", "modulus_pa=300000", "clearance_um=500", "MODULUS_PA=200000"]);
+    assert!(why.contains("modulus_pa stands there twice") && why.contains("nothing was changed"), "{why}");
+    let file = finger.file("twice.toml");
+    fs::write(&file, "[parameters]\nmodulus_pa = 300000\nclearance_um = 500\nModulus_Pa = 200000\n").expect("a file");
+    for command in ["restore", "diff"] {
+        let why = finger.refused(&["params", command, &file]);
+        assert!(why.contains("modulus_pa stands there twice"), "{why}");
+    }
+    assert_eq!(finger.json(&["params", "get"]), before);
+}

@@ -1,6 +1,6 @@
 //! A backup: TOML, a line each with its meaning.
 
-use super::Value;
+use super::{Value, twice};
 use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::shipped::address;
@@ -56,5 +56,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
             (Err(why), _) => wrong.push(why),
         }
     }
+    wrong.extend(twice(&values));
     if wrong.is_empty() { Ok(values) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }

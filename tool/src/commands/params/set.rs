@@ -3,7 +3,7 @@
 //! The parameters lie side by side, so they go out in one packet, which the controller takes whole or not at all. The
 //! few others have a packet each: where one is refused, what was set before is put back.
 
-use super::{Value, is_bus, is_param};
+use super::{Value, is_bus, is_param, twice};
 use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::link::table::Register;
@@ -20,7 +20,7 @@ pub(super) type Changed = (&'static Register, i64, i64);
 /// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says how
 /// it stands.
 pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
-    let wrong: Vec<String> = values.iter().filter_map(wrong).collect();
+    let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
         return Err(format!("{}; nothing was changed", wrong.join("; ")).into());
     }

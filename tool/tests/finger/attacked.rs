@@ -97,3 +97,27 @@ fn a_register_that_is_named_twice_changes_nothing() {
     }
     assert_eq!(finger.json(&["params", "get"]), before);
 }
+
+#[test]
+fn a_backup_that_was_cut_changes_nothing() {
+    let finger = Served::begin("wall");
+    let file = finger.file("cut.toml");
+    finger.done(&["params", "set", "creep_time_ms=20000", "modulus_pa=300000"]);
+    finger.done(&["params", "backup", &file]);
+    let whole = fs::read_to_string(&file).expect("it was written");
+    finger.done(&["params", "set", "creep_time_ms=10000", "modulus_pa=250000"]);
+    let before = finger.json(&["params", "get"]);
+    let number = whole.rfind("20000").expect("the last parameter") + 4;
+    let lines = whole.match_indices('\n').map(|(at, _)| at + 1).filter(|at| *at < whole.len());
+    // In the middle of the last number, in the middle of the last line, before its end, and between two lines.
+    for at in [number, number + 9, whole.len() - 1].into_iter().chain(lines.step_by(7)) {
+        fs::write(&file, &whole[..at]).expect("a file");
+        let why = finger.refused(&["params", "restore", &file]);
+        assert!(why.contains("cannot read"), "cut at {at}: {why}");
+        assert_eq!(finger.json(&["params", "get"]), before, "cut at {at}");
+    }
+    // Who leaves some out says so.
+    fs::write(&file, "[parameters]\nmodulus_pa = 300000").expect("a file");
+    finger.done(&["params", "restore", &file]);
+    assert_eq!(finger.json(&["params", "get", "modulus_pa"]), serde_json::json!({ "modulus_pa": 300_000 }));
+}

@@ -11,6 +11,8 @@ use std::path::Path;
 use toml_edit::Document;
 
 const TABLE: &str = "parameters";
+/// How many there are: a file that was cut has fewer, or a last line without an end.
+const COUNT: &str = "entries";
 
 /// Writes it, whole or not at all.
 pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Value]) -> Result<(), Error> {
@@ -19,9 +21,10 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
     let pong = client.ping()?;
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
-         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\n[{TABLE}]\n",
+         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n{COUNT} = {}\n\n[{TABLE}]\n",
         pong.firmware,
-        information >> 16
+        information >> 16,
+        values.len()
     );
     for (register, value) in values {
         let doc = register.doc.trim();
@@ -48,6 +51,15 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
     let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
     let table = document.get(TABLE).and_then(|item| item.as_table());
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{TABLE}]")))?;
+    if let Some(count) = document.get(COUNT).and_then(|item| item.as_integer())
+        && (count != table.len() as i64 || !text.ends_with('\n'))
+    {
+        let why = format!(
+            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. Where that is meant, take out the line `{COUNT}`",
+            table.len()
+        );
+        return Err(Error::file("read", path, why));
+    }
     let (mut values, mut wrong) = (Vec::new(), Vec::new());
     for (key, item) in table.iter() {
         match (table::find(key), item.as_integer()) {

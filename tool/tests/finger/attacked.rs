@@ -121,3 +121,17 @@ fn a_backup_that_was_cut_changes_nothing() {
     finger.done(&["params", "restore", &file]);
     assert_eq!(finger.json(&["params", "get", "modulus_pa"]), serde_json::json!({ "modulus_pa": 300_000 }));
 }
+
+#[test]
+fn an_address_that_another_has_is_refused() {
+    let finger = Served::begin("grasp");
+    let why = finger.refused(&["params", "set", "id=2", "modulus_pa=300000"]);
+    assert!(why.contains("another device has the ID 2") && why.contains("Nothing was changed"), "{why}");
+    let ids: Vec<_> = finger.json(&["scan", "--speeds", "1000000"]).as_array().expect("a list").clone();
+    assert_eq!(ids.iter().map(|found| found["id"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2)]);
+    assert_ne!(finger.json(&["params", "get", "modulus_pa"])["modulus_pa"], 300_000);
+    // Its own is none, and a free one is free.
+    finger.done(&["params", "set", "id=1"]);
+    finger.done(&["params", "set", "id=3"]);
+    finger.done(&["--id", "3", "params", "set", "id=1"]);
+}

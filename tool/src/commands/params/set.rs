@@ -37,6 +37,12 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
     }
+    for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
+        if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
+            let why = "two with one ID cannot be told apart, nor set apart again";
+            return Err(format!("another device has the ID {id}: {why}. Nothing was changed").into());
+        }
+    }
     let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
     changed.retain(|(_, from, to)| from != to);
     if after != before {

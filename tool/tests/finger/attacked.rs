@@ -2,6 +2,8 @@
 
 use crate::served::Served;
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip_cli::Client;
+use fingertip_cli::client::Reach;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
 
@@ -134,4 +136,21 @@ fn an_address_that_another_has_is_refused() {
     finger.done(&["params", "set", "id=1"]);
     finger.done(&["params", "set", "id=3"]);
     finger.done(&["--id", "3", "params", "set", "id=1"]);
+}
+
+#[test]
+fn recover_says_torque_is_off_only_where_it_is() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let mut client = client(&finger);
+    client.set(fingertip::shipped::address::TORQUE_ENABLE, 1).expect("it is taken");
+    drop(client);
+    let said = finger.done(&["recover"]);
+    assert!(said.starts_with("there was nothing to recover from; torque is on"), "{said}");
+    assert_eq!(finger.json(&["info"])["torque_enable"], 1);
+}
+
+fn client(finger: &Served) -> Client {
+    let port = Some(finger.port.clone());
+    Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
 }

@@ -11,6 +11,7 @@ pub mod messages;
 pub mod numbers;
 pub mod state;
 pub mod table;
+pub mod whole;
 
 pub use client::Client;
 pub use error::Error;

@@ -5,11 +5,11 @@ mod mcap;
 
 use super::{Interrupt, aside, say_json};
 use crate::state::{ANEW, Clock, State};
+use crate::whole::Part;
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -64,27 +64,22 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
     let format = args.format.map_or_else(|| of_name(&args.file), Ok)?;
-    let part = beside(&args.file);
+    let part = whole.then(|| Part::begin(&args.file)).transpose()?;
+    let to = part.as_ref().map(Part::file).transpose();
     let file = |why: io::Error| Error::file("write", &args.file, why);
-    let out: Box<dyn Write> = if whole {
-        Box::new(BufWriter::new(File::create(&part).map_err(file)?))
-    } else {
-        Box::new(io::stdout().lock())
+    let sink: io::Result<Box<dyn Sink>> = match (format, to.map_err(file)?) {
+        (Format::Csv, Some(to)) => csv::Csv::new(BufWriter::new(to), args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Csv, None) => csv::Csv::new(io::stdout().lock(), args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Mcap, Some(to)) => mcap::Mcap::new(to, client.id, args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Mcap, None) => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
     };
-    let mut sink: Box<dyn Sink> = match format {
-        Format::Csv => Box::new(csv::Csv::new(out, args.pressures).map_err(file)?),
-        Format::Mcap if whole => {
-            drop(out);
-            Box::new(mcap::Mcap::new(&part, client.id, args.pressures).map_err(file)?)
-        }
-        Format::Mcap => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
-    };
+    let mut sink = sink.map_err(file)?;
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
     let wall_s = begun.elapsed().as_secs_f64();
     sink.finish().map_err(file)?;
-    if whole {
-        fs::rename(&part, &args.file).map_err(file)?;
+    if let Some(part) = part {
+        part.place().map_err(file)?;
     }
     let (counts, lost) = taken?;
     let Counts { states, repeated, missed, .. } = counts;
@@ -167,11 +162,4 @@ fn of_name(file: &Path) -> Result<Format, String> {
         Some("mcap") => Ok(Format::Mcap),
         _ => Err(format!("{}: a name that ends with .csv or .mcap is asked for, or --format", file.display())),
     }
-}
-
-/// What is being written until it is whole.
-fn beside(file: &Path) -> PathBuf {
-    let mut name = file.file_name().unwrap_or_default().to_owned();
-    name.push(".new");
-    file.with_file_name(name)
 }

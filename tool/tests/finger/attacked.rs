@@ -6,6 +6,7 @@ use fingertip_cli::Client;
 use fingertip_cli::client::Reach;
 use std::fs;
 use std::io::{BufRead as _, BufReader, Read as _};
+use std::os::unix::fs::FileTypeExt as _;
 
 #[test]
 fn numbers_that_are_none_are_not_understood() {
@@ -153,4 +154,31 @@ fn recover_says_torque_is_off_only_where_it_is() {
 fn client(finger: &Served) -> Client {
     let port = Some(finger.port.clone());
     Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
+}
+
+#[test]
+fn only_files_are_written_in_place_and_by_one_at_a_time() {
+    let finger = Served::begin("wall");
+    let pipe = finger.file("pipe.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("it starts").success());
+    for arguments in [&["record", "--seconds", "0", &pipe][..], &["params", "backup", "--force", &pipe]] {
+        let why = finger.refused(arguments);
+        assert!(why.contains("it is no file"), "{why}");
+        assert!(fs::metadata(&pipe).expect("it is there").file_type().is_fifo());
+    }
+    // The folder is refused before anything is recorded, so nothing is lost.
+    let why = finger.refused(&["record", "--seconds", "0", "--format", "csv", &finger.file("")]);
+    assert!(why.contains("it is no file"), "{why}");
+
+    let other = Served::begin("wall");
+    let file = finger.file("both.csv");
+    let child = finger.start(&["record", &file]);
+    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+        std::thread::yield_now();
+    }
+    let why = other.refused(&["record", "--seconds", "0", &file]);
+    assert!(why.contains("another program is writing"), "{why}");
+    Served::interrupt(&child);
+    assert!(child.wait_with_output().expect("it ends").status.success());
+    assert!(fs::read_to_string(&file).expect("it is there").lines().count() > 10);
 }

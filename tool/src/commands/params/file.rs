@@ -2,10 +2,11 @@
 
 use super::{Value, twice};
 use crate::table::{self, name};
+use crate::whole::Part;
 use crate::{Client, Error};
 use fingertip::shipped::address;
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 use toml_edit::Document;
@@ -34,12 +35,9 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
     if path.exists() && !force {
         return Err(format!("{} is there already: --force writes over it", path.display()).into());
     }
-    let mut part = path.file_name().unwrap_or_default().to_owned();
-    part.push(".new");
-    let part = path.with_file_name(part);
-    let mut file = OpenOptions::new().create(true).truncate(true).write(true).open(&part).map_err(failed)?;
-    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(failed)?;
-    fs::rename(&part, path).map_err(failed)
+    let part = Part::begin(path)?;
+    part.file().and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)?;
+    part.place().map_err(failed)
 }
 
 /// Reads it.

@@ -73,7 +73,11 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         (Format::Mcap, Some(to)) => mcap::Mcap::new(to, client.id, args.pressures).map(|sink| Box::new(sink) as _),
         (Format::Mcap, None) => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
     };
-    let mut sink = sink.map_err(file)?;
+    let mut sink = match sink {
+        // Who closed the pipe wanted nothing at all.
+        Err(why) if why.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+        other => other.map_err(file)?,
+    };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
     let wall_s = begun.elapsed().as_secs_f64();

@@ -182,3 +182,17 @@ fn only_files_are_written_in_place_and_by_one_at_a_time() {
     assert!(child.wait_with_output().expect("it ends").status.success());
     assert!(fs::read_to_string(&file).expect("it is there").lines().count() > 10);
 }
+
+#[test]
+fn a_full_disk_is_told_and_a_closed_pipe_is_no_error() {
+    let finger = Served::begin("wall");
+    // Nobody reads from the first byte on.
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], writer);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], full);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("cannot write -: No space left"), "{said}");
+}

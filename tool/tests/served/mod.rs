@@ -119,6 +119,12 @@ impl Served {
         self.fingertip(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
     }
 
+    /// The end of one that writes to another place.
+    pub fn writing_to(&self, arguments: &[&str], place: impl Into<Stdio>) -> Output {
+        let child = self.fingertip(arguments).stdout(place).stderr(Stdio::piped()).spawn().expect("it starts");
+        child.wait_with_output().expect("it ends")
+    }
+
     fn fingertip(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
         command.env("FINGERTIP_PORT", &self.port).args(arguments);

@@ -177,6 +177,40 @@ fn tcp_takes_one_client_after_another_and_says_so() {
 }
 
 #[test]
+fn a_busy_port_says_so_also_to_who_speaks_first() {
+    let served = Served::begin(&["--tcp", "0"]);
+    let _first = TcpStream::connect(&served.name).expect("it listens");
+    for _ in 0..50 {
+        let mut words = String::new();
+        let mut second = TcpStream::connect(&served.name).expect("it listens");
+        second.write_all(&PING).expect("the system takes it");
+        second.read_to_string(&mut words).expect("words, and an end");
+        assert!(words.starts_with("busy: 127.0.0.1:"), "{words}");
+    }
+}
+
+#[test]
+fn who_has_gone_keeps_nobody_out() {
+    let mut served = Served::begin(&["--tcp", "0"]);
+    let pid = rustix::process::Pid::from_raw(served.child.id() as i32).expect("a process number");
+    let signal = |signal| rustix::process::kill_process(pid, signal).expect("it runs");
+    for _ in 0..20 {
+        // It sleeps while one goes and the next comes, as on a busy machine.
+        let mut first = TcpStream::connect(&served.name).expect("it listens");
+        served.ask("fault");
+        signal(rustix::process::Signal::STOP);
+        first.write_all(&PING).expect("the system takes it");
+        drop(first);
+        let mut next = TcpStream::connect(&served.name).expect("the system takes it");
+        signal(rustix::process::Signal::CONT);
+        next.write_all(&PING).expect("it listens");
+        let mut reply = [0; 14];
+        next.read_exact(&mut reply).expect("it answers");
+        assert_eq!(reply[..12], PONG);
+    }
+}
+
+#[test]
 fn what_is_there_is_told() {
     let why = refused(&program(&["wal"]).output().expect("it starts"));
     assert!(why.contains("no scene wal") && why.contains("did you mean `wall`?") && why.contains("raspberry"), "{why}");

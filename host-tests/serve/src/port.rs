@@ -8,8 +8,10 @@ use pty::Pty;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::AsFd;
 use rustix::io::Errno;
+use rustix::process::getpgrp;
+use rustix::termios::tcgetpgrp;
 use std::collections::VecDeque;
-use std::io::{self, PipeReader, PipeWriter, Write as _};
+use std::io::{self, IsTerminal as _, PipeReader, PipeWriter, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -121,7 +123,7 @@ impl Port {
             Opened::Pty(pty) => watched.push(PollFd::new(pty.near(), PollFlags::IN)),
             Opened::Tcp(tcp) => watched.extend(tcp.watched().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))),
         }
-        let side = self.side.as_ref().is_some_and(|side| !side.ended);
+        let side = self.side.as_ref().is_some_and(|side| !side.ended) && in_front(&input);
         if side {
             watched.push(PollFd::from_borrowed_fd(input.as_fd(), PollFlags::IN));
         }
@@ -186,6 +188,11 @@ impl Side {
             self.lines.push_back(String::from_utf8_lossy(&line).trim().to_owned());
         }
     }
+}
+
+/// Whether this may read what is typed: who does so from the background is stopped by the system.
+fn in_front(input: impl AsFd) -> bool {
+    tcgetpgrp(input).is_ok_and(|group| group == getpgrp()) || !io::stdin().is_terminal()
 }
 
 /// What is there to read.

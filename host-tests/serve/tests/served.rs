@@ -257,3 +257,57 @@ fn a_last_line_needs_no_end_and_a_line_too_long_is_none() {
     let (well, _, complained) = served.interrupt();
     assert!(well && complained.contains("a line of more than 1000 bytes is no command"), "{complained}");
 }
+
+/// A process, and what runs in its terminal, ended when dropped.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A job in the background that reads from its terminal is stopped by the system.
+#[test]
+fn behind_a_terminal_it_serves_on_while_somebody_types() {
+    let [path, number] = ["behind", "number"].map(link);
+    let job = format!(
+        "set -m; {} --pty {} > /dev/null 2>&1 & echo $! > {}; sleep 3600",
+        env!("CARGO_BIN_EXE_serve"),
+        path.display(),
+        number.display()
+    );
+    let mut script = Command::new("script");
+    script.args(["-qc", &job, "/dev/null"]).env("SHELL", "/bin/sh").stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut script = Killed(script.spawn().expect("Debian has it (bsdutils)"));
+    let mut typed = script.0.stdin.take().expect("it was asked for");
+    while !path.exists() {
+        std::thread::yield_now();
+    }
+    typed.write_all(b"typed\n").expect("it takes it");
+    // The terminal shows what it has.
+    let (mut shown, mut byte) = (Vec::new(), [0]);
+    while !shown.ends_with(b"typed") {
+        script.0.stdout.as_mut().expect("it was asked for").read_exact(&mut byte).expect("a terminal");
+        shown.push(byte[0]);
+    }
+    let number: i32 = std::fs::read_to_string(&number).expect("it was written").trim().parse().expect("a number");
+    let mut port = SerialPort::open(&path, 1_000_000).expect("it is there");
+    port.set_read_timeout(std::time::Duration::from_secs(1)).expect("a time-out");
+    for _ in 0..200 {
+        port.write_all(&PING).expect("it listens");
+        let mut reply = [0; 14];
+        while let Err(why) = port.read_exact(&mut reply) {
+            assert_eq!(why.kind(), std::io::ErrorKind::TimedOut);
+            let state = std::fs::read_to_string(format!("/proc/{number}/stat")).expect("it runs");
+            assert!(!state.contains(") T "), "it was stopped: {state}");
+        }
+        assert_eq!(reply[..12], PONG);
+    }
+    let pid = rustix::process::Pid::from_raw(number).expect("a process number");
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+    while path.is_symlink() {
+        std::thread::yield_now();
+    }
+}

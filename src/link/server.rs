@@ -61,6 +61,8 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     registered: Option<Registered>,
     actions: Actions,
     turn: Turn,
+    /// When a byte was heard that its turn may go by.
+    heard_ms: u32,
     /// How the loop stood at the last snapshot.
     stand: Stand,
     reply_delay_us: u32,
@@ -105,6 +107,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             registered: None,
             actions: Actions::default(),
             turn: Turn::None,
+            heard_ms: 0,
             stand: Stand::default(),
             reply_delay_us: 0,
             clocks,

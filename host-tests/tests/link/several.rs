@@ -120,6 +120,31 @@ fn fast_sync_read_makes_one_packet_of_all_parts() {
     }
 }
 
+/// Where one is missing, those behind it wait; what the host sends next is not the missing one's part.
+#[test]
+fn who_waits_for_one_that_is_missing_does_not_speak_into_the_next_packet() {
+    let mut devices = [device(1), device(2)];
+    for ids in [&[1, 9, 2][..], &[9, 2], &[1, 9, 9, 2]] {
+        talk(&mut devices, &packet(BROADCAST, 0x8A, &[&[7, 0, 4, 0], ids].concat()));
+        devices.iter_mut().for_each(|device| device.tick_ms = device.tick_ms.wrapping_add(10));
+        let replies =
+            talk(&mut devices, &packet(BROADCAST, 0x83, &[&[0x44, 0, 1, 0, 1, 2][..], &[7, 2].repeat(20)].concat()));
+        assert_eq!(replies, Vec::<Vec<u8>>::new(), "{ids:?}");
+    }
+    // A pause as it is between bytes at the slowest speed is none.
+    let request = packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]);
+    let first = devices[0].hear(&request).concat();
+    assert!(devices[1].hear(&request).is_empty());
+    let heard: Vec<_> = first
+        .iter()
+        .flat_map(|byte| {
+            devices[1].tick_ms += 2;
+            devices[1].hear(&[*byte])
+        })
+        .collect();
+    assert_eq!(heard.len(), 1);
+}
+
 #[test]
 fn fast_sync_read_gives_way_to_another_packet() {
     let mut waiting = device(2);

@@ -58,6 +58,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             return;
         }
         self.reply_delay_us = if shared.first() { self.settings.return_delay_us() } else { 0 };
+        self.behind = Some(shared.behind(request.length));
         reply.clear();
         let mut put = |byte| {
             reply.push(byte).ok();

@@ -100,7 +100,15 @@ class Fingertip(Bus):
     def stream(
         self, rate_hz: float = 200.0, seconds: Optional[float] = None, pressures: bool = True
     ) -> Iterator[State]:
-        """States in turn, each of another frame; those that got no answer are left out, ten in a row end it."""
+        """States in turn, each of another frame; those that got no answer are left out, ten in a row end it.
+
+        A rate of 0 is as fast as it goes; without seconds it goes on for ever.
+        """
+        if rate_hz != 0 and not 0.001 <= rate_hz <= 1e6:
+            raise ValueError(f"rate_hz of {rate_hz}: 0, or 0.001 to 1e6")
+        if seconds is not None and not 0 <= seconds <= 1e9:
+            raise ValueError(f"seconds of {seconds}: 0 to 1e9")
+        period_s = 1.0 / rate_hz if rate_hz else 0.0
         due, missed, frame, first_s = time.monotonic(), 0, None, None
         while True:
             try:
@@ -118,7 +126,7 @@ class Fingertip(Bus):
                 frame = state.frame
                 yield state
             # The rate holds on average: a state that came late is made up for, up to a tenth of a second.
-            due = max(due + 1.0 / rate_hz, time.monotonic() - 0.1)
+            due = max(due + period_s, time.monotonic() - 0.1)
             time.sleep(max(0.0, due - time.monotonic()))
 
     def tare(self) -> None:
@@ -132,11 +140,23 @@ class Fingertip(Bus):
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
 
     def press(self, newtons: float) -> None:
-        """Asks for a force: the tip approaches, touches and holds it. Returns at once."""
+        """Asks for a force: the tip approaches, touches and holds it. Returns at once.
+
+        Where the force is refused, torque is as it was.
+        """
+        goal_mn = round(1000 * newtons)
+        if not reg.GOAL_FORCE_MN.least <= goal_mn <= reg.GOAL_FORCE_MN.largest:
+            raise ValueError(f"{newtons} N: 0 to {reg.GOAL_FORCE_MN.largest / 1000} N are allowed")
         if self.read(reg.LIMITS) & _NOT_TARED:
             raise FingertipError("the tip is not tared since the controller started: free it and call tare()")
+        was_on = self.read(reg.TORQUE_ENABLE)
         self.write(reg.TORQUE_ENABLE, 1)
-        self.write(reg.GOAL_FORCE_MN, round(1000 * newtons))
+        try:
+            self.write(reg.GOAL_FORCE_MN, goal_mn)
+        except Refused:
+            if not was_on:
+                self.write(reg.TORQUE_ENABLE, 0)
+            raise
 
     def release(self) -> None:
         """Lets go, and turns torque off once the tip is clear."""

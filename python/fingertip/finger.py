@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Dict, Iterator, List, Mapping, Optional
+from typing import Dict, Iterator, List, Mapping, Optional, Tuple
 
 from . import registers as reg
 from .bus import Bus, FingertipError, NoAnswer, Refused, numbers
@@ -31,6 +31,10 @@ class Fault(IntEnum):
     NO_CLOCK, BROWN_OUT_LEVEL = 17, 18
 
 
+class Restarted(FingertipError):
+    """The controller started anew in between: torque is off, it is not tared, and its time begins again."""
+
+
 @dataclass(frozen=True)
 class State:
     """The state of the loop, all of it from one frame."""
@@ -56,7 +60,7 @@ class Fingertip(Bus):
 
     def __init__(self, port: str, device_id: int = 1, baud: int = 1_000_000, timeout_ms: float = 100.0):
         super().__init__(port, device_id, baud, timeout_ms)
-        self._last_us: Optional[int] = None
+        self._last: Optional[Tuple[int, int]] = None  # time and frame of the last state
         self._time_us = 0
         try:
             model = self.ping()
@@ -71,7 +75,10 @@ class Fingertip(Bus):
         return self
 
     def state(self, pressures: bool = True) -> State:
-        """Reads state and time in one packet, with the pressures or without: that is five times as short."""
+        """Reads state and time in one packet, with the pressures or without: that is five times as short.
+
+        Raises `Restarted` once where the controller started anew since the last one.
+        """
         end = _LAST.address + _LAST.width * _LAST.numbers if pressures else _LAST.address
         data = self.read_bytes(_FIRST.address, end - _FIRST.address)
 
@@ -81,7 +88,7 @@ class Fingertip(Bus):
         pascals = numbers(_LAST, data[_LAST.address - _FIRST.address :]) if pressures else []
         rows = [pascals[at : at + self._columns] for at in range(0, len(pascals), self._columns)]
         return State(
-            time_s=self._beyond_wrap(at(reg.PICTURE_TIME_US)),
+            time_s=self._beyond_wrap(at(reg.PICTURE_TIME_US), at(reg.PICTURE_FRAME)),
             frame=at(reg.PICTURE_FRAME),
             force_n=at(reg.PICTURE_FORCE_MN) * 1e-3,
             goal_n=at(reg.PICTURE_GOAL_MN) * 1e-3,
@@ -222,9 +229,12 @@ class Fingertip(Bus):
             value = self.read(register)
         return value
 
-    def _beyond_wrap(self, time_us: int) -> float:
+    def _beyond_wrap(self, time_us: int, frame: int) -> float:
         """Seconds since the first state; the controller's microseconds wrap after 71 minutes."""
-        if self._last_us is not None:
-            self._time_us += (time_us - self._last_us) & 0xFFFFFFFF
-        self._last_us = time_us
+        last_us, last_frame = self._last or (time_us, frame)
+        self._last = (time_us, frame)
+        if (frame - last_frame) & 0x80000000:
+            self._last, self._time_us = None, 0
+            raise Restarted("the controller started anew: torque is off, and it is not tared")
+        self._time_us += (time_us - last_us) & 0xFFFFFFFF
         return self._time_us / 1e6

@@ -27,3 +27,13 @@ with Fingertip(sys.argv[1], timeout_ms=float(sys.argv[2])) as finger:
     for rate_hz, seconds in [(float("nan"), 1.0), (-1.0, 1.0), (1e-30, 1.0), (100.0, float("nan")), (100.0, -1.0)]:
         refused(lambda: next(finger.stream(rate_hz, seconds)), ValueError)
     assert len(list(finger.stream(0, 0.05, pressures=False))) > 1, "0 is as fast as it goes"
+
+    stream = finger.stream(0, pressures=False)
+    [next(stream) for _ in range(10)]
+    # A broadcast, which nobody answers.
+    finger._packets.txPacket(finger._port, [0xFF, 0xFF, 0xFD, 0, 254, 3, 0, 8, 0, 0])
+    finger._port.is_using = False
+    refused(lambda: [None for _ in stream], FingertipError)
+    # What comes then is of another time, which begins anew.
+    assert finger.state().time_s == 0.0
+    refused(lambda: finger.press(1.0), FingertipError)

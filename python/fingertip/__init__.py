@@ -13,6 +13,6 @@ Times are the controller's own; registers and their units are in `fingertip.regi
 
 from . import registers
 from .bus import Bus, FingertipError, NoAnswer, Refused
-from .finger import Fault, Fingertip, Mode, State
+from .finger import Fault, Fingertip, Mode, Restarted, State
 
-__all__ = ["Bus", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "State", "registers"]
+__all__ = ["Bus", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "Restarted", "State", "registers"]

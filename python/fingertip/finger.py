@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Dict, Iterator, List, Mapping, Optional
+from typing import Dict, Iterator, List, Mapping, Optional, Tuple
 
 from . import registers as reg
 from .bus import Bus, FingertipError, NoAnswer, Refused, numbers
@@ -28,6 +28,11 @@ class Fault(IntEnum):
 
     NONE, LOST_FRAMES, ARRAY_BROKEN, ROW_STUCK, ARRAY_FROZEN, ENCODER_FROZEN, OVER_FORCE, BUS_SILENT = range(8)
     BROKEN_PARAMETERS, SUPPLY_LOW, SUPPLY_HIGH, BRIDGE, MISSED_DEADLINE, CRASH, RUNAWAY, REVERSED, UNSEEN = range(8, 17)
+    NO_CLOCK, BROWN_OUT_LEVEL = 17, 18
+
+
+class Restarted(FingertipError):
+    """The controller started anew in between: torque is off, it is not tared, and its time begins again."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,7 @@ class Fingertip(Bus):
 
     def __init__(self, port: str, device_id: int = 1, baud: int = 1_000_000, timeout_ms: float = 100.0):
         super().__init__(port, device_id, baud, timeout_ms)
-        self._last_us: Optional[int] = None
+        self._last: Optional[Tuple[int, int]] = None  # time and frame of the last state
         self._time_us = 0
         try:
             model = self.ping()
@@ -70,7 +75,10 @@ class Fingertip(Bus):
         return self
 
     def state(self, pressures: bool = True) -> State:
-        """Reads state and time in one packet, with the pressures or without: that is five times as short."""
+        """Reads state and time in one packet, with the pressures or without: that is five times as short.
+
+        Raises `Restarted` once where the controller started anew since the last one.
+        """
         end = _LAST.address + _LAST.width * _LAST.numbers if pressures else _LAST.address
         data = self.read_bytes(_FIRST.address, end - _FIRST.address)
 
@@ -80,7 +88,7 @@ class Fingertip(Bus):
         pascals = numbers(_LAST, data[_LAST.address - _FIRST.address :]) if pressures else []
         rows = [pascals[at : at + self._columns] for at in range(0, len(pascals), self._columns)]
         return State(
-            time_s=self._beyond_wrap(at(reg.PICTURE_TIME_US)),
+            time_s=self._beyond_wrap(at(reg.PICTURE_TIME_US), at(reg.PICTURE_FRAME)),
             frame=at(reg.PICTURE_FRAME),
             force_n=at(reg.PICTURE_FORCE_MN) * 1e-3,
             goal_n=at(reg.PICTURE_GOAL_MN) * 1e-3,
@@ -99,7 +107,15 @@ class Fingertip(Bus):
     def stream(
         self, rate_hz: float = 200.0, seconds: Optional[float] = None, pressures: bool = True
     ) -> Iterator[State]:
-        """States in turn, each of another frame; those that got no answer are left out, ten in a row end it."""
+        """States in turn, each of another frame; those that got no answer are left out, ten in a row end it.
+
+        A rate of 0 is as fast as it goes; without seconds it goes on for ever.
+        """
+        if rate_hz != 0 and not 0.001 <= rate_hz <= 1e6:
+            raise ValueError(f"rate_hz of {rate_hz}: 0, or 0.001 to 1e6")
+        if seconds is not None and not 0 <= seconds <= 1e9:
+            raise ValueError(f"seconds of {seconds}: 0 to 1e9")
+        period_s = 1.0 / rate_hz if rate_hz else 0.0
         due, missed, frame, first_s = time.monotonic(), 0, None, None
         while True:
             try:
@@ -117,7 +133,7 @@ class Fingertip(Bus):
                 frame = state.frame
                 yield state
             # The rate holds on average: a state that came late is made up for, up to a tenth of a second.
-            due = max(due + 1.0 / rate_hz, time.monotonic() - 0.1)
+            due = max(due + period_s, time.monotonic() - 0.1)
             time.sleep(max(0.0, due - time.monotonic()))
 
     def tare(self) -> None:
@@ -131,11 +147,23 @@ class Fingertip(Bus):
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
 
     def press(self, newtons: float) -> None:
-        """Asks for a force: the tip approaches, touches and holds it. Returns at once."""
+        """Asks for a force: the tip approaches, touches and holds it. Returns at once.
+
+        Where the force is refused, torque is as it was.
+        """
+        goal_mn = round(1000 * newtons)
+        if not reg.GOAL_FORCE_MN.least <= goal_mn <= reg.GOAL_FORCE_MN.largest:
+            raise ValueError(f"{newtons} N: 0 to {reg.GOAL_FORCE_MN.largest / 1000} N are allowed")
         if self.read(reg.LIMITS) & _NOT_TARED:
             raise FingertipError("the tip is not tared since the controller started: free it and call tare()")
+        was_on = self.read(reg.TORQUE_ENABLE)
         self.write(reg.TORQUE_ENABLE, 1)
-        self.write(reg.GOAL_FORCE_MN, round(1000 * newtons))
+        try:
+            self.write(reg.GOAL_FORCE_MN, goal_mn)
+        except Refused:
+            if not was_on:
+                self.write(reg.TORQUE_ENABLE, 0)
+            raise
 
     def release(self) -> None:
         """Lets go, and turns torque off once the tip is clear."""
@@ -201,9 +229,12 @@ class Fingertip(Bus):
             value = self.read(register)
         return value
 
-    def _beyond_wrap(self, time_us: int) -> float:
+    def _beyond_wrap(self, time_us: int, frame: int) -> float:
         """Seconds since the first state; the controller's microseconds wrap after 71 minutes."""
-        if self._last_us is not None:
-            self._time_us += (time_us - self._last_us) & 0xFFFFFFFF
-        self._last_us = time_us
+        last_us, last_frame = self._last or (time_us, frame)
+        self._last = (time_us, frame)
+        if (frame - last_frame) & 0x80000000:
+            self._last, self._time_us = None, 0
+            raise Restarted("the controller started anew: torque is off, and it is not tared")
+        self._time_us += (time_us - last_us) & 0xFFFFFFFF
         return self._time_us / 1e6

@@ -47,6 +47,8 @@ pub struct Receiver {
     expect: Expect,
     /// Bytes since the last packet that belong to none.
     stray: u8,
+    /// Bytes that still belong to a packet of which this device has sent a part.
+    shared: u16,
     id: u8,
     instruction: u8,
     /// Bytes to come before the CRC.
@@ -64,6 +66,7 @@ impl Receiver {
             window: 0,
             expect: Expect::Header,
             stray: 0,
+            shared: 0,
             id: 0,
             instruction: 0,
             left: 0,
@@ -93,6 +96,7 @@ impl Receiver {
             self.crc = crc::update(self.crc, &[byte]);
         }
         match self.expect {
+            Expect::Header if self.shared > 0 => self.shared -= 1,
             Expect::Header => self.stray = self.stray.saturating_add(1),
             Expect::Id if byte <= ID_MAX || byte == BROADCAST => {
                 self.id = byte;
@@ -131,7 +135,16 @@ impl Receiver {
         None
     }
 
+    /// This device sends a part of the packet that it hears, and does not hear that; so many bytes come behind it.
+    pub(super) fn take_part(&mut self, behind: u16) {
+        self.window = 0;
+        self.stray = 0;
+        self.shared = behind;
+        self.expect = Expect::Header;
+    }
+
     fn begin(&mut self) {
+        self.shared = 0;
         self.crc = crc::update(crc::START, &HEADER);
         self.params.clear();
         self.complete = true;

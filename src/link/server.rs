@@ -61,6 +61,10 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     registered: Option<Registered>,
     actions: Actions,
     turn: Turn,
+    /// Once this device has sent its part of a shared packet: how much comes behind it.
+    behind: Option<u16>,
+    /// When a byte was heard that its turn may go by.
+    heard_ms: u32,
     /// How the loop stood at the last snapshot.
     stand: Stand,
     reply_delay_us: u32,
@@ -105,6 +109,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             registered: None,
             actions: Actions::default(),
             turn: Turn::None,
+            behind: None,
+            heard_ms: 0,
             stand: Stand::default(),
             reply_delay_us: 0,
             clocks,
@@ -126,6 +132,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
                 Some(Event::BadCrc) => self.state.damaged(self.receiver.packet(), reply),
                 Some(Event::Framing) => self.state.counters.framing = self.state.counters.framing.saturating_add(1),
                 None => {}
+            }
+            if let Some(behind) = self.state.behind.take() {
+                self.receiver.take_part(behind);
             }
             if !reply.is_empty() {
                 return place + 1;

@@ -79,6 +79,13 @@ impl Shared {
         fits
     }
 
+    /// How much of the packet comes behind this device's part, which has so many bytes of data.
+    pub fn behind(&self, length: u16) -> u16 {
+        // The length leaves out the seven bytes before the instruction.
+        let own = self.ahead.max(FAST_HEAD as u16).saturating_add(length).saturating_add(FAST_EXTRA);
+        self.length.saturating_add(FAST_HEAD as u16 - 1).saturating_sub(own)
+    }
+
     /// Whether all that comes before this device's part was heard.
     pub fn due(&self) -> bool {
         self.heard >= self.ahead

@@ -12,8 +12,12 @@ use std::time::{Duration, Instant};
 
 /// The alert's bit of a status packet's error.
 const ALERT: u8 = 0x80;
+/// How long to wait for a device that is not expected to be there.
+const PROBE: Duration = Duration::from_secs(1);
 /// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
 const PING_BITS: u32 = 14 * 10;
+/// No bus is slower: all IDs would take minutes to answer.
+pub const BAUD_MIN: i64 = 1_200;
 
 /// How to reach a controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -22,7 +26,7 @@ pub struct Reach {
     #[arg(long, short, global = true, env = "FINGERTIP_PORT")]
     pub port: Option<String>,
     /// Bus speed
-    #[arg(long, short, global = true, default_value_t = 1_000_000)]
+    #[arg(long, short, global = true, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
     pub baud: u32,
     /// The controller's address on the bus
     #[arg(long, short, global = true, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=252))]
@@ -113,6 +117,25 @@ impl Client {
     pub fn ping(&mut self) -> Result<Pong, Error> {
         let data = self.ask("ping", instruction::PING, &[], 3)?;
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
+    }
+
+    /// Whether another device answers to an address; two at once do so with a damaged packet.
+    ///
+    /// # Errors
+    /// The port is lost.
+    pub fn is_taken(&mut self, id: u8) -> Result<bool, Error> {
+        let (own, timeout) = (self.id, self.timeout);
+        (self.id, self.timeout) = (id, timeout.min(PROBE));
+        let pong = self.ping();
+        // A late answer is waited for here, for as long.
+        let settled = self.settle();
+        (self.id, self.timeout) = (own, timeout);
+        settled?;
+        match pong {
+            Ok(_) | Err(Error::Damaged { .. } | Error::Refused { .. }) => Ok(true),
+            Err(Error::Silent { .. }) => Ok(false),
+            Err(why) => Err(why),
+        }
     }
 
     /// Asks all who are there.
@@ -235,16 +258,22 @@ impl Client {
     }
 
     fn send(&mut self, id: u8, instruction: u8, params: &[u8]) -> Result<(), Error> {
-        // The protocol does not number its packets: a late answer would be taken for the next one.
-        if std::mem::take(&mut self.owed) {
-            while !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty() {}
-        }
+        self.settle()?;
         self.line.discard();
         let mut packet = Reply::new();
         let mut sender = Sender::new(&mut packet, id, instruction);
         params.iter().for_each(|byte| sender.push(*byte));
         sender.finish();
         self.line.write(&packet).map_err(|why| self.lost(why))
+    }
+
+    /// Waits until the line is silent where an answer may come yet: the protocol does not number its packets, so a late
+    /// one would be taken for the next one.
+    fn settle(&mut self) -> Result<(), Error> {
+        if std::mem::take(&mut self.owed) {
+            while !self.line.read(self.timeout).map_err(|why| self.lost(why))?.is_empty() {}
+        }
+        Ok(())
     }
 
     fn lost(&self, why: std::io::Error) -> Error {

@@ -33,6 +33,9 @@ fn say_json(value: &Value) {
     say(serde_json::to_string_pretty(value).unwrap_or_default());
 }
 
+/// How long Ctrl-C may go unseen in a pause.
+const GLANCE: Duration = Duration::from_millis(50);
+
 /// Set by Ctrl-C and by the end of a terminal.
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
@@ -53,6 +56,15 @@ impl Interrupt {
     /// Whether it is time to end.
     pub fn came(&self) -> bool {
         self.0.load(Ordering::Relaxed)
+    }
+
+    /// Waits until then, or until it is time to end.
+    pub fn pause(&self, until: Instant) {
+        while !self.came()
+            && let Some(left) = until.checked_duration_since(Instant::now())
+        {
+            std::thread::sleep(left.min(GLANCE));
+        }
     }
 }
 

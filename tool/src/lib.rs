@@ -8,8 +8,10 @@ pub mod commands;
 pub mod error;
 pub mod line;
 pub mod messages;
+pub mod numbers;
 pub mod state;
 pub mod table;
+pub mod whole;
 
 pub use client::Client;
 pub use error::Error;

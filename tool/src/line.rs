@@ -9,6 +9,8 @@ use std::time::Duration;
 /// What a TCP port's name begins with: `tcp:127.0.0.1:7000`.
 const TCP: &str = "tcp:";
 const BUFFER: usize = 1024;
+/// What a served finger says to a second client begins with this.
+const BUSY: &[u8] = b"busy: ";
 
 /// A way to the bus.
 #[derive(Debug)]
@@ -81,6 +83,10 @@ impl Line {
         };
         match count {
             Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other end closed it")),
+            // A served finger says in words that another client is there.
+            Ok(count) if buffer.starts_with(BUSY) => {
+                Err(io::Error::new(ErrorKind::ResourceBusy, String::from_utf8_lossy(&buffer[..count]).trim_end()))
+            }
             Ok(count) => Ok(buffer[..count].to_vec()),
             Err(why) if matches!(why.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 Ok(Vec::new())

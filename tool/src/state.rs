@@ -157,17 +157,27 @@ impl State {
 /// The controller's time beyond its wrap, from the first state on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Clock {
-    last_us: Option<u32>,
+    /// Time and frame of the last state.
+    last: Option<(u32, u32)>,
     total_us: u64,
 }
 
+/// Why a [`Clock`] tells no time.
+pub const ANEW: &str = "the controller started anew: torque is off, and it is not tared";
+
 impl Clock {
-    /// Seconds since the first state; states come in order, an hour apart at most.
-    pub fn time_s(&mut self, time_us: u32) -> f64 {
-        let passed_us = self.last_us.map_or(0, |last_us| time_us.wrapping_sub(last_us));
-        self.last_us = Some(time_us);
-        self.total_us += u64::from(passed_us);
-        self.total_us as f64 / 1e6
+    /// Seconds since the first state; states come in order, an hour apart at most. None where frames count back: the
+    /// controller started anew, and how long that took nobody knows.
+    pub fn time_s(&mut self, state: &State) -> Option<f64> {
+        let now = (state.time_us, state.frame as u32);
+        let (last_us, last_frame) = self.last.replace(now).unwrap_or(now);
+        if now.1.wrapping_sub(last_frame) as i32 > -1 {
+            self.total_us += u64::from(now.0.wrapping_sub(last_us));
+            Some(self.total_us as f64 / 1e6)
+        } else {
+            *self = Self::default();
+            None
+        }
     }
 }
 
@@ -182,7 +192,18 @@ mod tests {
     fn the_clock_goes_on_beyond_its_wrap() {
         let mut clock = Clock::default();
         let times = [u32::MAX - 999, u32::MAX, 999_000];
-        assert_eq!(times.map(|time_us| clock.time_s(time_us)), [0.0, 0.000_999, 1.0]);
+        let times = times.map(|time_us| clock.time_s(&State { time_us, ..State::default() }));
+        assert_eq!(times, [Some(0.0), Some(0.000_999), Some(1.0)]);
+    }
+
+    #[test]
+    fn a_clock_that_began_again_tells_no_time() {
+        let mut clock = Clock::default();
+        let mut at = |time_us, frame| clock.time_s(&State { time_us, frame, ..State::default() });
+        // Frames wrap too, though after days.
+        assert_eq!([at(500, 0xFFFF_FFFF), at(600, 0), at(100, 1_000)].map(|time| time.is_some()), [true; 3]);
+        assert_eq!(at(900_000, 999), None);
+        assert_eq!([at(1_000_000, 1_999), at(1_500_000, 6_999)], [Some(0.0), Some(0.5)], "it begins with the next");
     }
 
     #[test]

@@ -122,3 +122,29 @@ fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a task of an array would run; none where it refuses.
+    fn task([id, min, max, count]: [u32; 4], shares: Option<&str>) -> Option<String> {
+        let mut command = Command::new("sh");
+        command.arg(paths::root().join("examples/cluster/slurm.sh")).arg("scene").env("SWEEP", "echo");
+        let names = ["ID", "MIN", "MAX", "COUNT"].map(|name| format!("SLURM_ARRAY_TASK_{name}"));
+        command.envs(names.iter().zip([id, min, max, count].map(|number| number.to_string())));
+        command.env_remove("SHARES").envs(shares.map(|shares| ("SHARES", shares)));
+        let output = command.output().expect("sh starts");
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().into())
+    }
+
+    #[test]
+    fn an_array_with_gaps_runs_no_other_share() {
+        assert_eq!(task([3, 1, 64, 64], None).as_deref(), Some("scene --shard 3/64"));
+        // Some of an array given again: 1 of 1 would be the whole sweep, and 1 of 2 a half.
+        for array in [[1, 1, 9, 2], [5, 5, 5, 1], [0, 0, 63, 64]] {
+            assert_eq!(task(array, None), None, "{array:?}");
+        }
+        assert_eq!(task([5, 5, 9, 2], Some("64")).as_deref(), Some("scene --shard 5/64"));
+    }
+}

@@ -128,6 +128,12 @@ fn columns(header: &csv::StringRecord) -> Result<(Kind, [usize; 4]), String> {
     let there = |names: [&str; 4]| lacks(names).iter().sum::<usize>();
     let meant = if there(HOLDS) > there(CYCLES) { HOLDS } else { CYCLES };
     let missing: Vec<_> = meant.into_iter().filter(|name| !header.iter().any(|column| column == *name)).collect();
+    if header.len() == 1
+        && let Some(mark) = [';', '\t'].into_iter().find(|mark| header.iter().any(|column| column.contains(*mark)))
+    {
+        let comma = "save the recording with commas between the columns and decimal points in the numbers";
+        return Err(format!("columns parted by {mark:?}: {comma}"));
+    }
     Err(format!(
         "the header lacks {}: name the columns {} (characteristic) or {} (held weights)",
         missing.join(", "),

@@ -52,6 +52,10 @@ fn what_is_no_recording() {
     refused("binary", &[0xff, 0xfe, 0, 1, 10, 200], &["line 1", "not text", "UTF-8"]);
     refused("missing", b"set,sample,force_N\na,0,1\n", &["line 1", "lacks conductance_mS"]);
     refused("other", b"run,weight_kg,t_s\na,0,1\n", &["line 1", "lacks conductance_mS", "run,weight_kg,t_s"]);
+    for mark in [";", "\t"] {
+        let text = Pressed::default().text().replace(',', mark);
+        refused("parted", text.as_bytes(), &["line 1", "parted by", "with commas"]);
+    }
     refused("twice", b"set,set,sample,force_N,conductance_mS\na,a,0,1,2\n", &["line 1", "twice", "leave one"]);
 }
 

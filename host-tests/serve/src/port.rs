@@ -3,12 +3,15 @@
 mod pty;
 mod tcp;
 
+use host_tests::say;
 use pty::Pty;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::AsFd;
 use rustix::io::Errno;
+use rustix::process::getpgrp;
+use rustix::termios::tcgetpgrp;
 use std::collections::VecDeque;
-use std::io::{self, PipeReader, PipeWriter, Write as _};
+use std::io::{self, IsTerminal as _, PipeReader, PipeWriter, Write as _};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -72,6 +75,8 @@ enum Opened {
 struct Side {
     begun: Vec<u8>,
     lines: VecDeque<String>,
+    /// Nothing more comes.
+    ended: bool,
 }
 
 impl Port {
@@ -118,7 +123,8 @@ impl Port {
             Opened::Pty(pty) => watched.push(PollFd::new(pty.near(), PollFlags::IN)),
             Opened::Tcp(tcp) => watched.extend(tcp.watched().map(|fd| PollFd::from_borrowed_fd(fd, PollFlags::IN))),
         }
-        if self.side.is_some() {
+        let side = self.side.as_ref().is_some_and(|side| !side.ended) && in_front(&input);
+        if side {
             watched.push(PollFd::from_borrowed_fd(input.as_fd(), PollFlags::IN));
         }
         let until = Timespec { tv_sec: within.as_secs() as i64, tv_nsec: within.subsec_nanos().into() };
@@ -128,7 +134,7 @@ impl Port {
             Err(_) => return Event::Stop,
         }
         let ready = |place: usize| watched.get(place).is_some_and(|fd| !fd.revents().is_empty());
-        let side = self.side.is_some() && ready(watched.len() - 1);
+        let side = side && ready(watched.len() - 1);
         let (stopped, first, second) = (ready(0), ready(1), watched.len() > 2 && ready(2));
         drop(watched);
         if stopped {
@@ -157,18 +163,36 @@ impl Port {
         let mut buffer = [0; BUFFER];
         let count = rustix::io::read(io::stdin(), &mut buffer).unwrap_or(0);
         let Some(side) = &mut self.side else { return };
+        buffer[..count].iter().for_each(|byte| side.take(*byte));
         if count == 0 {
-            self.side = None;
-            return;
-        }
-        for &byte in &buffer[..count] {
-            if byte == b'\n' || side.begun.len() == LINE_MAX {
-                side.lines.push_back(String::from_utf8_lossy(&std::mem::take(&mut side.begun)).trim().to_owned());
-            } else {
-                side.begun.push(byte);
-            }
+            // The last line may lack its end.
+            side.take(b'\n');
+            side.ended = true;
         }
     }
+}
+
+impl Side {
+    fn take(&mut self, byte: u8) {
+        if byte != b'\n' {
+            // What is too long is kept as far as it takes to tell.
+            if self.begun.len() <= LINE_MAX {
+                self.begun.push(byte);
+            }
+            return;
+        }
+        let line = std::mem::take(&mut self.begun);
+        if line.len() > LINE_MAX {
+            say::aside(format_args!("a line of more than {LINE_MAX} bytes is no command"));
+        } else {
+            self.lines.push_back(String::from_utf8_lossy(&line).trim().to_owned());
+        }
+    }
+}
+
+/// Whether this may read what is typed: who does so from the background is stopped by the system.
+fn in_front(input: impl AsFd) -> bool {
+    tcgetpgrp(input).is_ok_and(|group| group == getpgrp()) || !io::stdin().is_terminal()
 }
 
 /// What is there to read.

@@ -38,16 +38,27 @@ impl Served {
 
     /// What an example says.
     fn example(&self, name: &str, arguments: &[&str]) -> String {
-        let root = Path::new(env!("FINGERTIP_ROOT"));
-        let python = std::env::var_os("FINGERTIP_PYTHON").expect("`cargo xtask test` sets FINGERTIP_PYTHON");
-        let mut command = Command::new(PathBuf::from(python));
-        command.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", root.join("python"));
-        command.arg(root.join("python/examples").join(name)).args(["--port", &self.port, "--timeout-ms", PATIENCE_MS]);
-        let output = command.args(arguments).output().expect("Python starts");
-        let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-        assert!(output.status.success(), "{name}: {said}{complained}");
-        said.into_owned()
+        let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
+        let mut command = python();
+        command.arg(example).args(["--port", &self.port, "--timeout-ms", PATIENCE_MS]);
+        said(command.args(arguments))
     }
+}
+
+/// A Python that finds the package.
+fn python() -> Command {
+    let python = std::env::var_os("FINGERTIP_PYTHON").expect("`cargo xtask test` sets FINGERTIP_PYTHON");
+    let mut command = Command::new(PathBuf::from(python));
+    let root = Path::new(env!("FINGERTIP_ROOT"));
+    command.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", root.join("python"));
+    command
+}
+
+fn said(command: &mut Command) -> String {
+    let output = command.output().expect("Python starts");
+    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}{complained}");
+    said.into_owned()
 }
 
 impl Drop for Served {
@@ -89,4 +100,15 @@ fn the_examples_stream_show_set_and_recover() {
     served.command("mend");
     let recovered = served.example("recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);
     assert!(recovered.ends_with("times\n"), "{recovered}");
+}
+
+#[test]
+#[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
+fn the_package_stands_what_is_wrong() {
+    let served = Served::begin();
+    said(python().args([
+        &format!("{}/host-tests/serve/tests/package.py", env!("FINGERTIP_ROOT")),
+        &served.port,
+        PATIENCE_MS,
+    ]));
 }

@@ -177,6 +177,40 @@ fn tcp_takes_one_client_after_another_and_says_so() {
 }
 
 #[test]
+fn a_busy_port_says_so_also_to_who_speaks_first() {
+    let served = Served::begin(&["--tcp", "0"]);
+    let _first = TcpStream::connect(&served.name).expect("it listens");
+    for _ in 0..50 {
+        let mut words = String::new();
+        let mut second = TcpStream::connect(&served.name).expect("it listens");
+        second.write_all(&PING).expect("the system takes it");
+        second.read_to_string(&mut words).expect("words, and an end");
+        assert!(words.starts_with("busy: 127.0.0.1:"), "{words}");
+    }
+}
+
+#[test]
+fn who_has_gone_keeps_nobody_out() {
+    let mut served = Served::begin(&["--tcp", "0"]);
+    let pid = rustix::process::Pid::from_raw(served.child.id() as i32).expect("a process number");
+    let signal = |signal| rustix::process::kill_process(pid, signal).expect("it runs");
+    for _ in 0..20 {
+        // It sleeps while one goes and the next comes, as on a busy machine.
+        let mut first = TcpStream::connect(&served.name).expect("it listens");
+        served.ask("fault");
+        signal(rustix::process::Signal::STOP);
+        first.write_all(&PING).expect("the system takes it");
+        drop(first);
+        let mut next = TcpStream::connect(&served.name).expect("the system takes it");
+        signal(rustix::process::Signal::CONT);
+        next.write_all(&PING).expect("it listens");
+        let mut reply = [0; 14];
+        next.read_exact(&mut reply).expect("it answers");
+        assert_eq!(reply[..12], PONG);
+    }
+}
+
+#[test]
 fn what_is_there_is_told() {
     let why = refused(&program(&["wal"]).output().expect("it starts"));
     assert!(why.contains("no scene wal") && why.contains("did you mean `wall`?") && why.contains("raspberry"), "{why}");
@@ -208,5 +242,72 @@ fn commands_change_the_scene() {
     assert!(well);
     for wrong in ["MM of `far`", "no fault `nothing`", "no finger `2`: 1 to 1", "`jump` is no command"] {
         assert!(complained.contains(wrong), "{complained}");
+    }
+}
+
+#[test]
+fn a_last_line_needs_no_end_and_a_line_too_long_is_none() {
+    let mut served = Served::begin(&[]);
+    let side = served.side.as_mut().expect("it was asked for");
+    writeln!(side, "{}remove", "x".repeat(1_001)).expect("it listens");
+    write!(side, "state").expect("it listens");
+    served.side = None;
+    assert!(served.line().starts_with("finger 1: Off"));
+    assert_eq!(served.line(), "the object is at 5.00 mm\n", "nothing was taken away");
+    let (well, _, complained) = served.interrupt();
+    assert!(well && complained.contains("a line of more than 1000 bytes is no command"), "{complained}");
+}
+
+/// A process, and what runs in its terminal, ended when dropped.
+struct Killed(Child);
+
+impl Drop for Killed {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// A job in the background that reads from its terminal is stopped by the system.
+#[test]
+fn behind_a_terminal_it_serves_on_while_somebody_types() {
+    let [path, number] = ["behind", "number"].map(link);
+    let job = format!(
+        "set -m; {} --pty {} > /dev/null 2>&1 & echo $! > {}; sleep 3600",
+        env!("CARGO_BIN_EXE_serve"),
+        path.display(),
+        number.display()
+    );
+    let mut script = Command::new("script");
+    script.args(["-qc", &job, "/dev/null"]).env("SHELL", "/bin/sh").stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut script = Killed(script.spawn().expect("Debian has it (bsdutils)"));
+    let mut typed = script.0.stdin.take().expect("it was asked for");
+    while !path.exists() {
+        std::thread::yield_now();
+    }
+    typed.write_all(b"typed\n").expect("it takes it");
+    // The terminal shows what it has.
+    let (mut shown, mut byte) = (Vec::new(), [0]);
+    while !shown.ends_with(b"typed") {
+        script.0.stdout.as_mut().expect("it was asked for").read_exact(&mut byte).expect("a terminal");
+        shown.push(byte[0]);
+    }
+    let number: i32 = std::fs::read_to_string(&number).expect("it was written").trim().parse().expect("a number");
+    let mut port = SerialPort::open(&path, 1_000_000).expect("it is there");
+    port.set_read_timeout(std::time::Duration::from_secs(1)).expect("a time-out");
+    for _ in 0..200 {
+        port.write_all(&PING).expect("it listens");
+        let mut reply = [0; 14];
+        while let Err(why) = port.read_exact(&mut reply) {
+            assert_eq!(why.kind(), std::io::ErrorKind::TimedOut);
+            let state = std::fs::read_to_string(format!("/proc/{number}/stat")).expect("it runs");
+            assert!(!state.contains(") T "), "it was stopped: {state}");
+        }
+        assert_eq!(reply[..12], PONG);
+    }
+    let pid = rustix::process::Pid::from_raw(number).expect("a process number");
+    rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+    while path.is_symlink() {
+        std::thread::yield_now();
     }
 }

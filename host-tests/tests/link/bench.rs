@@ -35,6 +35,8 @@ pub struct Bench {
     frame: Frame,
     taxels: [[i32; COLUMNS]; ROWS],
     tare: [[i32; COLUMNS]; ROWS],
+    /// The time, which stands.
+    pub tick_ms: u32,
 }
 
 impl Bench {
@@ -53,6 +55,7 @@ impl Bench {
             frame,
             taxels: by_place(|place| 20_000 + place),
             tare: by_place(|place| (300 + place) << TARE_BITS),
+            tick_ms: 0x1_8123,
         }
     }
 
@@ -80,7 +83,7 @@ impl Bench {
         let snapshot = Snapshot {
             status: self.status,
             supply_mv: 6012,
-            tick_ms: 0x1_8123,
+            tick_ms: self.tick_ms,
             frame_time_us: 0xFEDC_BA98,
             frame_ns: 99_762,
             loop_time_us: 41,

@@ -120,6 +120,60 @@ fn fast_sync_read_makes_one_packet_of_all_parts() {
     }
 }
 
+/// Where one is missing, those behind it wait; what the host sends next is not the missing one's part.
+#[test]
+fn who_waits_for_one_that_is_missing_does_not_speak_into_the_next_packet() {
+    let mut devices = [device(1), device(2)];
+    for ids in [&[1, 9, 2][..], &[9, 2], &[1, 9, 9, 2]] {
+        talk(&mut devices, &packet(BROADCAST, 0x8A, &[&[7, 0, 4, 0], ids].concat()));
+        devices.iter_mut().for_each(|device| device.tick_ms = device.tick_ms.wrapping_add(10));
+        let replies =
+            talk(&mut devices, &packet(BROADCAST, 0x83, &[&[0x44, 0, 1, 0, 1, 2][..], &[7, 2].repeat(20)].concat()));
+        assert_eq!(replies, Vec::<Vec<u8>>::new(), "{ids:?}");
+    }
+    // A pause as it is between bytes at the slowest speed is none.
+    let request = packet(BROADCAST, 0x8A, &[7, 0, 1, 0, 1, 2]);
+    let first = devices[0].hear(&request).concat();
+    assert!(devices[1].hear(&request).is_empty());
+    let heard: Vec<_> = first
+        .iter()
+        .flat_map(|byte| {
+            devices[1].tick_ms += 2;
+            devices[1].hear(&[*byte])
+        })
+        .collect();
+    assert_eq!(heard.len(), 1);
+}
+
+/// What a device sends itself it does not hear: the rest of the shared packet is no noise for that.
+#[test]
+fn a_shared_packet_is_no_framing_error() {
+    let mut devices = [device(1), device(2), device(3), device(4)];
+    let sync =
+        |ids: &[u8]| packet(BROADCAST, 0x8A, &[&address::FRAME_COUNTER.to_le_bytes()[..], &[4, 0], ids].concat());
+    let bulk = |id: u8, length: u8| [&[id][..], &address::PRESENT_MODE.to_le_bytes(), &[length, 0]].concat();
+    let requests = [
+        sync(&[1]),
+        sync(&[1, 2, 3]),
+        sync(&[3, 1, 2]),
+        packet(BROADCAST, 0x9A, &[bulk(2, 9), bulk(1, 54), bulk(3, 1)].concat()),
+    ];
+    for request in requests.iter().chain(&requests) {
+        assert!(!talk(&mut devices, request).is_empty());
+        // The host waits its time before it goes on.
+        devices.iter_mut().for_each(|device| device.tick_ms += 10);
+        assert_eq!(talk(&mut devices, &packet(3, 0x01, &[])).len(), 1);
+    }
+    for device in &devices {
+        assert_eq!(device.server.counters().framing, 0);
+    }
+    // A packet that others leave unfinished is one, and noise too; what comes next is heard all the same.
+    talk(&mut devices, &sync(&[1, 9]));
+    talk(&mut devices, &[1; 40]);
+    assert_eq!(talk(&mut devices, &packet(3, 0x01, &[])).len(), 1);
+    assert!(devices.iter().all(|device| device.server.counters().framing == 1));
+}
+
 #[test]
 fn fast_sync_read_gives_way_to_another_packet() {
     let mut waiting = device(2);

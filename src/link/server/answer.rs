@@ -9,6 +9,10 @@ use crate::link::turn::{Request, Shared, Turn};
 
 use super::State;
 
+/// Who makes a pause as long as this in a packet that the devices share, at the slowest speed too, sends it no further:
+/// what comes then is another's.
+const SILENCE_MS: u32 = 5;
+
 // The largest part of a shared packet, its beginning included, fits into a reply.
 const _: () = assert!(8 + 2 + READ_MAX as usize + 2 <= REPLY_MAX);
 
@@ -54,6 +58,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             return;
         }
         self.reply_delay_us = if shared.first() { self.settings.return_delay_us() } else { 0 };
+        self.behind = Some(shared.behind(request.length));
         reply.clear();
         let mut put = |byte| {
             reply.push(byte).ok();
@@ -73,7 +78,8 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     /// Follows a packet that the devices share, and adds this one's part when all before it was heard.
     pub(super) fn listen(&mut self, byte: u8, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         let Turn::Shared(mut shared, request) = self.turn else { return };
-        self.turn = if !shared.hear(byte) {
+        let silent_ms = snapshot.tick_ms.wrapping_sub(core::mem::replace(&mut self.heard_ms, snapshot.tick_ms));
+        self.turn = if silent_ms > SILENCE_MS || !shared.hear(byte) {
             Turn::None
         } else if shared.due() {
             self.answer_shared(shared, request, snapshot, reply);

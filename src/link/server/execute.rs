@@ -251,7 +251,10 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         match shared {
             None => self.counters.count(StatusError::Length),
             Some(shared) if shared.due() => self.answer_shared(shared, wanted, snapshot, reply),
-            Some(shared) => self.turn = Turn::Shared(shared, wanted),
+            Some(shared) => {
+                self.heard_ms = snapshot.tick_ms;
+                self.turn = Turn::Shared(shared, wanted);
+            }
         }
     }
 }

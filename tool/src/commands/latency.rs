@@ -1,7 +1,7 @@
 //! `fingertip latency`.
 
 use super::{Interrupt, say, say_json};
-use crate::{Client, Error};
+use crate::{Client, Error, numbers};
 use fingertip::shipped::address;
 use serde_json::json;
 use std::time::{Duration, Instant};
@@ -15,7 +15,7 @@ const LENGTH: u16 = 54;
 #[command(after_help = "Example:\n  fingertip latency --seconds 10")]
 pub struct Args {
     /// For how long
-    #[arg(long, default_value_t = 5.0)]
+    #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
     seconds: f64,
 }
 

@@ -209,6 +209,12 @@ fn assignment(text: &str) -> Result<Value, Error> {
     Ok((register, value))
 }
 
+/// What is wrong with a list in which a register stands twice: which of its values is meant, nobody knows.
+fn twice(values: &[Value]) -> Option<String> {
+    let again = |at: usize| values[..at].iter().any(|(register, _)| register.address == values[at].0.address);
+    (0..values.len()).find(|at| again(*at)).map(|at| format!("{} stands there twice", name(values[at].0)))
+}
+
 fn is_param(register: &Register) -> bool {
     (address::PARAMS..address::PARAMS + 4 * Params::COUNT as u16).contains(&register.address)
 }

@@ -1,8 +1,8 @@
 //! `fingertip press`.
 
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
-use crate::state::{Clock, State};
-use crate::{Client, Error};
+use crate::state::{ANEW, Clock, State};
+use crate::{Client, Error, numbers};
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
@@ -23,12 +23,13 @@ const WATCHDOG_UNIT_MS: i64 = 20;
 #[command(after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10")]
 pub struct Args {
     /// Force to hold, N
+    #[arg(value_parser = numbers::newtons)]
     newtons: f64,
     /// How long to hold it
-    #[arg(long, default_value_t = 2.0)]
+    #[arg(long, default_value_t = 2.0, value_parser = numbers::seconds)]
     seconds: f64,
     /// How long the approach may take until the force is held
-    #[arg(long, default_value_t = 10.0)]
+    #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
@@ -90,7 +91,7 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
     let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), None::<Held>);
     loop {
         let state = State::read(client)?;
-        let time_s = clock.time_s(state.time_us);
+        let time_s = clock.time_s(&state).ok_or(ANEW)?;
         if state.fault != 0 {
             return Err(stopped(state.fault));
         }
@@ -137,7 +138,8 @@ fn let_go(args: &Args, client: &mut Client) -> Result<(), Error> {
     loop {
         let state = State::read(client)?;
         let clear = state.mode == Mode::Release as i64 && state.speed_um_per_s.abs() < 1_000 && state.force_mn < 10;
-        if state.fault != 0 || clear || begun.elapsed().as_secs_f64() > args.within_s {
+        let off = state.mode == Mode::Off as i64;
+        if state.fault != 0 || clear || off || begun.elapsed().as_secs_f64() > args.within_s {
             break;
         }
         std::thread::sleep(LOOK);

@@ -4,12 +4,12 @@ mod csv;
 mod mcap;
 
 use super::{Interrupt, aside, say_json};
-use crate::state::{Clock, State};
-use crate::{Client, Error};
+use crate::state::{ANEW, Clock, State};
+use crate::whole::Part;
+use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -28,10 +28,10 @@ pub struct Args {
     /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV
     file: PathBuf,
     /// For how long; without it, until Ctrl-C
-    #[arg(long)]
+    #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
     /// How many states a second to ask for; 0 asks as fast as answers come
-    #[arg(long, default_value_t = 200.0)]
+    #[arg(long, default_value_t = 200.0, value_parser = numbers::rate_hz_or_all)]
     rate_hz: f64,
     /// With the pressure of each taxel
     #[arg(long)]
@@ -64,27 +64,26 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
     let format = args.format.map_or_else(|| of_name(&args.file), Ok)?;
-    let part = beside(&args.file);
+    let part = whole.then(|| Part::begin(&args.file)).transpose()?;
+    let to = part.as_ref().map(Part::file).transpose();
     let file = |why: io::Error| Error::file("write", &args.file, why);
-    let out: Box<dyn Write> = if whole {
-        Box::new(BufWriter::new(File::create(&part).map_err(file)?))
-    } else {
-        Box::new(io::stdout().lock())
+    let sink: io::Result<Box<dyn Sink>> = match (format, to.map_err(file)?) {
+        (Format::Csv, Some(to)) => csv::Csv::new(BufWriter::new(to), args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Csv, None) => csv::Csv::new(io::stdout().lock(), args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Mcap, Some(to)) => mcap::Mcap::new(to, client.id, args.pressures).map(|sink| Box::new(sink) as _),
+        (Format::Mcap, None) => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
     };
-    let mut sink: Box<dyn Sink> = match format {
-        Format::Csv => Box::new(csv::Csv::new(out, args.pressures).map_err(file)?),
-        Format::Mcap if whole => {
-            drop(out);
-            Box::new(mcap::Mcap::new(&part, client.id, args.pressures).map_err(file)?)
-        }
-        Format::Mcap => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
+    let mut sink = match sink {
+        // Who closed the pipe wanted nothing at all.
+        Err(why) if why.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
+        other => other.map_err(file)?,
     };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
     let wall_s = begun.elapsed().as_secs_f64();
     sink.finish().map_err(file)?;
-    if whole {
-        fs::rename(&part, &args.file).map_err(file)?;
+    if let Some(part) = part {
+        part.place().map_err(file)?;
     }
     let (counts, lost) = taken?;
     let Counts { states, repeated, missed, .. } = counts;
@@ -119,7 +118,7 @@ fn take(
     interrupt: &Interrupt,
     sink: &mut dyn Sink,
 ) -> Result<(Counts, Option<Error>), Error> {
-    let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz.min(1e6)) } else { Duration::ZERO };
+    let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
     let (mut counts, mut clock, mut frame, mut row) = (Counts::default(), Clock::default(), None, 0);
     let mut due = Instant::now();
     while !interrupt.came() {
@@ -127,7 +126,7 @@ fn take(
         match read {
             Ok(state) => {
                 row = 0;
-                let time_s = clock.time_s(state.time_us);
+                let Some(time_s) = clock.time_s(&state) else { return Ok((counts, Some(ANEW.into()))) };
                 if args.seconds.is_some_and(|seconds| time_s > seconds) {
                     break;
                 }
@@ -155,7 +154,7 @@ fn take(
         }
         // The rate holds on average: a state that came late is made up for, where it was not too late.
         due = (due + period).max(Instant::now().checked_sub(LATE_MAX).unwrap_or(due));
-        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        interrupt.pause(due);
     }
     Ok((counts, None))
 }
@@ -167,11 +166,4 @@ fn of_name(file: &Path) -> Result<Format, String> {
         Some("mcap") => Ok(Format::Mcap),
         _ => Err(format!("{}: a name that ends with .csv or .mcap is asked for, or --format", file.display())),
     }
-}
-
-/// What is being written until it is whole.
-fn beside(file: &Path) -> PathBuf {
-    let mut name = file.file_name().unwrap_or_default().to_owned();
-    name.push(".new");
-    file.with_file_name(name)
 }

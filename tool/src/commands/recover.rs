@@ -33,13 +33,20 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
         return Err(format!("fault {left} ({words}) stands again: what causes it is still there").into());
     }
     let untared = client.number(address::LIMITS)? as u16 & fingertip::state::Limits::NOT_TARED != 0;
+    let on = client.number(address::TORQUE_ENABLE)? != 0;
     if json {
-        say_json(&json!({ "fault": fault, "fault_name": words, "watchdog_tripped": tripped, "tared": !untared }));
+        say_json(
+            &json!({ "fault": fault, "fault_name": words, "watchdog_tripped": tripped, "tared": !untared, "torque": on }),
+        );
         return Ok(());
     }
     match words {
         Some(words) => say(format_args!("fault {fault} ({words}) is cleared; torque is off, the goal is 0")),
         None if tripped => say("the bus watchdog had tripped: it is reset, torque is off, the goal is 0"),
+        None if on => {
+            say("there was nothing to recover from; torque is on, and stays so");
+            return Ok(());
+        }
         None => say("there was nothing to recover from; torque is off, the goal is 0"),
     }
     say(if untared {

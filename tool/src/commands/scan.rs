@@ -1,7 +1,7 @@
 //! `fingertip scan`.
 
 use super::{aside, say, say_json};
-use crate::client::{Pong, Reach};
+use crate::client::{BAUD_MIN, Pong, Reach};
 use crate::{Client, Error, line, table};
 use fingertip::store::BAUD_RATES;
 use serde_json::json;
@@ -11,7 +11,7 @@ use serde_json::json;
 #[command(after_help = "Examples:\n  fingertip scan\n  fingertip --port /dev/ttyUSB0 scan --speeds 57600,1000000")]
 pub struct Args {
     /// Only at these speeds, in baud
-    #[arg(long, value_delimiter = ',', value_name = "BAUD")]
+    #[arg(long, value_delimiter = ',', value_name = "BAUD", value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
     speeds: Vec<u32>,
 }
 

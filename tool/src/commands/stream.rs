@@ -3,7 +3,7 @@
 #[cfg(feature = "foxglove")]
 mod server;
 
-use crate::{Client, Error};
+use crate::{Client, Error, numbers};
 
 /// Where to stream to.
 #[derive(Debug, clap::Args)]
@@ -17,7 +17,7 @@ pub struct Args {
     #[arg(long, default_value_t = 8765)]
     tcp: u16,
     /// States a second
-    #[arg(long, default_value_t = 60.0)]
+    #[arg(long, default_value_t = 60.0, value_parser = numbers::rate_hz)]
     rate_hz: f64,
 }
 

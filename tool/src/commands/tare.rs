@@ -1,7 +1,7 @@
 //! `fingertip tare`.
 
 use super::{no_fault, say, say_json, wait_for};
-use crate::{Client, Error, table};
+use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::Limits;
 use serde_json::json;
@@ -16,7 +16,7 @@ const DONE: i64 = 2;
 #[command(after_help = "Example:\n  fingertip tare")]
 pub struct Args {
     /// How long it may take; a real controller needs 20 ms
-    #[arg(long, default_value_t = 5.0)]
+    #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
@@ -33,7 +33,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         );
     }
     client.set(address::TARE, 1)?;
-    let within = Duration::from_secs_f64(args.within_s.clamp(0.0, 1e6));
+    let within = Duration::from_secs_f64(args.within_s);
     let state = wait_for(client, address::TARE_STATE, within, |state| state != RUNNING)?;
     match state {
         DONE => {}

@@ -3,7 +3,7 @@
 mod draw;
 
 use crate::state::{Clock, State};
-use crate::{Client, Error};
+use crate::{Client, Error, numbers};
 use crossterm::event::{self, Event, KeyCode, KeyModifiers};
 use std::collections::VecDeque;
 use std::io::{self, IsTerminal as _};
@@ -19,10 +19,10 @@ const PAST_S: f64 = 10.0;
 #[command(after_help = "Example:\n  fingertip view --rate-hz 30    (q ends)")]
 pub struct Args {
     /// Updates a second
-    #[arg(long, default_value_t = 30.0)]
+    #[arg(long, default_value_t = 30.0, value_parser = numbers::rate_hz)]
     rate_hz: f64,
     /// Ends after so long
-    #[arg(long)]
+    #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
 }
 
@@ -48,7 +48,11 @@ impl Seen {
     pub fn take(&mut self, read: Result<State, Error>) {
         match read {
             Ok(state) => {
-                let time_s = self.clock.time_s(state.time_us);
+                let time_s = self.clock.time_s(&state).unwrap_or_else(|| {
+                    // The past is another run's.
+                    self.past.clear();
+                    self.clock.time_s(&state).unwrap_or_default()
+                });
                 self.past.push_back((time_s, state.force_mn, state.goal_mn));
                 while self.past.front().is_some_and(|(at_s, ..)| time_s - at_s > PAST_S) {
                     self.past.pop_front();

@@ -1,6 +1,9 @@
 //! A finger that is served from a thread, and `fingertip` set on it.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+use fingertip::link::Reply;
+use fingertip::link::packet::BROADCAST;
+use fingertip::link::sender;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
 use sim::effects::set::Named;
@@ -38,7 +41,14 @@ impl serve::Finger for Told {
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
-            let done = self.native.command(&command);
+            let done = match command.strip_prefix("raw ") {
+                // As another host on the bus would.
+                Some(number) => {
+                    self.native.0.hear(&instruction(number.parse().expect("an instruction's number")));
+                    Ok(String::new())
+                }
+                None => self.native.command(&command),
+            };
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
             (0..20).for_each(|_| self.native.0.frame());
             answer.send(done).expect("somebody waits for it");
@@ -109,6 +119,12 @@ impl Served {
         self.fingertip(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts")
     }
 
+    /// The end of one that writes to another place.
+    pub fn writing_to(&self, arguments: &[&str], place: impl Into<Stdio>) -> Output {
+        let child = self.fingertip(arguments).stdout(place).stderr(Stdio::piped()).spawn().expect("it starts");
+        child.wait_with_output().expect("it ends")
+    }
+
     fn fingertip(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
         command.env("FINGERTIP_PORT", &self.port).args(arguments);
@@ -140,6 +156,18 @@ impl Served {
         complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
     }
 
+    /// What it complains of where it does not understand.
+    pub fn not_understood(arguments: &[&str]) -> String {
+        let output = Command::new(env!("CARGO_BIN_EXE_fingertip"))
+            .env("FINGERTIP_PORT", "/nowhere")
+            .args(arguments)
+            .output()
+            .expect("it starts");
+        let err = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {err}");
+        err
+    }
+
     /// Ctrl-C.
     pub fn interrupt(child: &Child) {
         let pid = i32::try_from(child.id()).expect("a process number");
@@ -153,6 +181,13 @@ impl Drop for Served {
         self.stop.stop();
         let _ = std::fs::remove_dir_all(&self.folder);
     }
+}
+
+/// An instruction to all, which nobody answers, without parameters.
+fn instruction(number: u8) -> Vec<u8> {
+    let mut packet = Reply::new();
+    sender::Sender::new(&mut packet, BROADCAST, number).finish();
+    packet.to_vec()
 }
 
 fn said(output: &Output) -> String {

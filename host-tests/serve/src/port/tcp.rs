@@ -3,14 +3,19 @@
 use host_tests::say;
 use rustix::fd::{AsFd, BorrowedFd};
 use std::io::{self, ErrorKind, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 
 #[derive(Debug)]
 pub(super) struct Tcp {
     pub name: String,
     listener: TcpListener,
     client: Option<(TcpStream, SocketAddr)>,
+    /// Who was refused last, open until the next one comes.
+    refused: Option<TcpStream>,
 }
+
+/// More than a client can have sent that is not there any more.
+const LAST_READS: usize = 64;
 
 impl Tcp {
     pub fn open(port: u16) -> io::Result<Self> {
@@ -18,7 +23,7 @@ impl Tcp {
             .map_err(|why| io::Error::new(why.kind(), format!("cannot open TCP port {port}: {why}")))?;
         listener.set_nonblocking(true)?;
         let name = listener.local_addr()?.to_string();
-        Ok(Self { name, listener, client: None })
+        Ok(Self { name, listener, client: None, refused: None })
     }
 
     /// The listener, and the client where there is one.
@@ -28,8 +33,16 @@ impl Tcp {
 
     /// Takes a client in, and what the one that is there sends.
     pub fn read(&mut self, new: bool, bytes: bool) -> Vec<u8> {
-        let heard = if bytes { self.hear() } else { Vec::new() };
+        let mut heard = if bytes { self.hear() } else { Vec::new() };
         if new && let Ok((client, from)) = self.listener.accept() {
+            // The one that is there may have gone since, behind what it sent last.
+            for _ in 0..LAST_READS {
+                let last = self.hear();
+                if last.is_empty() {
+                    break;
+                }
+                heard.extend(last);
+            }
             self.welcome(client, from);
         }
         heard
@@ -55,6 +68,9 @@ impl Tcp {
             Some((_, first)) => {
                 // One bus has one host. Who is refused is told, in words that no client takes for a packet.
                 let _ = writeln!(client, "busy: {first} is connected to this fingertip, one client at a time");
+                // Were it closed with something unread, the words would be lost.
+                let _ = client.shutdown(Shutdown::Write);
+                self.refused = Some(client);
                 say::aside(format_args!("refused  {from}: {first} is connected, one client at a time"));
             }
             None if ready.is_ok() => {

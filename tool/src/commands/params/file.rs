@@ -1,16 +1,19 @@
 //! A backup: TOML, a line each with its meaning.
 
-use super::Value;
+use super::{Value, twice};
 use crate::table::{self, name};
+use crate::whole::Part;
 use crate::{Client, Error};
 use fingertip::shipped::address;
 use std::fmt::Write as _;
-use std::fs::{self, OpenOptions};
+use std::fs;
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
 use toml_edit::Document;
 
 const TABLE: &str = "parameters";
+/// How many there are: a file that was cut has fewer, or a last line without an end.
+const COUNT: &str = "entries";
 
 /// Writes it, whole or not at all.
 pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Value]) -> Result<(), Error> {
@@ -19,9 +22,10 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
     let pong = client.ping()?;
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
-         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\n[{TABLE}]\n",
+         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n{COUNT} = {}\n\n[{TABLE}]\n",
         pong.firmware,
-        information >> 16
+        information >> 16,
+        values.len()
     );
     for (register, value) in values {
         let doc = register.doc.trim();
@@ -31,12 +35,9 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
     if path.exists() && !force {
         return Err(format!("{} is there already: --force writes over it", path.display()).into());
     }
-    let mut part = path.file_name().unwrap_or_default().to_owned();
-    part.push(".new");
-    let part = path.with_file_name(part);
-    let mut file = OpenOptions::new().create(true).truncate(true).write(true).open(&part).map_err(failed)?;
-    file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(failed)?;
-    fs::rename(&part, path).map_err(failed)
+    let part = Part::begin(path)?;
+    part.file().and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)?;
+    part.place().map_err(failed)
 }
 
 /// Reads it.
@@ -48,6 +49,15 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
     let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
     let table = document.get(TABLE).and_then(|item| item.as_table());
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{TABLE}]")))?;
+    if let Some(count) = document.get(COUNT).and_then(|item| item.as_integer())
+        && (count != table.len() as i64 || !text.ends_with('\n'))
+    {
+        let why = format!(
+            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. Where that is meant, take out the line `{COUNT}`",
+            table.len()
+        );
+        return Err(Error::file("read", path, why));
+    }
     let (mut values, mut wrong) = (Vec::new(), Vec::new());
     for (key, item) in table.iter() {
         match (table::find(key), item.as_integer()) {
@@ -56,5 +66,6 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
             (Err(why), _) => wrong.push(why),
         }
     }
+    wrong.extend(twice(&values));
     if wrong.is_empty() { Ok(values) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }

@@ -3,7 +3,7 @@
 //! The parameters lie side by side, so they go out in one packet, which the controller takes whole or not at all. The
 //! few others have a packet each: where one is refused, what was set before is put back.
 
-use super::{Value, is_bus, is_param};
+use super::{Value, is_bus, is_param, twice};
 use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::link::table::Register;
@@ -20,7 +20,7 @@ pub(super) type Changed = (&'static Register, i64, i64);
 /// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says how
 /// it stands.
 pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
-    let wrong: Vec<String> = values.iter().filter_map(wrong).collect();
+    let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
         return Err(format!("{}; nothing was changed", wrong.join("; ")).into());
     }
@@ -36,6 +36,12 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
     check_together(&after)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
+    }
+    for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
+        if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
+            let why = "two with one ID cannot be told apart, nor set apart again";
+            return Err(format!("another device has the ID {id}: {why}. Nothing was changed").into());
+        }
     }
     let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
     changed.retain(|(_, from, to)| from != to);

@@ -8,7 +8,6 @@ use mcap::{McapError, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter};
-use std::path::Path;
 
 pub(super) struct Mcap {
     out: Writer<BufWriter<File>>,
@@ -24,9 +23,9 @@ fn failed(why: McapError) -> io::Error {
 }
 
 impl Mcap {
-    pub fn new(path: &Path, id: u8, pressures: bool) -> io::Result<Self> {
+    pub fn new(file: File, id: u8, pressures: bool) -> io::Result<Self> {
         let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
-        let mut out = options.create(BufWriter::new(File::create(path)?)).map_err(failed)?;
+        let mut out = options.create(BufWriter::new(file)).map_err(failed)?;
         let topics = [Some(Topic::Scalars), pressures.then_some(Topic::Image)];
         let channel = |topic: Topic| {
             let schema = out.add_schema(topic.schema_name(), "jsonschema", &topic.schema())?;

@@ -37,7 +37,11 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
         match State::read_picture(client) {
             Ok(state) => {
                 lost = false;
-                let time_s = clock.time_s(state.time_us);
+                let time_s = clock.time_s(&state).unwrap_or_else(|| {
+                    // It started anew: its time counts on from now.
+                    begun = None;
+                    clock.time_s(&state).unwrap_or_default()
+                });
                 let begun = *begun.get_or_insert_with(SystemTime::now);
                 let at = (begun + Duration::from_secs_f64(time_s)).duration_since(UNIX_EPOCH).unwrap_or_default();
                 for (topic, channel) in &channels {
@@ -52,7 +56,7 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
             }
         }
         due = (due + period).max(Instant::now().checked_sub(period).unwrap_or(due));
-        sleep(due.saturating_duration_since(Instant::now()));
+        interrupt.pause(due);
     }
     server.stop().wait_blocking();
     Ok(())

@@ -1,6 +1,8 @@
 //! Every command against a served finger: the native core and link behind a pseudo-terminal. Judged by words, bytes and
 //! counts, never by the clock.
 
+mod attacked;
+#[path = "../served/mod.rs"]
 mod served;
 
 use fingertip::params::Params;
@@ -211,7 +213,7 @@ fn a_recording_that_is_interrupted_is_whole() {
 
     // One whose line is lost keeps what it had, and says why it ends.
     let lost = finger.file("lost.csv");
-    let child = finger.start(&["record", "--timeout-ms", "1", &lost]);
+    let child = finger.start(&["record", &lost]);
     while fs::metadata(format!("{lost}.new")).is_err() {
         std::thread::yield_now();
     }

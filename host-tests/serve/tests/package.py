@@ -1,0 +1,39 @@
+"""What the package makes of wrong numbers and of a controller that starts anew: package.py PORT TIMEOUT_MS."""
+
+import sys
+
+from fingertip import Fault, Fingertip, FingertipError, Mode, registers
+
+
+def refused(doing, error):
+    try:
+        doing()
+    except error:
+        return
+    raise AssertionError(f"{doing} was not refused with {error}")
+
+
+for number in range(registers.FAULT.largest + 1):
+    Fault(number)
+for number in range(registers.PRESENT_MODE.largest + 1):
+    Mode(number)
+
+with Fingertip(sys.argv[1], timeout_ms=float(sys.argv[2])) as finger:
+    finger.tare()
+    # Beyond what the register takes, beyond force_max_mn, and no number at all.
+    for newtons, error in [(-1.0, ValueError), (1e6, ValueError), (100.0, FingertipError), (float("nan"), ValueError)]:
+        refused(lambda: finger.press(newtons), error)
+        assert finger.read(registers.TORQUE_ENABLE) == 0, newtons
+    for rate_hz, seconds in [(float("nan"), 1.0), (-1.0, 1.0), (1e-30, 1.0), (100.0, float("nan")), (100.0, -1.0)]:
+        refused(lambda: next(finger.stream(rate_hz, seconds)), ValueError)
+    assert len(list(finger.stream(0, 0.05, pressures=False))) > 1, "0 is as fast as it goes"
+
+    stream = finger.stream(0, pressures=False)
+    [next(stream) for _ in range(10)]
+    # A broadcast, which nobody answers.
+    finger._packets.txPacket(finger._port, [0xFF, 0xFF, 0xFD, 0, 254, 3, 0, 8, 0, 0])
+    finger._port.is_using = False
+    refused(lambda: [None for _ in stream], FingertipError)
+    # What comes then is of another time, which begins anew.
+    assert finger.state().time_s == 0.0
+    refused(lambda: finger.press(1.0), FingertipError)

@@ -1,0 +1,45 @@
+//! Numbers on the command line: what is no time or rate is not understood, so nothing waits for ever or ends in a panic.
+
+use std::ops::RangeInclusive;
+
+/// Thirty years and more.
+const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
+/// From one in a quarter of an hour to more than there are frames.
+const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
+
+/// A time in s.
+///
+/// # Errors
+/// It is none.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    within(text, &SECONDS)
+}
+
+/// A rate in Hz.
+///
+/// # Errors
+/// It is none.
+pub fn rate_hz(text: &str) -> Result<f64, String> {
+    within(text, &RATES_HZ)
+}
+
+/// A rate in Hz, or 0 for as fast as it goes.
+///
+/// # Errors
+/// It is none.
+pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
+    if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
+}
+
+/// A force in N; which ones the controller takes is its own affair.
+///
+/// # Errors
+/// It is none.
+pub fn newtons(text: &str) -> Result<f64, String> {
+    within(text, &(0.0..=1e6))
+}
+
+fn within(text: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| range.contains(number));
+    number.ok_or_else(|| format!("a number from {} to {} is asked for", range.start(), range.end()))
+}

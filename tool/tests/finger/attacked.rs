@@ -1,0 +1,198 @@
+//! What a host's program must not do, whatever it is asked and whatever happens to the controller meanwhile.
+
+use crate::served::Served;
+use fingertip::link::packet::instruction::REBOOT;
+use fingertip_cli::Client;
+use fingertip_cli::client::Reach;
+use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _};
+use std::os::unix::fs::FileTypeExt as _;
+
+#[test]
+fn numbers_that_are_none_are_not_understood() {
+    for arguments in [
+        &["record", "--seconds", "nan", "a.csv"][..],
+        &["record", "--seconds=-1", "a.csv"],
+        &["record", "--seconds", "inf", "a.csv"],
+        &["record", "--rate-hz", "nan", "a.csv"],
+        &["record", "--rate-hz=-5", "a.csv"],
+        &["record", "--rate-hz", "1e-30", "a.csv"],
+        &["record", "--rate-hz", "1e30", "a.csv"],
+        &["view", "--rate-hz", "nan"],
+        &["stream", "--rate-hz", "nan"],
+        &["view", "--seconds", "nan"],
+        &["tare", "--within-s", "nan"],
+        &["tare", "--within-s", "1e300"],
+        &["press", "nan"],
+        &["press", "1", "--seconds", "nan"],
+        &["press", "1", "--within-s", "nan"],
+        &["press", "1", "--seconds=-1"],
+        &["latency", "--seconds", "nan"],
+        &["scan", "--speeds", "0"],
+        &["--baud", "0", "info"],
+    ] {
+        let said = Served::not_understood(arguments);
+        assert!(!said.contains("panicked") && said.contains("for '"), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn a_pause_between_states_ends_at_once() {
+    let finger = Served::begin("wall");
+    let file = finger.file("slow.csv");
+    // A state in a quarter of an hour.
+    let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
+    while fs::read_to_string(format!("{file}.new")).is_err() {
+        std::thread::yield_now();
+    }
+    Served::interrupt(&child);
+    assert!(child.wait().expect("it ends").success());
+    assert!(fs::read_to_string(&file).expect("it is there").starts_with("time_s,"));
+}
+
+#[test]
+fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let file = finger.file("again.csv");
+    let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
+    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+        std::thread::yield_now();
+    }
+    finger.command(&format!("raw {REBOOT}"));
+    let output = child.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("the recording ends after") && said.contains("started anew"), "{said}");
+    // What it had is whole, and its times are.
+    let text = fs::read_to_string(&file).expect("it is there");
+    let times: Vec<f64> =
+        text.lines().skip(1).map(|row| row.split(',').next().expect("a cell").parse().expect("a time")).collect();
+    assert!(times.windows(2).all(|pair| pair[0] < pair[1]) && times.last() < Some(&4_000.0), "{:?}", times.last());
+
+    finger.done(&["tare"]);
+    let mut child = finger.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
+    let mut reader = BufReader::new(child.stderr.take().expect("it was asked for"));
+    let mut line = String::new();
+    while !line.starts_with("force") {
+        line.clear();
+        reader.read_line(&mut line).expect("it says how it stands");
+    }
+    finger.command(&format!("raw {REBOOT}"));
+    let mut rest = String::new();
+    reader.read_to_string(&mut rest).expect("it says why it ends");
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(1), "{rest}{}", String::from_utf8_lossy(&output.stdout));
+    assert!(rest.contains("started anew"), "{rest}");
+}
+
+#[test]
+fn a_register_that_is_named_twice_changes_nothing() {
+    let finger = Served::begin("wall");
+    let before = finger.json(&["params", "get"]);
+    let why = finger.refused(&["params", "set", "modulus_pa=300000", "clearance_um=500", "MODULUS_PA=200000"]);
+    assert!(why.contains("modulus_pa stands there twice") && why.contains("nothing was changed"), "{why}");
+    let file = finger.file("twice.toml");
+    fs::write(&file, "[parameters]\nmodulus_pa = 300000\nclearance_um = 500\nModulus_Pa = 200000\n").expect("a file");
+    for command in ["restore", "diff"] {
+        let why = finger.refused(&["params", command, &file]);
+        assert!(why.contains("modulus_pa stands there twice"), "{why}");
+    }
+    assert_eq!(finger.json(&["params", "get"]), before);
+}
+
+#[test]
+fn a_backup_that_was_cut_changes_nothing() {
+    let finger = Served::begin("wall");
+    let file = finger.file("cut.toml");
+    finger.done(&["params", "set", "creep_time_ms=20000", "modulus_pa=300000"]);
+    finger.done(&["params", "backup", &file]);
+    let whole = fs::read_to_string(&file).expect("it was written");
+    finger.done(&["params", "set", "creep_time_ms=10000", "modulus_pa=250000"]);
+    let before = finger.json(&["params", "get"]);
+    let number = whole.rfind("20000").expect("the last parameter") + 4;
+    let lines = whole.match_indices('\n').map(|(at, _)| at + 1).filter(|at| *at < whole.len());
+    // In the middle of the last number, in the middle of the last line, before its end, and between two lines.
+    for at in [number, number + 9, whole.len() - 1].into_iter().chain(lines.step_by(7)) {
+        fs::write(&file, &whole[..at]).expect("a file");
+        let why = finger.refused(&["params", "restore", &file]);
+        assert!(why.contains("cannot read"), "cut at {at}: {why}");
+        assert_eq!(finger.json(&["params", "get"]), before, "cut at {at}");
+    }
+    // Who leaves some out says so.
+    fs::write(&file, "[parameters]\nmodulus_pa = 300000").expect("a file");
+    finger.done(&["params", "restore", &file]);
+    assert_eq!(finger.json(&["params", "get", "modulus_pa"]), serde_json::json!({ "modulus_pa": 300_000 }));
+}
+
+#[test]
+fn an_address_that_another_has_is_refused() {
+    let finger = Served::begin("grasp");
+    let why = finger.refused(&["params", "set", "id=2", "modulus_pa=300000"]);
+    assert!(why.contains("another device has the ID 2") && why.contains("Nothing was changed"), "{why}");
+    let ids: Vec<_> = finger.json(&["scan", "--speeds", "1000000"]).as_array().expect("a list").clone();
+    assert_eq!(ids.iter().map(|found| found["id"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2)]);
+    assert_ne!(finger.json(&["params", "get", "modulus_pa"])["modulus_pa"], 300_000);
+    // Its own is none, and a free one is free.
+    finger.done(&["params", "set", "id=1"]);
+    finger.done(&["params", "set", "id=3"]);
+    finger.done(&["--id", "3", "params", "set", "id=1"]);
+}
+
+#[test]
+fn recover_says_torque_is_off_only_where_it_is() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let mut client = client(&finger);
+    client.set(fingertip::shipped::address::TORQUE_ENABLE, 1).expect("it is taken");
+    drop(client);
+    let said = finger.done(&["recover"]);
+    assert!(said.starts_with("there was nothing to recover from; torque is on"), "{said}");
+    assert_eq!(finger.json(&["info"])["torque_enable"], 1);
+}
+
+fn client(finger: &Served) -> Client {
+    let port = Some(finger.port.clone());
+    Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
+}
+
+#[test]
+fn only_files_are_written_in_place_and_by_one_at_a_time() {
+    let finger = Served::begin("wall");
+    let pipe = finger.file("pipe.csv");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().expect("it starts").success());
+    for arguments in [&["record", "--seconds", "0", &pipe][..], &["params", "backup", "--force", &pipe]] {
+        let why = finger.refused(arguments);
+        assert!(why.contains("it is no file"), "{why}");
+        assert!(fs::metadata(&pipe).expect("it is there").file_type().is_fifo());
+    }
+    // The folder is refused before anything is recorded, so nothing is lost.
+    let why = finger.refused(&["record", "--seconds", "0", "--format", "csv", &finger.file("")]);
+    assert!(why.contains("it is no file"), "{why}");
+
+    let other = Served::begin("wall");
+    let file = finger.file("both.csv");
+    let child = finger.start(&["record", &file]);
+    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+        std::thread::yield_now();
+    }
+    let why = other.refused(&["record", "--seconds", "0", &file]);
+    assert!(why.contains("another program is writing"), "{why}");
+    Served::interrupt(&child);
+    assert!(child.wait_with_output().expect("it ends").status.success());
+    assert!(fs::read_to_string(&file).expect("it is there").lines().count() > 10);
+}
+
+#[test]
+fn a_full_disk_is_told_and_a_closed_pipe_is_no_error() {
+    let finger = Served::begin("wall");
+    // Nobody reads from the first byte on.
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], writer);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], full);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("cannot write -: No space left"), "{said}");
+}

@@ -1,5 +1,6 @@
 //! The converters' inputs: rows in, column voltages out.
 
+use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
 use host_tests::plant::{World, readout::decay};
@@ -92,6 +93,9 @@ pub struct FrontEnd {
     pub counts: ScanCounts,
     /// In a scene.
     pub scan: Option<Scan>,
+    /// What the pins of the rows' port that are no rows did, while somebody asks; a snapshot does not keep it.
+    #[serde(skip)]
+    pub pin_edges: Option<Vec<PinEdge>>,
     /// Words of each converter that nobody has fetched yet.
     pub waiting: [VecDeque<u16>; 3],
     /// Newest first: a sample just before an edge still sees what was before it.
@@ -112,6 +116,7 @@ impl Shared {
             trigger_cut: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
+            pin_edges: None,
             waiting: Default::default(),
             drives: [Drive::default(); 3],
         })))
@@ -132,6 +137,13 @@ impl FrontEnd {
             self.drives.rotate_right(1);
         }
         self.drives[0] = Drive { rows, since_ns: at_ns };
+    }
+
+    /// A pin of the rows' port that is no row changed.
+    pub fn note_edge(&mut self, pin: usize, high: bool, at_ns: u64) {
+        if let Some(edges) = &mut self.pin_edges {
+            edges.push(PinEdge { pin, at_ns, high });
+        }
     }
 
     /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a

@@ -1,7 +1,7 @@
 //! The reference finger against a wall, in single precision: array, motor and wall of `docs/plant.md`, quick enough to
 //! run beside the loop on the microcontroller.
 //!
-//! Simpler than the plant that the demonstration stands in: explicit steps of a tenth of a frame, all rows of a frame
+//! Simpler than the plant that the demonstration stands in: explicit steps of a sixth of a frame, all rows of a frame
 //! read at its middle, the pressures interpolated from a table over the indentation. `tests/finger.rs` holds the force
 //! steps against those of the demonstration.
 
@@ -35,11 +35,10 @@ const COUNTS_PER_RAD: f32 = 1_600.0 / (2.0 * PI);
 const SOURCE_V: f32 = 6.0;
 const SOURCE_OHM: f32 = 0.1;
 
-/// Steps of a frame; the new duty comes after so many of them, 43 us as in the demonstration, and the array is read
-/// after half of them.
-const STEPS: usize = 10;
-const DUTY_AFTER: usize = 4;
-const READ_AFTER: usize = 5;
+/// Steps of a frame; the new duty comes after half of them, 50 us for the demonstration's 43, and the array is read
+/// then.
+const STEPS: usize = 6;
+const HALF_OF_THEM: usize = STEPS / 2;
 
 /// Distances of a taxel's middle from the array's along an axis, in half pitches: 1, 3, .. 9.
 const HALF: usize = COLUMNS / 2;
@@ -120,10 +119,8 @@ impl Finger {
     pub fn advance(&mut self, bridge: Bridge, frame_ns: u32) {
         let step_s = frame_ns as f32 * 1e-9 / STEPS as f32;
         for step in 0..STEPS {
-            if step == DUTY_AFTER {
+            if step == HALF_OF_THEM {
                 self.bridge = bridge;
-            }
-            if step == READ_AFTER {
                 self.read_mm = self.depth_mm();
             }
             self.step(step_s);
@@ -177,24 +174,28 @@ impl Finger {
         let place = self.read_mm / DEPTH_STEP_MM;
         let low = (place as usize).min(DEPTHS - 2);
         let part = (place - low as f32).min(1.0);
+        let (below, above) = (&self.kpa[low], &self.kpa[low + 1]);
+        let mut loaded = [0.0; CLASSES];
+        for ((code, below), above) in loaded.iter_mut().zip(below).zip(above) {
+            *code = PRELOAD + PER_KPA * (below + part * (above - below));
+        }
         for along in 0..HALF {
-            let mut codes = [0.0; HALF];
-            for (across, code) in codes.iter_mut().enumerate() {
-                let class = class(along.max(across), along.min(across));
-                let (below, above) = (self.kpa[low][class], self.kpa[low + 1][class]);
-                *code = PRELOAD + PER_KPA * (below + part * (above - below));
-            }
+            let codes: [f32; HALF] = core::array::from_fn(|across| loaded[class(along.max(across), along.min(across))]);
             let share = 1.0 / (1.0 + SAG_PER_CODE * 2.0 * codes.iter().sum::<f32>());
             for (across, code) in codes.into_iter().enumerate() {
                 let code = ((GROUND + share * code) as u16).min(4_095);
-                for row in [HALF - 1 - along, HALF + along] {
-                    frame.set_code(row, HALF - 1 - across, code);
-                    frame.set_code(row, HALF + across, code);
-                }
+                frame.set_code(HALF + along, HALF - 1 - across, code);
+                frame.set_code(HALF + along, HALF + across, code);
+            }
+            // The other half of the array mirrors this one.
+            if let Some(row) = frame.codes.slot(HALF + along).copied()
+                && let Some(mirrored) = frame.codes.slot_mut(HALF - 1 - along)
+            {
+                *mirrored = row;
             }
         }
-        for column in 0..COLUMNS {
-            frame.set_code(ROWS, column, GROUND as u16);
+        if let Some(undriven) = frame.codes.slot_mut(ROWS) {
+            undriven.fill(GROUND as u16);
         }
         frame.sequence = frame.sequence.wrapping_add(1);
     }

@@ -30,6 +30,7 @@ mod rows;
 #[path = "../image/stages.rs"]
 mod stages;
 
+use board::bridge::Bridge;
 use board::scan::Scan;
 use board::{clocks, crash, guard, health, options, stack, trace};
 use bringup::script::Bench;
@@ -55,6 +56,8 @@ fn main() -> ! {
     let clocked = clocks::start_external();
     let external_hz = oscillators::external_by_internal();
     let p = clocks::init(clocked);
+    // Asleep, should there be one after all.
+    let _bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
     clocks::accelerate_flash();
     clocks::freeze_when_halted();
     clocks::free_trace_pin();

@@ -18,8 +18,9 @@ const SAMPLES: u32 = 4_096;
 const COLUMN: usize = 1;
 /// The slot in which it steps.
 const SLOT: usize = 2;
-const HALF: u16 = 2_048;
-const FULL: u16 = 4_095;
+/// The step, and what a sample that saw it is above.
+const STEP: u16 = 3_000;
+const SEEN: u16 = 1_500;
 /// Ticks of the scan's timer between two places of the step.
 const STRIDE: usize = 4;
 
@@ -72,7 +73,7 @@ pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
     let mut latest = None;
     for at in (from..to).step_by(STRIDE) {
         let Some((stepped, code)) = step_at(scan, at) else { break };
-        if (HALF..FULL).contains(&code) {
+        if code > SEEN {
             latest = latest.max(Some(stepped));
         }
     }
@@ -94,7 +95,7 @@ fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
             now = pac::TIM8.cnt().read().cnt();
             now >= at
         })?;
-        set(FULL - 1);
+        set(STEP);
         wait_until(|| pac::GPIOB.odr().read().0 & ((1 << ROWS) - 1) != 1 << SLOT)?;
         set(0);
         Some(now)

@@ -41,6 +41,9 @@ pub struct Args {
     /// Which probe, where there are several, as `probe-rs list` shows it
     #[arg(long, value_name = "PROBE")]
     probe: Option<String>,
+    /// Write nothing to the board: the image is on it already, copied to the NUCLEO's drive for example
+    #[arg(long)]
+    flashed: bool,
     /// Leave the kernels' estimates out: they take QEMU, and another image
     #[arg(long)]
     without_estimates: bool,
@@ -74,7 +77,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         }
         Some(port) => {
             let mut command = Program { package: NAME, name: "bringup-host", whole: true }.build(console)?;
-            flash::put(&image, args.probe.as_deref(), console)?;
+            if !args.flashed {
+                flash::put(&image, args.probe.as_deref(), console)?;
+            }
             command.arg("--port").arg(port).arg("--sha256").arg(image.sha256());
             command
         }

@@ -8,7 +8,7 @@ use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Frame, Pipeline, TARE_FRAMES};
 use fingertip::units::{CoreCycles, Newtons};
-use images::record::Record;
+use images::record::{Digest, Record};
 
 /// Goals in mN, and for how many frames each is held; 0 lets go. The first has 5 mm to go.
 pub const GOALS: [(i32, u32); 6] =
@@ -150,6 +150,18 @@ impl Bench {
         pipeline.step(frame, sense, command);
         self.pass(pipeline.status(), pipeline.config().timing.frame_ns, CoreCycles(0));
         record
+    }
+
+    /// A digest of all that a pipeline makes of the records, from their beginning: the same on every machine.
+    pub fn digest(&mut self, pipeline: &mut Pipeline) -> u32 {
+        self.restart();
+        let mut digest = Digest::new();
+        for _ in 0..RECORDS {
+            self.record(pipeline);
+            digest.add(pipeline.status().duty, pipeline.status());
+        }
+        let value = digest.value();
+        value as u32 ^ (value >> 32) as u32
     }
 
     /// What the next step takes.

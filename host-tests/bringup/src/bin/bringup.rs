@@ -136,6 +136,8 @@ fn main() -> ! {
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
     scan.stop();
+    *pipeline = Pipeline::new(config);
+    report::number("loop_bits", bench.digest(pipeline));
     kernels::run(config, bench, pipeline);
     report::end();
     stages::wait(Kept { stage: Stage::Waits, ..kept })

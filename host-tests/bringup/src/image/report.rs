@@ -61,6 +61,11 @@ pub fn figure(name: &str, value: f32) {
     line(format_args!("figure {name} {value:.4}"));
 }
 
+/// A whole number of the report, to its last digit.
+pub fn number(name: &str, value: u32) {
+    line(format_args!("figure {name} {value}"));
+}
+
 /// A kernel's cycles, their median and the most.
 pub fn cycles(kernel: &str, median: u32, most: u32) {
     line(format_args!("cycles {median} {most} {kernel}"));

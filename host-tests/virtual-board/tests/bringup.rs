@@ -8,19 +8,13 @@ use std::path::PathBuf;
 use virtual_board::{Options, bringup as emulated};
 
 /// Figures of the emulated board that show nothing of a real one.
-const NOT_SHOWN: [&str; 16] = [
+const NOT_SHOWN: [&str; 10] = [
     "hse_mhz",
     "lsi_khz",
-    "loopback_57600",
-    "loopback_115200",
-    "loopback_1000000",
-    "loopback_2000000",
-    "loopback_3000000",
     "flash_word_us",
     "flash_erase_ms",
     "noise_prefetch_codes",
     "noise_codes",
-    "sample_ends_ns",
     "loop_answer_us",
     "step_cycles",
     "step_most_cycles",

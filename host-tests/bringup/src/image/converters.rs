@@ -72,8 +72,9 @@ pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
     let (from, to) = (timing.settle.0 as u16, timing.slot.0 as u16);
     let mut latest = None;
     for at in (from..to).step_by(STRIDE) {
-        let Some((stepped, code)) = step_at(scan, at) else { break };
-        if code > SEEN {
+        if let Some((stepped, code)) = step_at(scan, at)
+            && code > SEEN
+        {
             latest = latest.max(Some(stepped));
         }
     }
@@ -86,7 +87,6 @@ pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
 /// Steps up at a tick of the slot; when that was, and what the column's code became of it.
 fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
     let set = |code: u16| pac::DAC1.dhr12r(0).write(|w| w.set_dhr(code));
-    let before = scan::newest().sequence;
     let stepped = cortex_m::interrupt::free(|_| {
         set(0);
         wait_until(|| pac::GPIOB.odr().read().0 & ((1 << ROWS) - 1) == 1 << SLOT)?;
@@ -100,8 +100,10 @@ fn step_at(scan: &mut scan::Scan, at: u16) -> Option<(u16, u16)> {
         set(0);
         Some(now)
     })?;
+    // What waited for the interrupts is counted by now: the frame with the step is the next to be complete.
+    let before = scan::newest();
     let mut frame = Frame::EMPTY;
-    wait_until(|| scan::newest().sequence.wrapping_sub(before) >= 2)?;
+    wait_until(|| scan::newest() != before)?;
     scan.copy(scan::newest(), &mut frame).then(|| (stepped, frame.code(SLOT, COLUMN)))
 }
 

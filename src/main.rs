@@ -12,7 +12,7 @@ use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::supply::Supply;
 use board::watchdog::Watchdogs;
-use board::{bus, clocks, crash, guard, link_task, options, stack, watch};
+use board::{bus, clocks, crash, guard, link_task, options, stack, trace, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -69,6 +69,7 @@ async fn main(spawner: Spawner) {
         pipeline.stop(Fault::Crash);
     }
 
+    trace::start(p.PB10, p.PB13, p.PB14, p.PB15);
     guard::start(p.TIM5);
     let rows = [
         p.PB0.into(),

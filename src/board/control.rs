@@ -18,6 +18,7 @@ use super::guard::{self, Stopwatch};
 use super::health;
 use super::scan::{Completed, Scan, WAKE};
 use super::supply::Supply;
+use super::trace;
 use super::watchdog::Watchdogs;
 
 /// The first frame may come this many frame times after the start, before the guard trips.
@@ -51,7 +52,9 @@ pub async fn run(control: Control) {
     state.start();
     loop {
         WAKE.wait().await;
+        trace::Pin::Control.high();
         state.turn();
+        trace::Pin::Control.low();
     }
 }
 
@@ -93,6 +96,7 @@ impl State {
     fn turn(&mut self) {
         if guard::take_trip() {
             self.without_frames();
+            trace::Pin::Guard.low();
         }
         self.find_frames();
         self.take_frame();

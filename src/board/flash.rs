@@ -31,7 +31,7 @@ pub type SaveError = store::SaveError<Error>;
 impl Store {
     /// Takes the flash, and looks at what it holds.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
-        let chip = Chip(Flash::new_blocking(flash));
+        let chip = Chip::new(flash);
         let journal = Journal::new(&chip);
         Self { chip, journal }
     }
@@ -57,7 +57,15 @@ impl Store {
     }
 }
 
-struct Chip(Flash<'static, Blocking>);
+/// The flash itself.
+pub struct Chip(Flash<'static, Blocking>);
+
+impl Chip {
+    /// Takes it.
+    pub fn new(flash: Peri<'static, FLASH>) -> Self {
+        Self(Flash::new_blocking(flash))
+    }
+}
 
 impl store::Flash for Chip {
     type Error = Error;

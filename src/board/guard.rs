@@ -16,7 +16,7 @@ use fingertip::scan::ScanTiming;
 use fingertip::shipped::CLOCKS;
 use fingertip::units::CoreCycles;
 
-use super::{bridge, scan};
+use super::{bridge, scan, trace};
 
 /// Ticks of the stopwatch in a second.
 pub const HZ: u32 = 84_000_000;
@@ -103,6 +103,7 @@ pub fn take_trip() -> bool {
 #[embassy_stm32::interrupt]
 fn TIM5() {
     bridge::make_safe();
+    trace::Pin::Guard.high();
     TRIPPED.store(true, Ordering::Release);
     clear_flag();
     pac::TIM5.ccr(COMPARE_1).write_value(now().wrapping_add(PERIOD.load(Ordering::Relaxed)));

@@ -21,6 +21,7 @@ pub mod reference;
 pub mod scan;
 pub mod stack;
 pub mod supply;
+pub mod trace;
 pub mod watch;
 pub mod watchdog;
 

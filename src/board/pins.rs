@@ -26,8 +26,8 @@ pub fn timer_input(pin: Peri<'static, impl Pin>, function: u8, pull: Pull) {
 }
 
 /// A timer's output, pulled down while the timer leaves it.
-pub fn timer_output(pin: Peri<'static, impl Pin>, function: u8) {
-    alternate(pin.into(), function, AfType::output_pull(OutputType::PushPull, Speed::High, Pull::Down));
+pub fn timer_output(pin: Peri<'static, impl Pin>, function: u8, speed: Speed) {
+    alternate(pin.into(), function, AfType::output_pull(OutputType::PushPull, speed, Pull::Down));
 }
 
 /// An output that starts low and is then set through its port.

@@ -20,7 +20,7 @@ use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 
 use super::health::{self, Broken};
-use super::{converter, guard, pins, reference};
+use super::{converter, guard, pins, reference, trace};
 use machine::*;
 
 /// Wakes the control task: a frame is complete or half complete, or the guard tripped.

@@ -37,7 +37,8 @@ impl Watchdogs {
         Self { independent: IndependentWatchdog::new(independent, INDEPENDENT_US), count: LARGEST as u8 }
     }
 
-    /// Starts both, with the longest time.
+    /// Starts both, with the longest time. The independent one takes its own some cycles of its clock after its start
+    /// (RM0390, IWDG_SR): until it is fed then, 0.2 ms later, it counts from 0.5 s.
     pub fn start(&mut self) {
         self.independent.unleash();
         self.allow_long();

@@ -2,7 +2,8 @@
 
 use crate::{
     console::{self, Console},
-    image, paths,
+    image::{self, Image},
+    paths,
     toolchain::Choice,
 };
 use anyhow::{Context, Result, bail};
@@ -36,6 +37,16 @@ const BOR_LEV: u32 = 0b11 << 2;
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::firmware(choice, console)?;
     console.say(&image.summary());
+    put(&image, args.probe.as_deref(), console)?;
+    console.say("The board runs the image.");
+    Ok(())
+}
+
+/// Writes and verifies an image, sees to the option bytes, and starts it.
+///
+/// # Errors
+/// probe-rs is missing, or there is no board.
+pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<()> {
     if paths::find_program("probe-rs").is_none() {
         bail!(
             "probe-rs writes the image to the board, and is not in PATH.\n\
@@ -45,14 +56,12 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
             image.base
         );
     }
-    let probe = Probe(args.probe.as_deref());
+    let probe = Probe(probe);
     let mut download = probe.command("download");
     download.args(["--verify", "--binary-format", "bin", "--base-address"]);
     console.run(download.arg(format!("{:#x}", image.base)).arg(&image.bin))?;
     set_brown_out_level(&probe, console)?;
-    console.run(&mut probe.command("reset"))?;
-    console.say("The board runs the image.");
-    Ok(())
+    console.run(&mut probe.command("reset"))
 }
 
 /// Programs brown-out level 3 where the option bytes have another: the image refuses torque without it.

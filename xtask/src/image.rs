@@ -108,6 +108,16 @@ pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     Ok(image)
 }
 
+/// Builds an image that checks a board, with the flashable bytes beside it.
+///
+/// # Errors
+/// It does not compile or link.
+pub fn checking(toolchain: Toolchain, name: &str, console: &mut Console) -> Result<Image> {
+    let image = Image::read(&built(checked(toolchain, "build", name).arg("--release"), toolchain, name, console)?)?;
+    fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
+    Ok(image)
+}
+
 /// Builds an image for the emulated core and returns where it lies.
 ///
 /// # Errors
@@ -125,6 +135,13 @@ fn built(command: &mut Command, toolchain: Toolchain, name: &str, console: &mut 
 pub fn flashed(toolchain: Toolchain, subcommand: &str) -> Command {
     let mut command = toolchain.cargo(subcommand);
     command.args(["--package", "fingertip", "--bin", "firmware", "--features", "firmware"]);
+    command
+}
+
+/// `cargo <subcommand>` of an image that checks a board.
+pub fn checked(toolchain: Toolchain, subcommand: &str, name: &str) -> Command {
+    let mut command = toolchain.cargo(subcommand);
+    command.args(["--package", name, "--bin", name, "--no-default-features", "--features", "image"]);
     command
 }
 

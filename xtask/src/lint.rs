@@ -38,7 +38,7 @@ pub fn run(choice: Choice) -> Result<()> {
         for (name, feature) in IMAGES {
             console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
         }
-        Ok(())
+        console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))
     });
     stages.stage("documentation", |console| {
         let mut command = console::cargo("doc");

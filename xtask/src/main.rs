@@ -1,6 +1,7 @@
 //! The project's commands. `cargo xtask --help` lists them; each does its own set-up.
 
 mod apt;
+mod bringup;
 mod browser;
 mod cluster;
 mod console;
@@ -95,6 +96,8 @@ enum Command {
     Build,
     /// Build the flash image and write it to a board with probe-rs
     Flash(flash::Args),
+    /// Check a bare NUCLEO-F446RE, or the emulated board: clocks, watchdogs, flash, converters, scan, the loop, cycles
+    Bringup(bringup::Args),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
     Qemu(qemu::Args),
     /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
@@ -150,6 +153,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
+        Command::Bringup(args) => bringup::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => study::run(args, toolchain, console),

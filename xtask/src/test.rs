@@ -1,7 +1,11 @@
 //! Every test, a stage each.
 
 use crate::{
-    browser, console, host, image, proof, python, qemu, size::Sizes, stages::Stages, timing, toolchain::Choice,
+    bringup, browser, console, host, image, proof, python, qemu,
+    size::Sizes,
+    stages::Stages,
+    timing,
+    toolchain::{self, Choice},
 };
 use anyhow::{Context, Result};
 
@@ -34,7 +38,9 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
         let mut command = host::cargo("test", "virtual-board");
+        let checking = bringup::build(toolchain::ensure(choice, console)?, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
+        command.env("FINGERTIP_BRINGUP", &checking.elf);
         host::test(&mut command, console)
     });
     stages.stage("Python package on a served finger", |console| {

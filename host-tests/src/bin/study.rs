@@ -1,6 +1,7 @@
 //! What accuracy costs in time: makes the study's inputs, and tables and pictures of its run.
 //!
-//! `study inputs FILE` writes the inputs for the image.
+//! `study inputs FILE` writes the inputs for the image. `study few KEPT FULL` writes the few that the image of `cargo
+//! xtask bringup` keeps, and the same with the records that it makes itself.
 //! `study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
 //! is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
 
@@ -12,12 +13,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "usage: study inputs FILE | study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]";
+const USAGE: &str =
+    "usage: study inputs FILE | study few KEPT FULL | study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
+        ["few", kept, full] => few(kept, full),
         ["report", shipped, quick, ref flags @ ..] => report([shipped, quick], flags),
         _ => Err(USAGE.into()),
     };
@@ -28,6 +31,14 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn few(kept: &str, full: &str) -> Result<(), String> {
+    let inputs = Inputs::new();
+    for (file, bytes) in [(kept, inputs.few_to_bytes()), (full, inputs.few_with_records())] {
+        fs::write(file, bytes).map_err(|error| format!("{file}: {error}"))?;
+    }
+    Ok(())
 }
 
 fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {

@@ -6,8 +6,10 @@ use crate::fit_cases::Scene;
 use crate::fit_statistics::{FRAMES, GOOD, Series};
 use crate::plant::{Setup, World};
 use crate::stimulus;
+use bringup::script::{Bench, RECORDS};
 use fastrand::Rng;
-use fingertip::shipped::{COLUMNS, Frame, Picture, ROWS};
+use fingertip::params::Params;
+use fingertip::shipped::{COLUMNS, Config, Frame, Picture, Pipeline, ROWS};
 use images::record::Record;
 
 const SEED: u64 = 2003;
@@ -63,14 +65,15 @@ fn seen(series: &Series) -> Vec<Seen> {
     seen
 }
 
-/// For each pitch its cases.
-fn seen_to_bytes(seen: &[Seen]) -> Vec<u8> {
-    let mut words = vec![seen.len() as i32, FRAMES as i32];
+/// For each pitch its cases, of each so many pictures.
+fn seen_to_bytes<'a>(seen: impl Iterator<Item = &'a Seen>, pictures: usize) -> Vec<u8> {
+    let seen: Vec<_> = seen.collect();
+    let mut words = vec![seen.len() as i32, pictures as i32];
     for same in seen.chunk_by(|a, b| a.scene.pitch_mm == b.scene.pitch_mm) {
         words.extend(same.first().map(|seen| (seen.scene.pitch_mm * 1e3).round() as i32));
         words.push(same.len() as i32);
-        let pictures = same.iter().flat_map(|seen| &seen.pictures);
-        words.extend(pictures.flat_map(|picture| picture.taxels.into_iter().flatten()));
+        let shown = same.iter().flat_map(|seen| seen.pictures.iter().take(pictures));
+        words.extend(shown.flat_map(|picture| picture.taxels.into_iter().flatten()));
     }
     words.into_iter().flat_map(i32::to_le_bytes).collect()
 }
@@ -154,10 +157,49 @@ impl Inputs {
             bytes.extend(pairs_to_bytes(section));
         }
         bytes.extend(self.frames.to_bytes());
-        self.fits.iter().for_each(|seen| bytes.extend(seen_to_bytes(seen)));
+        self.fits.iter().for_each(|seen| bytes.extend(seen_to_bytes(seen.iter(), FRAMES)));
         bytes.extend(pairs_to_bytes(&self.control));
         bytes.extend((self.records.len() as u32).to_le_bytes());
         bytes.extend(self.records.iter().flat_map(Record::to_bytes));
+        bytes
+    }
+}
+
+/// What a board's image keeps of each section: every so manieth of the numbers, frames and contacts, and so many
+/// pictures of a contact.
+const FEW: [usize; 4] = [32, 16, 16, 12];
+
+impl Inputs {
+    /// What the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
+    pub fn few_to_bytes(&self) -> Vec<u8> {
+        let [number, frame, contact, pictures] = FEW;
+        let few = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());
+        let mut bytes = Vec::new();
+        for section in [&self.root, &self.force, &self.indentation, &self.pressure] {
+            bytes.extend(few(section, number));
+        }
+        bytes.extend(few(&self.rings, number / 4));
+        let contacts = self.frames.contacts.iter().copied().step_by(frame).collect();
+        bytes.extend(Frames { contacts, ..self.frames }.to_bytes());
+        for seen in &self.fits {
+            bytes.extend(seen_to_bytes(seen.iter().step_by(contact), pictures));
+        }
+        bytes.extend(few(&self.control, number));
+        bytes
+    }
+
+    /// The same with the records behind it, as that image makes them: what the timing model's image takes.
+    ///
+    /// # Panics
+    /// Never: the default parameters are sound, as the core's own tests show.
+    pub fn few_with_records(&self) -> Vec<u8> {
+        let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
+        let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
+        bench.finger.make_table();
+        bench.restart();
+        let mut bytes = self.few_to_bytes();
+        bytes.extend(RECORDS.to_le_bytes());
+        (0..RECORDS).for_each(|_| bytes.extend(bench.record(&mut pipeline).to_bytes()));
         bytes
     }
 }

@@ -15,7 +15,7 @@ use host_tests::plant::Bridge;
 use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
 use rigless::snapshot::{self, Reader, Store, Writer};
-use rigless::soc::stm32f427::generated::{GPIOC, TIM1};
+use rigless::soc::stm32f427::generated::{DAC, GPIOC, TIM1, USART2};
 use rigless::time::VirtualNanos;
 
 /// The plant's step, and the least of a scene's world.
@@ -24,6 +24,10 @@ pub const STEP_NS: u64 = 10_000;
 const LOG_NS: u64 = 1_000_000;
 /// TIM1's registers behind which the duty stands, as offsets: CCR1 and CCR2.
 const DUTY_REGISTERS: [u64; 2] = [0x34, 0x38];
+
+/// USART2's register with single-wire mode, and its bit.
+const CR3: u64 = 0x14;
+const HDSEL: u64 = 1 << 3;
 
 /// All that is not the board, and that a snapshot keeps.
 #[derive(Debug)]
@@ -106,6 +110,10 @@ impl Bench {
                 self.latency.duty_written(at_ns, frame_end_ns);
             }
             self.watch_bridge(board, at_ns);
+        } else if access.address == USART2.base + CR3 {
+            board.wire().set_single(access.value & HDSEL != 0);
+        } else if access.address.wrapping_sub(DAC.base) < 0x400 {
+            self.front_end.lock().write_dac(access.address - DAC.base, access.value, at_ns);
         } else if access.address.wrapping_sub(GPIOC.base) < 0x400 {
             self.watch_bridge(board, at_ns);
             let on = board.transmits();

@@ -228,6 +228,8 @@ impl Device for Converter {
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
+        } else if change.instance == ROW_PORT.0 && self.nth == 0 {
+            self.front_end.lock().note_edge(change.request, change.level == Level::High, context.now().0);
         } else if change.instance == "TIM8" && change.request == COMPARE_1 {
             let mut front_end = self.front_end.lock();
             if front_end.trigger_cut || front_end.scan.is_some() {

@@ -49,6 +49,12 @@ pub enum Error {
     /// The client's pseudo-terminal failed.
     #[error("the bus client's pseudo-terminal: {0}")]
     Client(#[from] std::io::Error),
+    /// The bring-up image gave no report.
+    #[error("the report of the bring-up image: {0}")]
+    Report(std::io::Error),
+    /// Some of its checks fail.
+    #[error("{0} checks fail; see the table")]
+    Failed(usize),
     /// The plant was asked for where the board stands in a scene.
     #[error("the board stands in a scene, not in the plant")]
     InAScene,

@@ -1,5 +1,6 @@
 //! The converters' inputs: rows in, column voltages out.
 
+use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
 use host_tests::plant::{World, readout::decay};
@@ -66,6 +67,15 @@ impl Scan {
 /// What the columns settle to under the drive of that place and under the one before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
 
+/// The DAC's first channel, on the pin of column 1: codes, newest first, and since when. Its buffer is off; it is quick.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Dac([(u16, u64); 3]);
+
+/// The column on its pin, and its registers: control, and the code to the right.
+const DAC_COLUMN: usize = 1;
+const DAC_CR: u64 = 0;
+const DAC_DHR12R1: u64 = 8;
+
 /// What the converters have done.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScanCounts {
@@ -92,6 +102,12 @@ pub struct FrontEnd {
     pub counts: ScanCounts,
     /// In a scene.
     pub scan: Option<Scan>,
+    /// What the pins of the rows' port that are no rows did, while somebody asks; a snapshot does not keep it.
+    #[serde(skip)]
+    pub pin_edges: Option<Vec<PinEdge>>,
+    /// What the DAC's first channel drives its pin to; none while it is off. A snapshot does not keep it.
+    #[serde(skip)]
+    pub dac: Option<Dac>,
     /// Words of each converter that nobody has fetched yet.
     pub waiting: [VecDeque<u16>; 3],
     /// Newest first: a sample just before an edge still sees what was before it.
@@ -112,6 +128,8 @@ impl Shared {
             trigger_cut: false,
             scan_interrupt_lost: false,
             counts: ScanCounts::default(),
+            pin_edges: None,
+            dac: None,
             waiting: Default::default(),
             drives: [Drive::default(); 3],
         })))
@@ -132,6 +150,26 @@ impl FrontEnd {
             self.drives.rotate_right(1);
         }
         self.drives[0] = Drive { rows, since_ns: at_ns };
+    }
+
+    /// The image wrote to a register of the DAC.
+    pub fn write_dac(&mut self, offset: u64, value: u64, at_ns: u64) {
+        match (offset, &mut self.dac) {
+            (DAC_CR, None) if value & 1 == 1 => self.dac = Some(Dac::default()),
+            (DAC_CR, Some(_)) if value & 1 == 0 => self.dac = None,
+            (DAC_DHR12R1, Some(Dac(codes))) => {
+                codes.rotate_right(1);
+                codes[0] = ((value & 0xfff) as u16, at_ns);
+            }
+            _ => {}
+        }
+    }
+
+    /// A pin of the rows' port that is no row changed.
+    pub fn note_edge(&mut self, pin: usize, high: bool, at_ns: u64) {
+        if let Some(edges) = &mut self.pin_edges {
+            edges.push(PinEdge { pin, at_ns, high });
+        }
     }
 
     /// In a scene: a word for the rows' port, to set the pins of its lower half and reset those of its upper, begins a
@@ -195,6 +233,11 @@ impl FrontEnd {
             let word = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
                 Some(Some(place)) => {
                     let column = converter * COLUMN_INPUTS[0].len() + place;
+                    if let (DAC_COLUMN, Some(Dac(codes))) = (column, &self.dac) {
+                        let held = codes.iter().find(|(_, since_ns)| *since_ns <= at_ns);
+                        self.waiting[converter].push_back(held.map_or(0, |(code, _)| *code));
+                        continue;
+                    }
                     let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
                     match &mut self.world {
                         Surroundings::Plant(world) => {

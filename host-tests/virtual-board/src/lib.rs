@@ -9,6 +9,7 @@
 
 pub mod bench;
 pub mod board;
+pub mod bringup;
 pub mod client;
 mod clock;
 pub mod converter;

@@ -18,6 +18,8 @@ enum Command {
     /// Runs the image for some time and reports speed, frames, log and emulator gaps.
     #[cfg(feature = "log")]
     Run(commands::run::Arguments),
+    /// Runs the image of `cargo xtask bringup` and judges its report.
+    Bringup(commands::bringup::Arguments),
     /// Touches an object, holds forces, lets go; judges the figures and draws pictures.
     Demo(commands::demo::Arguments),
     /// Keeps the board alive for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port.
@@ -34,6 +36,7 @@ fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().command {
         #[cfg(feature = "log")]
         Command::Run(arguments) => commands::run::run(&arguments).map_err(Into::into),
+        Command::Bringup(arguments) => commands::bringup::run(&arguments).map_err(Into::into),
         Command::Demo(arguments) => commands::demo::run(&arguments).map_err(Into::into),
         Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),
         #[cfg(feature = "scenes")]

@@ -53,6 +53,17 @@ impl Latency {
     }
 }
 
+/// A pin's level changed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PinEdge {
+    /// Its number in its port.
+    pub pin: usize,
+    /// Virtual time.
+    pub at_ns: u64,
+    /// Whether it is high from then on.
+    pub high: bool,
+}
+
 /// The bridge went on or off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BridgeEdge {

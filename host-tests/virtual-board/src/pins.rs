@@ -15,12 +15,14 @@ enum Mode {
 }
 
 /// Port, pins, mode: the table of `docs/board.md`.
-const WIRED: [(usize, &[u8], Mode); 9] = [
+const WIRED: [(usize, &[u8], Mode); 11] = [
     (1, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], Mode::Output),
     (0, &[0, 1, 4, 6, 7], Mode::Analog),
     (2, &[0, 1, 2, 3, 4, 5], Mode::Analog),
     (0, &[8, 9], Mode::Function(1)),
     (1, &[12], Mode::Function(1)),
+    (1, &[10, 13, 15], Mode::Output),
+    (1, &[14], Mode::Function(3)),
     (2, &[6, 7], Mode::Function(2)),
     (0, &[2, 3], Mode::Function(7)),
     (2, &[8, 9], Mode::Output),

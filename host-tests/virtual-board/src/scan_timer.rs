@@ -165,7 +165,9 @@ impl Device for ScanTimer {
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
-        let taken = register == Register::Ccr1 && self.take_edge(value, registers);
+        // The second channel is the first's copy on a pin that leads nowhere: its compare would be an event in each slot.
+        let idle = register == Register::Ccr2;
+        let taken = idle || register == Register::Ccr1 && self.take_edge(value, registers);
         if register == Register::Ccr1 && !taken {
             self.compare_standing(value, registers, context);
         }

@@ -22,6 +22,7 @@ pub struct Wire {
     outgoing: VecDeque<(u64, u8)>,
     handed_over: u64,
     incoming: Vec<TimedByte>,
+    single: bool,
 }
 store!(Wire);
 
@@ -29,6 +30,11 @@ impl Wire {
     /// Queues bytes that start no earlier than an instant; each follows the one before it.
     pub fn send(&mut self, from_ns: u64, bytes: &[u8]) {
         self.outgoing.extend(bytes.iter().map(|byte| (from_ns, *byte)));
+    }
+
+    /// Whether the port is in single-wire mode: its receiver is on the transmit pin, and hears what it sends.
+    pub fn set_single(&mut self, single: bool) {
+        self.single = single;
     }
 
     /// From when on the next byte may go out.
@@ -54,7 +60,11 @@ impl Wire {
 
 impl Peer for Wire {
     fn receive(&mut self, word: u16, context: &mut Timeline<'_, '_>) {
-        self.incoming.push(TimedByte { at_ns: context.now().0, byte: (word & 0xff) as u8 });
+        let byte = TimedByte { at_ns: context.now().0, byte: (word & 0xff) as u8 };
+        self.incoming.push(byte);
+        if self.single {
+            self.outgoing.push_back((byte.at_ns, byte.byte));
+        }
     }
 
     fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {

@@ -12,6 +12,8 @@ use embassy_stm32::pac::timer::vals::Ocm;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, ROWS, SLOTS};
 
+use super::trace;
+
 /// TIM8's compare 1 in the converters' list of triggers.
 pub const TRIGGER_TIM8_CC1: u8 = 13;
 /// Streams of DMA2, with their channels: bank A, the rows, bank B.
@@ -25,20 +27,22 @@ pub const CHANNEL_ADC2: u8 = 1;
 pub const HALF_LEN: u16 = (SLOTS * BANK_COLUMNS) as u16;
 pub const BUFFER_LEN: u16 = 2 * HALF_LEN;
 
-/// What each slot writes to the port's set/reset register: its row set, the others reset; all reset in the last.
+/// What each slot writes to the port's set/reset register: its row set, the others reset; in the last all rows reset,
+/// and the frame's trace pin set.
 ///
 /// Atomic so that it lies in RAM: a flash that is being programmed would make the DMA wait.
 static ROW_WORDS: [AtomicU32; SLOTS] = {
     let mut words = [const { AtomicU32::new(0) }; SLOTS];
     let mut slot = 0;
     while slot < SLOTS {
-        let set = if slot < ROWS { 1 << slot } else { 0 };
-        words[slot] = AtomicU32::new((ALL_ROWS & !set) << 16 | set);
+        let set = if slot < ROWS { 1 << slot } else { 1 << trace::FRAME };
+        words[slot] = AtomicU32::new((ALL_PINS & !set) << 16 | set);
         slot += 1;
     }
     words
 };
-pub const ALL_ROWS: u32 = (1 << ROWS) - 1;
+/// The rows, and the frame's trace pin.
+const ALL_PINS: u32 = ((1 << ROWS) - 1) | (1 << trace::FRAME);
 
 /// Stops the timer first, so that nothing asks for DMA any more, then all that hung on it. No row stays driven.
 pub fn stop() {
@@ -65,7 +69,7 @@ pub fn stop() {
     });
     interrupt::DMA2_STREAM1.unpend();
     interrupt::DMA2_STREAM2.unpend();
-    pac::GPIOB.bsrr().write(|w| w.0 = ALL_ROWS << 16);
+    pac::GPIOB.bsrr().write(|w| w.0 = ALL_PINS << 16);
 }
 
 pub fn start_converter(adc: Adc, set_sequence: impl FnOnce()) {
@@ -118,17 +122,24 @@ pub fn start_rows() {
     stream.cr().modify(|w| w.set_en(true));
 }
 
-/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters. Leaves the
-/// counter at 0, with the compare's output low.
+/// The update moves the row; the compare's rising edge, a settle time later, triggers both converters. The second
+/// channel is the same on the trigger's trace pin. Leaves the counter at 0, with the compare's output low.
 pub fn set_timer(timing: ScanTiming) {
     let timer = pac::TIM8;
     timer.arr().write(|w| w.set_arr((timing.slot.0 - 1) as u16));
-    timer.ccr(0).write(|w| w.set_ccr(timing.settle.0 as u16));
+    for channel in 0..2 {
+        timer.ccr(channel).write(|w| w.set_ccr(timing.settle.0 as u16));
+    }
     timer.ccmr_output(0).write(|w| {
-        w.set_ocm(0, Ocm::PWM_MODE2);
-        w.set_ocpe(0, true);
+        for channel in 0..2 {
+            w.set_ocm(channel, Ocm::PWM_MODE2);
+            w.set_ocpe(channel, true);
+        }
     });
-    timer.ccer().write(|w| w.set_cce(0, true));
+    timer.ccer().write(|w| {
+        w.set_cce(0, true);
+        w.set_ccne(1, true);
+    });
     timer.bdtr().write(|w| w.set_moe(true));
     timer.egr().write(|w| w.set_ug(true));
 }

@@ -1,5 +1,6 @@
 //! The commands, one module each.
 
+pub mod bringup;
 pub mod demo;
 #[cfg(feature = "scenes")]
 pub mod population;

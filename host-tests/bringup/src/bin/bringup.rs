@@ -1,0 +1,162 @@
+//! The image of `cargo xtask bringup`: measures a bare NUCLEO-F446RE with the firmware's own board layer, closes the
+//! loop on a finger that it simulates, and tells all of it on the virtual COM port.
+//!
+//! It judges nothing: `bringup::checks` does, on the host. What ends in a reset comes first, see `stages`.
+#![no_std]
+#![no_main]
+
+#[path = "../../../../src/board/mod.rs"]
+#[allow(dead_code, reason = "the image takes a part of the firmware's board layer")]
+mod board;
+
+#[path = "../image/converters.rs"]
+mod converters;
+#[path = "../image/flash_times.rs"]
+mod flash_times;
+#[path = "../image/host.rs"]
+mod host;
+#[path = "../image/kernels.rs"]
+mod kernels;
+#[path = "../image/loopback.rs"]
+mod loopback;
+#[path = "../image/on_chip.rs"]
+mod on_chip;
+#[path = "../image/oscillators.rs"]
+mod oscillators;
+#[path = "../image/report.rs"]
+mod report;
+#[path = "../image/rows.rs"]
+mod rows;
+#[path = "../image/stages.rs"]
+mod stages;
+
+use board::bridge::Bridge;
+use board::scan::Scan;
+use board::{clocks, crash, guard, health, options, stack, trace};
+use bringup::script::Bench;
+use cortex_m::peripheral::DWT;
+use defmt_rtt as _;
+use fingertip::link::snapshot::CrashCause;
+use fingertip::params::Params;
+use fingertip::shipped::{Config, Pipeline};
+use stages::{Kept, Stage};
+use static_cell::{ConstStaticCell, StaticCell};
+
+static BENCH: ConstStaticCell<Bench> = ConstStaticCell::new(Bench::new());
+static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
+static CONFIG: StaticCell<Config> = StaticCell::new();
+
+/// Cycles of the core in a microsecond.
+const CYCLES_PER_US: u32 = 168;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    stack::guard_foot();
+    let boot = crash::boot();
+    let clocked = clocks::start_external();
+    let external_hz = oscillators::external_by_internal();
+    let p = clocks::init(clocked);
+    // Asleep, should there be one after all.
+    let _bridge = Bridge::new(p.TIM1, p.PA8, p.PA9, p.PB12, p.PC9);
+    clocks::accelerate_flash();
+    clocks::freeze_when_halted();
+    clocks::free_trace_pin();
+    board::set_priorities();
+    count_cycles();
+    trace::start(p.PB10, p.PB13, p.PB14, p.PB15);
+    guard::start(p.TIM5);
+    report::start(p.USART2, p.PA2, p.PA3);
+
+    let config = make_config();
+    let kept = Kept::load(boot.reset);
+    match kept.stage {
+        Stage::Waits if boot.crashed => report::say(format_args!(
+            "crashed: cause {}, line {}, pc {:#010x}",
+            boot.crash.cause as u8, boot.crash.line, boot.crash.pc
+        )),
+        Stage::Waits => {}
+        Stage::Window => stages::window(kept, p.IWDG, p.WWDG, config.timing),
+        Stage::Independent => stages::independent(kept, p.IWDG, p.WWDG),
+        Stage::Foot => stages::foot(kept),
+        Stage::Rest => {}
+    }
+    if kept.stage != Stage::Rest {
+        stages::wait(kept);
+    }
+    Kept { stage: Stage::Waits, ..kept }.store();
+
+    report::begin();
+    if let Some(hz) = external_hz {
+        report::figure("hse_mhz", hz * 1e-6);
+    }
+    if let Some(hz) = oscillators::low_speed() {
+        report::figure("lsi_khz", hz * 1e-3);
+    }
+    report::figure("core_per_stopwatch", oscillators::core_per_stopwatch());
+    report::figure("brown_out_bits", (options::loaded() >> 2 & 0b11) as f32);
+    let [window, independent] = kept.cycles.map(|cycles| cycles as f32 / CYCLES_PER_US as f32);
+    report::figure("window_watchdog_us", window);
+    report::figure("independent_watchdog_ms", independent * 1e-3);
+    report::figure("stack_foot", f32::from(u8::from(boot.crashed && boot.crash.cause == CrashCause::HardFault)));
+    loopback::run();
+    flash_times::run(p.FLASH);
+    converters::noise();
+
+    let rows = [
+        p.PB0.into(),
+        p.PB1.into(),
+        p.PB2.into(),
+        p.PB3.into(),
+        p.PB4.into(),
+        p.PB5.into(),
+        p.PB6.into(),
+        p.PB7.into(),
+        p.PB8.into(),
+        p.PB9.into(),
+    ];
+    let columns = [
+        p.PA1.into(),
+        p.PA4.into(),
+        p.PA6.into(),
+        p.PA7.into(),
+        p.PC5.into(),
+        p.PC0.into(),
+        p.PC1.into(),
+        p.PC2.into(),
+        p.PC3.into(),
+        p.PC4.into(),
+    ];
+    let mut scan = Scan::new(p.TIM8, p.ADC1, p.ADC2, p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2, rows, columns);
+    report::figure("analogue_mv", f32::from(health::health().analogue_mv));
+    scan.start(config.timing);
+    rows::run(kept.frames);
+    converters::sample_instant(&mut scan, config.timing);
+
+    let (bench, pipeline) = (BENCH.take(), PIPELINE.init_with(|| Pipeline::new(config)));
+    bench.finger.make_table();
+    on_chip::run(bench, pipeline);
+    scan.stop();
+    *pipeline = Pipeline::new(config);
+    report::number("loop_bits", bench.digest(pipeline));
+    kernels::run(config, bench, pipeline);
+    report::end();
+    stages::wait(Kept { stage: Stage::Waits, ..kept })
+}
+
+#[inline(never)]
+fn make_config() -> &'static Config {
+    let Ok(config) = Config::shipped(&Params::DEFAULT) else { host::fail("the default parameters are refused") };
+    CONFIG.init(config)
+}
+
+fn count_cycles() {
+    if let Some(mut core) = cortex_m::Peripherals::take() {
+        core.DCB.enable_trace();
+        core.DWT.enable_cycle_counter();
+    }
+}
+
+/// Whether so many cycles have passed since then.
+fn passed(since: u32, cycles: u32) -> bool {
+    DWT::cycle_count().wrapping_sub(since) >= cycles
+}

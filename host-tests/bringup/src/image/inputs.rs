@@ -1,0 +1,63 @@
+//! The kernels' inputs: some of the study's from the image, and behind them the records of the loop on the simulated
+//! finger, made anew each time that they are asked for.
+
+use bringup::script::{Bench, RECORDS};
+use fingertip::shipped::{Config, Pipeline};
+use images::record::Record;
+
+use crate::host::fail;
+
+/// As `study few` writes them.
+static BYTES: &[u8] = include_bytes!("../inputs.bin");
+
+/// Where the next byte is.
+pub struct Inputs<'a> {
+    place: usize,
+    config: &'static Config,
+    bench: &'a mut Bench,
+    pipeline: &'a mut Pipeline,
+}
+
+impl<'a> Inputs<'a> {
+    /// From the start. Takes what makes the records.
+    pub fn new(config: &'static Config, bench: &'a mut Bench, pipeline: &'a mut Pipeline) -> Self {
+        Self { place: 0, config, bench, pipeline }
+    }
+
+    /// The next bytes.
+    pub fn read(&mut self, bytes: &mut [u8]) {
+        if let Some(kept) = BYTES.get(self.place..self.place + bytes.len()) {
+            bytes.copy_from_slice(kept);
+        } else if self.place == BYTES.len() && bytes.len() == 4 {
+            bytes.copy_from_slice(&RECORDS.to_le_bytes());
+        } else if bytes.len() == Record::BYTES {
+            bytes.copy_from_slice(&self.bench.record(self.pipeline).to_bytes());
+        } else {
+            fail("the inputs end early")
+        }
+        self.place += bytes.len();
+    }
+
+    /// The next words.
+    pub fn words<const N: usize>(&mut self) -> [i32; N] {
+        core::array::from_fn(|_| {
+            let mut bytes = [0; 4];
+            self.read(&mut bytes);
+            i32::from_le_bytes(bytes)
+        })
+    }
+
+    /// Where the next byte lies.
+    pub fn place(&self) -> usize {
+        self.place
+    }
+
+    /// Goes back to a place: of the records to the first only.
+    pub fn seek(&mut self, place: usize) {
+        if place >= BYTES.len() {
+            self.bench.restart();
+            *self.pipeline = Pipeline::new(self.config);
+        }
+        self.place = place;
+    }
+}

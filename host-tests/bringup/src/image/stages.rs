@@ -1,0 +1,123 @@
+//! What ends in a reset, one after another, and what is kept through it: in memory that a start leaves alone.
+
+use core::mem::MaybeUninit;
+use cortex_m::peripheral::{DWT, SCB};
+use embassy_stm32::Peri;
+use embassy_stm32::peripherals::{IWDG, WWDG};
+use fingertip::link::snapshot::ResetCause;
+use fingertip::scan::ScanTiming;
+
+use crate::board::watchdog::Watchdogs;
+use crate::{CYCLES_PER_US, passed, report};
+
+/// What comes next.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// For the host.
+    Waits,
+    /// The window watchdog bites.
+    Window,
+    /// The independent watchdog bites.
+    Independent,
+    /// A store below the stack's foot.
+    Foot,
+    /// All else.
+    Rest,
+}
+
+const MAGIC: u32 = 0x4252_5550;
+const STAGES: [Stage; 5] = [Stage::Waits, Stage::Window, Stage::Independent, Stage::Foot, Stage::Rest];
+/// A watchdog that has not bitten by then will not: twice the independent one's longest time.
+const BITES_BY: u32 = 50_000 * CYCLES_PER_US;
+/// The independent watchdog has taken its time by then: a millisecond.
+const TAKES_BY: u32 = 1_000 * CYCLES_PER_US;
+/// The word below RAM.
+const BELOW_RAM: *mut u32 = 0x1FFF_FFFC as *mut u32;
+
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Words {
+    magic: u32,
+    stage: u32,
+    frames: u32,
+    cycles: [u32; 2],
+}
+
+#[unsafe(link_section = ".uninit.bringup")]
+static mut KEPT: MaybeUninit<Words> = MaybeUninit::uninit();
+
+/// What is kept through a reset.
+#[derive(Clone, Copy)]
+pub struct Kept {
+    /// What comes next.
+    pub stage: Stage,
+    /// How many frames the rows are read back for.
+    pub frames: u32,
+    /// How long the watchdogs waited, window and independent: 0 where one did not bite.
+    pub cycles: [u32; 2],
+}
+
+impl Kept {
+    const NOTHING: Self = Self { stage: Stage::Waits, frames: 0, cycles: [0; 2] };
+
+    /// What was kept; nothing after a power-on.
+    pub fn load(reset: ResetCause) -> Self {
+        // SAFETY: any bit pattern is valid, and nothing else runs.
+        let Words { magic, stage, frames, cycles } = unsafe { (&raw const KEPT).cast::<Words>().read_volatile() };
+        let stage = STAGES.get(stage as usize).filter(|_| magic == MAGIC && reset != ResetCause::PowerOn);
+        stage.map_or(Self::NOTHING, |stage| Self { stage: *stage, frames, cycles })
+    }
+
+    /// Keeps it.
+    pub fn store(self) {
+        let Self { stage, frames, cycles } = self;
+        let stage = STAGES.iter().position(|known| *known == stage).unwrap_or(0) as u32;
+        let words = Words { magic: MAGIC, stage, frames, cycles };
+        // SAFETY: as for `load`.
+        unsafe { (&raw mut KEPT).cast::<Words>().write_volatile(words) }
+    }
+}
+
+/// Waits for the host's word, then begins.
+pub fn wait(kept: Kept) -> ! {
+    let frames = report::wait_for_go();
+    Kept { stage: Stage::Window, frames, ..kept }.store();
+    SCB::sys_reset()
+}
+
+/// Lets the window watchdog bite, as it waits while frames are expected.
+pub fn window(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
+    let mut dogs = Watchdogs::new(independent, window);
+    dogs.start();
+    dogs.expect_frames(timing);
+    bitten(Kept { stage: Stage::Independent, ..kept }, 0)
+}
+
+/// Lets the independent watchdog bite, while the other waits for as long as it can.
+pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>) -> ! {
+    let mut dogs = Watchdogs::new(independent, window);
+    dogs.start();
+    cortex_m::asm::delay(TAKES_BY);
+    dogs.pet();
+    bitten(Kept { stage: Stage::Foot, ..kept }, 1)
+}
+
+/// Notes how long it waits until it is reset.
+fn bitten(mut kept: Kept, dog: usize) -> ! {
+    let since = DWT::cycle_count();
+    while !passed(since, BITES_BY) {
+        kept.cycles[dog] = DWT::cycle_count().wrapping_sub(since);
+        kept.store();
+    }
+    kept.cycles[dog] = 0;
+    kept.store();
+    SCB::sys_reset()
+}
+
+/// Stores below RAM, as a stack that runs over does: a hard fault, whose handler resets.
+pub fn foot(kept: Kept) -> ! {
+    Kept { stage: Stage::Rest, ..kept }.store();
+    // SAFETY: nothing lies there; the memory protection unit refuses it, and where it does not nothing is lost.
+    unsafe { BELOW_RAM.write_volatile(0) };
+    SCB::sys_reset()
+}

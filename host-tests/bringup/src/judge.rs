@@ -1,0 +1,220 @@
+//! The report of a board, judged.
+
+use crate::checks::{self, Check, FLAT};
+use crate::listen::Report;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+use std::fs;
+use std::io::Error;
+use std::path::Path;
+
+/// Of the JSON file's fields.
+const SCHEMA_VERSION: u32 = 1;
+/// A kernel's cycles may differ by this share of the estimate, or by so many: what the model does not know of flash.
+const SHARE: f64 = 0.1;
+const CYCLES: f64 = 10.0;
+/// What the kernels' calls themselves take.
+const NOTHING: &str = "nothing: an empty call";
+
+/// Which board it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Board {
+    /// A NUCLEO.
+    Silicon,
+    /// The emulated one: some figures are its own and show nothing.
+    Emulated,
+}
+
+/// What is said of a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// As expected.
+    Pass,
+    /// Otherwise, or not reported.
+    Fail,
+    /// The emulated board cannot show it.
+    NotShown,
+}
+
+/// A check and what came of it.
+#[derive(Debug, Serialize)]
+pub struct Judged {
+    /// In the report.
+    pub name: String,
+    /// In words.
+    pub what: String,
+    /// Of the figures.
+    pub unit: &'static str,
+    /// None where it was not reported.
+    pub figure: Option<f64>,
+    /// The least that is expected.
+    pub at_least: f64,
+    /// The most; none where there is no limit.
+    pub at_most: Option<f64>,
+    /// Where that comes from.
+    pub source: &'static str,
+    /// What is said of it.
+    pub verdict: Verdict,
+    /// What to do, or why it is not shown.
+    pub advice: Option<&'static str>,
+}
+
+/// A kernel's cycles beside the timing model's estimate.
+#[derive(Debug, Serialize)]
+pub struct Kernel {
+    /// Kernel and variant.
+    pub name: String,
+    /// Measured, the call taken off.
+    pub median_cycles: f64,
+    /// The same.
+    pub most_cycles: f64,
+    /// With the flash's wait states, of the same inputs; none where no estimate was made.
+    pub estimated_cycles: Option<f64>,
+    /// What is said of it.
+    pub verdict: Verdict,
+}
+
+/// All of a board.
+#[derive(Debug, Serialize)]
+pub struct Judgement {
+    /// Of these fields.
+    pub schema_version: u32,
+    /// Of the bytes that were flashed.
+    pub image_sha256: String,
+    /// The part's own.
+    pub board_uid: String,
+    /// Which board it was.
+    pub board: Board,
+    /// How many checks pass.
+    pub passed: usize,
+    /// How many do not.
+    pub failed: usize,
+    /// How many the emulated board cannot show.
+    pub not_shown: usize,
+    /// All checks.
+    pub checks: Vec<Judged>,
+    /// All kernels.
+    pub kernels: Vec<Kernel>,
+}
+
+/// Estimated cycles by kernel, of a file with a line `CYCLES KERNEL` each.
+///
+/// # Errors
+/// The file cannot be read, or has another line.
+pub fn estimates(path: &Path) -> Result<HashMap<String, f64>, Error> {
+    let wrong = |why: &str| Error::other(format!("{}: {why}", path.display()));
+    let text = fs::read_to_string(path).map_err(|error| wrong(&error.to_string()))?;
+    let line = |line: &str| {
+        let (cycles, kernel) = line.split_once(' ')?;
+        Some((kernel.to_owned(), cycles.parse().ok()?))
+    };
+    text.lines().map(|words| line(words).ok_or_else(|| wrong(&format!("`{words}` is no estimate")))).collect()
+}
+
+/// Judges a report. `estimates` are cycles by kernel.
+pub fn judge(report: &Report, board: Board, image_sha256: String, estimates: &HashMap<String, f64>) -> Judgement {
+    let checks: Vec<_> = checks::checks().into_iter().map(|check| judged(check, report, board)).collect();
+    let call = report.cycles.iter().find(|(name, ..)| name == NOTHING).map_or(0.0, |(_, median, _)| *median);
+    let own = report.cycles.iter().filter(|(name, ..)| name != NOTHING);
+    let kernels: Vec<_> = own
+        .map(|(name, median, most)| {
+            let (median, most) = (median - call, most - call);
+            let estimate = estimates.get(name).copied();
+            let near = estimate.is_none_or(|cycles| (median - cycles).abs() <= f64::max(cycles * SHARE, CYCLES));
+            let verdict = match (board, near) {
+                (Board::Emulated, _) => Verdict::NotShown,
+                (Board::Silicon, true) => Verdict::Pass,
+                (Board::Silicon, false) => Verdict::Fail,
+            };
+            Kernel { name: name.clone(), median_cycles: median, most_cycles: most, estimated_cycles: estimate, verdict }
+        })
+        .collect();
+    let count = |verdict| {
+        let all = checks.iter().map(|check| check.verdict).chain(kernels.iter().map(|kernel| kernel.verdict));
+        all.filter(|of| *of == verdict).count()
+    };
+    let [passed, failed, not_shown] = [Verdict::Pass, Verdict::Fail, Verdict::NotShown].map(count);
+    Judgement {
+        schema_version: SCHEMA_VERSION,
+        image_sha256,
+        board_uid: report.uid.clone(),
+        board,
+        passed,
+        failed,
+        not_shown,
+        checks,
+        kernels,
+    }
+}
+
+fn judged(check: Check, report: &Report, board: Board) -> Judged {
+    let Check { name, what, unit, within: [least, most], source, then, unseen } = check;
+    let figure = report.figures.iter().find(|(of, _)| *of == name).map(|(_, figure)| *figure);
+    let unseen = unseen.filter(|_| board == Board::Emulated);
+    let (verdict, advice) = match unseen {
+        Some(why) => (Verdict::NotShown, Some(why)),
+        None if figure.is_some_and(|figure| (least..=most).contains(&figure)) => (Verdict::Pass, None),
+        None => (Verdict::Fail, Some(then)),
+    };
+    let at_most = most.is_finite().then_some(most);
+    Judged { name, what, unit, figure, at_least: least, at_most, source, verdict, advice }
+}
+
+impl Judgement {
+    /// As a table: what fails with its source and what to do.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for check in &self.checks {
+            let figure = check.figure.map_or("none".into(), number);
+            let expected = match check.at_most {
+                Some(most) if most == check.at_least => number(most),
+                Some(most) => format!("{} to {}", number(check.at_least), number(most)),
+                None => format!("{} or more", number(check.at_least)),
+            };
+            let Judged { what, unit, source, .. } = check;
+            // A string takes every write.
+            let _ = writeln!(text, "{} {figure:>10} {unit:<7}{expected:>18}  {what}", word(check.verdict));
+            match (check.verdict, check.advice) {
+                (Verdict::Fail, Some(advice)) => {
+                    let _ = writeln!(text, "{:13}expected by {source}\n{:13}to do: {advice}", "", "");
+                }
+                (Verdict::NotShown, Some(why)) => {
+                    let _ = writeln!(text, "{:13}not shown by the emulator: {why}", "");
+                }
+                _ => {}
+            }
+        }
+        let _ = writeln!(
+            text,
+            "\n{:<13}{:>10}{:>10}{:>10}  kernel: cycles, the call taken off",
+            "", "median", "most", "estimate"
+        );
+        for Kernel { name, median_cycles, most_cycles, estimated_cycles, verdict } in &self.kernels {
+            let estimate = estimated_cycles.map_or("-".into(), number);
+            let _ = writeln!(text, "{} {median_cycles:>10}{most_cycles:>10}{estimate:>10}  {name}", word(*verdict));
+        }
+        if self.board == Board::Emulated {
+            let _ = writeln!(text, "{:13}no kernel is shown by the emulator: {FLAT}", "");
+        }
+        let Self { image_sha256, board_uid, passed, failed, not_shown, .. } = self;
+        let _ = writeln!(text, "\nsha-256  {image_sha256}\nboard    {board_uid}");
+        let _ = writeln!(text, "{passed} passed, {failed} failed, {not_shown} not shown by the emulator");
+        text
+    }
+}
+
+const fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Pass => "pass        ",
+        Verdict::Fail => "FAIL        ",
+        Verdict::NotShown => "(not shown) ",
+    }
+}
+
+fn number(figure: f64) -> String {
+    let text = format!("{figure:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}

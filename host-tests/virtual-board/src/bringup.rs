@@ -1,0 +1,62 @@
+//! The image of `cargo xtask bringup` on the emulated board, listened to as on a NUCLEO's virtual COM port.
+
+use crate::demo::flashable::Flashable;
+use crate::{Error, Options, Rig};
+use bringup::judge::{Board, Judgement, judge};
+use bringup::listen::listen;
+use host_tests::plant::{Setup, World};
+use std::collections::{HashMap, VecDeque};
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+/// Nothing that the image does takes so long without a line, virtual time.
+const SILENT_MS: u64 = 60_000;
+
+/// Runs the image to the end of its report and judges that.
+///
+/// # Errors
+/// The image does not run, crashes, or is silent.
+pub fn run(
+    image: &Path,
+    options: &Options,
+    frames: u32,
+    estimates: &HashMap<String, f64>,
+    progress: &mut dyn FnMut(&str),
+) -> Result<(Judgement, Rig), Error> {
+    let mut rig = Rig::new(image, World::new(&Setup::default()), options)?;
+    let sha256 = Flashable::of(rig.image())?.sha256();
+    let report =
+        listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress).map_err(Error::Report)?;
+    Ok((judge(&report, Board::Emulated, sha256, estimates), rig))
+}
+
+/// The far end of the port; to read runs the board.
+struct Port<'a> {
+    rig: &'a mut Rig,
+    heard: VecDeque<u8>,
+}
+
+impl Read for Port<'_> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        for _ in 0..SILENT_MS {
+            if !self.heard.is_empty() {
+                return self.heard.read(bytes);
+            }
+            self.rig.run_ms(1).map_err(io::Error::other)?;
+            let received = self.rig.take_received().map_err(io::Error::other)?;
+            self.heard.extend(received.iter().map(|timed| timed.byte));
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
+}
+
+impl Write for Port<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.rig.send(bytes).map_err(io::Error::other)?;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

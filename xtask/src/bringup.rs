@@ -71,7 +71,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let estimates = if args.without_estimates { None } else { Some(estimates(toolchain, console)?) };
     let mut command = match port {
         None => {
-            let mut command = host::BOARD.build(console)?;
+            let mut command = host::SCENE_BOARD.build(console)?;
             command.arg(NAME).arg("--image").arg(std::path::absolute(&image.elf)?);
             command
         }

@@ -9,6 +9,7 @@
 
 pub mod bench;
 pub mod board;
+#[cfg(feature = "bringup")]
 pub mod bringup;
 pub mod client;
 mod clock;

@@ -19,6 +19,7 @@ enum Command {
     #[cfg(feature = "log")]
     Run(commands::run::Arguments),
     /// Runs the image of `cargo xtask bringup` and judges its report.
+    #[cfg(feature = "bringup")]
     Bringup(commands::bringup::Arguments),
     /// Touches an object, holds forces, lets go; judges the figures and draws pictures.
     Demo(commands::demo::Arguments),
@@ -36,6 +37,7 @@ fn main() -> ExitCode {
     let result: Result<(), Box<dyn std::error::Error>> = match Arguments::parse().command {
         #[cfg(feature = "log")]
         Command::Run(arguments) => commands::run::run(&arguments).map_err(Into::into),
+        #[cfg(feature = "bringup")]
         Command::Bringup(arguments) => commands::bringup::run(&arguments).map_err(Into::into),
         Command::Demo(arguments) => commands::demo::run(&arguments).map_err(Into::into),
         Command::Serve(arguments) => commands::serve::run(&arguments).map_err(Into::into),

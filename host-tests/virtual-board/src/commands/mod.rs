@@ -1,5 +1,6 @@
 //! The commands, one module each.
 
+#[cfg(feature = "bringup")]
 pub mod bringup;
 pub mod demo;
 #[cfg(feature = "scenes")]

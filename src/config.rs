@@ -144,6 +144,14 @@ impl Config {
         Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
     }
 
+    /// g V of a voltage at the motor, up to [`Params::voltage_max_mv`] either way, Q8 mm/s^2.
+    pub fn push(&self, voltage_mv: i32) -> i32 {
+        let most = self.params.voltage_max_mv.max(0).unsigned_abs();
+        let share = voltage_mv.unsigned_abs().min(most).wrapping_mul(self.share_per_mv_q32);
+        let push = ((u64::from(self.voltage_limit.cast_unsigned()) * u64::from(share)) >> 32) as i32;
+        if voltage_mv < 0 { -push } else { push }
+    }
+
     /// See [`Shaped::new`], into which this goes: a configuration is large, and would be copied.
     #[inline(always)]
     fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {

@@ -1,0 +1,186 @@
+//! From the strokes' lines to the drive.
+//!
+//! Under a step of voltage V from rest, a motor with friction that does not change with speed goes
+//!
+//! ```text
+//! x = v (t - tau (1 - exp(-t / tau)))      v = (V - V_f) / (k N)      tau = R J / k^2
+//! ```
+//!
+//! so the line of the steady part has the slope v, and crosses the place of rest at t = tau. Two voltages give k from
+//! the difference of the speeds, which friction does not change, and V_f from what is left.
+
+use super::line::Line;
+use super::strokes::{EACH, kind};
+use super::{Drive, Refusal};
+use crate::config::Config;
+use crate::root::floor_sqrt;
+
+/// A line has so many frames at least, and such a slope (Q16 counts a frame).
+const FRAMES_MIN: u32 = 16;
+const SPEED_MIN: i32 = 64;
+/// What the supply's divider and reference add to a voltage, and what the dead time adds to a time, permille.
+const VOLTAGE_PERMILLE: u64 = 8;
+const TIME_PERMILLE: u64 = 10;
+/// What friction changes with speed, permille of it.
+const FRICTION_PERMILLE: u64 = 30;
+/// The speeds of a kind may lie apart by this part of their mean, and the two ways' torque constants.
+const APART: i64 = 8;
+/// The duty acts this much later than the frame that it was made from, frames in Q8.
+const DEAD_Q8: i32 = 85;
+/// The mean range of three is this many standard deviations, hundredths.
+const RANGE_OF_THREE: u64 = 169;
+/// 2 pi in millionths.
+const TURN: u64 = 6_283_185;
+
+/// Values of a kind.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Spread {
+    sum: i64,
+    least: i32,
+    most: i32,
+}
+
+impl Spread {
+    const NONE: Self = Self { sum: 0, least: i32::MAX, most: i32::MIN };
+
+    fn add(&mut self, value: i32) {
+        self.sum += i64::from(value);
+        self.least = self.least.min(value);
+        self.most = self.most.max(value);
+    }
+
+    fn mean(&self) -> i64 {
+        self.sum / i64::from(EACH)
+    }
+
+    fn range(&self) -> i64 {
+        (i64::from(self.most) - i64::from(self.least)).max(0)
+    }
+}
+
+/// What the strokes gave so far, back and forward.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Estimate {
+    /// Slow and fast: counts a frame, Q16.
+    speeds: [[Spread; 2]; 2],
+    /// Of the fast ones: time constants in frames, Q8.
+    times: [Spread; 2],
+    /// The largest time constant of all so far, frames.
+    slowest: u32,
+}
+
+impl Estimate {
+    /// Nothing yet.
+    pub const NONE: Self = Self { speeds: [[Spread::NONE; 2]; 2], times: [Spread::NONE; 2], slowest: 0 };
+
+    /// The largest time constant seen, in frames; 0 before the first.
+    pub fn slowest(&self) -> u32 {
+        self.slowest
+    }
+
+    /// Takes a stroke whose line began so many frames after its voltage; false where there is no line in it.
+    pub fn take(&mut self, stroke: u8, began: u32, line: &Line) -> bool {
+        let (forward, fast) = kind(stroke);
+        let way = usize::from(forward);
+        let fitted = line.fit().filter(|fitted| line.frames() >= FRAMES_MIN && fitted.speed >= SPEED_MIN);
+        let Some(fitted) = fitted else { return false };
+        let time = (began.min(1 << 20) << 8).cast_signed().saturating_sub(fitted.zero).saturating_sub(DEAD_Q8);
+        self.slowest = self.slowest.max(time.max(0).unsigned_abs().div_ceil(256));
+        self.speeds[way][usize::from(fast)].add(fitted.speed);
+        if fast {
+            self.times[way].add(time);
+        }
+        true
+    }
+
+    /// The drive, from voltages (mV) that the slow and the fast strokes had beyond those (back and forward) that all
+    /// of a way had.
+    #[inline(never)]
+    pub fn drive(&self, beyond_mv: [i32; 2], common_mv: [i32; 2], config: &Config) -> Result<Drive, Refusal> {
+        let p = &config.params;
+        let [slow_mv, fast_mv] = beyond_mv;
+        let step_mv = u64::from((fast_mv - slow_mv).max(0).unsigned_abs());
+        let kinds = self.speeds.as_flattened();
+        if kinds.iter().any(|kind| kind.range() > kind.mean() / APART) {
+            return Err(Refusal::Unsteady);
+        }
+        let gains = self.speeds.map(|[slow, fast]| fast.mean() - slow.mean());
+        let gain = (gains[0] + gains[1]) / 2;
+        if gain <= 0 || (gains[0] - gains[1]).abs() > gain / APART || step_mv == 0 {
+            return Err(Refusal::Unsteady);
+        }
+        // k = dV / dw, w = 2 pi s / (counts T).
+        let gain = gain.unsigned_abs();
+        let turns = step_mv * u64::from(p.encoder_counts_per_turn.unsigned_abs());
+        let scaled = turns * u64::from(config.timing.frame_ns);
+        let torque_constant = ((((scaled << 8) / gain.max(1)).min(1 << 52)) << 8) / TURN;
+        // The mean of three varies by a range of three / (1.69 sqrt(3)), and two means make a difference.
+        let range = kinds.iter().map(Spread::range).sum::<i64>().unsigned_abs() / 4;
+        let scatter = range * 100_000 / (RANGE_OF_THREE * 173 / 100 * gain).max(1);
+        let torque_constant_sigma = together([scatter, VOLTAGE_PERMILLE, 0]);
+
+        let [time_back, time_forward] = self.times;
+        let frames_q8 = (time_back.mean() + time_forward.mean()) / 2;
+        if frames_q8 <= 0 {
+            return Err(Refusal::Unsteady);
+        }
+        let frames_q8 = frames_q8.unsigned_abs();
+        let time_ns = (frames_q8 * u64::from(config.timing.frame_ns)) >> 8;
+        let time_us = (time_ns + 500) / 1_000;
+        let range = (time_back.range() + time_forward.range()).unsigned_abs() / 2;
+        let time_scatter = range * 100_000 / (RANGE_OF_THREE * 245 / 100 * frames_q8).max(1);
+        let time_constant_sigma = together([time_scatter, TIME_PERMILLE, 0]);
+
+        // J = tau k^2 / R and T = V_f k / R.
+        let resistance = u64::from(p.resistance_mohm.max(1).unsigned_abs());
+        let per_resistance = |value: u64| (value + resistance / 2) / resistance;
+        let torque_constant = torque_constant.min(1 << 20);
+        let inertia = per_resistance(time_us.min(1 << 20) * torque_constant * torque_constant / 1_000_000);
+        let inertia_sigma = together([time_constant_sigma, 2 * torque_constant_sigma, 0]);
+
+        let friction = |slow: &Spread, gain: i64, common_mv: i32| {
+            // In uV, of which a voltage has 26 bits.
+            let lost = slow.mean().max(0).unsigned_abs() * (step_mv * 1_000) / gain.max(1).unsigned_abs();
+            let given = u64::from(common_mv.saturating_add(slow_mv).max(0).unsigned_abs()) * 1_000;
+            let left = given.saturating_sub(lost);
+            // The slow speed counts 1.5 times and the fast one half: 1.6 times the scatter of k, of the step.
+            let sigma = (step_mv * scatter * 1_600).checked_div(left).unwrap_or(1_000);
+            (
+                per_resistance(left * torque_constant / 1_000),
+                together([sigma, torque_constant_sigma, FRICTION_PERMILLE]),
+            )
+        };
+        let [[slow_back, _], [slow_forward, _]] = &self.speeds;
+        let (back, back_sigma) = friction(slow_back, gains[0], common_mv[0]);
+        let (forward, forward_sigma) = friction(slow_forward, gains[1], common_mv[1]);
+
+        let within = |value: u64, name: &str| {
+            let range = crate::params::Params::RANGES.iter().find(|(other, ..)| *other == name);
+            range.is_some_and(|(_, _, min, max)| (i64::from(*min)..=i64::from(*max)).contains(&(value as i64)))
+        };
+        let sound = within(torque_constant, "torque_constant_unm_per_a")
+            && within(inertia, "inertia_ug_m2")
+            && within(back, "friction_unm")
+            && within(forward, "friction_unm");
+        if !sound {
+            return Err(Refusal::Range);
+        }
+        let permille = |value: u64| value.min(u16::MAX.into()) as u16;
+        Ok(Drive {
+            torque_constant_unm_per_a: torque_constant as u32,
+            torque_constant_sigma: permille(torque_constant_sigma),
+            time_constant_us: time_us as u32,
+            time_constant_sigma: permille(time_constant_sigma),
+            inertia_ug_m2: inertia as u32,
+            inertia_sigma: permille(inertia_sigma),
+            friction_unm: [forward as u16, back as u16],
+            friction_sigma: [permille(forward_sigma), permille(back_sigma)],
+        })
+    }
+}
+
+/// Independent parts of an uncertainty, permille.
+fn together(parts: [u64; 3]) -> u64 {
+    let squares = parts.map(|part| part.min(1 << 16).pow(2));
+    u64::from(floor_sqrt(squares.iter().sum()))
+}

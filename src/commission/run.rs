@@ -1,0 +1,332 @@
+//! The motions: a jog each way, then strokes to and fro under steps of voltage, each bounded in duty, time and travel.
+//!
+//! ```text
+//! jog forward - rest - jog back - rest - [ stroke - rest ] 13 times
+//! ```
+//!
+//! Voltage is given, not closed over the encoder. A stroke ends where the shorted motor will roll out within the way;
+//! whatever else happens shorts the motor at once, waits until it rests, and ends in a refusal.
+
+use super::estimate::Estimate;
+use super::line::Line;
+use super::strokes::{COUNT, FAST_FROM, JOG_PART, Plan, STROKE_PART, kind};
+use super::{Commissioning, Refusal, Task};
+use crate::config::Config;
+use crate::units::Newtons;
+
+/// Counts that are motion, and what a jog must make of them.
+const MOVED: i32 = 2;
+const PROVEN: i32 = 4;
+
+/// What a frame says.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// The encoder's count.
+    pub encoder: i32,
+    /// The array's force.
+    pub force: Newtons,
+    /// The bridge's supply.
+    pub supply_mv: u16,
+    /// Whether the voltage asked for is not what was let through.
+    pub held_back: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Idle,
+    Jog,
+    Stroke,
+    /// Shorted until it rests; then on, or to the refusal.
+    Rest(Option<Refusal>),
+}
+
+/// A commissioning.
+#[derive(Clone, Debug)]
+pub struct Run {
+    phase: Phase,
+    outcome: Commissioning,
+    task: Task,
+    plan: Plan,
+    /// Jogs and strokes done.
+    done: u8,
+    forward: bool,
+    /// Counts where it all began, and where this motion did.
+    origin: i32,
+    begun: i32,
+    /// Frames of this motion, or of this rest.
+    frames: u32,
+    /// What is asked for.
+    voltage_mv: i32,
+    /// Voltages at which the jogs began to move, back and forward, and how far each went.
+    moving_mv: [i32; 2],
+    jogged: [i32; 2],
+    /// What the slow strokes have beyond that.
+    slow_mv: i32,
+    line: Line,
+    /// The last look at the speed: where and when, and the fastest.
+    looked: (i32, u32),
+    fastest: i32,
+    /// The count that stood last, and since which frame.
+    stood: (i32, u32),
+    estimate: Estimate,
+}
+
+impl Run {
+    /// Nothing asked for.
+    pub const fn new() -> Self {
+        Self {
+            phase: Phase::Idle,
+            outcome: Commissioning::None,
+            task: Task::Stop,
+            plan: Plan::NONE,
+            done: 0,
+            forward: true,
+            origin: 0,
+            begun: 0,
+            frames: 0,
+            voltage_mv: 0,
+            moving_mv: [0; 2],
+            jogged: [0; 2],
+            slow_mv: 0,
+            line: Line::NONE,
+            looked: (0, 0),
+            fastest: 0,
+            stood: (0, 0),
+            estimate: Estimate::NONE,
+        }
+    }
+
+    /// Starts anew, at rest at this count.
+    #[inline(never)]
+    pub fn start(&mut self, task: Task, encoder: i32, config: &Config) {
+        *self = Self {
+            phase: Phase::Jog,
+            outcome: Commissioning::Running(0),
+            task,
+            plan: Plan::new(config, 0),
+            origin: encoder,
+            begun: encoder,
+            ..Self::new()
+        };
+    }
+
+    /// Whether it still needs the motor.
+    pub fn running(&self) -> bool {
+        self.phase != Phase::Idle
+    }
+
+    /// How it stands.
+    pub fn outcome(&self) -> Commissioning {
+        self.outcome
+    }
+
+    /// Shorts the motor until it rests, and ends without a result.
+    pub fn halt(&mut self, encoder: i32) {
+        if !matches!(self.phase, Phase::Idle | Phase::Rest(Some(_))) {
+            self.brake(Some(Refusal::Interrupted), encoder);
+        }
+    }
+
+    /// Ends without a result, at once.
+    pub fn refuse(&mut self, refusal: Refusal) {
+        self.phase = Phase::Idle;
+        self.voltage_mv = 0;
+        self.outcome = Commissioning::Refused(refusal);
+    }
+
+    /// What the motor is to get.
+    pub fn voltage_mv(&self) -> i32 {
+        self.voltage_mv
+    }
+
+    /// Takes a frame.
+    #[inline(never)]
+    pub fn observe(&mut self, view: &View, config: &Config) {
+        self.frames = self.frames.saturating_add(1);
+        match self.phase {
+            Phase::Idle => {}
+            Phase::Rest(refusal) => self.rest(refusal, view, config),
+            Phase::Jog | Phase::Stroke => {
+                if let Some(refusal) = self.danger(view) {
+                    self.brake(Some(refusal), view.encoder);
+                } else if self.phase == Phase::Jog {
+                    self.jog(view);
+                } else {
+                    self.stroke(view);
+                }
+            }
+        }
+    }
+
+    /// Counts from where this motion began, along its way.
+    fn along(&self, encoder: i32) -> i32 {
+        let way = encoder.wrapping_sub(self.begun);
+        if self.forward { way } else { way.saturating_neg() }
+    }
+
+    fn danger(&self, view: &View) -> Option<Refusal> {
+        let off = view.encoder.wrapping_sub(self.origin).saturating_abs();
+        if view.force >= self.plan.touch {
+            Some(Refusal::Touched)
+        } else if view.held_back {
+            Some(Refusal::HeldBack)
+        } else if off > self.plan.farthest || self.phase == Phase::Stroke && self.along(view.encoder) < -PROVEN {
+            Some(Refusal::Astray)
+        } else {
+            None
+        }
+    }
+
+    /// Up to the limit in half of the time; no more once it moves.
+    fn jog(&mut self, view: &View) {
+        let limit = i32::from(view.supply_mv) / JOG_PART;
+        let way = self.along(view.encoder);
+        let [moving_mv, jogged] =
+            [&mut self.moving_mv, &mut self.jogged].map(|both| &mut both[usize::from(self.forward)]);
+        *jogged = way;
+        if *moving_mv == 0 {
+            let rise = self.frames.saturating_mul(2).min(self.plan.jog_frames);
+            let level = (i64::from(limit) * i64::from(rise)).checked_div(self.plan.jog_frames.into());
+            let level = level.unwrap_or(0) as i32;
+            if way.saturating_abs() >= MOVED {
+                *moving_mv = level.max(1);
+            }
+            self.voltage_mv = level;
+        } else {
+            self.voltage_mv = (*moving_mv).min(limit);
+        }
+        if !self.forward {
+            self.voltage_mv = -self.voltage_mv;
+        }
+        if self.frames >= self.plan.jog_frames || way.saturating_abs() >= self.plan.jog {
+            self.brake(None, view.encoder);
+        }
+    }
+
+    fn stroke(&mut self, view: &View) {
+        let way = self.along(view.encoder);
+        let (_, fast) = kind(self.done.saturating_sub(2));
+        let place = usize::from(fast);
+        if self.frames > self.plan.run_up {
+            self.line.add(way);
+        }
+        // What pushes against the motor shows as a speed that falls.
+        let (at, since) = self.looked;
+        if self.frames.wrapping_sub(since) >= self.plan.span[place] {
+            let gone = way.saturating_sub(at);
+            self.looked = (way, self.frames);
+            self.fastest = self.fastest.max(gone);
+            if gone < self.fastest - self.fastest / 4 - 1 {
+                return self.brake(Some(Refusal::Blocked), view.encoder);
+            }
+        }
+        let off = view.encoder.wrapping_sub(self.origin);
+        let off = if self.forward { off } else { off.saturating_neg() };
+        if off.saturating_add(self.plan.roll[place]) >= self.plan.half {
+            if self.done > 2 && !self.estimate.take(self.done - 2, self.plan.run_up + 1, &self.line) {
+                return self.brake(Some(Refusal::Unsteady), view.encoder);
+            }
+            self.brake(None, view.encoder);
+        } else if self.line.full() {
+            self.brake(Some(Refusal::Unsteady), view.encoder);
+        }
+    }
+
+    /// Shorts the motor.
+    fn brake(&mut self, refusal: Option<Refusal>, encoder: i32) {
+        self.voltage_mv = 0;
+        self.phase = Phase::Rest(refusal);
+        self.frames = 0;
+        self.stood = (encoder, 0);
+    }
+
+    fn rest(&mut self, refusal: Option<Refusal>, view: &View, config: &Config) {
+        let (count, since) = self.stood;
+        if view.encoder != count {
+            self.stood = (view.encoder, self.frames);
+        } else if self.frames.wrapping_sub(since) >= self.plan.still {
+            return match refusal {
+                Some(refusal) => self.refuse(refusal),
+                None => self.next(view, config),
+            };
+        }
+        if view.force >= self.plan.touch && refusal.is_none() {
+            self.phase = Phase::Rest(Some(Refusal::Touched));
+        }
+        if self.frames >= self.plan.rest {
+            self.refuse(refusal.unwrap_or(Refusal::Restless));
+        }
+    }
+
+    /// The next motion, or the end.
+    fn next(&mut self, view: &View, config: &Config) {
+        self.done = self.done.saturating_add(1);
+        self.frames = 0;
+        self.begun = view.encoder;
+        if self.done == 1 {
+            self.forward = false;
+            self.phase = Phase::Jog;
+            return;
+        }
+        if self.done == 2
+            && let Some(refusal) = self.direction()
+        {
+            return self.refuse(refusal);
+        }
+        if self.task != Task::Measure {
+            return self.end(Commissioning::Directed);
+        }
+        let stroke = self.done - 2;
+        if stroke >= COUNT {
+            return match self.estimate.drive([self.slow_mv, self.plan.beyond_mv[1]], self.moving_mv, config) {
+                Ok(drive) => self.end(Commissioning::Measured(drive)),
+                Err(refusal) => self.refuse(refusal),
+            };
+        }
+        let (forward, fast) = kind(stroke);
+        if stroke == FAST_FROM {
+            // By now the time constant is known; where it is longer than thought, the fast strokes are less so.
+            self.plan = Plan::new(config, self.estimate.slowest());
+        } else if !fast {
+            self.slow_mv = self.plan.beyond_mv[0];
+        }
+        self.forward = forward;
+        let voltage = self.moving_mv[usize::from(forward)] + self.plan.beyond_mv[usize::from(fast)];
+        let limit = (i32::from(view.supply_mv) / STROKE_PART).min(config.params.voltage_max_mv);
+        if voltage > limit {
+            return self.refuse(Refusal::HeldBack);
+        }
+        self.voltage_mv = if forward { voltage } else { -voltage };
+        self.line = Line::NONE;
+        self.looked = (0, 0);
+        self.fastest = 0;
+        self.phase = Phase::Stroke;
+        self.outcome = Commissioning::Running((u32::from(self.done) * 100 / (u32::from(COUNT) + 2)) as u8);
+    }
+
+    fn end(&mut self, outcome: Commissioning) {
+        self.phase = Phase::Idle;
+        self.voltage_mv = 0;
+        self.outcome = outcome;
+    }
+
+    /// What the jogs say against the direction.
+    fn direction(&self) -> Option<Refusal> {
+        let [back, forward] = self.jogged;
+        if back >= PROVEN && forward >= PROVEN {
+            None
+        } else if back <= -PROVEN && forward <= -PROVEN {
+            Some(Refusal::Reversed)
+        } else if back.saturating_abs() < PROVEN || forward.saturating_abs() < PROVEN {
+            Some(Refusal::Still)
+        } else {
+            Some(Refusal::Astray)
+        }
+    }
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -10,7 +10,7 @@
 //! the difference of the speeds, which friction does not change, and V_f from what is left.
 
 use super::line::Line;
-use super::strokes::{EACH, kind};
+use super::strokes::{COUNT_FROM, EACH, kind};
 use super::{Drive, Refusal};
 use crate::config::Config;
 use crate::root::floor_sqrt;
@@ -18,9 +18,9 @@ use crate::root::floor_sqrt;
 /// A line has so many frames at least, and such a slope (Q16 counts a frame).
 const FRAMES_MIN: u32 = 16;
 const SPEED_MIN: i32 = 64;
-/// What the supply's divider and reference add to a voltage, and what the dead time adds to a time, permille.
+/// What the supply's divider and reference add to a voltage, and friction at low speed to a time, permille.
 const VOLTAGE_PERMILLE: u64 = 8;
-const TIME_PERMILLE: u64 = 10;
+const TIME_PERMILLE: u64 = 15;
 /// What friction changes with speed, permille of it.
 const FRICTION_PERMILLE: u64 = 30;
 /// The speeds of a kind may lie apart by this part of their mean, and the two ways' torque constants.
@@ -65,7 +65,7 @@ pub struct Estimate {
     speeds: [[Spread; 2]; 2],
     /// Of the fast ones: time constants in frames, Q8.
     times: [Spread; 2],
-    /// The largest time constant of all so far, frames.
+    /// The largest time constant of the trials, frames.
     slowest: u32,
 }
 
@@ -73,24 +73,27 @@ impl Estimate {
     /// Nothing yet.
     pub const NONE: Self = Self { speeds: [[Spread::NONE; 2]; 2], times: [Spread::NONE; 2], slowest: 0 };
 
-    /// The largest time constant seen, in frames; 0 before the first.
+    /// The largest time constant of the trials, in frames; 0 before the first.
     pub fn slowest(&self) -> u32 {
         self.slowest
     }
 
-    /// Takes a stroke whose line began so many frames after its voltage; false where there is no line in it.
-    pub fn take(&mut self, stroke: u8, began: u32, line: &Line) -> bool {
+    /// Takes a stroke whose line began so many frames after its voltage, a trial or one that counts; gives its speed
+    /// (counts a frame, Q16), or nothing where there is no line in it.
+    pub fn take(&mut self, stroke: u8, began: u32, line: &Line) -> Option<i32> {
         let (forward, fast) = kind(stroke);
         let way = usize::from(forward);
-        let fitted = line.fit().filter(|fitted| line.frames() >= FRAMES_MIN && fitted.speed >= SPEED_MIN);
-        let Some(fitted) = fitted else { return false };
+        let fitted = line.fit().filter(|fitted| line.frames() >= FRAMES_MIN && fitted.speed >= SPEED_MIN)?;
         let time = (began.min(1 << 20) << 8).cast_signed().saturating_sub(fitted.zero).saturating_sub(DEAD_Q8);
-        self.slowest = self.slowest.max(time.max(0).unsigned_abs().div_ceil(256));
-        self.speeds[way][usize::from(fast)].add(fitted.speed);
+        if stroke < COUNT_FROM {
+            self.slowest = self.slowest.max(time.max(0).unsigned_abs().div_ceil(256));
+        } else {
+            self.speeds[way][usize::from(fast)].add(fitted.speed);
+        }
         if fast {
             self.times[way].add(time);
         }
-        true
+        Some(fitted.speed)
     }
 
     /// The drive, from voltages (mV) that the slow and the fast strokes had beyond those (back and forward) that all

@@ -9,7 +9,7 @@
 
 use super::estimate::Estimate;
 use super::line::Line;
-use super::strokes::{COUNT, FAST_FROM, JOG_PART, Plan, STROKE_PART, kind};
+use super::strokes::{COUNT, COUNT_FROM, JOG_PART, Plan, STROKE_PART, kind};
 use super::{Commissioning, Refusal, Task};
 use crate::config::Config;
 use crate::units::Newtons;
@@ -57,11 +57,10 @@ pub struct Run {
     frames: u32,
     /// What is asked for.
     voltage_mv: i32,
-    /// Voltages at which the jogs began to move, back and forward, and how far each went.
-    moving_mv: [i32; 2],
+    /// Voltages that the strokes back and forward have for friction: first those at which the jogs began to move. How
+    /// far each jog went.
+    common_mv: [i32; 2],
     jogged: [i32; 2],
-    /// What the slow strokes have beyond that.
-    slow_mv: i32,
     line: Line,
     /// The last look at the speed: where and when, and the fastest.
     looked: (i32, u32),
@@ -85,9 +84,8 @@ impl Run {
             begun: 0,
             frames: 0,
             voltage_mv: 0,
-            moving_mv: [0; 2],
+            common_mv: [0; 2],
             jogged: [0; 2],
-            slow_mv: 0,
             line: Line::NONE,
             looked: (0, 0),
             fastest: 0,
@@ -181,19 +179,19 @@ impl Run {
     fn jog(&mut self, view: &View) {
         let limit = i32::from(view.supply_mv) / JOG_PART;
         let way = self.along(view.encoder);
-        let [moving_mv, jogged] =
-            [&mut self.moving_mv, &mut self.jogged].map(|both| &mut both[usize::from(self.forward)]);
+        let [common_mv, jogged] =
+            [&mut self.common_mv, &mut self.jogged].map(|both| &mut both[usize::from(self.forward)]);
         *jogged = way;
-        if *moving_mv == 0 {
+        if *common_mv == 0 {
             let rise = self.frames.saturating_mul(2).min(self.plan.jog_frames);
             let level = (i64::from(limit) * i64::from(rise)).checked_div(self.plan.jog_frames.into());
             let level = level.unwrap_or(0) as i32;
             if way.saturating_abs() >= MOVED {
-                *moving_mv = level.max(1);
+                *common_mv = level.max(1);
             }
             self.voltage_mv = level;
         } else {
-            self.voltage_mv = (*moving_mv).min(limit);
+            self.voltage_mv = (*common_mv).min(limit);
         }
         if !self.forward {
             self.voltage_mv = -self.voltage_mv;
@@ -207,7 +205,7 @@ impl Run {
         let way = self.along(view.encoder);
         let (_, fast) = kind(self.done.saturating_sub(2));
         let place = usize::from(fast);
-        if self.frames > self.plan.run_up {
+        if self.frames > self.run_up() {
             self.line.add(way);
         }
         // What pushes against the motor shows as a speed that falls.
@@ -223,13 +221,29 @@ impl Run {
         let off = view.encoder.wrapping_sub(self.origin);
         let off = if self.forward { off } else { off.saturating_neg() };
         if off.saturating_add(self.plan.roll[place]) >= self.plan.half {
-            if self.done > 2 && !self.estimate.take(self.done - 2, self.plan.run_up + 1, &self.line) {
-                return self.brake(Some(Refusal::Unsteady), view.encoder);
-            }
-            self.brake(None, view.encoder);
-        } else if self.line.full() {
+            let stroke = self.done.saturating_sub(2);
+            let sound = stroke == 0 || self.take(stroke);
+            self.brake((!sound).then_some(Refusal::Unsteady), view.encoder);
+        } else if self.frames >= self.plan.longest {
             self.brake(Some(Refusal::Unsteady), view.encoder);
         }
+    }
+
+    /// Takes the line of a stroke; a trial shows what the jog's voltage has beyond friction's.
+    fn take(&mut self, stroke: u8) -> bool {
+        let Some(speed) = self.estimate.take(stroke, self.run_up() + 1, &self.line) else { return false };
+        if stroke < COUNT_FROM {
+            let [slow_mv, _] = self.plan.beyond_mv;
+            let had = (i64::from(slow_mv) * i64::from(speed)).checked_div(self.plan.slow.into()).unwrap_or(0);
+            let common = &mut self.common_mv[usize::from(self.forward)];
+            *common = (i64::from(*common) + i64::from(slow_mv) - had).max(0).min(i64::from(*common)) as i32;
+        }
+        true
+    }
+
+    /// Frames of a run-up; a trial, which may go farther in it, has fewer.
+    fn run_up(&self) -> u32 {
+        if self.done < 2 + COUNT_FROM { self.plan.run_up / 2 } else { self.plan.run_up }
     }
 
     /// Shorts the motor.
@@ -278,20 +292,17 @@ impl Run {
         }
         let stroke = self.done - 2;
         if stroke >= COUNT {
-            return match self.estimate.drive([self.slow_mv, self.plan.beyond_mv[1]], self.moving_mv, config) {
+            return match self.estimate.drive(self.plan.beyond_mv, self.common_mv, config) {
                 Ok(drive) => self.end(Commissioning::Measured(drive)),
                 Err(refusal) => self.refuse(refusal),
             };
         }
         let (forward, fast) = kind(stroke);
-        if stroke == FAST_FROM {
-            // By now the time constant is known; where it is longer than thought, the fast strokes are less so.
+        if stroke == COUNT_FROM {
             self.plan = Plan::new(config, self.estimate.slowest());
-        } else if !fast {
-            self.slow_mv = self.plan.beyond_mv[0];
         }
         self.forward = forward;
-        let voltage = self.moving_mv[usize::from(forward)] + self.plan.beyond_mv[usize::from(fast)];
+        let voltage = self.common_mv[usize::from(forward)] + self.plan.beyond_mv[usize::from(fast)];
         let limit = (i32::from(view.supply_mv) / STROKE_PART).min(config.params.voltage_max_mv);
         if voltage > limit {
             return self.refuse(Refusal::HeldBack);

@@ -4,7 +4,7 @@ use crate::config::{Config, newtons};
 use crate::units::Newtons;
 
 /// Half of the way that the strokes go to and fro, um.
-const HALF_UM: i64 = 800;
+const HALF_UM: i64 = 900;
 /// No farther than this from where it began, um.
 const FARTHEST_UM: i64 = 1_600;
 /// How far a jog goes at most, um,
@@ -20,25 +20,28 @@ const TOUCH_MN: i32 = 60;
 const PRESS_MN: i32 = 250;
 /// Speed of a fast stroke at most, um/s, and how many times slower a slow one is.
 const SPEED_UM_PER_S: i64 = 30_000;
-const SLOWER: i64 = 3;
+const SLOWER: i64 = 2;
 /// A shorted motor rolls on for this far at most, um.
-const ROLL_UM: i64 = 200;
+const ROLL_UM: i64 = 220;
 /// So many time constants belong to the run-up.
 const RUN_UP: u32 = 5;
 /// At rest: so long without a count, within so long, ns.
 const STILL_NS: u32 = 20_000_000;
 const REST_NS: u32 = 500_000_000;
+/// A stroke takes so long at most, ns.
+const STROKE_NS: u32 = 1_000_000_000;
 /// A force shows over this long, ns, and so many counts.
 const SPAN_NS: u32 = 8_000_000;
 const SPAN_COUNTS: u64 = 12;
 
 /// Slow strokes to each side, and fast ones.
 pub const EACH: u8 = 3;
-/// The first slow one begins in the middle and does not count.
-pub const COUNT: u8 = 1 + 4 * EACH;
-
+/// Before those that count the first one goes to the end of the way, and one to each side is a trial.
+pub const COUNT_FROM: u8 = 3;
 /// The first fast one.
-pub const FAST_FROM: u8 = 1 + 2 * EACH;
+const FAST_FROM: u8 = COUNT_FROM + 2 * EACH;
+/// All.
+pub const COUNT: u8 = FAST_FROM + 2 * EACH;
 
 /// Of the strokes, counted from 0: whether it goes forward, and whether it is fast.
 pub const fn kind(stroke: u8) -> (bool, bool) {
@@ -48,6 +51,8 @@ pub const fn kind(stroke: u8) -> (bool, bool) {
 /// What the parameters make of the bounds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
+    /// Speed that a slow stroke is to have, counts a frame, Q16.
+    pub slow: i32,
     /// Counts from the middle to where a stroke is over, and from where it began to where everything is.
     pub half: i32,
     /// See [`Plan::half`].
@@ -68,6 +73,8 @@ pub struct Plan {
     pub still: u32,
     /// See [`Plan::still`].
     pub rest: u32,
+    /// Frames of a stroke at most.
+    pub longest: u32,
     /// The force that is a touch.
     pub touch: Newtons,
 }
@@ -75,6 +82,7 @@ pub struct Plan {
 impl Plan {
     /// Before the first.
     pub const NONE: Self = Self {
+        slow: 0,
         half: 0,
         farthest: 0,
         jog: 0,
@@ -85,6 +93,7 @@ impl Plan {
         span: [0; 2],
         still: 0,
         rest: 0,
+        longest: 0,
         touch: Newtons::ZERO,
     };
 
@@ -124,7 +133,10 @@ impl Plan {
             frames(SPAN_NS.max(((ns * 1_000_000) >> 24).min(100_000_000) as u32)).max(1)
         };
         let roll = |speed: i64| counts((speed.max(0).unsigned_abs() * time_us / 1_000_000) as i64);
+        let counts_per_s = (speeds[0].max(0).unsigned_abs() << 40) / (1_000 * mm_per_count_q40).max(1);
+        let slow = ((counts_per_s * u64::from(frame_ns)) << 8) / 1_000_000_000;
         Self {
+            slow: (slow << 8).min(i32::MAX as u64) as i32,
             half: counts(HALF_UM),
             farthest: counts(FARTHEST_UM),
             jog: counts(JOG_UM),
@@ -135,6 +147,7 @@ impl Plan {
             span: speeds.map(span),
             still: frames(STILL_NS).max(1),
             rest: frames(REST_NS).max(2),
+            longest: frames(STROKE_NS).max(2),
             touch,
         }
     }

@@ -76,7 +76,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             return self.commission.running();
         }
         let Some(task) = asked.commission.filter(|task| *task != Task::Stop) else { return false };
-        if !self.tared || command.torque || contact.force >= self.config.contact_off {
+        if !self.tared || command.torque || contact.force >= self.config.contact_on {
             return false;
         }
         if task == Task::Measure && self.config.params.direction_confirmed == 0 {

@@ -45,6 +45,7 @@ fn two_hundred_drives_are_measured() {
         forces.push((1e3 * host.force_n, number));
         if came != Came::Measured {
             refused.push((number, came));
+            println!("drive {number} {came:?}: {:?}", &finger.drawn[..6]);
             continue;
         }
         let k = 1e-3 * value(&finger, "torque_mnm_per_a");

@@ -9,7 +9,7 @@
 
 use super::estimate::Estimate;
 use super::line::Line;
-use super::strokes::{COUNT, COUNT_FROM, JOG_PART, Plan, STROKE_PART, kind};
+use super::strokes::{COUNT, COUNT_FROM, JOG_PART, KNOWN_WAY, Plan, STROKE_PART, kind};
 use super::{Commissioning, Refusal, Task};
 use crate::config::Config;
 use crate::units::Newtons;
@@ -17,6 +17,8 @@ use crate::units::Newtons;
 /// Counts that are motion, and what a jog must make of them.
 const MOVED: i32 = 2;
 const PROVEN: i32 = 4;
+/// A trial is so many times slower than a slow stroke.
+const TRIAL: i32 = 2;
 
 /// What a frame says.
 #[derive(Clone, Copy, Debug)]
@@ -65,6 +67,8 @@ pub struct Run {
     /// The last look at the speed: where and when, and the fastest.
     looked: (i32, u32),
     fastest: i32,
+    /// Counts over the last span.
+    gone: i32,
     /// The count that stood last, and since which frame.
     stood: (i32, u32),
     estimate: Estimate,
@@ -89,6 +93,7 @@ impl Run {
             line: Line::NONE,
             looked: (0, 0),
             fastest: 0,
+            gone: 0,
             stood: (0, 0),
             estimate: Estimate::NONE,
         }
@@ -196,7 +201,13 @@ impl Run {
         if !self.forward {
             self.voltage_mv = -self.voltage_mv;
         }
+        if self.pushed(way.saturating_abs()) {
+            return self.brake(Some(Refusal::Blocked), view.encoder);
+        }
         if self.frames >= self.plan.jog_frames || way.saturating_abs() >= self.plan.jog {
+            // By now it goes steadily, or nearly.
+            let speed = (i64::from(self.gone) << 16).checked_div(self.plan.span.into()).unwrap_or(0);
+            self.lower_common(self.beyond_mv(speed));
             self.brake(None, view.encoder);
         }
     }
@@ -208,15 +219,8 @@ impl Run {
         if self.frames > self.run_up() {
             self.line.add(way);
         }
-        // What pushes against the motor shows as a speed that falls.
-        let (at, since) = self.looked;
-        if self.frames.wrapping_sub(since) >= self.plan.span[place] {
-            let gone = way.saturating_sub(at);
-            self.looked = (way, self.frames);
-            self.fastest = self.fastest.max(gone);
-            if gone < self.fastest - self.fastest / 4 - 1 {
-                return self.brake(Some(Refusal::Blocked), view.encoder);
-            }
+        if self.pushed(way) {
+            return self.brake(Some(Refusal::Blocked), view.encoder);
         }
         let off = view.encoder.wrapping_sub(self.origin);
         let off = if self.forward { off } else { off.saturating_neg() };
@@ -229,16 +233,40 @@ impl Run {
         }
     }
 
+    /// Whether the speed falls as if something pushed against the motor.
+    fn pushed(&mut self, way: i32) -> bool {
+        let (at, since) = self.looked;
+        if self.frames.wrapping_sub(since) < self.plan.span {
+            return false;
+        }
+        self.gone = way.saturating_sub(at);
+        self.looked = (way, self.frames);
+        self.fastest = self.fastest.max(self.gone);
+        let known = self.phase == Phase::Stroke && self.done >= 2 + COUNT_FROM;
+        let drop = if known { self.plan.drop.saturating_mul(KNOWN_WAY) } else { self.plan.drop };
+        self.gone <= self.fastest.saturating_sub(drop)
+    }
+
+    /// What the voltage has beyond that of friction, for a speed (counts a frame, Q16): mV.
+    fn beyond_mv(&self, speed: i64) -> i64 {
+        (i64::from(self.plan.beyond_mv[0]) * speed).checked_div(self.plan.slow.into()).unwrap_or(0)
+    }
+
     /// Takes the line of a stroke; a trial shows what the jog's voltage has beyond friction's.
     fn take(&mut self, stroke: u8) -> bool {
         let Some(speed) = self.estimate.take(stroke, self.run_up() + 1, &self.line) else { return false };
         if stroke < COUNT_FROM {
-            let [slow_mv, _] = self.plan.beyond_mv;
-            let had = (i64::from(slow_mv) * i64::from(speed)).checked_div(self.plan.slow.into()).unwrap_or(0);
-            let common = &mut self.common_mv[usize::from(self.forward)];
-            *common = (i64::from(*common) + i64::from(slow_mv) - had).max(0).min(i64::from(*common)) as i32;
+            let had = self.beyond_mv(speed.into());
+            self.lower_common(had - i64::from(self.plan.beyond_mv[0] / TRIAL));
         }
         true
+    }
+
+    /// Takes what a motion had beyond friction's voltage off the one that the next ones have for it.
+    fn lower_common(&mut self, by_mv: i64) {
+        let common = &mut self.common_mv[usize::from(self.forward)];
+        // Three quarters: the torque constant is not known yet, and friction must be overcome.
+        *common = (i64::from(*common) - by_mv.max(0) * 3 / 4).max(0) as i32;
     }
 
     /// Frames of a run-up; a trial, which may go farther in it, has fewer.
@@ -277,6 +305,9 @@ impl Run {
         self.done = self.done.saturating_add(1);
         self.frames = 0;
         self.begun = view.encoder;
+        self.line = Line::NONE;
+        self.looked = (0, 0);
+        self.fastest = 0;
         if self.done == 1 {
             self.forward = false;
             self.phase = Phase::Jog;
@@ -302,15 +333,14 @@ impl Run {
             self.plan = Plan::new(config, self.estimate.slowest());
         }
         self.forward = forward;
-        let voltage = self.common_mv[usize::from(forward)] + self.plan.beyond_mv[usize::from(fast)];
+        let beyond = self.plan.beyond_mv[usize::from(fast)];
+        let beyond = if stroke < COUNT_FROM { beyond / TRIAL } else { beyond };
+        let voltage = self.common_mv[usize::from(forward)] + beyond;
         let limit = (i32::from(view.supply_mv) / STROKE_PART).min(config.params.voltage_max_mv);
         if voltage > limit {
             return self.refuse(Refusal::HeldBack);
         }
         self.voltage_mv = if forward { voltage } else { -voltage };
-        self.line = Line::NONE;
-        self.looked = (0, 0);
-        self.fastest = 0;
         self.phase = Phase::Stroke;
         self.outcome = Commissioning::Running((u32::from(self.done) * 100 / (u32::from(COUNT) + 2)) as u8);
     }

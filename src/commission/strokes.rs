@@ -8,7 +8,7 @@ const HALF_UM: i64 = 900;
 /// No farther than this from where it began, um.
 const FARTHEST_UM: i64 = 1_600;
 /// How far a jog goes at most, um,
-const JOG_UM: i64 = 1_000;
+const JOG_UM: i64 = 500;
 /// and for how long, ns; its voltage rises to the limit in the first half.
 const JOG_NS: u32 = 100_000_000;
 /// The jog's limit: this part of the supply. No stroke takes more than a third.
@@ -18,11 +18,11 @@ pub const STROKE_PART: i32 = 3;
 const TOUCH_MN: i32 = 60;
 /// What a fast stroke may press with once it brakes.
 const PRESS_MN: i32 = 250;
-/// Speed of a fast stroke at most, um/s, and how many times slower a slow one is.
+/// Speed of a fast stroke at most, um/s, and a slow one's share.
 const SPEED_UM_PER_S: i64 = 30_000;
-const SLOWER: i64 = 2;
+const SLOW_PERCENT: i64 = 55;
 /// A shorted motor rolls on for this far at most, um.
-const ROLL_UM: i64 = 220;
+const ROLL_UM: i64 = 250;
 /// So many time constants belong to the run-up.
 const RUN_UP: u32 = 5;
 /// At rest: so long without a count, within so long, ns.
@@ -30,9 +30,13 @@ const STILL_NS: u32 = 20_000_000;
 const REST_NS: u32 = 500_000_000;
 /// A stroke takes so long at most, ns.
 const STROKE_NS: u32 = 1_000_000_000;
-/// A force shows over this long, ns, and so many counts.
+/// The motor is to feel this force, mN, over this time, ns, or one in which it takes so many counts.
+const PUSH_MN: i64 = 100;
 const SPAN_NS: u32 = 8_000_000;
-const SPAN_COUNTS: u64 = 12;
+const SPAN_MAX_NS: u64 = 50_000_000;
+const DROP_COUNTS: u64 = 2;
+/// Where others went before, so many times that.
+pub const KNOWN_WAY: i32 = 3;
 
 /// Slow strokes to each side, and fast ones.
 pub const EACH: u8 = 3;
@@ -67,8 +71,10 @@ pub struct Plan {
     pub beyond_mv: [i32; 2],
     /// Frames of a run-up.
     pub run_up: u32,
-    /// Frames over which a slow and a fast stroke's speed is looked at for a force.
-    pub span: [u32; 2],
+    /// Frames over which the speed is looked at for a force, and the counts that a force takes off them.
+    pub span: u32,
+    /// See [`Plan::span`].
+    pub drop: i32,
     /// Frames without a count that are rest, and how long to wait for them.
     pub still: u32,
     /// See [`Plan::still`].
@@ -90,7 +96,8 @@ impl Plan {
         roll: [0; 2],
         beyond_mv: [0; 2],
         run_up: 0,
-        span: [0; 2],
+        span: 0,
+        drop: 0,
         still: 0,
         rest: 0,
         longest: 0,
@@ -118,20 +125,19 @@ impl Plan {
         let room_um = ((i64::from(room.max(0)) * 1_000) >> 24).min(ROLL_UM);
         let fast = (room_um.max(0).unsigned_abs() * 1_000_000 / time_us) as i64;
         let fast = fast.min(SPEED_UM_PER_S).min(i64::from(p.approach_um_per_s));
-        let speeds = [fast / SLOWER, fast];
+        let speeds = [fast * SLOW_PERCENT / 100, fast];
         // um/s times uN m/A (uV s) times mrad/mm (urad/um): 1e-9 mV.
         let per_speed =
             u64::from(p.torque_constant_unm_per_a.unsigned_abs()) * u64::from(p.reduction_mrad_per_mm.unsigned_abs());
         let millivolts = |speed: i64| {
             (speed.max(0).unsigned_abs() * per_speed / 1_000_000_000).min(p.voltage_max_mv.unsigned_abs().into()) as i32
         };
-        // Nanoseconds for so many counts: mm/2^40 over um/s.
-        let span = |speed: i64| {
-            let mm_q40 = SPAN_COUNTS * mm_per_count_q40;
-            let ns = ((mm_q40 >> 16) * 1_000).checked_div(speed.unsigned_abs()).unwrap_or(0);
-            // Q24 of ms.
-            frames(SPAN_NS.max(((ns * 1_000_000) >> 24).min(100_000_000) as u32)).max(1)
-        };
+        // What a force takes of the speed, um/s: F / (m c).
+        let push = i64::from(config.bounds.acceleration_per_n) * PUSH_MN * 512;
+        let slower = push.checked_div(config.damping_q17_per_s.max(1).into()).unwrap_or(0).max(1).unsigned_abs();
+        let slower = ((slower << 40) / (1_000 * mm_per_count_q40).max(1)).max(1);
+        let span_ns = u64::from(SPAN_NS).max(1_000_000_000 * DROP_COUNTS / slower).min(SPAN_MAX_NS);
+        let drop = (slower * span_ns / 1_000_000_000).max(2).min(super::line::COUNTS_MAX as u64) as i32;
         let roll = |speed: i64| counts((speed.max(0).unsigned_abs() * time_us / 1_000_000) as i64);
         let counts_per_s = (speeds[0].max(0).unsigned_abs() << 40) / (1_000 * mm_per_count_q40).max(1);
         let slow = ((counts_per_s * u64::from(frame_ns)) << 8) / 1_000_000_000;
@@ -144,7 +150,8 @@ impl Plan {
             roll: speeds.map(roll),
             beyond_mv: speeds.map(millivolts),
             run_up: (RUN_UP as u64 * time_ns / u64::from(frame_ns)).min(super::line::FRAMES_MAX.into()) as u32 + 1,
-            span: speeds.map(span),
+            span: frames(span_ns as u32).max(1),
+            drop,
             still: frames(STILL_NS).max(1),
             rest: frames(REST_NS).max(2),
             longest: frames(STROKE_NS).max(2),

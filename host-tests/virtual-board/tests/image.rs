@@ -14,7 +14,7 @@ use virtual_board::{Options, Rig};
 fn rig() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts")
+    Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts")
 }
 
 /// A board that is up.

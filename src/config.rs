@@ -9,6 +9,7 @@ pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
+pub mod motions;
 mod shaped;
 
 pub use error::ConfigError;
@@ -24,6 +25,7 @@ use bounds::{Bounds, Drives};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
+use motions::{Driven, Motions};
 
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
@@ -128,6 +130,8 @@ pub struct Config {
     pub clearance: Millimetres,
     /// What the guard goes by.
     pub bounds: Bounds,
+    /// The bounds of the motions that measure the drive.
+    pub motions: Motions,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
@@ -246,6 +250,7 @@ impl Config {
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,
+            motions: Motions::new(p, &tip, &Driven { frame_s, mm_per_count, damping: c, mass }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen: force_seen(p, codes_milli, &tip),

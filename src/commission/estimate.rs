@@ -13,6 +13,7 @@ use super::line::Line;
 use super::strokes::{COUNT_FROM, EACH, kind};
 use super::{Drive, Refusal};
 use crate::config::Config;
+use crate::params::Params;
 use crate::root::floor_sqrt;
 
 /// A line has so many frames at least, and such a slope (Q16 counts a frame).
@@ -27,8 +28,6 @@ const FRICTION_PERMILLE: u64 = 30;
 const APART: i64 = 8;
 /// The duty acts this much later than the frame that it was made from, frames in Q8.
 const DEAD_Q8: i32 = 85;
-/// The mean range of three is this many standard deviations, hundredths.
-const RANGE_OF_THREE: u64 = 169;
 /// 2 pi in millionths.
 const TURN: u64 = 6_283_185;
 
@@ -47,10 +46,6 @@ impl Spread {
         self.sum += i64::from(value);
         self.least = self.least.min(value);
         self.most = self.most.max(value);
-    }
-
-    fn mean(&self) -> i64 {
-        self.sum / i64::from(EACH)
     }
 
     fn range(&self) -> i64 {
@@ -98,58 +93,56 @@ impl Estimate {
 
     /// The drive, from voltages (mV) that the slow and the fast strokes had beyond those (back and forward) that all
     /// of a way had.
+    ///
+    /// Sums stand for means of [`EACH`]: so there are few divisions, which take long.
     #[inline(never)]
     pub fn drive(&self, beyond_mv: [i32; 2], common_mv: [i32; 2], config: &Config) -> Result<Drive, Refusal> {
         let p = &config.params;
         let [slow_mv, fast_mv] = beyond_mv;
         let step_mv = u64::from((fast_mv - slow_mv).max(0).unsigned_abs());
         let kinds = self.speeds.as_flattened();
-        if kinds.iter().any(|kind| kind.range() > kind.mean() / APART) {
+        if kinds.iter().any(|kind| kind.range() * APART * i64::from(EACH) > kind.sum) {
             return Err(Refusal::Unsteady);
         }
-        let gains = self.speeds.map(|[slow, fast]| fast.mean() - slow.mean());
-        let gain = (gains[0] + gains[1]) / 2;
-        if gain <= 0 || (gains[0] - gains[1]).abs() > gain / APART || step_mv == 0 {
+        let gains = self.speeds.map(|[slow, fast]| fast.sum - slow.sum);
+        let gain = gains[0] + gains[1];
+        let [time_back, time_forward] = self.times;
+        let time = time_back.sum + time_forward.sum;
+        if gain <= 0 || (gains[0] - gains[1]).abs() * 2 * APART > gain || step_mv == 0 || time <= 0 {
             return Err(Refusal::Unsteady);
         }
+        let (gain, time) = (gain.unsigned_abs().max(1), time.unsigned_abs().max(1));
+        const BOTH: u64 = 2 * EACH as u64;
+
         // k = dV / dw, w = 2 pi s / (counts T).
-        let gain = gain.unsigned_abs();
         let turns = step_mv * u64::from(p.encoder_counts_per_turn.unsigned_abs());
-        let scaled = turns * u64::from(config.timing.frame_ns);
-        let torque_constant = ((((scaled << 8) / gain.max(1)).min(1 << 52)) << 8) / TURN;
+        let scaled = turns * u64::from(config.timing.frame_ns) * BOTH;
+        let torque_constant = (((scaled << 8) / gain).min(1 << 52) << 8) / TURN;
+        let torque_constant = torque_constant.min(1 << 18);
         // The mean of three varies by a range of three / (1.69 sqrt(3)), and two means make a difference.
-        let range = kinds.iter().map(Spread::range).sum::<i64>().unsigned_abs() / 4;
-        let scatter = range * 100_000 / (RANGE_OF_THREE * 173 / 100 * gain).max(1);
+        let range = kinds.iter().map(Spread::range).sum::<i64>().unsigned_abs();
+        let scatter = range * (BOTH * 1_000 * 100 / 4 / 293) / gain;
         let torque_constant_sigma = together([scatter, VOLTAGE_PERMILLE, 0]);
 
-        let [time_back, time_forward] = self.times;
-        let frames_q8 = (time_back.mean() + time_forward.mean()) / 2;
-        if frames_q8 <= 0 {
-            return Err(Refusal::Unsteady);
-        }
-        let frames_q8 = frames_q8.unsigned_abs();
-        let time_ns = (frames_q8 * u64::from(config.timing.frame_ns)) >> 8;
-        let time_us = (time_ns + 500) / 1_000;
-        let range = (time_back.range() + time_forward.range()).unsigned_abs() / 2;
-        let time_scatter = range * 100_000 / (RANGE_OF_THREE * 245 / 100 * frames_q8).max(1);
-        let time_constant_sigma = together([time_scatter, TIME_PERMILLE, 0]);
-
-        // J = tau k^2 / R and T = V_f k / R.
+        // tau = R J / k^2.
+        let time_us = ((time * u64::from(config.timing.frame_ns)) / (BOTH * 256 * 1_000)).min(1 << 20);
+        let range = (time_back.range() + time_forward.range()).unsigned_abs();
+        let scatter_of_time = range * (BOTH * 1_000 * 100 / 2 / 414) / time;
+        let time_constant_sigma = together([scatter_of_time, TIME_PERMILLE, 0]);
         let resistance = u64::from(p.resistance_mohm.max(1).unsigned_abs());
-        let per_resistance = |value: u64| (value + resistance / 2) / resistance;
-        let torque_constant = torque_constant.min(1 << 20);
-        let inertia = per_resistance(time_us.min(1 << 20) * torque_constant * torque_constant / 1_000_000);
+        let inertia = over(time_us * torque_constant * torque_constant, resistance * 1_000_000);
         let inertia_sigma = together([time_constant_sigma, 2 * torque_constant_sigma, 0]);
 
+        // T = V_f k / R.
         let friction = |slow: &Spread, gain: i64, common_mv: i32| {
             // In uV, of which a voltage has 26 bits.
-            let lost = slow.mean().max(0).unsigned_abs() * (step_mv * 1_000) / gain.max(1).unsigned_abs();
+            let lost = slow.sum.max(0).unsigned_abs() * (step_mv * 1_000) / gain.max(1).unsigned_abs();
             let given = u64::from(common_mv.saturating_add(slow_mv).max(0).unsigned_abs()) * 1_000;
             let left = given.saturating_sub(lost);
-            // The slow speed counts 1.5 times and the fast one half: 1.6 times the scatter of k, of the step.
-            let sigma = (step_mv * scatter * 1_600).checked_div(left).unwrap_or(1_000);
+            // The slow speed counts 2.2 times and the fast one 1.2 times: 2.5 times the scatter of one.
+            let sigma = (step_mv * scatter * 2_530).checked_div(left).unwrap_or(1_000);
             (
-                per_resistance(left * torque_constant / 1_000),
+                over(left * torque_constant, resistance * 1_000),
                 together([sigma, torque_constant_sigma, FRICTION_PERMILLE]),
             )
         };
@@ -157,14 +150,10 @@ impl Estimate {
         let (back, back_sigma) = friction(slow_back, gains[0], common_mv[0]);
         let (forward, forward_sigma) = friction(slow_forward, gains[1], common_mv[1]);
 
-        let within = |value: u64, name: &str| {
-            let range = crate::params::Params::RANGES.iter().find(|(other, ..)| *other == name);
-            range.is_some_and(|(_, _, min, max)| (i64::from(*min)..=i64::from(*max)).contains(&(value as i64)))
-        };
-        let sound = within(torque_constant, "torque_constant_unm_per_a")
-            && within(inertia, "inertia_ug_m2")
-            && within(back, "friction_unm")
-            && within(forward, "friction_unm");
+        let sound = TORQUE_CONSTANT.hold(torque_constant)
+            && INERTIA.hold(inertia)
+            && FRICTION.hold(back)
+            && FRICTION.hold(forward);
         if !sound {
             return Err(Refusal::Range);
         }
@@ -180,6 +169,50 @@ impl Estimate {
             friction_sigma: [permille(forward_sigma), permille(back_sigma)],
         })
     }
+}
+
+/// The range of a parameter.
+struct Allowed {
+    min: u64,
+    max: u64,
+}
+
+const TORQUE_CONSTANT: Allowed = Allowed::of("torque_constant_unm_per_a");
+const INERTIA: Allowed = Allowed::of("inertia_ug_m2");
+const FRICTION: Allowed = Allowed::of("friction_unm");
+
+impl Allowed {
+    const fn of(name: &str) -> Self {
+        let mut place = 0;
+        while !same(Params::RANGES[place].0.as_bytes(), name.as_bytes()) {
+            place += 1;
+        }
+        let (_, _, min, max) = Params::RANGES[place];
+        Self { min: min as u64, max: max as u64 }
+    }
+
+    fn hold(&self, value: u64) -> bool {
+        value >= self.min && value <= self.max
+    }
+}
+
+const fn same(one: &[u8], other: &[u8]) -> bool {
+    if one.len() != other.len() {
+        return false;
+    }
+    let mut place = 0;
+    while place < one.len() {
+        if one[place] != other[place] {
+            return false;
+        }
+        place += 1;
+    }
+    true
+}
+
+/// A share, rounded.
+fn over(value: u64, of: u64) -> u64 {
+    (value + of / 2) / of.max(1)
 }
 
 /// Independent parts of an uncertainty, permille.

@@ -1,5 +1,7 @@
 //! A straight line through an encoder's counts, one a frame.
 
+use crate::config::motions::COUNTS_MAX;
+
 /// Sums over frames 0 to n - 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Line {
@@ -17,9 +19,8 @@ pub struct Fitted {
     pub zero: i32,
 }
 
-/// So many frames and counts at most: the sums then have 43 bits, and the slope's numerator 62.
-pub const FRAMES_MAX: u32 = 2_047;
-pub const COUNTS_MAX: i32 = 1 << 20;
+/// So many frames at most: the sums then have 43 bits, and the slope's numerator 62.
+const FRAMES_MAX: u32 = 2_047;
 
 impl Line {
     /// No frames.

@@ -9,14 +9,20 @@
 
 use super::estimate::Estimate;
 use super::line::Line;
-use super::strokes::{COUNT, COUNT_FROM, JOG_PART, KNOWN_WAY, Plan, STROKE_PART, kind};
+use super::strokes::{COUNT, COUNT_FROM, kind};
 use super::{Commissioning, Refusal, Task};
 use crate::config::Config;
+use crate::config::motions::Motions;
 use crate::units::Newtons;
 
 /// Counts that are motion, and what a jog must make of them.
 const MOVED: i32 = 2;
 const PROVEN: i32 = 4;
+/// The jog's limit: this part of the supply. No stroke takes more than a third.
+const JOG_PART: i32 = 20;
+const STROKE_PART: i32 = 3;
+/// Where others went before, a push must be so many times stronger to be one.
+const KNOWN_WAY: i32 = 3;
 /// A trial is so many times slower than a slow stroke.
 const TRIAL: i32 = 2;
 
@@ -48,7 +54,7 @@ pub struct Run {
     phase: Phase,
     outcome: Commissioning,
     task: Task,
-    plan: Plan,
+    plan: Motions,
     /// Jogs and strokes done.
     done: u8,
     forward: bool,
@@ -81,7 +87,7 @@ impl Run {
             phase: Phase::Idle,
             outcome: Commissioning::None,
             task: Task::Stop,
-            plan: Plan::NONE,
+            plan: Motions::NONE,
             done: 0,
             forward: true,
             origin: 0,
@@ -106,7 +112,7 @@ impl Run {
             phase: Phase::Jog,
             outcome: Commissioning::Running(0),
             task,
-            plan: Plan::new(config, 0),
+            plan: config.motions,
             origin: encoder,
             begun: encoder,
             ..Self::new()
@@ -330,7 +336,7 @@ impl Run {
         }
         let (forward, fast) = kind(stroke);
         if stroke == COUNT_FROM {
-            self.plan = Plan::new(config, self.estimate.slowest());
+            self.plan = self.plan.slower(self.estimate.slowest());
         }
         self.forward = forward;
         let beyond = self.plan.beyond_mv[usize::from(fast)];

@@ -68,7 +68,12 @@ fn a_new_board_is_commissioned_and_keeps_it() {
     assert_eq!(old[3], 0, "nobody knows yet which way the motor goes");
     assert_eq!(refused(&mut rig, address::TORQUE_ENABLE, 1), RESULT);
     assert_eq!(outcome(&mut rig, 2), (4, 3), "the direction comes first");
+    let before_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
     assert_eq!(outcome(&mut rig, 1), (2, 0));
+    println!(
+        "loop time at most {before_us} us before, {} us with the jog",
+        read_u16(&mut rig, address::LOOP_TIME_MAX_US)
+    );
     write_u8(&mut rig, address::COMMISSION_ACCEPT, 1);
     rig.run_ms(5).expect("it runs");
     assert_eq!(outcome(&mut rig, 2), (3, 0));

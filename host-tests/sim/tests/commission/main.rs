@@ -176,6 +176,61 @@ fn it_can_be_interrupted_at_any_moment() {
     assert!(tell("travel mm", travels) < TRAVEL_MM);
 }
 
+/// Motors that are nothing like the reference's, known as far as their sheets go, and one that is far from its sheet.
+#[test]
+fn other_motors_are_measured_too() {
+    let motors = [
+        // A gearless one on a short crank: 12 V, 0.4 rad/mm.
+        (
+            "ratio",
+            "[motor]\nresistance_ohm = 8\ntorque_mnm_per_a = 16\ninertia_g_cm2 = 8\n\
+            [transmission]\nratio = 4\ndrum_radius_mm = 10\n[supply]\nsource_v = 8\n\
+            [effects.dry_friction]\ntorque_mnm = 0.3\n",
+        ),
+        // A small quick one with a high gear.
+        (
+            "small",
+            "[motor]\nresistance_ohm = 9\ntorque_mnm_per_a = 3.2\ninertia_g_cm2 = 0.1\n\
+            [transmission]\nratio = 150\ndrum_radius_mm = 8\n[effects.dry_friction]\ntorque_mnm = 0.05\n",
+        ),
+        // Three times the inertia that the controller has.
+        (
+            "heavy",
+            "[motor]\ninertia_g_cm2 = 2.1\n[controller]\ninertia_ug_m2 = 71\n\
+            [effects.dry_friction]\ntorque_mnm = 0.12\n",
+        ),
+        // One whose torque ripples as by 0.2 N at the tip, which might as well be something that it meets.
+        ("rippled", "[effects.dry_friction]\ntorque_mnm = 0.12\n[effects.cogging]\ntorque_mnm = 0.06\n"),
+    ];
+    for (name, tables) in motors {
+        let text = format!("about = \"a motor\"\nduration_s = 1.0\n[object]\ndistance_mm = 5\n{tables}");
+        let scene = sim::scene::read("motor.toml", &text, &[]).unwrap_or_else(|errors| panic!("{errors}\n{text}"));
+        let mut host = Host::new(&scene);
+        let came = host.commission(2);
+        let motor = scene.table("motor");
+        let k = motor.number("torque_mnm_per_a");
+        let found = 1e-3 * f64::from(host.read(address::MEASURED_TORQUE_CONSTANT));
+        let inertia = 1e-2 * f64::from(host.read(address::MEASURED_INERTIA));
+        println!(
+            "{name}: {came:?}, k {found} of {k}, J {inertia} of {}, friction {} and {} uN m; travel {:.2} mm",
+            motor.number("inertia_g_cm2"),
+            host.read(address::MEASURED_FRICTION_FORWARD),
+            host.read(address::MEASURED_FRICTION_BACK),
+            host.travel_mm,
+        );
+        assert!(host.travel_mm < TRAVEL_MM && host.force_n == 0.0);
+        if name == "rippled" {
+            assert_eq!(came, Came::Refused(8));
+            continue;
+        }
+        assert_eq!(came, Came::Measured, "{name}");
+        assert!(
+            (found / k - 1.0).abs() < 0.03 && (inertia / motor.number("inertia_g_cm2") - 1.0).abs() < 0.1,
+            "{name}"
+        );
+    }
+}
+
 #[test]
 fn two_hundred_drives_are_measured() {
     let population = drives();

@@ -203,7 +203,7 @@ fn the_runs_come_everywhere() {
     });
     outcome.expect("the rules hold");
     let [modes, faults, outcomes, refusals] = all.into_inner();
-    assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6]);
+    assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert!(
         outcomes.contains(&1) && [10, 11].iter().all(|number| refusals.contains(number)),
         "{outcomes:?} {refusals:?}"

@@ -30,4 +30,6 @@ pub struct Command {
     pub clear_request: u8,
     /// A change of this number asks for a measurement of Young's modulus.
     pub identify_request: u8,
+    /// A change of this number asks for a [`crate::commission::Task`], which its lowest bits name.
+    pub commission_request: u8,
 }

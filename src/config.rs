@@ -9,6 +9,7 @@ pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
+pub mod motions;
 mod shaped;
 
 pub use error::ConfigError;
@@ -24,6 +25,7 @@ use bounds::{Bounds, Drives};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
+use motions::{Driven, Motions};
 
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
@@ -128,6 +130,8 @@ pub struct Config {
     pub clearance: Millimetres,
     /// What the guard goes by.
     pub bounds: Bounds,
+    /// The bounds of the motions that measure the drive.
+    pub motions: Motions,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
@@ -142,6 +146,14 @@ impl Config {
     pub fn travel(&self, counts: i32) -> Millimetres {
         let counts = counts.max(-self.counts_max).min(self.counts_max);
         Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
+    }
+
+    /// g V of a voltage at the motor, up to [`Params::voltage_max_mv`] either way, Q8 mm/s^2.
+    pub fn push(&self, voltage_mv: i32) -> i32 {
+        let most = self.params.voltage_max_mv.max(0).unsigned_abs();
+        let share = voltage_mv.unsigned_abs().min(most).wrapping_mul(self.share_per_mv_q32);
+        let push = ((u64::from(self.voltage_limit.cast_unsigned()) * u64::from(share)) >> 32) as i32;
+        if voltage_mv < 0 { -push } else { push }
     }
 
     /// See [`Shaped::new`], into which this goes: a configuration is large, and would be copied.
@@ -238,6 +250,7 @@ impl Config {
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,
+            motions: Motions::new(p, &tip, &Driven { frame_s, mm_per_count, damping: c, mass }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen: force_seen(p, codes_milli, &tip),

@@ -63,6 +63,14 @@ impl SpeedLoop {
         self.drive.duty(supply_mv, config)
     }
 
+    /// The duty for a voltage (g V, Q8 mm/s^2) that no law asks for.
+    pub fn push(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
+        let speed = clamp_bits(self.observer.speed.to_bits(), 28);
+        let back_emf = clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4;
+        self.drive.apply(voltage, back_emf, supply_mv, config, limits);
+        self.drive.duty(supply_mv, config)
+    }
+
     /// The law, and the limits of what it asks for: the voltage.
     #[inline(always)]
     pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {

@@ -149,6 +149,9 @@ params! {
     creep_permille = 0 in 0..=300;
     /// Time constant of the creep.
     creep_time_ms = 10_000 in 500..=600_000;
+    /// Whether somebody saw that positive duty moves the tip towards the object, and the jog that the encoder then counts
+    /// up: 1 yes, 0 no. Without it the bus refuses torque. See `docs/commissioning.md`.
+    direction_confirmed = 0 in 0..=1;
 }
 
 impl Default for Params {

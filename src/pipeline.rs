@@ -8,6 +8,7 @@ mod requests;
 pub use report::{Bridge, Status, Taken, Taring};
 
 use crate::command::Command;
+use crate::commission::{self, Run, Task};
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
 use crate::control::SpeedLoop;
@@ -34,6 +35,7 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     guard: Guard,
     goal: Goal,
     press: Press,
+    commission: Run,
     status: Status,
     tared: bool,
 }
@@ -52,6 +54,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             guard: Guard::default(),
             goal: Goal::default(),
             press: Press::new(),
+            commission: Run::new(),
             status: Status::default(),
             tared: false,
         }
@@ -61,6 +64,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// anew.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
+        self.interrupt_commission();
+        // What was measured belonged to the parameters before.
+        if !matches!(self.status.commissioning, commission::Commissioning::Refused(_)) {
+            self.commission = Run::new();
+            self.status.commissioning = self.commission.outcome();
+        }
         self.leave();
     }
 
@@ -80,6 +89,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.press.refuse(Refusal::Interrupted);
             self.status.identification = self.press.outcome();
         }
+        self.interrupt_commission();
         if self.status.tare == Taring::Running {
             self.status.tare = Taring::Refused;
         }
@@ -116,7 +126,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
         // What the array feels, where it can be trusted: the bridge does not wait for the rest. The frame that turns
         // torque on drives already, so it is judged like all after it.
-        let starting = self.status.mode == Mode::Off && command.torque && self.tared && !asked.tare;
+        let drives = command.torque || asked.commission.is_some_and(|task| task != Task::Stop);
+        let starting = self.status.mode == Mode::Off && drives && self.tared && !asked.tare;
         let watched = self.watched() || starting;
         let picture = self.array.read(frame, &self.config);
         let broken = monitor::array_broken(picture, &self.config);
@@ -130,7 +141,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         // to fit to in a broken array. Where a frame shows nothing while the bridge is driven, the contact is the last
         // one's.
         let sound = monitor::array_sound(picture, &self.config);
-        let fits = sound && self.status.mode != Mode::Identify;
+        let fits = sound && !matches!(self.status.mode, Mode::Identify | Mode::Commission);
         let contact = if fits {
             self.fit.read(picture, &self.config)
         } else if sound || !watched {
@@ -179,14 +190,25 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.press.observe(&view, &self.config);
         }
 
+        // What motions that measure the drive make of it.
+        if self.status.mode == Mode::Commission {
+            let held_back = self.motion.drive.voltage() != self.config.push(self.commission.voltage_mv());
+            let view =
+                commission::View { encoder: sense.encoder, force: seen.force, supply_mv: sense.supply_mv, held_back };
+            self.commission.observe(&view, &self.config);
+        }
+
         // What to do about it.
-        let mode = self.next_mode(asked, command, &contact, sound);
+        let mode = self.next_mode(asked, command, &contact, sound, sense.encoder);
         self.status.mode = mode;
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
         }
+        if mode != Mode::Commission {
+            self.interrupt_commission();
+        }
         let reference = match mode {
-            Mode::Off | Mode::Tare | Mode::Fault => None,
+            Mode::Off | Mode::Tare | Mode::Fault | Mode::Commission => None,
             Mode::Approach | Mode::Force | Mode::Release => {
                 Some(self.goal.reference(mode, command.goal, &contact, &mut self.motion, &self.config, &mut limits))
             }
@@ -194,6 +216,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         };
         let duty = match reference {
             Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
+            None if mode == Mode::Commission => {
+                let voltage = self.config.push(self.commission.voltage_mv());
+                self.motion.push(voltage, sense.supply_mv, &self.config, &mut limits)
+            }
             None => self.motion.coast(),
         };
         // Nor does it drive by a frame that shows nothing: for that long the motor is shorted.
@@ -210,6 +236,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
 
         self.status.identification = self.press.outcome();
+        self.status.commissioning = self.commission.outcome();
         self.status.limits = limits;
         self.status.fit_level = fit_level;
         self.status.contact = contact;
@@ -231,6 +258,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.status.duty = Duty::ZERO;
         }
         broken
+    }
+
+    /// Ends motions that measure the drive, for the reason that another mode begins.
+    fn interrupt_commission(&mut self) {
+        if self.commission.running() {
+            self.commission.refuse(commission::Refusal::Interrupted);
+            self.status.commissioning = self.commission.outcome();
+        }
     }
 
     /// Whether faults count: not while the bridge is off anyhow.

@@ -68,14 +68,16 @@ const ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>()
 
 /// Where each register begins.
 pub mod address {
-    use super::{ALL, table};
+    use super::{COLUMNS, ROWS, table};
 
     pub use table::address::*;
 
+    const PICTURES: [u16; 3] = table::picture_addresses::<ROWS, COLUMNS>();
+
     /// Pressure on each taxel, row by row.
-    pub const PRESSURES: u16 = ALL[table::COUNT - 3].address;
+    pub const PRESSURES: u16 = PICTURES[0];
     /// Converter codes of the last frame, row by row.
-    pub const RAW_CODES: u16 = ALL[table::COUNT - 2].address;
+    pub const RAW_CODES: u16 = PICTURES[1];
     /// Zero of each taxel in converter codes, row by row.
-    pub const TARE_CODES: u16 = ALL[table::COUNT - 1].address;
+    pub const TARE_CODES: u16 = PICTURES[2];
 }

@@ -14,7 +14,7 @@ from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler, PortHandle
 from fingertip import registers as reg
 
 BAUD = 1_000_000
-MODES = ["off", "tare", "approach", "force", "release", "fault", "identify"]
+MODES = ["off", "tare", "approach", "force", "release", "fault", "identify", "commission"]
 TARING, TARED = 1, 2  # of the register TARE_STATE
 
 

@@ -13,6 +13,8 @@ Times are the controller's own; registers and their units are in `fingertip.regi
 
 from . import registers
 from .bus import Bus, FingertipError, NoAnswer, Refused
-from .finger import Fault, Fingertip, Mode, Restarted, State
+from .finger import Drive, Fault, Fingertip, Mode, Restarted, State
 
-__all__ = ["Bus", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "Restarted", "State", "registers"]
+__all__ = [
+    "Bus", "Drive", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "Restarted", "State", "registers",
+]

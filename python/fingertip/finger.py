@@ -15,12 +15,29 @@ _NOT_TARED, _TARED_TOUCHING = 1 << 6, 1 << 10
 _FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES
 _PARAMETERS = [register for register in reg.ALL if register.stored and register.address >= reg.TIP_RADIUS_UM.address]
 _PATIENCE_S = 10.0
+_COMMISSION_S = 60.0
+_JOG, _MEASURE = 1, 2
+_RUNNING, _REFUSED = 1, 4
+_REASONS = {
+    1: "a stop, torque, a fault, a tare or new parameters ended it",
+    2: "tare first, with torque off; nothing may touch the tip",
+    3: "jog first, and confirm the direction",
+    4: "the encoder did not count at 5 % of duty: is the motor connected, and free to move?",
+    5: "the encoder counts against the motor: swap the motor's leads or the encoder's channels",
+    6: "the encoder does not follow the motor: is one of its channels open?",
+    7: "the tip touched something: leave it 2 mm of air",
+    8: "the motor felt a force that the array did not: leave the finger 2 mm to both sides",
+    9: "the guard or a limit held the voltage back: are slew, current and speed limits wide enough?",
+    10: "the tip did not come to rest: does something move it?",
+    11: "the strokes do not agree: does friction or a spring change along the way?",
+    12: "a result is outside of its parameter's range: check gear, encoder and resistance",
+}
 
 
 class Mode(IntEnum):
     """What the controller is doing."""
 
-    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY = range(7)
+    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY, COMMISSION = range(8)
 
 
 class Fault(IntEnum):
@@ -53,6 +70,18 @@ class State:
     fault: Fault
     limits: int  # a bit each
     pressures_kpa: List[List[float]]  # row by row; none where they were not read
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive as measured; `sigma` has the standard uncertainties, as shares, by the names of the other fields."""
+
+    torque_constant_unm_per_a: int
+    time_constant_us: int
+    inertia_ug_m2: int  # where the parameter resistance_mohm is true, as the friction
+    friction_forward_unm: int
+    friction_back_unm: int
+    sigma: Dict[str, float]
 
 
 class Fingertip(Bus):
@@ -146,6 +175,52 @@ class Fingertip(Bus):
         if self.read(reg.LIMITS) & _TARED_TOUCHING:
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
 
+    def jog(self) -> None:
+        """Moves the tip a little, towards the object first: proves that motor and encoder go the same way."""
+        self._commission(_JOG)
+
+    def confirm_direction(self) -> None:
+        """Says that somebody saw the jog go towards the object first: torque is refused before."""
+        self.write(reg.COMMISSION_ACCEPT, 1)
+
+    def measure_drive(self) -> Drive:
+        """Measures the drive by motions of 1 mm to both sides in the air. The parameters stay until it is accepted."""
+        self._commission(_MEASURE)
+        rows = {
+            "torque_constant_unm_per_a": (reg.MEASURED_TORQUE_CONSTANT, reg.TORQUE_CONSTANT_SIGMA),
+            "time_constant_us": (reg.MEASURED_TIME_CONSTANT, reg.TIME_CONSTANT_SIGMA),
+            "inertia_ug_m2": (reg.MEASURED_INERTIA, reg.INERTIA_SIGMA),
+            "friction_forward_unm": (reg.MEASURED_FRICTION_FORWARD, reg.FRICTION_FORWARD_SIGMA),
+            "friction_back_unm": (reg.MEASURED_FRICTION_BACK, reg.FRICTION_BACK_SIGMA),
+        }
+        values = {name: self.read(value) for name, (value, _) in rows.items()}
+        return Drive(sigma={name: self.read(sigma) * 1e-3 for name, (_, sigma) in rows.items()}, **values)
+
+    def accept_drive(self, save: bool = False) -> None:
+        """Takes what was measured into the parameters."""
+        self.write(reg.COMMISSION_ACCEPT, 2)
+        if save:
+            self.save()
+
+    def _commission(self, task: int) -> None:
+        self.write(reg.COMMISSION, task)
+        begun, frame_s = self.read(reg.FRAME_COUNTER), 1e-9 * self.read(reg.FRAME_PERIOD_NS)
+        try:
+            state = _RUNNING
+            # By the controller's own time: a simulated one may be slower than a real one.
+            while state == _RUNNING and (self.read(reg.FRAME_COUNTER) - begun) % 2**32 * frame_s < _COMMISSION_S:
+                time.sleep(0.02)
+                state = self.read(reg.COMMISSION_STATE)
+        except BaseException:
+            self.write(reg.COMMISSION, 0)
+            raise
+        if state == _RUNNING:
+            self.write(reg.COMMISSION, 0)
+            raise FingertipError("it did not end in a minute: stopped")
+        if state == _REFUSED:
+            refusal = self.read(reg.COMMISSION_REFUSAL)
+            raise FingertipError(f"refused: {_REASONS.get(refusal, refusal)}")
+
     def press(self, newtons: float) -> None:
         """Asks for a force: the tip approaches, touches and holds it. Returns at once.
 
@@ -156,6 +231,8 @@ class Fingertip(Bus):
             raise ValueError(f"{newtons} N: 0 to {reg.GOAL_FORCE_MN.largest / 1000} N are allowed")
         if self.read(reg.LIMITS) & _NOT_TARED:
             raise FingertipError("the tip is not tared since the controller started: free it and call tare()")
+        if not self.read(reg.DIRECTION_CONFIRMED):
+            raise FingertipError("nobody confirmed yet which way the motor goes: jog(), watch, confirm_direction()")
         was_on = self.read(reg.TORQUE_ENABLE)
         self.write(reg.TORQUE_ENABLE, 1)
         try:

@@ -5,6 +5,7 @@
 //! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
 
 use crate::command::Command;
+use crate::commission::{Commissioning, Task};
 use crate::params::Params;
 use crate::pipeline::Taken;
 use crate::state::{Fault, Limits, Mode};
@@ -21,6 +22,8 @@ pub(super) struct Stand {
     pub faulted: bool,
     /// It is that of the bus watchdog.
     pub bus_silent: bool,
+    /// What commissioning found.
+    pub commissioned: Commissioning,
     taken: Taken,
     mode: Mode,
     tared: bool,
@@ -46,6 +49,7 @@ impl Stand {
         Self {
             faulted: status.fault.is_some(),
             bus_silent: status.fault == Some(Fault::BusSilent),
+            commissioned: status.commissioning,
             taken: status.taken,
             mode: status.mode,
             tared: !status.limits.has(Limits::NOT_TARED),
@@ -70,18 +74,28 @@ impl Stand {
         }
     }
 
+    /// Whether the motor moves to be measured, or is about to.
+    pub fn commissioning(&self, command: &Command) -> bool {
+        let waits = command.commission_request != self.taken.commission;
+        self.mode == Mode::Commission || waits && Task::of(command.commission_request) != Task::Stop
+    }
+
     /// Refuses what a write asks for and what cannot be done.
     ///
     /// # Errors
     /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a measurement of the modulus
-    /// without torque or tare; a save while the loop drives, is about to or tares, when it must not wait for the flash.
+    /// without torque or tare; one of the drive with torque, in a fault or without a tare; a save while the loop drives, is about to or tares, when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;
         let taring = self.mode == Mode::Tare || after.tare_request != self.taken.tare;
         let tare = after.tare_request == before.tare_request || !stopped;
         let identify = after.identify_request == before.identify_request || after.torque && (self.tared || taring);
-        let save = !actions.save || !after.torque && !taring && matches!(self.mode, Mode::Off | Mode::Fault);
-        if goal && tare && identify && save { Ok(()) } else { Err(StatusError::Result) }
+        let commission = after.commission_request == before.commission_request
+            || Task::of(after.commission_request) == Task::Stop
+            || !after.torque && self.tared && !taring && !self.faulted;
+        let moves = self.commissioning(after);
+        let save = !actions.save || !after.torque && !taring && !moves && matches!(self.mode, Mode::Off | Mode::Fault);
+        if goal && tare && identify && commission && save { Ok(()) } else { Err(StatusError::Result) }
     }
 }

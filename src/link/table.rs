@@ -24,6 +24,7 @@ use super::stand::Stand;
 use indirect::Part;
 
 pub use list::{COUNT, registers};
+pub use pictures::picture_addresses;
 pub use register::{Access, Kind, Register};
 pub(super) use view::View;
 
@@ -110,7 +111,10 @@ pub(super) fn check_read<const ROWS: usize, const COLUMNS: usize>(
     if !(1..=READ_MAX).contains(&length) {
         return Err(StatusError::Length);
     }
-    let end = const { pictures::end::<ROWS, COLUMNS>() };
+    let end = const {
+        let pictures = pictures::end::<ROWS, COLUMNS>();
+        if pictures > registers::END { pictures } else { registers::END }
+    };
     address.checked_add(length).filter(|&last| last <= end).map(|_| ()).ok_or(StatusError::Access)
 }
 
@@ -160,6 +164,7 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         return Err(StatusError::Length);
     }
     let before = staged.settings.command;
+    let moves = before.torque || staged.stand.commissioning(&before);
     let params = staged.settings.record.params;
     let mut at = address;
     let mut rest = data;
@@ -170,9 +175,9 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
                 let element = usize::from(cell.element(at).0);
                 let targets = staged.settings.indirect;
                 let block = targets.get(first + element..first + indirect::BLOCK).unwrap_or_default();
-                write_through::<ROWS, COLUMNS>(staged, block, rest, before.torque)?
+                write_through::<ROWS, COLUMNS>(staged, block, rest, moves)?
             }
-            _ => write_element::<ROWS, COLUMNS>(staged, &cell, at, rest, before.torque)?,
+            _ => write_element::<ROWS, COLUMNS>(staged, &cell, at, rest, moves)?,
         };
         rest = rest.get(usize::from(taken)..).ok_or(StatusError::Length)?;
         at = at.saturating_add(taken);
@@ -187,11 +192,11 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
     cell: &Cell,
     at: u16,
     data: &[u8],
-    torque: bool,
+    moves: bool,
 ) -> Result<u16, StatusError> {
     match cell.access {
         Access::ReadOnly => return Err(StatusError::Access),
-        Access::TorqueOff | Access::Stored if torque => return Err(StatusError::Access),
+        Access::TorqueOff | Access::Stored if moves => return Err(StatusError::Access),
         _ => {}
     }
     let (element, 0) = cell.element(at) else { return Err(StatusError::Length) };
@@ -215,7 +220,7 @@ fn write_through<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged,
     targets: &[u16],
     data: &[u8],
-    torque: bool,
+    moves: bool,
 ) -> Result<u16, StatusError> {
     let target = targets.first().copied().filter(|&target| target != 0).ok_or(StatusError::Access)?;
     let cell = Cell::at::<ROWS, COLUMNS>(target).ok_or(StatusError::Access)?;
@@ -223,7 +228,7 @@ fn write_through<const ROWS: usize, const COLUMNS: usize>(
     if !along || targets.len() < usize::from(cell.kind.width()) {
         return Err(StatusError::Length);
     }
-    write_element::<ROWS, COLUMNS>(staged, &cell, target, data, torque)
+    write_element::<ROWS, COLUMNS>(staged, &cell, target, data, moves)
 }
 
 /// Which parameter a byte belongs to.

@@ -2,12 +2,20 @@
 
 use super::requests::Asked;
 use super::{Command, Contact, Pipeline};
+use crate::commission::{self, Task};
 use crate::state::Mode;
 use crate::units::Newtons;
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// The mode table of [`crate::state`], with what each change of mode prepares.
-    pub(super) fn next_mode(&mut self, asked: Asked, command: &Command, contact: &Contact, sound: bool) -> Mode {
+    pub(super) fn next_mode(
+        &mut self,
+        asked: Asked,
+        command: &Command,
+        contact: &Contact,
+        sound: bool,
+        encoder: i32,
+    ) -> Mode {
         let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
         let before = self.status.mode;
         let cleared = before == Mode::Fault && asked.clear && !command.torque;
@@ -31,11 +39,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 if self.tared { Mode::Off } else { Mode::Tare }
             }
             Mode::Off if command.torque && self.tared => wanted,
+            Mode::Off | Mode::Commission if self.commissions(asked, command, contact, encoder) => Mode::Commission,
             _ if !command.torque => {
                 self.follow_drift(contact, sound);
                 Mode::Off
             }
-            Mode::Off => Mode::Off,
+            Mode::Off | Mode::Commission => Mode::Off,
             Mode::Identify if self.press.running() => Mode::Identify,
             Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
                 self.press.start(&self.motion);
@@ -56,6 +65,26 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         };
         self.note_requests(asked, before, mode, command);
         mode
+    }
+
+    /// Whether the drive is measured, or begins to be.
+    fn commissions(&mut self, asked: Asked, command: &Command, contact: &Contact, encoder: i32) -> bool {
+        if self.status.mode == Mode::Commission {
+            if asked.commission.is_some() || command.torque {
+                self.commission.halt(encoder);
+            }
+            return self.commission.running();
+        }
+        let Some(task) = asked.commission.filter(|task| *task != Task::Stop) else { return false };
+        if !self.tared || command.torque || contact.force >= self.config.contact_on {
+            return false;
+        }
+        if task == Task::Measure && self.config.params.direction_confirmed == 0 {
+            self.commission.refuse(commission::Refusal::Unconfirmed);
+            return false;
+        }
+        self.commission.start(task, encoder, &self.config);
+        true
     }
 
     /// Lets the baseline follow drift where nothing is touched.

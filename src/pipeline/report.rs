@@ -1,5 +1,6 @@
 //! What a step reports beside the duty.
 
+use crate::commission::Commissioning;
 use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
 use crate::state::{Fault, Limits, Mode};
@@ -14,6 +15,8 @@ pub struct Taken {
     pub clear: u8,
     /// See [`crate::command::Command::identify_request`].
     pub identify: u8,
+    /// See [`crate::command::Command::commission_request`].
+    pub commission: u8,
 }
 
 /// How the tare that was last asked for stands. The numbers are stable.
@@ -58,6 +61,8 @@ pub struct Status {
     pub duty: Duty,
     /// The measurement of Young's modulus.
     pub identification: Identification,
+    /// The commissioning of the drive.
+    pub commissioning: Commissioning,
     /// The tare.
     pub tare: Taring,
     /// The requests taken up.
@@ -87,7 +92,9 @@ impl Status {
             Mode::Fault if self.fault == Some(Fault::Bridge) => Bridge::Asleep,
             Mode::Fault => Bridge::Brakes,
             Mode::Off | Mode::Tare => Bridge::Open,
-            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => Bridge::Driven(self.duty),
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify | Mode::Commission => {
+                Bridge::Driven(self.duty)
+            }
         }
     }
 }

@@ -4,9 +4,11 @@
 //! | --- | --- | --- |
 //! | tare | in every mode but fault, also in the frame that clears one | refused: [`Taring::Refused`] |
 //! | clear | in fault, with torque off | the fault stands, or there is none |
+//! | commission | in off, with torque off and the array tared; a stop in commission | refused: [`commission::Refusal`] |
 //! | identify | in approach, force and release; with torque on it waits for these while torque is taken up, a tare is under way or another measurement ends | refused: [`Refusal::NotReady`] |
 
 use super::{Command, Pipeline, Taring};
+use crate::commission::{self, Task};
 use crate::identify::Refusal;
 use crate::state::Mode;
 
@@ -16,6 +18,7 @@ pub(super) struct Asked {
     pub tare: bool,
     pub clear: bool,
     pub identify: bool,
+    pub commission: Option<Task>,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
@@ -27,8 +30,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             tare: command.tare_request != taken.tare,
             clear: command.clear_request != taken.clear,
             identify: command.identify_request != taken.identify,
+            commission: (command.commission_request != taken.commission).then(|| Task::of(command.commission_request)),
         };
         (taken.tare, taken.clear) = (command.tare_request, command.clear_request);
+        taken.commission = command.commission_request;
+        // So it stays where nothing comes of it.
+        if asked.commission.is_some_and(|task| task != Task::Stop) && !self.commission.running() {
+            self.commission.refuse(commission::Refusal::NotReady);
+        }
         asked
     }
 
@@ -42,6 +51,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.press.refuse(Refusal::NotReady);
             self.status.identification = self.press.outcome();
         }
+        self.status.commissioning = self.commission.outcome();
     }
 
     /// Answers what was asked for, by what became of the mode.

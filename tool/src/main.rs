@@ -3,7 +3,7 @@
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
-use fingertip_cli::commands::{info, latency, params, press, record, recover, scan, stream, tare, view};
+use fingertip_cli::commands::{commission, info, latency, params, press, record, recover, scan, stream, tare, view};
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -52,6 +52,9 @@ enum Command {
     Params(params::Command),
     /// Measure the zero of every taxel; nothing may touch the tip
     Tare(tare::Args),
+    /// Prove the motor's direction, and measure the drive
+    #[command(subcommand)]
+    Commission(commission::Command),
     /// Touch, hold a force for a while, let go
     Press(press::Args),
     /// Clear what stopped the motor, and say what stands in the way
@@ -92,6 +95,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Record(args) => record::run(args, &mut connect()?, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
+        Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
         Command::Recover => recover::run(&mut connect()?, cli.json),
         Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),

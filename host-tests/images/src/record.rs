@@ -49,7 +49,8 @@ impl Record {
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
         put(&answer.0.to_le_bytes());
-        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request } =
+        // A recording asks for no commissioning.
+        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =
             command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
@@ -79,6 +80,7 @@ impl Record {
             tare_request: u8::from_le_bytes(take(&mut rest)),
             clear_request: u8::from_le_bytes(take(&mut rest)),
             identify_request: u8::from_le_bytes(take(&mut rest)),
+            commission_request: 0,
         };
         Self { frame, sense, command }
     }
@@ -125,6 +127,8 @@ impl Digest {
             identification,
             tare,
             taken,
+            // No recording asks for one.
+            commissioning: _,
         } = *status;
         let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } =
             contact;
@@ -141,7 +145,7 @@ impl Digest {
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
             self.0.update(&bits.to_le_bytes());
         }
-        let Taken { tare: tares, clear: clears, identify: identifies } = taken;
+        let Taken { tare: tares, clear: clears, identify: identifies, commission: _ } = taken;
         self.0.update(&[identification.number(), identification.refusal(), tare as u8, tares, clears, identifies]);
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());

@@ -96,6 +96,9 @@ fn the_examples_stream_show_set_and_recover() {
     let shown = served.example("parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
     assert!(shown.contains("300000  (was 250000)") && shown.contains("50  (was 40)"), "{shown}");
 
+    let drive = served.example("commission.py", &["--yes", "--save"]);
+    assert!(drive.contains("torque_constant_unm_per_a ") && drive.ends_with("accepted\n"), "{drive}");
+
     served.command("fault supply-low");
     served.command("mend");
     let recovered = served.example("recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);

@@ -5,6 +5,7 @@ use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Health, Reply, ResetCause};
+use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
@@ -41,7 +42,8 @@ pub struct Bench {
 
 impl Bench {
     pub fn new() -> Self {
-        Self::with(Record { id: ID, ..Record::DEFAULT })
+        let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
+        Self::with(Record { id: ID, params, ..Record::DEFAULT })
     }
 
     pub fn with(record: Record) -> Self {
@@ -67,15 +69,21 @@ impl Bench {
 
     /// The made-up loop takes up what it is asked, and carries out a tare and a clear at once.
     pub fn take_up(&mut self) {
-        let Command { tare_request: tare, clear_request: clear, identify_request: identify, torque, .. } =
-            self.server.command();
+        let Command {
+            tare_request: tare,
+            clear_request: clear,
+            identify_request: identify,
+            commission_request: commission,
+            torque,
+            ..
+        } = self.server.command();
         if clear != self.status.taken.clear && !torque {
             self.set_fault(None);
         }
         if tare != self.status.taken.tare {
             self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
         }
-        self.status.taken = Taken { tare, clear, identify };
+        self.status.taken = Taken { tare, clear, identify, commission };
     }
 
     /// What the bus sends in return, packet by packet.

@@ -26,7 +26,7 @@ fn every_register_is_explained() {
     for register in REGISTERS {
         assert!(register.doc.trim().ends_with('.'), "{}: {:?}", register.name, register.doc);
         assert!(register.min <= register.max, "{}", register.name);
-        let plain = ["bad_taxels_max", "baseline_follows"];
+        let plain = ["bad_taxels_max", "baseline_follows", "direction_confirmed"];
         let unit = step(register);
         let params = usize::from(address::PARAMS)..usize::from(address::PARAMS) + 4 * Params::COUNT;
         let named = !params.contains(&usize::from(register.address)) || plain.contains(&register.name) || unit != "1";

@@ -82,6 +82,7 @@ fn reboot_is_answered_first() {
 fn factory_reset_keeps_what_it_is_told_to() {
     let mut params = Record::DEFAULT.params;
     params.pitch_um = 2_000;
+    params.direction_confirmed = 1;
     let record = Record { id: 9, baud_code: 4, return_delay_2us: 3, fit_level: FitLevel::AllRows, params };
     for (kind, id, baud_code) in [(0x01, 9, 3), (0x02, 9, 4), (0xFF, 1, 3)] {
         let mut bench = Bench::with(record);

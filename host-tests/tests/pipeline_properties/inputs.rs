@@ -122,6 +122,8 @@ impl Arguments {
         command.tare_request = command.tare_request.wrapping_add(tare);
         command.clear_request = command.clear_request.wrapping_add(clear);
         command.identify_request = command.identify_request.wrapping_add(identify);
+        // Its lowest bits name a task.
+        command.commission_request = command.commission_request.wrapping_add(identify.wrapping_mul(5));
     }
 }
 

@@ -7,12 +7,15 @@
 use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
 use crate::error::Error;
+use crate::flash::SECTOR;
 use crate::front_end::{REFERENCE_V, ScanCounts, Shared};
 use crate::image::Firmware;
 use crate::link::Listening;
 use crate::scene::finger::Finger;
 use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
+use fingertip::params::Params;
+use fingertip::store::{self, Record};
 use host_tests::plant::World;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
@@ -35,6 +38,15 @@ pub struct Options {
     /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
     /// the factory does.
     pub brown_out_bits: u8,
+}
+
+impl Options {
+    /// A board whose flash holds that its motor goes the right way: torque is refused before that is known.
+    pub fn confirmed() -> Self {
+        let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
+        let record = store::encode(&Record { params, ..Record::DEFAULT }, 0);
+        Self { presets: vec![(SECTOR.start, record.to_vec())], ..Self::default() }
+    }
 }
 
 impl Default for Options {

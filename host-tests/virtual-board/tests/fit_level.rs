@@ -32,7 +32,7 @@ fn hold(rig: &mut Rig) {
 fn holding_over_the_edge() -> Rig {
     let mut setup = Setup::default();
     (setup.wall.distance_mm, setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.5, 7.5, 1.0);
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");

@@ -14,7 +14,7 @@ use virtual_board::{Options, Rig};
 fn rig() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts")
+    Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts")
 }
 
 /// A board that is up.
@@ -180,7 +180,7 @@ fn three_runs_and_one_cut_by_a_snapshot_have_one_trace() {
     cut.run_until_ns(33_000_000).expect("it runs");
     cut.snapshot(&file).expect("a snapshot is taken");
     drop(cut);
-    let mut rest = Rig::restore(&image(), &file, &Options::default()).expect("the snapshot is restored");
+    let mut rest = Rig::restore(&image(), &file, &Options::confirmed()).expect("the snapshot is restored");
     std::fs::remove_file(&file).expect("the snapshot's file was there");
     assert_eq!(rest.now_ns(), 33_000_000);
     eventful(&mut rest);

@@ -151,7 +151,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             0xFF => return Ok(()),
             _ => return Err(StatusError::Range),
         };
-        if self.settings.command.torque {
+        if self.settings.command.torque || self.stand.commissioning(&self.settings.command) {
             return Err(StatusError::Access);
         }
         let mut staged = self.staged();

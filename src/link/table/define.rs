@@ -47,6 +47,12 @@ macro_rules! control_table {
             $(Cell { address: $address, of: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
         ];
 
+        /// Where they end.
+        pub(super) const END: u16 = {
+            let last = &FIXED[FIXED.len() - 1];
+            last.address + last.kind.width() * last.count
+        };
+
         /// The register that begins at an address.
         pub(super) const fn fixed(address: u16) -> Register {
             let mut place = 0;

@@ -37,7 +37,13 @@ const fn cell(address: u16, count: u16) -> Cell {
     Cell { address, of: address, count, kind: Kind::U16, access: Access::ReadOnly }
 }
 
-/// Where the table ends.
+/// Where the pressures, the raw codes and the tare's begin in an array's table.
+pub const fn picture_addresses<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
+    let [pressures, codes, tare] = cells::<ROWS, COLUMNS>();
+    [pressures.address, codes.address, tare.address]
+}
+
+/// Where they end.
 pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
     let [_, _, last] = cells::<ROWS, COLUMNS>();
     last.address + last.kind.width() * last.count

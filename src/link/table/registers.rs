@@ -6,6 +6,8 @@
 //! [`address::PARAMS`] on, 4 bytes each; the [`super::pictures`] of the array, which go by its shape; the
 //! [`super::indirect`] registers, and the [`super::mirrors`].
 //!
+//! From 4096 on, where the pictures of the largest array end, stands what has nothing to do with the array.
+//!
 //! Addresses below 256 are those of the X-series, with its meaning, but for the mirrors from 148 to 167.
 
 use crate::contact::FitLevel;
@@ -14,7 +16,9 @@ use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
 use crate::store::Record;
 
-use super::values::{bump, permille, set_goal, set_recover, set_torque, set_watchdog, short, watchdog};
+use super::values::{
+    bump, permille, set_accept, set_commission, set_goal, set_recover, set_torque, set_watchdog, short, watchdog,
+};
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
@@ -50,8 +54,8 @@ control_table! {
     11 OPERATING_MODE: U8 TorqueOff, "" * 1, 0 to 0 = 0,
         |_, _| 0,
         |_, _| Ok(());
-    /// 1 lets the bridge be driven. Goes to 0 on a fault. 0 takes the goal back: the next 1 presses nothing before a
-    /// new goal.
+    /// 1 lets the bridge be driven; refused with a result error before the parameter direction_confirmed is 1. Goes to 0
+    /// on a fault. 0 takes the goal back: the next 1 presses nothing before a new goal; it stops a commissioning.
     64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |view, _| u32::from(view.settings().command.torque),
         set_torque;
@@ -109,8 +113,8 @@ control_table! {
     /// How the stored registers stand to the flash: 0 the same, 1 changed since, 2 the last save failed.
     263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
         |view, _| view.settings().saved as u32;
-    /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 identify.
-    264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 6,
+    /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 identify, 7 commission.
+    264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 7,
         |view, _| view.snapshot.status.mode as u32;
     /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11 bridge, 12
@@ -313,6 +317,60 @@ control_table! {
     /// Bytes that came faster than they were taken.
     510 LINE_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.line_errors[2]);
+    /// Asks the drive what it is like, with torque off and the tip in the air: 1 jogs, which proves the direction, 2 jogs
+    /// and measures, 0 stops what is under way. Refused with a result error with torque on, in a fault and before a
+    /// tare. Reads 0.
+    4224 COMMISSION: U8 ReadWrite, "" * 1, 0 to 2 = 0,
+        |_, _| 0,
+        set_commission;
+    /// The commissioning that was last asked for: 0 none since reset or new parameters, 1 running, 2 the jog proved
+    /// the direction, 3 measured, 4 refused.
+    4225 COMMISSION_STATE: U8 ReadOnly, "" * 1, 0 to 4,
+        |view, _| view.commission_state();
+    /// How much of it is done.
+    4226 COMMISSION_PROGRESS: U8 ReadOnly, "%" * 1, 0 to 100,
+        |view, _| u32::from(view.snapshot.status.commissioning.progress());
+    /// Why there is no result; 0 it was not refused. 1 interrupted, 2 not ready: not tared, touching or torque on, 3 the
+    /// direction is not confirmed, 4 the encoder stood, 5 it counts against the motor, 6 it does not follow, 7 touched,
+    /// 8 blocked, 9 the voltage was held back, 10 never at rest, 11 the strokes do not agree, 12 out of range.
+    4227 COMMISSION_REFUSAL: U8 ReadOnly, "" * 1, 0 to 12,
+        |view, _| u32::from(view.snapshot.status.commissioning.refusal());
+    /// 1 says that the jog first moved the tip towards the object: sets direction_confirmed. 2 takes what was measured
+    /// into torque_constant_unm_per_a, inertia_ug_m2 and friction_unm. Refused with a result error where there is
+    /// nothing to accept. Saved by save_parameters only. Reads 0.
+    4228 COMMISSION_ACCEPT: U8 TorqueOff, "" * 1, 0 to 2 = 0,
+        |_, _| 0,
+        set_accept;
+    /// Torque constant as measured; 0, as all that follow, where there is no result.
+    4232 MEASURED_TORQUE_CONSTANT: U32 ReadOnly, "uN m/A" * 1, 0 to 200_000,
+        |view, _| view.measured().torque_constant_unm_per_a;
+    /// Time constant of a run-up: resistance times inertia over the square of the torque constant.
+    4236 MEASURED_TIME_CONSTANT: U32 ReadOnly, "us" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.measured().time_constant_us;
+    /// Inertia at the motor's shaft, where resistance_mohm is true.
+    4240 MEASURED_INERTIA: U32 ReadOnly, "ug m^2" * 1, 0 to 20_000,
+        |view, _| view.measured().inertia_ug_m2;
+    /// Friction at the motor's shaft on the way forward, where resistance_mohm is true.
+    4244 MEASURED_FRICTION_FORWARD: U16 ReadOnly, "uN m" * 1, 0 to 20_000,
+        |view, _| u32::from(view.measured().friction_unm[0]);
+    /// The same on the way back.
+    4246 MEASURED_FRICTION_BACK: U16 ReadOnly, "uN m" * 1, 0 to 20_000,
+        |view, _| u32::from(view.measured().friction_unm[1]);
+    /// Standard uncertainty of the torque constant.
+    4248 TORQUE_CONSTANT_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.measured().torque_constant_sigma);
+    /// That of the time constant.
+    4250 TIME_CONSTANT_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.measured().time_constant_sigma);
+    /// That of the inertia; what resistance_mohm is wrong by comes on top.
+    4252 INERTIA_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.measured().inertia_sigma);
+    /// That of the friction on the way forward, in the same way.
+    4254 FRICTION_FORWARD_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.measured().friction_sigma[0]);
+    /// That of the friction on the way back.
+    4256 FRICTION_BACK_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
+        |view, _| u32::from(view.measured().friction_sigma[1]);
 }
 
 /// A number of at most two digits.

@@ -1,5 +1,6 @@
 //! Registers whose values take more than a line to read or to write.
 
+use crate::commission::{Commissioning, Task};
 use crate::config::newtons;
 use crate::link::packet::StatusError;
 use crate::link::settings::Settings;
@@ -11,16 +12,46 @@ use super::Staged;
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Torque enable: refused while a fault or a tripped watchdog stands; off takes the goal back.
+/// Torque enable: refused while a fault or a tripped watchdog stands, and where nobody confirmed which way the motor
+/// goes; off takes the goal back.
 pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
     let on = value != 0;
-    if on && (staged.settings.watchdog_tripped || staged.stand.faulted) {
+    let unconfirmed = staged.settings.record.params.direction_confirmed == 0;
+    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed) {
         return Err(StatusError::Result);
     }
+    let commissioning = staged.stand.commissioning(&staged.settings.command);
     let command = &mut staged.settings.command;
     command.torque = on;
     if !on {
         command.goal = Newtons::ZERO;
+        if commissioning {
+            command.commission_request = Task::Stop.after(command.commission_request);
+        }
+    }
+    Ok(())
+}
+
+/// Commission: a task.
+pub(super) fn set_commission(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    let task = Task::of(value as u8);
+    let command = &mut staged.settings.command;
+    command.commission_request = task.after(command.commission_request);
+    Ok(())
+}
+
+/// Takes what commissioning found into the parameters.
+pub(super) fn set_accept(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+    let params = &mut staged.settings.record.params;
+    match (value, staged.stand.commissioned) {
+        (0, _) => {}
+        (1, Commissioning::Directed | Commissioning::Measured(_)) => params.direction_confirmed = 1,
+        (2, Commissioning::Measured(drive)) => {
+            params.torque_constant_unm_per_a = drive.torque_constant_unm_per_a as i32;
+            params.inertia_ug_m2 = drive.inertia_ug_m2 as i32;
+            params.friction_unm = drive.friction_unm.iter().map(|&way| i32::from(way)).sum::<i32>() / 2;
+        }
+        _ => return Err(StatusError::Result),
     }
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! What a read sees: the device's own state, and the picture of the loop.
 
+use crate::commission::{Commissioning, Drive};
 use crate::contact::Contact;
 use crate::identify::{Identification, Modulus};
 use crate::link::packet::StatusError;
@@ -85,6 +86,18 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
             return Identification::Running.number().into();
         }
         status.identification.number().into()
+    }
+
+    pub(super) fn measured(&self) -> Drive {
+        self.snapshot.status.commissioning.drive()
+    }
+
+    pub(super) fn commission_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.commission_request != status.taken.commission {
+            return Commissioning::Running(0).number().into();
+        }
+        status.commissioning.number().into()
     }
 
     pub(super) fn refused(&self, error: StatusError) -> u32 {

@@ -3,6 +3,7 @@
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
 use crate::state::{ANEW, Clock, State};
 use crate::{Client, Error, numbers};
+use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
@@ -83,7 +84,17 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     Ok(())
 }
 
+/// The controller refuses torque before.
+fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
+    let place = Params::RANGES.iter().position(|(name, ..)| *name == "direction_confirmed").unwrap_or_default();
+    if client.number(address::PARAMS + 4 * place as u16)? != 0 {
+        return Ok(());
+    }
+    Err("nobody confirmed yet which way the motor goes: `fingertip commission jog`, and watch the tip".into())
+}
+
 fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
+    direction_confirmed(client)?;
     // Some faults show only once torque is on: then it is not the goal that is wrong.
     if let Err(why) = client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, goal_mn)) {
         return no_fault(client).and(Err(why));

@@ -54,6 +54,33 @@ fn who_is_not_there_is_told() {
 }
 
 #[test]
+fn a_drive_is_commissioned() {
+    let finger = Served::begin("wall");
+    finger.done(&["params", "set", "direction_confirmed=0"]);
+    let why = finger.refused(&["commission", "jog"]);
+    assert!(why.contains("`fingertip tare`"), "{why}");
+    finger.done(&["tare"]);
+    let why = finger.refused(&["press", "1"]);
+    assert!(why.contains("`fingertip commission jog`"), "{why}");
+    let why = finger.refused(&["commission", "confirm"]);
+    assert!(why.contains("no jog to confirm"), "{why}");
+    let why = finger.refused(&["commission", "measure"]);
+    assert!(why.contains("jog first"), "{why}");
+    let jogged = finger.done(&["commission", "jog"]);
+    assert!(jogged.contains("the same way") && jogged.contains("`fingertip commission confirm`"), "{jogged}");
+    finger.done(&["commission", "confirm"]);
+    let measured = finger.json(&["commission", "measure"]);
+    let constant = &measured["torque_constant_unm_per_a"];
+    let (found, now) = (constant["value"].as_f64().expect("a number"), constant["now"].as_f64().expect("a number"));
+    assert!((found / now - 1.0).abs() < 0.03 && constant["sigma_percent"].as_f64() > Some(0.0), "{measured}");
+    let accepted = finger.done(&["commission", "accept"]);
+    assert!(accepted.contains("`fingertip params save`"), "{accepted}");
+    let why = finger.refused(&["commission", "accept"]);
+    assert!(why.contains("no measurement to accept"), "{why}");
+    finger.done(&["commission", "stop"]);
+}
+
+#[test]
 fn it_tares_presses_and_lets_go() {
     let finger = Served::begin("wall");
     let why = finger.refused(&["press", "1"]);

@@ -4,6 +4,7 @@ use super::machines::Machines;
 use super::{Mix, Source, frames};
 use fingertip::config::curve::Curve;
 use fingertip::config::gains::Gains;
+use fingertip::config::motions::Motions;
 use fingertip::config::{self, ConfigError};
 use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
@@ -120,6 +121,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         travel_max,
         clearance,
         bounds,
+        motions,
         force_fault,
         force_max,
         force_seen,
@@ -179,4 +181,13 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [brake_least, brake_usual, brake_most] {
         mix.add(*number);
     }
+    let Motions { half, farthest, jog, jog_frames, roll, beyond_mv, slow, time, run_up, span, .. } = motions;
+    let Motions { drop, still, rest, longest, touch, .. } = motions;
+    for number in [half, farthest, jog, slow, drop, &roll[0], &roll[1], &beyond_mv[0], &beyond_mv[1]] {
+        mix.add(*number);
+    }
+    for frames in [jog_frames, time, run_up, span, still, rest, longest] {
+        mix.add(*frames);
+    }
+    mix.add(touch.to_bits());
 }

@@ -123,7 +123,8 @@ impl<E: Set> Bus<E> {
                 unit.pipeline.stop(Fault::LostFrames);
                 unit.pipeline.status()
             };
-            unit.next = Bridge::of(status);
+            let bridge = Bridge::of(status);
+            unit.next = device.broken.as_ref().map_or(bridge, |broken| broken.at_motor(bridge));
         }
     }
 

@@ -10,7 +10,7 @@ const LIMITS: u32 = 32;
 
 /// A row's name, in its bit's order from the first one.
 const NAMES: [(u32, &str, &[&str]); 3] = [
-    (0, "mode", &["off", "tare", "approach", "force", "release", "fault", "identify"]),
+    (0, "mode", &["off", "tare", "approach", "force", "release", "fault", "identify", "commission"]),
     (
         FAULTS,
         "fault",
@@ -117,7 +117,7 @@ fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
 }
 
 // A new mode or fault must not run into the next one's bits.
-const _: () = assert!((Mode::Identify as u32) < FAULTS && FAULTS + (Fault::Unseen as u32) < LIMITS);
+const _: () = assert!((Mode::Commission as u32) < FAULTS && FAULTS + (Fault::Unseen as u32) < LIMITS);
 const _: () = assert!(Limits::GUARD == 1 << 12);
 
 #[cfg(test)]

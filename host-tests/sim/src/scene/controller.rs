@@ -59,6 +59,8 @@ pub fn params(scene: &Scene) -> Params {
         friction_unm: whole(effect("dry_friction", "torque_mnm") * 1e3),
         reduction_mrad_per_mm: whole(transmission.number("ratio") / transmission.number("drum_radius_mm") * 1e3),
         encoder_counts_per_turn: whole(motor.number("encoder_counts_per_turn")),
+        // Whoever simulates a finger knows how it is wired.
+        direction_confirmed: 1,
         ..Params::DEFAULT
     };
     let mut values = known.to_array();

@@ -100,7 +100,7 @@ fn scaled(thousandths: i32, one: i64) -> i32 {
 }
 
 fn mode(number: u8) -> Mode {
-    [Mode::Off, Mode::Tare, Mode::Approach, Mode::Force, Mode::Release, Mode::Fault, Mode::Identify]
+    [Mode::Off, Mode::Tare, Mode::Approach, Mode::Force, Mode::Release, Mode::Fault, Mode::Identify, Mode::Commission]
         .into_iter()
         .find(|mode| *mode as u8 == number)
         .unwrap_or(Mode::Fault)

@@ -1,6 +1,7 @@
 //! What the tests of the flash image share.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::store::{self, Record};
 use host_tests::plant::{Setup, World};
@@ -60,12 +61,28 @@ pub fn scratch(name: &str) -> PathBuf {
     folder.join(format!("{}-{name}", program.file_stem().expect("it has a name").display()))
 }
 
+/// Writes a parameter.
+pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
+    let place = Params::RANGES.iter().position(|(other, ..)| *other == name).expect("a parameter");
+    let register = address::PARAMS + 4 * place as u16;
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, register, value).map(drop));
+    written.expect("the client runs").expect("the image obeys");
+    // The scan starts anew.
+    rig.run_ms(5).expect("it runs");
+}
+
+/// Says that the motor goes the right way, as after a jog: torque is refused before.
+pub fn confirm_direction(rig: &mut Rig) {
+    write_param(rig, "direction_confirmed", 1);
+}
+
 /// Starts a board, which then holds 1 N against a wall 0.5 mm away.
 fn hold(options: &Options) -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
     let mut rig = Rig::new(&image(), World::new(&setup), options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
+    confirm_direction(&mut rig);
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);

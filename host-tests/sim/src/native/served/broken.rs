@@ -3,6 +3,7 @@
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
+use host_tests::plant::Bridge;
 use std::str::FromStr;
 
 /// What breaks.
@@ -24,13 +25,15 @@ pub enum Kind {
     SupplyHigh,
     /// The bridge's driver reports a fault: fault 11.
     Bridge,
-    /// The encoder counts backwards: fault 15, once the motor is driven.
+    /// The encoder counts backwards, its channels are swapped: fault 15, once the motor is driven.
     EncoderReversed,
+    /// The motor's leads are swapped: fault 15, once the motor is driven.
+    LeadsSwapped,
 }
 
 impl Kind {
     /// All, with the names by which they are asked for.
-    pub const ALL: [(&'static str, Self); 9] = [
+    pub const ALL: [(&'static str, Self); 10] = [
         ("lost-frames", Self::LostFrames),
         ("array-broken", Self::ArrayBroken),
         ("row-stuck", Self::RowStuck),
@@ -40,6 +43,7 @@ impl Kind {
         ("supply-high", Self::SupplyHigh),
         ("bridge", Self::Bridge),
         ("encoder-reversed", Self::EncoderReversed),
+        ("leads-swapped", Self::LeadsSwapped),
     ];
 
     /// The names, for people.
@@ -74,6 +78,14 @@ impl Broken {
         Self { kind, then: None }
     }
 
+    /// What the motor gets of what the bridge is told.
+    pub fn at_motor(&self, bridge: Bridge) -> Bridge {
+        match (self.kind, bridge) {
+            (Kind::LeadsSwapped, Bridge::Driven { duty }) => Bridge::Driven { duty: -duty },
+            _ => bridge,
+        }
+    }
+
     /// Changes what the controller is given; false where no frame comes in.
     pub fn change(&mut self, frame: &mut Frame, sense: &mut Sense, params: &Params) -> bool {
         let (frozen, encoder) = self.then.get_or_insert((*frame, sense.encoder));
@@ -95,6 +107,7 @@ impl Broken {
             Kind::SupplyLow => sense.supply_mv = millivolts(params.supply_min_mv - BEYOND_MV),
             Kind::SupplyHigh => sense.supply_mv = millivolts(params.supply_max_mv + BEYOND_MV),
             Kind::Bridge => sense.bridge_fault = true,
+            Kind::LeadsSwapped => {}
         }
         true
     }

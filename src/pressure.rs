@@ -10,6 +10,7 @@
 
 mod calibration;
 mod curve;
+mod gains;
 mod picture;
 mod row;
 mod suspect;
@@ -17,6 +18,7 @@ mod tare;
 mod touched;
 
 pub use calibration::{Calibration, CalibrationError};
+pub use gains::Gains;
 pub use picture::Picture;
 
 use crate::config::Config;

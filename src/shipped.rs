@@ -47,6 +47,8 @@ pub type Frame = crate::frame::Frame<ROWS, COLUMNS>;
 pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
 /// See [`crate::pressure::Picture`].
 pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
+/// See [`crate::pressure::Gains`].
+pub type Gains = crate::pressure::Gains<ROWS, COLUMNS>;
 /// See [`crate::pressure::Calibration`].
 pub type Calibration = crate::pressure::Calibration<ROWS, COLUMNS>;
 /// See [`crate::pressure::Array`].
@@ -57,6 +59,12 @@ pub type Fit = crate::contact::Fit<ROWS, COLUMNS>;
 pub type Budget = crate::pipeline::budget::Budget<ROWS, COLUMNS>;
 /// See [`crate::pipeline::Pipeline`].
 pub type Pipeline = crate::pipeline::Pipeline<ROWS, COLUMNS>;
+/// See [`crate::store::Record`].
+pub type Record = crate::store::Record<ROWS, COLUMNS>;
+/// See [`crate::store::Loaded`].
+pub type Loaded = crate::store::Loaded<ROWS, COLUMNS>;
+/// See [`crate::link::Settings`].
+pub type Settings = crate::link::Settings<ROWS, COLUMNS>;
 /// See [`crate::link::Snapshot`].
 pub type Snapshot<'a> = crate::link::Snapshot<'a, ROWS, COLUMNS>;
 /// See [`crate::link::Server`].
@@ -73,9 +81,11 @@ pub mod address {
     pub use table::address::*;
 
     /// Pressure on each taxel, row by row.
-    pub const PRESSURES: u16 = ALL[table::COUNT - 3].address;
+    pub const PRESSURES: u16 = ALL[table::COUNT - 4].address;
     /// Converter codes of the last frame, row by row.
-    pub const RAW_CODES: u16 = ALL[table::COUNT - 2].address;
+    pub const RAW_CODES: u16 = ALL[table::COUNT - 3].address;
     /// Zero of each taxel in converter codes, row by row.
-    pub const TARE_CODES: u16 = ALL[table::COUNT - 1].address;
+    pub const TARE_CODES: u16 = ALL[table::COUNT - 2].address;
+    /// The gain of each taxel, row by row.
+    pub const GAINS: u16 = ALL[table::COUNT - 1].address;
 }

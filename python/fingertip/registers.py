@@ -170,6 +170,7 @@ PICTURE_CONFIDENCE = Register("picture_confidence", 767, 1, 1, False, 1, False, 
 PRESSURES = Register("pressures", 768, 2, 100, False, 10, False, 0, 65535)
 RAW_CODES = Register("raw_codes", 1024, 2, 110, False, 1, False, 0, 4095)
 TARE_CODES = Register("tare_codes", 1280, 2, 100, False, 1, False, 0, 4095)
+GAINS = Register("gains", 1536, 2, 100, False, 1, True, 8192, 32767)
 
 ALL = (
     MODEL_NUMBER,
@@ -322,4 +323,5 @@ ALL = (
     PRESSURES,
     RAW_CODES,
     TARE_CODES,
+    GAINS,
 )

@@ -6,13 +6,13 @@ use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Bridge as Wanted;
-use fingertip::shipped::{Config, Frame, Pipeline};
+use fingertip::shipped::{Calibration, Config, Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::health;
@@ -98,6 +98,7 @@ impl State {
         self.take_frame();
         self.check_part();
         self.configure();
+        self.calibrate();
         self.save();
     }
 
@@ -239,6 +240,14 @@ impl State {
             self.stop(Fault::BrokenParameters);
         }
         self.restart_scan();
+    }
+
+    /// Takes new gains, which need a new tare.
+    fn calibrate(&mut self) {
+        if let Some(gains) = GAINS.take(|gains| *gains) {
+            self.parts.bridge.apply(Wanted::Open);
+            self.parts.pipeline.calibrate(&Calibration::of(&gains));
+        }
     }
 
     /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so

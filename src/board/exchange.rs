@@ -10,8 +10,7 @@ use embassy_sync::signal::Signal;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Frame, ROWS};
-use fingertip::store::Record;
+use fingertip::shipped::{COLUMNS, Frame, Gains, ROWS, Record};
 
 use super::flash::SaveError;
 use super::guard::Stopwatch;
@@ -71,6 +70,8 @@ pub static REPORT: Shared<Report> = Shared::new();
 pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
+/// New gains for control.
+pub static GAINS: Mailbox<Gains> = Mailbox::new(Gains::ONE);
 /// A record for control to save, and how that went.
 pub static SAVE: Mailbox<Record> = Mailbox::new(Record::DEFAULT);
 /// See [`SAVE`].

@@ -5,12 +5,11 @@
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply};
-use fingertip::shipped::{CLOCKS, Server, Snapshot};
-use fingertip::store::Record;
+use fingertip::shipped::{CLOCKS, Record, Server, Snapshot};
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
 use super::health;
 use super::log::log_save_error;
@@ -82,6 +81,10 @@ impl LinkTask {
             // The newest count where control has not yet taken those before.
             PARAMS.take(|_| ());
             PARAMS.fill(|params| *params = settings.record.params);
+        }
+        if actions.calibrate {
+            GAINS.take(|_| ());
+            GAINS.fill(|gains| *gains = settings.record.gains);
         }
         if actions.save {
             let saved = self.save(&settings.record).await;

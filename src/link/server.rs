@@ -18,8 +18,8 @@ use super::snapshot::Snapshot;
 use super::stand::Stand;
 use super::turn::Turn;
 
-/// The longest Reg Write: all parameters at once.
-pub const REG_WRITE_MAX: usize = 160;
+/// The longest Reg Write: all gains of 10 x 10 taxels at once.
+pub const REG_WRITE_MAX: usize = 200;
 
 /// Counts of what went wrong on the bus since reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,7 +56,7 @@ struct Registered {
 /// What the device knows.
 #[derive(Clone, Debug)]
 pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
-    pub settings: Settings,
+    pub settings: Settings<ROWS, COLUMNS>,
     pub counters: Counters,
     registered: Option<Registered>,
     actions: Actions,
@@ -70,7 +70,7 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Server, Snapshot}, store::Record};
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, Server, Snapshot}};
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
@@ -98,7 +98,7 @@ pub struct Server<const ROWS: usize, const COLUMNS: usize> {
 
 impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// A device with these stored settings, torque off; it judges new ones by the board's clocks.
-    pub fn new(record: Record, clocks: &'static Clocks) -> Self {
+    pub fn new(record: Record<ROWS, COLUMNS>, clocks: &'static Clocks) -> Self {
         let state = State {
             settings: Settings::new(record),
             counters: Counters::default(),
@@ -145,7 +145,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     }
 
     /// All that the host may change.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
 

@@ -93,8 +93,8 @@ impl Cell {
 }
 
 /// What a write works on: a copy, which replaces the original once the whole write is found good.
-pub(super) struct Staged {
-    pub settings: Settings,
+pub(super) struct Staged<const ROWS: usize, const COLUMNS: usize> {
+    pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
     /// How the loop stands.
     pub stand: Stand,
@@ -152,7 +152,7 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
 /// # Errors
 /// What is wrong with the first register that is refused; the copy is then of no use.
 pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     address: u16,
     data: &[u8],
 ) -> Result<(), StatusError> {
@@ -177,13 +177,13 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         rest = rest.get(usize::from(taken)..).ok_or(StatusError::Length)?;
         at = at.saturating_add(taken);
     }
-    staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params, staged.clocks)?;
+    staged.settings.check(staged.settings.record.params != params, staged.clocks)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 
 /// Writes the element that begins at `at`, and tells how many bytes it took.
 fn write_element<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     cell: &Cell,
     at: u16,
     data: &[u8],
@@ -204,7 +204,7 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
         if let Some(slot) = staged.settings.indirect.get_mut(first + usize::from(element)) {
             *slot = target;
         }
-    } else {
+    } else if !pictures::set(staged, cell.of, element, value)? {
         registers::set(staged, cell.of, value)?;
     }
     Ok(cell.kind.width())
@@ -212,7 +212,7 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
 
 /// Writes the register that the first of these addresses leads to: the others must lead to the rest of it.
 fn write_through<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     targets: &[u16],
     data: &[u8],
     torque: bool,

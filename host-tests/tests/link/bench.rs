@@ -7,9 +7,9 @@ use fingertip::link::sender::Sender;
 use fingertip::link::{Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
+use fingertip::shipped::Record;
 use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
-use fingertip::store::Record;
 
 /// The ID of the device under test.
 pub const ID: u8 = 1;

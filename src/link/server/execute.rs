@@ -109,13 +109,14 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         Ok(())
     }
 
-    fn staged(&self) -> Staged {
+    fn staged(&self) -> Staged<ROWS, COLUMNS> {
         Staged { settings: self.settings, actions: self.actions, stand: self.stand, clocks: self.clocks }
     }
 
-    fn commit(&mut self, mut staged: Staged) {
+    fn commit(&mut self, mut staged: Staged<ROWS, COLUMNS>) {
         let (before, after) = (&self.settings.record, &staged.settings.record);
         staged.actions.configure |= before.params != after.params;
+        staged.actions.calibrate |= before.gains != after.gains;
         staged.actions.baud |= before.baud_code != after.baud_code;
         if before != after {
             staged.settings.saved = Saved::Changed;
@@ -156,7 +157,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         }
         let mut staged = self.staged();
         staged.settings.record = record;
-        staged.settings.check::<ROWS, COLUMNS>(true, staged.clocks)?;
+        staged.settings.check(true, staged.clocks)?;
         staged.actions.save = true;
         staged.stand.check(&staged.settings.command, &staged.settings.command, staged.actions)?;
         self.commit(staged);

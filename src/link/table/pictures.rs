@@ -4,12 +4,15 @@
 
 use crate::frame::Shape;
 
-use super::{Access, Cell, Kind, Register, View};
+use crate::link::packet::StatusError;
+use crate::pressure::{GAIN_MAX, GAIN_ONE};
+
+use super::{Access, Cell, Kind, Register, Staged, View};
 
 /// Where the first picture begins, whatever the shape.
 pub(super) const FIRST: u16 = 768;
 /// How many there are.
-pub(super) const COUNT: usize = 3;
+pub(super) const COUNT: usize = 4;
 /// Name, largest value, unit and resolution of each, and what it means.
 const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
     ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row; 0 before the first tare."),
@@ -21,16 +24,25 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
         " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.",
     ),
     ("TARE_CODES", 4095, "", 1, " Zero of each taxel in converter codes, row by row."),
+    (
+        "GAINS",
+        GAIN_MAX as i64,
+        "1/16384",
+        1,
+        " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.",
+    ),
 ];
+
 /// Where they are in an array's table.
-pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; 3] {
+pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
     let taxels = Shape::<ROWS, COLUMNS>::TAXELS as u16;
     let codes = (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16;
     let first = cell(FIRST, taxels);
     let second = cell(after(&first), codes);
     let third = cell(after(&second), taxels);
-    [first, second, third]
+    let gains = Cell { access: Access::Stored, ..cell(after(&third), taxels) };
+    [first, second, third, gains]
 }
 
 const fn cell(address: u16, count: u16) -> Cell {
@@ -39,7 +51,7 @@ const fn cell(address: u16, count: u16) -> Cell {
 
 /// Where the table ends.
 pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
-    let [_, _, last] = cells::<ROWS, COLUMNS>();
+    let [.., last] = cells::<ROWS, COLUMNS>();
     last.address + last.kind.width() * last.count
 }
 
@@ -49,15 +61,17 @@ const fn after(cell: &Cell) -> u16 {
 }
 
 /// As their documentation has them.
-pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; 3] {
+pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let cells = cells::<ROWS, COLUMNS>();
-    [register(0, &cells), register(1, &cells), register(2, &cells)]
+    [register(0, &cells), register(1, &cells), register(2, &cells), register(3, &cells)]
 }
 
-const fn register(picture: usize, cells: &[Cell; 3]) -> Register {
+const fn register(picture: usize, cells: &[Cell; COUNT]) -> Register {
     let (name, max, unit, scale, doc) = PICTURES[picture];
     let Cell { address, count, kind, access, .. } = cells[picture];
-    Register { name, address, kind, count, access, unit, scale, min: 0, max, default: None, doc }
+    let stored = matches!(access, Access::Stored);
+    let (min, default) = if stored { (GAIN_ONE as i64 / 2, Some(GAIN_ONE as i64)) } else { (0, None) };
+    Register { name, address, kind, count, access, unit, scale, min, max, default, doc }
 }
 
 /// The value of an element; 0 where there is no such picture.
@@ -66,7 +80,7 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     address: u16,
     element: usize,
 ) -> u32 {
-    let [pressures, codes, tare] = const { cells::<ROWS, COLUMNS>() };
+    let [pressures, codes, tare, gains] = const { cells::<ROWS, COLUMNS>() };
     let snapshot = view.snapshot;
     let value = if address == pressures.address {
         if view.tared() { snapshot.pressure_10pa(element) } else { 0 }
@@ -74,10 +88,27 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
         snapshot.frame.code(element / COLUMNS, element % COLUMNS)
     } else if address == tare.address {
         snapshot.tare_codes(element)
+    } else if address == gains.address {
+        view.settings().record.gains.get(element)
     } else {
         0
     };
     value.into()
+}
+
+/// Sets an element of a picture that can be written; false where the address is not one's.
+pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    address: u16,
+    element: u16,
+    value: i64,
+) -> Result<bool, StatusError> {
+    let [.., gains] = const { cells::<ROWS, COLUMNS>() };
+    if address != gains.address {
+        return Ok(false);
+    }
+    let set = u16::try_from(value).is_ok_and(|gain| staged.settings.record.gains.set(element.into(), gain));
+    if set { Ok(true) } else { Err(StatusError::Range) }
 }
 
 #[cfg(test)]
@@ -86,10 +117,10 @@ mod tests {
 
     #[test]
     fn pictures_stand_apart() {
-        let addresses = |cells: [super::Cell; 3]| cells.map(|cell| cell.address);
-        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280]);
-        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280]);
-        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048]);
-        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072]);
+        let addresses = |cells: [super::Cell; super::COUNT]| cells.map(|cell| cell.address);
+        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280, 1_536]);
+        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280, 1_536]);
+        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048, 2_560]);
+        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072, 4_096]);
     }
 }

@@ -12,9 +12,12 @@ use crate::contact::FitLevel;
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
-use crate::store::Record;
+use crate::store;
 
 use super::values::{bump, permille, set_goal, set_recover, set_torque, set_watchdog, short, watchdog};
+/// The defaults go by no shape.
+type Record = store::Record<3, 3>;
+
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.

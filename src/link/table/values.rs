@@ -12,7 +12,10 @@ use super::Staged;
 const WATCHDOG_MS: u16 = 20;
 
 /// Torque enable: refused while a fault or a tripped watchdog stands; off takes the goal back.
-pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     let on = value != 0;
     if on && (staged.settings.watchdog_tripped || staged.stand.faulted) {
         return Err(StatusError::Result);
@@ -26,7 +29,10 @@ pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusEr
 }
 
 /// Goal force: refused while a tripped watchdog stands.
-pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_goal<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped {
         return Err(StatusError::Range);
     }
@@ -35,7 +41,10 @@ pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusErro
 }
 
 /// Bus watchdog: 0 resets a tripped one.
-pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_watchdog<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped && value != 0 {
         return Err(StatusError::Range);
     }
@@ -45,7 +54,10 @@ pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), Status
 }
 
 /// Recover: a tripped watchdog, torque, goal and fault in one.
-pub(super) fn set_recover(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if value == 0 || !staged.stand.faulted && !staged.settings.watchdog_tripped {
         return Ok(());
     }
@@ -59,7 +71,7 @@ pub(super) fn set_recover(staged: &mut Staged, value: i64) -> Result<(), StatusE
 }
 
 /// The bus watchdog as it reads.
-pub(super) fn watchdog(settings: &Settings) -> i32 {
+pub(super) fn watchdog<const ROWS: usize, const COLUMNS: usize>(settings: &Settings<ROWS, COLUMNS>) -> i32 {
     if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
 }
 

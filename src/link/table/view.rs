@@ -21,7 +21,7 @@ pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
-    pub(super) fn settings(&self) -> &'a Settings {
+    pub(super) fn settings(&self) -> &'a Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
 

@@ -44,6 +44,8 @@ pub mod control;
 
 pub mod identify;
 
+pub mod calibrate;
+
 pub mod safety;
 
 pub mod pipeline;

@@ -7,6 +7,8 @@ mod requests;
 
 pub use report::{Bridge, Status, Taken, Taring};
 
+use crate::calibrate::scale::Scale;
+use crate::calibrate::{Calibrator, Proposal, Refusal as Unfit};
 use crate::command::Command;
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
@@ -34,6 +36,8 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     guard: Guard,
     goal: Goal,
     press: Press,
+    calibrator: Calibrator<ROWS, COLUMNS>,
+    scale: Scale,
     status: Status,
     tared: bool,
 }
@@ -52,6 +56,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             guard: Guard::default(),
             goal: Goal::default(),
             press: Press::new(),
+            calibrator: Calibrator::new(),
+            scale: Scale::new(),
             status: Status::default(),
             tared: false,
         }
@@ -61,6 +67,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// anew.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
+        self.forget();
         self.leave();
     }
 
@@ -68,6 +75,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// under way begins anew.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
+        self.forget();
         self.tared = false;
         self.leave();
     }
@@ -80,6 +88,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.press.refuse(Refusal::Interrupted);
             self.status.identification = self.press.outcome();
         }
+        self.calibrator.interrupt();
+        self.status.calibration = self.calibrator.standing();
         if self.status.tare == Taring::Running {
             self.status.tare = Taring::Refused;
         }
@@ -94,6 +104,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// The array's last picture and its calibration.
     pub fn array(&self) -> &Array<ROWS, COLUMNS> {
         &self.array
+    }
+
+    /// The gains that presses propose.
+    pub fn proposal(&self) -> &Proposal<ROWS, COLUMNS> {
+        self.calibrator.proposal()
     }
 
     /// The configuration in force.
@@ -177,6 +192,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if self.status.mode == Mode::Identify {
             let view = PressView { picture, contact: &contact, encoder: sense.encoder, motion: &self.motion };
             self.press.observe(&view, &self.config);
+            self.calibrator.observe(&view, &self.config);
         }
 
         // What to do about it.
@@ -185,10 +201,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if self.press.running() && mode != Mode::Identify {
             self.press.refuse(Refusal::Interrupted);
         }
+        if mode != Mode::Identify {
+            self.calibrator.interrupt();
+        }
         let reference = match mode {
             Mode::Off | Mode::Tare | Mode::Fault => None,
             Mode::Approach | Mode::Force | Mode::Release => {
                 Some(self.goal.reference(mode, command.goal, &contact, &mut self.motion, &self.config, &mut limits))
+            }
+            Mode::Identify if self.calibrator.running() => {
+                Some(self.calibrator.reference(&mut self.motion, &self.config, &mut limits))
             }
             Mode::Identify => Some(self.press.reference(&mut self.motion, &self.config, &mut limits)),
         };
@@ -209,7 +231,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             limits.set(Limits::TARED_TOUCHING);
         }
 
+        self.calibrator.work(&self.array, &self.config);
+        self.scale.observe(mode, &contact, &self.config);
+        if command.shown_request != self.status.taken.shown {
+            self.status.taken.shown = command.shown_request;
+            self.scale.take(command.shown_mn, &contact);
+        }
+        self.status.scale = self.scale.standing();
         self.status.identification = self.press.outcome();
+        self.status.calibration = self.calibrator.standing();
         self.status.limits = limits;
         self.status.fit_level = fit_level;
         self.status.contact = contact;

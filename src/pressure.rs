@@ -87,6 +87,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         &self.picture
     }
 
+    /// The gain of a taxel, Q14; 0 where it is masked, or there is none.
+    pub fn gain(&self, row: usize, column: usize) -> u16 {
+        let gain = self.rows.get(row).and_then(|row| row.gains.get(lanes::place(column, COLUMNS)));
+        gain.copied().unwrap_or(0).cast_unsigned()
+    }
+
     /// The tare of every row's taxels: corrected codes with [`TARE_BITS`] fractional bits.
     pub fn tare(&self) -> impl Iterator<Item = &[i32; COLUMNS]> {
         self.rows.iter().map(|row| &row.tare)

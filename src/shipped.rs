@@ -49,6 +49,8 @@ pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
 pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
 /// See [`crate::pressure::Gains`].
 pub type Gains = crate::pressure::Gains<ROWS, COLUMNS>;
+/// See [`crate::calibrate::Proposal`].
+pub type Proposal = crate::calibrate::Proposal<ROWS, COLUMNS>;
 /// See [`crate::pressure::Calibration`].
 pub type Calibration = crate::pressure::Calibration<ROWS, COLUMNS>;
 /// See [`crate::pressure::Array`].
@@ -76,16 +78,22 @@ const ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>()
 
 /// Where each register begins.
 pub mod address {
-    use super::{ALL, table};
+    use super::{COLUMNS, ROWS, table};
 
     pub use table::address::*;
 
+    const PICTURES: [u16; table::PICTURES] = table::pictures_at::<ROWS, COLUMNS>();
+
     /// Pressure on each taxel, row by row.
-    pub const PRESSURES: u16 = ALL[table::COUNT - 4].address;
+    pub const PRESSURES: u16 = PICTURES[0];
     /// Converter codes of the last frame, row by row.
-    pub const RAW_CODES: u16 = ALL[table::COUNT - 3].address;
+    pub const RAW_CODES: u16 = PICTURES[1];
     /// Zero of each taxel in converter codes, row by row.
-    pub const TARE_CODES: u16 = ALL[table::COUNT - 2].address;
+    pub const TARE_CODES: u16 = PICTURES[2];
     /// The gain of each taxel, row by row.
-    pub const GAINS: u16 = ALL[table::COUNT - 1].address;
+    pub const GAINS: u16 = PICTURES[3];
+    /// The gain of each taxel that presses propose, row by row.
+    pub const PROPOSED_GAINS: u16 = PICTURES[4];
+    /// Their standard uncertainty.
+    pub const PROPOSED_SIGMAS: u16 = PICTURES[5];
 }

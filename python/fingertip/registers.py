@@ -171,6 +171,20 @@ PRESSURES = Register("pressures", 768, 2, 100, False, 10, False, 0, 65535)
 RAW_CODES = Register("raw_codes", 1024, 2, 110, False, 1, False, 0, 4095)
 TARE_CODES = Register("tare_codes", 1280, 2, 100, False, 1, False, 0, 4095)
 GAINS = Register("gains", 1536, 2, 100, False, 1, True, 8192, 32767)
+CALIBRATE = Register("calibrate", 1736, 1, 1, False, 1, False, 0, 3)
+CALIBRATE_STATE = Register("calibrate_state", 1737, 1, 1, False, 1, False, 0, 3)
+CALIBRATE_REFUSAL = Register("calibrate_refusal", 1738, 1, 1, False, 1, False, 0, 11)
+CALIBRATE_PROGRESS = Register("calibrate_progress", 1739, 1, 1, False, 1, False, 0, 100)
+CALIBRATE_PRESSES = Register("calibrate_presses", 1740, 1, 1, False, 1, False, 0, 200)
+CALIBRATE_TAXELS = Register("calibrate_taxels", 1742, 2, 1, False, 1, False, 0, 512)
+SCALE_SHOWS_MN = Register("scale_shows_mn", 1744, 4, 1, True, 1, False, 0, 150000)
+SCALE_REFUSAL = Register("scale_refusal", 1748, 1, 1, False, 1, False, 0, 6)
+SCALE_POINTS = Register("scale_points", 1749, 1, 1, False, 1, False, 0, 255)
+SCALE = Register("scale", 1750, 1, 1, False, 1, False, 0, 3)
+SCALE_FACTOR_PPM = Register("scale_factor_ppm", 1752, 4, 1, False, 1, False, 0, 4000000)
+SCALE_SIGMA_PPM = Register("scale_sigma_ppm", 1756, 4, 1, False, 1, False, 0, 1000000)
+PROPOSED_GAINS = Register("proposed_gains", 1792, 2, 100, False, 1, False, 0, 32767)
+PROPOSED_SIGMAS = Register("proposed_sigmas", 1992, 1, 100, False, 1, False, 0, 255)
 
 ALL = (
     MODEL_NUMBER,
@@ -324,4 +338,18 @@ ALL = (
     RAW_CODES,
     TARE_CODES,
     GAINS,
+    CALIBRATE,
+    CALIBRATE_STATE,
+    CALIBRATE_REFUSAL,
+    CALIBRATE_PROGRESS,
+    CALIBRATE_PRESSES,
+    CALIBRATE_TAXELS,
+    SCALE_SHOWS_MN,
+    SCALE_REFUSAL,
+    SCALE_POINTS,
+    SCALE,
+    SCALE_FACTOR_PPM,
+    SCALE_SIGMA_PPM,
+    PROPOSED_GAINS,
+    PROPOSED_SIGMAS,
 )

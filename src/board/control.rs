@@ -220,6 +220,10 @@ impl State {
         let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
         // Where the link is just answering, it has the next one.
         PICTURE.visit(|picture| {
+            let stale = picture.report.is_none_or(|before| before.status.calibration != report.status.calibration);
+            if stale {
+                picture.proposal = *pipeline.proposal();
+            }
             picture.report = Some(report);
             picture.frame = *frame;
             picture.taxels.copy_from_slice(&pipeline.array().picture().taxels);
@@ -242,11 +246,14 @@ impl State {
         self.restart_scan();
     }
 
-    /// Takes new gains, which need a new tare.
+    /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
     fn calibrate(&mut self) {
         if let Some(gains) = GAINS.take(|gains| *gains) {
             self.parts.bridge.apply(Wanted::Open);
+            self.parts.scan.stop();
+            guard::rest();
             self.parts.pipeline.calibrate(&Calibration::of(&gains));
+            self.restart_scan();
         }
     }
 

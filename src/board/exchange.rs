@@ -10,7 +10,7 @@ use embassy_sync::signal::Signal;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Frame, Gains, ROWS, Record};
+use fingertip::shipped::{COLUMNS, Frame, Gains, Proposal, ROWS, Record};
 
 use super::flash::SaveError;
 use super::guard::Stopwatch;
@@ -62,6 +62,8 @@ pub struct Picture {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
     pub tare: [[i32; COLUMNS]; ROWS],
+    /// The gains that presses propose.
+    pub proposal: Proposal,
 }
 
 /// The newest report.
@@ -83,6 +85,7 @@ pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     taxels: [[0; COLUMNS]; ROWS],
     pascals_per_sum_q32: 0,
     tare: [[0; COLUMNS]; ROWS],
+    proposal: Proposal::NONE,
 });
 
 /// A small value that is read and replaced as a whole.

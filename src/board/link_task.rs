@@ -120,7 +120,7 @@ impl LinkTask {
 
 /// What the bus may read, of the newest picture.
 fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
-    let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
+    let Picture { report, frame, taxels, pascals_per_sum_q32, tare, proposal } = picture;
     let report = report.unwrap_or_default();
     Snapshot {
         status: report.status,
@@ -137,6 +137,7 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         taxels,
         pascals_per_sum_q32: *pascals_per_sum_q32,
         tare,
+        proposal,
     }
 }
 

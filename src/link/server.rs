@@ -60,6 +60,8 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     pub counters: Counters,
     registered: Option<Registered>,
     actions: Actions,
+    /// The gains proposed are to be those in force.
+    accept: bool,
     turn: Turn,
     /// How the loop stood at the last snapshot.
     stand: Stand,
@@ -70,13 +72,13 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, Server, Snapshot}};
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, Proposal, ROWS, Record, Server, Snapshot}};
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
 ///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0, loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(), health: Default::default(),
-///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros,
+///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros, proposal: &Proposal::NONE,
 /// };
 /// let mut reply = Reply::new();
 /// let mut received: &[u8] = &[0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4E];
@@ -104,6 +106,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             counters: Counters::default(),
             registered: None,
             actions: Actions::default(),
+            accept: false,
             turn: Turn::None,
             stand: Stand::default(),
             reply_delay_us: 0,

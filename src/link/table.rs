@@ -24,6 +24,7 @@ use super::stand::Stand;
 use indirect::Part;
 
 pub use list::{COUNT, registers};
+pub use pictures::{COUNT as PICTURES, at as pictures_at};
 pub use register::{Access, Kind, Register};
 pub(super) use view::View;
 
@@ -72,7 +73,8 @@ impl Cell {
     /// All but the parameters.
     fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).chain(&mirrors::CELLS)
+        // The pictures first: of larger arrays they reach beyond where the registers of this one's calibration stand.
+        pictures.iter().chain(&registers::CELLS).chain(&indirect::CELLS).chain(&mirrors::CELLS)
     }
 
     /// That of a register by itself, where it begins.
@@ -96,6 +98,8 @@ impl Cell {
 pub(super) struct Staged<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
+    /// The gains that presses propose are to be those in force.
+    pub accept: bool,
     /// How the loop stands.
     pub stand: Stand,
     /// The board's.

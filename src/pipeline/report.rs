@@ -1,5 +1,6 @@
 //! What a step reports beside the duty.
 
+use crate::calibrate::{Standing, scale};
 use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
 use crate::state::{Fault, Limits, Mode};
@@ -14,6 +15,12 @@ pub struct Taken {
     pub clear: u8,
     /// See [`crate::command::Command::identify_request`].
     pub identify: u8,
+    /// See [`crate::command::Command::calibrate_request`].
+    pub calibrate: u8,
+    /// See [`crate::command::Command::forget_request`].
+    pub forget: u8,
+    /// See [`crate::command::Command::shown_request`].
+    pub shown: u8,
 }
 
 /// How the tare that was last asked for stands. The numbers are stable.
@@ -58,6 +65,10 @@ pub struct Status {
     pub duty: Duty,
     /// The measurement of Young's modulus.
     pub identification: Identification,
+    /// The calibration of the taxels.
+    pub calibration: Standing,
+    /// The absolute scale by what a scale shows.
+    pub scale: scale::Standing,
     /// The tare.
     pub tare: Taring,
     /// The requests taken up.

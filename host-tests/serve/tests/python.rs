@@ -85,6 +85,15 @@ fn the_examples_stream_show_set_and_recover() {
     let shown = served.example("parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
     assert!(shown.contains("300000  (was 250000)") && shown.contains("50  (was 40)"), "{shown}");
 
+    // A wall is a plate, and its finger has no spread: what is proposed is near to 1.
+    let arguments = ["--modulus", "--presses", "2", "--no-wait", "--holds", "1.5", "--shown", "160", "--save"];
+    let calibrated = served.example("calibrate.py", &arguments);
+    assert!(
+        calibrated.contains("press 2: ") && calibrated.ends_with("done: tare before the next press\n"),
+        "{calibrated}"
+    );
+    assert!(calibrated.contains("forces times 1.04") || calibrated.contains("forces times 1.05"), "{calibrated}");
+
     served.command("fault supply-low");
     served.command("mend");
     let recovered = served.example("recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);

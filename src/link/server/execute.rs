@@ -47,6 +47,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             instruction::FAST_BULK_READ if !own => self.fast_bulk_read(params, snapshot, reply),
             _ => {
                 let result = self.change(packet, own);
+                self.accept(snapshot);
                 self.conclude(packet, level, result, reply);
             }
         }
@@ -110,7 +111,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     }
 
     fn staged(&self) -> Staged<ROWS, COLUMNS> {
-        Staged { settings: self.settings, actions: self.actions, stand: self.stand, clocks: self.clocks }
+        Staged { settings: self.settings, actions: self.actions, accept: false, stand: self.stand, clocks: self.clocks }
     }
 
     fn commit(&mut self, mut staged: Staged<ROWS, COLUMNS>) {
@@ -123,6 +124,16 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         }
         self.settings = staged.settings;
         self.actions = staged.actions;
+        self.accept |= staged.accept;
+    }
+
+    /// Makes proposed gains those in force, where that was asked for.
+    fn accept(&mut self, snapshot: &Snapshot<'_, ROWS, COLUMNS>) {
+        if core::mem::take(&mut self.accept) {
+            let mut staged = self.staged();
+            staged.settings.record.gains = snapshot.proposal.gains;
+            self.commit(staged);
+        }
     }
 
     /// Reg Write: checked now, written by Action.

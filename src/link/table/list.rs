@@ -9,8 +9,7 @@ use super::{Access, Kind, Register, indirect, mirrors, pictures};
 pub const COUNT: usize =
     FIXED.len() + mirrors::REGISTERS.len() + indirect::REGISTERS.len() + Params::COUNT + pictures::COUNT;
 
-/// Every register of an array of this shape, in the order of the addresses; the last four are the pressures, the raw
-/// codes, the tare's and the gains.
+/// Every register of an array of this shape, in the order of the addresses.
 pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let mut all = [FIXED[0]; COUNT];
     let mut count = 0;

@@ -70,6 +70,46 @@ pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
     Ok(())
 }
 
+/// Calibrate: a press, to forget, or to accept.
+pub(super) fn set_calibrate<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    let command = &mut staged.settings.command;
+    match value {
+        1 => bump(&mut command.calibrate_request, 1),
+        2 => bump(&mut command.forget_request, 1),
+        3 if command.torque => return Err(StatusError::Access),
+        3 if !staged.stand.proposed => return Err(StatusError::Result),
+        3 => staged.accept = true,
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Scale: to forget, or to accept.
+pub(super) fn set_scale<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    let factor_ppm = i64::from(staged.stand.factor_ppm);
+    match value {
+        2 => bump(&mut staged.settings.command.forget_request, 1),
+        3 if staged.settings.command.torque => return Err(StatusError::Access),
+        3 if factor_ppm == 0 => return Err(StatusError::Result),
+        3 => {
+            let params = &mut staged.settings.record.params;
+            let by = |value: i32, over: i64, under: i64| {
+                (i64::from(value) * over + under / 2).checked_div(under).unwrap_or(0) as i32
+            };
+            params.codes_per_kpa_milli = by(params.codes_per_kpa_milli, 1_000_000, factor_ppm);
+            params.modulus_pa = by(params.modulus_pa, factor_ppm, 1_000_000);
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
 /// The bus watchdog as it reads.
 pub(super) fn watchdog<const ROWS: usize, const COLUMNS: usize>(settings: &Settings<ROWS, COLUMNS>) -> i32 {
     if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }

@@ -41,7 +41,8 @@ impl Digest {
 
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
     let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
-    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request } = *command;
+    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =
+        *command;
     [
         sequence,
         encoder as u32,
@@ -74,6 +75,9 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         speed,
         duty: applied,
         identification,
+        // No scene asks for it.
+        calibration: _,
+        scale: _,
         tare,
         taken,
     } = *status;

@@ -178,6 +178,7 @@ impl<E: Set> Bus<E> {
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
                 tare: &tare,
+                proposal: pipeline.proposal(),
             };
             let taken = device.server.feed(bytes, &snapshot, &mut reply);
             bytes = &bytes[taken..];

@@ -13,6 +13,20 @@ Times are the controller's own; registers and their units are in `fingertip.regi
 
 from . import registers
 from .bus import Bus, FingertipError, NoAnswer, Refused
+from .calibration import ArrayCalibration, Gain, Scale
 from .finger import Fault, Fingertip, Mode, State
 
-__all__ = ["Bus", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "State", "registers"]
+__all__ = [
+    "ArrayCalibration",
+    "Bus",
+    "Fault",
+    "Fingertip",
+    "FingertipError",
+    "Gain",
+    "Mode",
+    "NoAnswer",
+    "Refused",
+    "Scale",
+    "State",
+    "registers",
+]

@@ -32,4 +32,12 @@ pub struct Command {
     pub identify_request: u8,
     /// A change of this number asks for a [`crate::commission::Task`], which its lowest bits name.
     pub commission_request: u8,
+    /// A change of this number asks for a press that calibrates the taxels.
+    pub calibrate_request: u8,
+    /// A change of this number forgets the presses that calibrate the taxels.
+    pub forget_request: u8,
+    /// A change of this number says that a scale under the plate shows [`Command::shown_mn`].
+    pub shown_request: u8,
+    /// What it shows, mN.
+    pub shown_mn: i32,
 }

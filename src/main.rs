@@ -19,11 +19,10 @@ use embassy_executor::{InterruptExecutor, Spawner};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use fingertip::config::ConfigError;
-use fingertip::link::Settings;
 use fingertip::params::Params;
-use fingertip::shipped::{Config, Pipeline};
+use fingertip::shipped::{Calibration, Config, Loaded, Pipeline, Record, Settings};
 use fingertip::state::Fault;
-use fingertip::store::{Loaded, Record, Remark, settle};
+use fingertip::store::{Remark, settle};
 use static_cell::StaticCell;
 
 /// Runs control above everything but the scan and the guard.
@@ -58,6 +57,7 @@ async fn main(spawner: Spawner) {
         sound = false;
     });
     let pipeline = unwrap!(made, "the default parameters make a configuration: a test of the core holds that");
+    pipeline.calibrate(&Calibration::of(&record.gains));
     if let Some(fault) = unfit {
         log_unfit(fault);
         pipeline.stop(fault);

@@ -7,6 +7,8 @@ mod requests;
 
 pub use report::{Bridge, Status, Taken, Taring};
 
+use crate::calibrate::scale::Scale;
+use crate::calibrate::{Calibrator, Proposal, Refusal as Unfit};
 use crate::command::Command;
 use crate::commission::{self, Run, Task};
 use crate::config::Shaped;
@@ -36,6 +38,8 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     goal: Goal,
     press: Press,
     commission: Run,
+    calibrator: Calibrator<ROWS, COLUMNS>,
+    scale: Scale,
     status: Status,
     tared: bool,
 }
@@ -55,6 +59,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             goal: Goal::default(),
             press: Press::new(),
             commission: Run::new(),
+            calibrator: Calibrator::new(),
+            scale: Scale::new(),
             status: Status::default(),
             tared: false,
         }
@@ -70,6 +76,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.commission = Run::new();
             self.status.commissioning = self.commission.outcome();
         }
+        self.forget();
         self.leave();
     }
 
@@ -77,6 +84,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// under way begins anew.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
+        self.forget();
         self.tared = false;
         self.leave();
     }
@@ -90,6 +98,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.status.identification = self.press.outcome();
         }
         self.interrupt_commission();
+        self.calibrator.interrupt();
+        self.status.calibration = self.calibrator.standing();
         if self.status.tare == Taring::Running {
             self.status.tare = Taring::Refused;
         }
@@ -104,6 +114,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// The array's last picture and its calibration.
     pub fn array(&self) -> &Array<ROWS, COLUMNS> {
         &self.array
+    }
+
+    /// The gains that presses propose.
+    pub fn proposal(&self) -> &Proposal<ROWS, COLUMNS> {
+        self.calibrator.proposal()
     }
 
     /// The configuration in force.
@@ -188,6 +203,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if self.status.mode == Mode::Identify {
             let view = PressView { picture, contact: &contact, encoder: sense.encoder, motion: &self.motion };
             self.press.observe(&view, &self.config);
+            self.calibrator.observe(&view, &self.config);
         }
 
         // What motions that measure the drive make of it.
@@ -207,10 +223,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if mode != Mode::Commission {
             self.interrupt_commission();
         }
+        if mode != Mode::Identify {
+            self.calibrator.interrupt();
+        }
         let reference = match mode {
             Mode::Off | Mode::Tare | Mode::Fault | Mode::Commission => None,
             Mode::Approach | Mode::Force | Mode::Release => {
                 Some(self.goal.reference(mode, command.goal, &contact, &mut self.motion, &self.config, &mut limits))
+            }
+            Mode::Identify if self.calibrator.running() => {
+                Some(self.calibrator.reference(&mut self.motion, &self.config, &mut limits))
             }
             Mode::Identify => Some(self.press.reference(&mut self.motion, &self.config, &mut limits)),
         };
@@ -235,8 +257,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             limits.set(Limits::TARED_TOUCHING);
         }
 
+        self.calibrator.work(&self.array, &self.config);
+        self.scale.observe(mode, &contact, &self.config);
+        if command.shown_request != self.status.taken.shown {
+            self.status.taken.shown = command.shown_request;
+            self.scale.take(command.shown_mn, &contact);
+        }
+        self.status.scale = self.scale.standing();
         self.status.identification = self.press.outcome();
         self.status.commissioning = self.commission.outcome();
+        self.status.calibration = self.calibrator.standing();
         self.status.limits = limits;
         self.status.fit_level = fit_level;
         self.status.contact = contact;

@@ -10,6 +10,7 @@
 
 mod calibration;
 mod curve;
+mod gains;
 mod picture;
 mod row;
 mod suspect;
@@ -17,6 +18,7 @@ mod tare;
 mod touched;
 
 pub use calibration::{Calibration, CalibrationError};
+pub use gains::Gains;
 pub use picture::Picture;
 
 use crate::config::Config;
@@ -83,6 +85,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// The picture of the last frame.
     pub fn picture(&self) -> &Picture<ROWS, COLUMNS> {
         &self.picture
+    }
+
+    /// The gain of a taxel, Q14; 0 where it is masked, or there is none.
+    pub fn gain(&self, row: usize, column: usize) -> u16 {
+        let gain = self.rows.get(row).and_then(|row| row.gains.get(lanes::place(column, COLUMNS)));
+        gain.copied().unwrap_or(0).cast_unsigned()
     }
 
     /// The tare of every row's taxels: corrected codes with [`TARE_BITS`] fractional bits.

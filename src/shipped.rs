@@ -47,6 +47,10 @@ pub type Frame = crate::frame::Frame<ROWS, COLUMNS>;
 pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
 /// See [`crate::pressure::Picture`].
 pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
+/// See [`crate::pressure::Gains`].
+pub type Gains = crate::pressure::Gains<ROWS, COLUMNS>;
+/// See [`crate::calibrate::Proposal`].
+pub type Proposal = crate::calibrate::Proposal<ROWS, COLUMNS>;
 /// See [`crate::pressure::Calibration`].
 pub type Calibration = crate::pressure::Calibration<ROWS, COLUMNS>;
 /// See [`crate::pressure::Array`].
@@ -57,6 +61,12 @@ pub type Fit = crate::contact::Fit<ROWS, COLUMNS>;
 pub type Budget = crate::pipeline::budget::Budget<ROWS, COLUMNS>;
 /// See [`crate::pipeline::Pipeline`].
 pub type Pipeline = crate::pipeline::Pipeline<ROWS, COLUMNS>;
+/// See [`crate::store::Record`].
+pub type Record = crate::store::Record<ROWS, COLUMNS>;
+/// See [`crate::store::Loaded`].
+pub type Loaded = crate::store::Loaded<ROWS, COLUMNS>;
+/// See [`crate::link::Settings`].
+pub type Settings = crate::link::Settings<ROWS, COLUMNS>;
 /// See [`crate::link::Snapshot`].
 pub type Snapshot<'a> = crate::link::Snapshot<'a, ROWS, COLUMNS>;
 /// See [`crate::link::Server`].
@@ -72,7 +82,7 @@ pub mod address {
 
     pub use table::address::*;
 
-    const PICTURES: [u16; 3] = table::picture_addresses::<ROWS, COLUMNS>();
+    const PICTURES: [u16; table::PICTURES] = table::pictures_at::<ROWS, COLUMNS>();
 
     /// Pressure on each taxel, row by row.
     pub const PRESSURES: u16 = PICTURES[0];
@@ -80,4 +90,10 @@ pub mod address {
     pub const RAW_CODES: u16 = PICTURES[1];
     /// Zero of each taxel in converter codes, row by row.
     pub const TARE_CODES: u16 = PICTURES[2];
+    /// The gain of each taxel, row by row.
+    pub const GAINS: u16 = PICTURES[3];
+    /// The gain of each taxel that presses propose, row by row.
+    pub const PROPOSED_GAINS: u16 = PICTURES[4];
+    /// Their standard uncertainty.
+    pub const PROPOSED_SIGMAS: u16 = PICTURES[5];
 }

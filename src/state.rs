@@ -8,10 +8,11 @@
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
 //! | 4 release | backs off to the set clearance behind the surface that it touched, then holds there | goal > 0: approach |
 //! | 7 commission | small steps of voltage, to learn what the drive is like | done, refused or stopped: off |
-//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force | done or refused: approach (goal > 0), release (goal = 0) |
+//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force, for the modulus or the taxels' gains | done or refused: approach (goal > 0), release (goal = 0) |
 //! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
-//! Commission is asked for in off, with torque off. Identify, which measures Young's modulus, is asked for in approach, force or release.
+//! Commission is asked for in off, with torque off. Identify, which measures Young's modulus or calibrates the taxels,
+//! is asked for in approach, force or release.
 //!
 //! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault,
 //! and from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what
@@ -34,7 +35,7 @@ pub enum Mode {
     Release = 4,
     /// Stopped by a fault.
     Fault = 5,
-    /// Pressing to measure Young's modulus.
+    /// Pressing to measure Young's modulus or the taxels' gains.
     Identify = 6,
     /// Moving a little in the air to measure the drive.
     Commission = 7,

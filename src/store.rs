@@ -9,7 +9,8 @@
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
 //! All little-endian; FF up to the next multiple of 16. The number of a name is its CRC-32, so a firmware with other
-//! values takes those that it knows. A record before these, "FTIP", is read too, where its values are this firmware's.
+//! values takes those that it knows. Behind the parameters come the taxels' gains, two in a value, under the numbers from
+//! [`gains_number`] on; they are left out where all are 1. A record before these, "FTIP", is read too, where its values are this firmware's.
 //!
 //! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So
 //! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
@@ -25,10 +26,11 @@ use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 use crate::contact::FitLevel;
 use crate::params::Params;
+use crate::pressure::Gains;
 
-pub use format::{SLOT_BYTES, encode};
+pub use format::{SLOT_BYTES, words};
 pub use journal::{Flash, Journal, Loaded, SaveError, Sector};
-pub use names::number;
+pub use names::{gains_number, number};
 pub use taken::{Remark, settle};
 
 /// The largest ID of a device on the bus.
@@ -41,7 +43,8 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// What outlives a reset.
 ///
 /// ```
-/// use fingertip::store::{Flash, Journal, Record, Sector};
+/// use fingertip::shipped::Record;
+/// use fingertip::store::{Flash, Journal, Sector};
 ///
 /// /// Two sectors in memory.
 /// struct Sectors([[u8; 1024]; 2]);
@@ -67,7 +70,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 /// assert_eq!(Journal::new(&flash).load(&flash, |_| ()).record, record);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Record {
+pub struct Record<const ROWS: usize, const COLUMNS: usize> {
     /// Address on the bus, 0 to 252.
     pub id: u8,
     /// Bus speed by the protocol's code: [`BAUD_RATES`].
@@ -78,15 +81,23 @@ pub struct Record {
     pub fit_level: FitLevel,
     /// The parameters.
     pub params: Params,
+    /// The taxels' gains.
+    pub gains: Gains<ROWS, COLUMNS>,
 }
 
-impl Record {
+impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
     /// What a blank flash stands for: ID 1, 1 Mbaud, 500 us.
-    pub const DEFAULT: Self =
-        Self { id: 1, baud_code: 3, return_delay_2us: 250, fit_level: FitLevel::OneRow, params: Params::DEFAULT };
+    pub const DEFAULT: Self = Self {
+        id: 1,
+        baud_code: 3,
+        return_delay_2us: 250,
+        fit_level: FitLevel::OneRow,
+        params: Params::DEFAULT,
+        gains: Gains::ONE,
+    };
 }
 
-impl Default for Record {
+impl<const ROWS: usize, const COLUMNS: usize> Default for Record<ROWS, COLUMNS> {
     fn default() -> Self {
         Self::DEFAULT
     }

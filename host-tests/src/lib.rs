@@ -35,3 +35,11 @@ pub mod stimulus;
 #[cfg(feature = "judges")]
 pub mod study;
 pub mod units;
+
+/// A record's bytes as they are written to flash.
+pub fn encode<const ROWS: usize, const COLUMNS: usize>(
+    record: &fingertip::store::Record<ROWS, COLUMNS>,
+    sequence: u32,
+) -> Vec<u8> {
+    fingertip::store::words(record, sequence).flat_map(u32::to_le_bytes).collect()
+}

@@ -13,8 +13,22 @@ Times are the controller's own; registers and their units are in `fingertip.regi
 
 from . import registers
 from .bus import Bus, FingertipError, NoAnswer, Refused
+from .calibration import ArrayCalibration, Gain, Scale
 from .finger import Drive, Fault, Fingertip, Mode, Restarted, State
 
 __all__ = [
-    "Bus", "Drive", "Fault", "Fingertip", "FingertipError", "Mode", "NoAnswer", "Refused", "Restarted", "State", "registers",
+    "ArrayCalibration",
+    "Bus",
+    "Drive",
+    "Fault",
+    "Fingertip",
+    "FingertipError",
+    "Gain",
+    "Mode",
+    "NoAnswer",
+    "Refused",
+    "Restarted",
+    "Scale",
+    "State",
+    "registers",
 ]

@@ -13,7 +13,11 @@ _TARING, _TARED = 1, 2
 _SAME, _CHANGED = 0, 1
 _NOT_TARED, _TARED_TOUCHING = 1 << 6, 1 << 10
 _FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES
-_PARAMETERS = [register for register in reg.ALL if register.stored and register.address >= reg.TIP_RADIUS_UM.address]
+_PARAMETERS = [
+    register
+    for register in reg.ALL
+    if register.stored and register.numbers == 1 and register.address >= reg.TIP_RADIUS_UM.address
+]
 _PATIENCE_S = 10.0
 _COMMISSION_S = 60.0
 _JOG, _MEASURE = 1, 2

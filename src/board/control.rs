@@ -6,13 +6,13 @@ use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Bridge as Wanted;
-use fingertip::shipped::{Config, Frame, Pipeline};
+use fingertip::shipped::{Calibration, Config, Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::health;
@@ -102,6 +102,7 @@ impl State {
         self.take_frame();
         self.check_part();
         self.configure();
+        self.calibrate();
         self.save();
     }
 
@@ -223,6 +224,10 @@ impl State {
         let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
         // Where the link is just answering, it has the next one.
         PICTURE.visit(|picture| {
+            let stale = picture.report.is_none_or(|before| before.status.calibration != report.status.calibration);
+            if stale {
+                picture.proposal = *pipeline.proposal();
+            }
             picture.report = Some(report);
             picture.frame = *frame;
             picture.taxels.copy_from_slice(&pipeline.array().picture().taxels);
@@ -243,6 +248,17 @@ impl State {
             self.stop(Fault::BrokenParameters);
         }
         self.restart_scan();
+    }
+
+    /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
+    fn calibrate(&mut self) {
+        if let Some(gains) = GAINS.take(|gains| *gains) {
+            self.parts.bridge.apply(Wanted::Open);
+            self.parts.scan.stop();
+            guard::rest();
+            self.parts.pipeline.calibrate(&Calibration::of(&gains));
+            self.restart_scan();
+        }
     }
 
     /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so

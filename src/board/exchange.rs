@@ -10,8 +10,7 @@ use embassy_sync::signal::Signal;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Frame, ROWS};
-use fingertip::store::Record;
+use fingertip::shipped::{COLUMNS, Frame, Gains, Proposal, ROWS, Record};
 
 use super::flash::SaveError;
 use super::guard::Stopwatch;
@@ -63,6 +62,8 @@ pub struct Picture {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
     pub tare: [[i32; COLUMNS]; ROWS],
+    /// The gains that presses propose.
+    pub proposal: Proposal,
 }
 
 /// The newest report.
@@ -71,6 +72,8 @@ pub static REPORT: Shared<Report> = Shared::new();
 pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
+/// New gains for control.
+pub static GAINS: Mailbox<Gains> = Mailbox::new(Gains::ONE);
 /// A record for control to save, and how that went.
 pub static SAVE: Mailbox<Record> = Mailbox::new(Record::DEFAULT);
 /// See [`SAVE`].
@@ -82,6 +85,7 @@ pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     taxels: [[0; COLUMNS]; ROWS],
     pascals_per_sum_q32: 0,
     tare: [[0; COLUMNS]; ROWS],
+    proposal: Proposal::NONE,
 });
 
 /// A small value that is read and replaced as a whole.

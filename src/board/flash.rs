@@ -5,7 +5,8 @@ use embassy_stm32::flash::{Blocking, Error, Flash};
 use embassy_stm32::pac;
 use embassy_stm32::pac::flash::vals::Psize;
 use embassy_stm32::peripherals::FLASH;
-use fingertip::store::{self, Journal, Loaded, Record, Remark, Sector};
+use fingertip::shipped::{Loaded, Record};
+use fingertip::store::{self, Journal, Remark, Sector};
 
 const FLASH_START: u32 = 0x0800_0000;
 const SECTOR_BYTES: u32 = 128 * 1024;
@@ -44,10 +45,10 @@ impl Store {
     /// See [`Journal::make_room`]. Takes up to 2 s in which the core stands, so call it before the watchdog and the
     /// scan start.
     pub fn make_room(&mut self) -> Result<bool, SaveError> {
-        self.journal.make_room(&mut self.chip)
+        self.journal.make_room(&mut self.chip, Record::SLOT_MAX)
     }
 
-    /// Appends a record. The core stands while each of its 72 words is written, 16 us and at most 100 us: the motor
+    /// Appends a record. The core stands while each of its 78 words is written (178 with gains), 16 us and at most 100 us: the motor
     /// must be off, the scan stopped, and `between` them the watchdog fed.
     ///
     /// # Errors

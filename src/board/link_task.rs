@@ -5,12 +5,11 @@
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
 use fingertip::link::{Actions, Reply};
-use fingertip::shipped::{CLOCKS, Server, Snapshot};
-use fingertip::store::Record;
+use fingertip::shipped::{CLOCKS, Record, Server, Snapshot};
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
 use super::health;
 use super::log::log_save_error;
@@ -83,6 +82,10 @@ impl LinkTask {
             PARAMS.take(|_| ());
             PARAMS.fill(|params| *params = settings.record.params);
         }
+        if actions.calibrate {
+            GAINS.take(|_| ());
+            GAINS.fill(|gains| *gains = settings.record.gains);
+        }
         if actions.save {
             let saved = self.save(&settings.record).await;
             self.server.note_saved(saved);
@@ -117,7 +120,7 @@ impl LinkTask {
 
 /// What the bus may read, of the newest picture.
 fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
-    let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
+    let Picture { report, frame, taxels, pascals_per_sum_q32, tare, proposal } = picture;
     let report = report.unwrap_or_default();
     Snapshot {
         status: report.status,
@@ -134,6 +137,7 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         taxels,
         pascals_per_sum_q32: *pascals_per_sum_q32,
         tare,
+        proposal,
     }
 }
 

@@ -45,6 +45,12 @@ pub struct Press {
     from: Millimetres,
     moved_to: Millimetres,
     still_ns: u32,
+    /// It goes on where the array's edge or a bad taxel ends a measurement of the modulus, and gives none.
+    deep: bool,
+    /// Taxels that were bad at the touch.
+    bad_at_touch: u16,
+    /// The way from the touch in this frame, where it counts.
+    sampled: Option<Millimetres>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +85,9 @@ impl Press {
             from: Millimetres::ZERO,
             moved_to: Millimetres::ZERO,
             still_ns: 0,
+            deep: false,
+            bad_at_touch: 0,
+            sampled: None,
         }
     }
 
@@ -90,6 +99,27 @@ impl Press {
             moved_to: motion.observer.travel,
             ..Self::new()
         };
+    }
+
+    /// The same for a press that only ends with the depth, the force, the travel or a taxel that goes bad.
+    pub fn start_deep(&mut self, motion: &SpeedLoop) {
+        self.start(motion);
+        self.deep = true;
+    }
+
+    /// How far the tip went since the touch was noticed, where this frame is one of the press.
+    pub fn sampled(&self) -> Option<Millimetres> {
+        self.sampled
+    }
+
+    /// Where the tip touched, from where that was noticed; not above 0.
+    pub fn touched(&self) -> Millimetres {
+        Millimetres(self.touch.0.saturating_sub(self.from.0))
+    }
+
+    /// How deep a press goes: 0.3 a, the range of the paper's measurement.
+    pub fn depth_goal(config: &Config) -> Millimetres {
+        depth_goal(config)
     }
 
     /// Whether it still needs the motor.
@@ -115,7 +145,9 @@ impl Press {
         if self.phase == Phase::Idle {
             return;
         }
-        if view.picture.bad_count > 0 {
+        self.sampled = None;
+        let bad_before = if self.deep && self.phase != Phase::Squeeze { u16::MAX } else { self.bad_at_touch };
+        if view.picture.bad_count > bad_before {
             return self.finish(Refusal::BadTaxels);
         }
         if self.stalled(view, config) {
@@ -166,6 +198,7 @@ impl Press {
         self.fit = TravelFit::new(travel, depth_goal(config), config.force_fault);
         self.step = Step::at(0);
         self.phase = Phase::Squeeze;
+        self.bad_at_touch = view.picture.bad_count;
     }
 
     fn squeeze<const ROWS: usize, const COLUMNS: usize>(
@@ -179,15 +212,14 @@ impl Press {
         let speed = view.motion.observer.speed;
         let measured = view.motion.observer.measured(view.encoder, config);
         let way = measured.0.saturating_sub(self.from.0).to_bits();
-        if way >= 0
-            && speed >= MillimetresPerSecond(-SPEED_TAKEN.0)
-            && speed <= SPEED_TAKEN
-            && let Some((way, force)) = self.step.take(way, contact.force)
-        {
-            self.fit.add(Millimetres(self.from.0.saturating_add(way.0)), force);
+        if way >= 0 && speed >= MillimetresPerSecond(-SPEED_TAKEN.0) && speed <= SPEED_TAKEN {
+            self.sampled = Some(Millimetres::from_bits(way));
+            if let Some((way, force)) = self.step.take(way, contact.force) {
+                self.fit.add(Millimetres(self.from.0.saturating_add(way.0)), force);
+            }
         }
         let depth = Millimetres(measured.0.saturating_sub(self.touch.0));
-        let at_edge = beyond_edge::<ROWS, COLUMNS>(&contact, depth, config);
+        let at_edge = !self.deep && beyond_edge::<ROWS, COLUMNS>(&contact, depth, config);
         if at_edge || at_end || depth >= depth_goal(config) || contact.force >= config.force_max {
             self.finish(if at_edge { Refusal::Edge } else { Refusal::Span });
         }
@@ -196,6 +228,10 @@ impl Press {
     /// Ends with what the points so far give; where they are too few, what ended the press is the reason.
     fn finish(&mut self, cause: Refusal) {
         self.phase = Phase::Idle;
+        if self.deep {
+            self.outcome = Identification::Refused(cause);
+            return;
+        }
         self.outcome = match self.fit.modulus() {
             Ok(result) => Identification::Done(Modulus { sigma: with_readout(result), ..result }),
             Err(Refusal::Span | Refusal::Points) => Identification::Refused(cause),

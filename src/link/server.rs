@@ -18,8 +18,8 @@ use super::snapshot::Snapshot;
 use super::stand::Stand;
 use super::turn::Turn;
 
-/// The longest Reg Write: all parameters at once.
-pub const REG_WRITE_MAX: usize = 160;
+/// The longest Reg Write: all gains of 10 x 10 taxels at once.
+pub const REG_WRITE_MAX: usize = 200;
 
 /// Counts of what went wrong on the bus since reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -56,10 +56,12 @@ struct Registered {
 /// What the device knows.
 #[derive(Clone, Debug)]
 pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
-    pub settings: Settings,
+    pub settings: Settings<ROWS, COLUMNS>,
     pub counters: Counters,
     registered: Option<Registered>,
     actions: Actions,
+    /// The gains proposed are to be those in force.
+    accept: bool,
     turn: Turn,
     /// Once this device has sent its part of a shared packet: how much comes behind it.
     behind: Option<u16>,
@@ -74,13 +76,13 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Server, Snapshot}, store::Record};
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, Proposal, ROWS, Record, Server, Snapshot}};
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
 ///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0, loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(), health: Default::default(),
-///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros,
+///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros, proposal: &Proposal::NONE,
 /// };
 /// let mut reply = Reply::new();
 /// let mut received: &[u8] = &[0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4E];
@@ -102,12 +104,13 @@ pub struct Server<const ROWS: usize, const COLUMNS: usize> {
 
 impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// A device with these stored settings, torque off; it judges new ones by the board's clocks.
-    pub fn new(record: Record, clocks: &'static Clocks) -> Self {
+    pub fn new(record: Record<ROWS, COLUMNS>, clocks: &'static Clocks) -> Self {
         let state = State {
             settings: Settings::new(record),
             counters: Counters::default(),
             registered: None,
             actions: Actions::default(),
+            accept: false,
             turn: Turn::None,
             behind: None,
             heard_ms: 0,
@@ -154,7 +157,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     }
 
     /// All that the host may change.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
 

@@ -11,9 +11,9 @@ use super::table::indirect;
 
 /// Everything that a write can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Settings {
+pub struct Settings<const ROWS: usize, const COLUMNS: usize> {
     /// What outlives a reset once it is saved.
-    pub record: Record,
+    pub record: Record<ROWS, COLUMNS>,
     /// What the loop is asked for.
     pub command: Command,
     /// 0: only Ping is answered; 1: reads too; 2: everything.
@@ -47,13 +47,15 @@ pub struct Actions {
     pub save: bool,
     /// The parameters changed: make a new configuration.
     pub configure: bool,
+    /// The taxels' gains changed: take them, and forget the tare.
+    pub calibrate: bool,
     /// The bus speed changed.
     pub baud: bool,
 }
 
-impl Settings {
+impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
     /// The settings after a reset.
-    pub fn new(record: Record) -> Self {
+    pub fn new(record: Record<ROWS, COLUMNS>) -> Self {
         Self {
             record,
             command: Command::default(),
@@ -78,11 +80,7 @@ impl Settings {
     ///
     /// # Errors
     /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force.
-    pub(super) fn check<const ROWS: usize, const COLUMNS: usize>(
-        &self,
-        params_changed: bool,
-        clocks: &Clocks,
-    ) -> Result<(), StatusError> {
+    pub(super) fn check(&self, params_changed: bool, clocks: &Clocks) -> Result<(), StatusError> {
         if params_changed {
             Shaped::<ROWS, COLUMNS>::new(&self.record.params, clocks).map_err(|error| match error {
                 ConfigError::Param(_) => StatusError::Range,

@@ -1,5 +1,6 @@
 //! What the bus may read of the running controller, gathered by the firmware.
 
+use crate::calibrate::Proposal;
 use crate::frame::Frame;
 use crate::pipeline::Status;
 use crate::pressure::TARE_BITS;
@@ -36,6 +37,8 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`TARE_BITS`] fractional bits.
     pub tare: &'a [[i32; COLUMNS]; ROWS],
+    /// The gains that presses propose.
+    pub proposal: &'a Proposal<ROWS, COLUMNS>,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
@@ -177,6 +180,7 @@ mod tests {
             taxels: &taxels,
             pascals_per_sum_q32: 8 << 32,
             tare: &tare,
+            proposal: &Proposal::NONE,
         };
         let at = |place| (snapshot.pressure_10pa(place), snapshot.tare_codes(place));
         assert_eq!([0, 1, 2, 100].map(at), [(0, 0), (0, 0), (1, 8), (0, 0)]);

@@ -4,6 +4,7 @@
 //! request that is impossible by these is refused with the result error. What comes in between, as a fault in the next
 //! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
 
+use crate::calibrate::State;
 use crate::command::Command;
 use crate::commission::{Commissioning, Task};
 use crate::params::Params;
@@ -29,6 +30,10 @@ pub(super) struct Stand {
     tared: bool,
     supply_mv: u16,
     bad_taxels: u8,
+    /// Taxels have gains proposed.
+    pub proposed: bool,
+    /// The factor that a scale proposes for forces, millionths; 0 none.
+    pub factor_ppm: u32,
 }
 
 /// What stands in the way of recovering from a fault: it would be back at once. The numbers are stable.
@@ -55,6 +60,9 @@ impl Stand {
             tared: !status.limits.has(Limits::NOT_TARED),
             supply_mv: snapshot.supply_mv,
             bad_taxels: status.contact.bad_taxels,
+            // While a press runs, or is worked out, there may be a mixture.
+            proposed: status.calibration.presses > 0 && status.calibration.state != State::Running,
+            factor_ppm: status.scale.factor_ppm,
         }
     }
 
@@ -83,14 +91,16 @@ impl Stand {
     /// Refuses what a write asks for and what cannot be done.
     ///
     /// # Errors
-    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a measurement of the modulus
-    /// without torque or tare; one of the drive with torque, in a fault or without a tare; a save while the loop drives, is about to or tares, when it must not wait for the flash.
+    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press that measures
+    /// modulus or gains without torque or tare; a measurement of the drive with torque, in a fault or without a tare; a
+    /// save while the loop drives, is about to or tares, when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;
         let taring = self.mode == Mode::Tare || after.tare_request != self.taken.tare;
         let tare = after.tare_request == before.tare_request || !stopped;
-        let identify = after.identify_request == before.identify_request || after.torque && (self.tared || taring);
+        let pressed = [before, after].map(|command| (command.identify_request, command.calibrate_request));
+        let identify = pressed[0] == pressed[1] || after.torque && (self.tared || taring);
         let commission = after.commission_request == before.commission_request
             || Task::of(after.commission_request) == Task::Stop
             || !after.torque && self.tared && !taring && !self.faulted;

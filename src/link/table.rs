@@ -24,7 +24,7 @@ use super::stand::Stand;
 use indirect::Part;
 
 pub use list::{COUNT, registers};
-pub use pictures::picture_addresses;
+pub use pictures::{COUNT as PICTURES, at as pictures_at};
 pub use register::{Access, Kind, Register};
 pub(super) use view::View;
 
@@ -73,7 +73,8 @@ impl Cell {
     /// All but the parameters.
     fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        registers::CELLS.iter().chain(pictures).chain(&indirect::CELLS).chain(&mirrors::CELLS)
+        // The pictures first: of larger arrays they reach beyond where the registers of this one's calibration stand.
+        pictures.iter().chain(&registers::CELLS).chain(&indirect::CELLS).chain(&mirrors::CELLS)
     }
 
     /// That of a register by itself, where it begins.
@@ -94,9 +95,11 @@ impl Cell {
 }
 
 /// What a write works on: a copy, which replaces the original once the whole write is found good.
-pub(super) struct Staged {
-    pub settings: Settings,
+pub(super) struct Staged<const ROWS: usize, const COLUMNS: usize> {
+    pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
+    /// The gains that presses propose are to be those in force.
+    pub accept: bool,
     /// How the loop stands.
     pub stand: Stand,
     /// The board's.
@@ -156,7 +159,7 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
 /// # Errors
 /// What is wrong with the first register that is refused; the copy is then of no use.
 pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     address: u16,
     data: &[u8],
 ) -> Result<(), StatusError> {
@@ -182,13 +185,13 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         rest = rest.get(usize::from(taken)..).ok_or(StatusError::Length)?;
         at = at.saturating_add(taken);
     }
-    staged.settings.check::<ROWS, COLUMNS>(staged.settings.record.params != params, staged.clocks)?;
+    staged.settings.check(staged.settings.record.params != params, staged.clocks)?;
     staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 
 /// Writes the element that begins at `at`, and tells how many bytes it took.
 fn write_element<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     cell: &Cell,
     at: u16,
     data: &[u8],
@@ -209,7 +212,7 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
         if let Some(slot) = staged.settings.indirect.get_mut(first + usize::from(element)) {
             *slot = target;
         }
-    } else {
+    } else if !pictures::set(staged, cell.of, element, value)? {
         registers::set(staged, cell.of, value)?;
     }
     Ok(cell.kind.width())
@@ -217,7 +220,7 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
 
 /// Writes the register that the first of these addresses leads to: the others must lead to the rest of it.
 fn write_through<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged,
+    staged: &mut Staged<ROWS, COLUMNS>,
     targets: &[u16],
     data: &[u8],
     moves: bool,

@@ -45,9 +45,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 Mode::Off
             }
             Mode::Off | Mode::Commission => Mode::Off,
-            Mode::Identify if self.press.running() => Mode::Identify,
+            Mode::Identify if self.press.running() || self.calibrator.running() => Mode::Identify,
             Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
                 self.press.start(&self.motion);
+                Mode::Identify
+            }
+            Mode::Approach | Mode::Force | Mode::Release if asked.calibrate && !self.calibrator.busy() => {
+                self.calibrator.start(&self.motion);
                 Mode::Identify
             }
             Mode::Approach if wanted == Mode::Approach && contact.force >= self.config.contact_on => {

@@ -1,5 +1,6 @@
 //! What a step reports beside the duty.
 
+use crate::calibrate::{Standing, scale};
 use crate::commission::Commissioning;
 use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
@@ -15,6 +16,12 @@ pub struct Taken {
     pub clear: u8,
     /// See [`crate::command::Command::identify_request`].
     pub identify: u8,
+    /// See [`crate::command::Command::calibrate_request`].
+    pub calibrate: u8,
+    /// See [`crate::command::Command::forget_request`].
+    pub forget: u8,
+    /// See [`crate::command::Command::shown_request`].
+    pub shown: u8,
     /// See [`crate::command::Command::commission_request`].
     pub commission: u8,
 }
@@ -63,6 +70,10 @@ pub struct Status {
     pub identification: Identification,
     /// The commissioning of the drive.
     pub commissioning: Commissioning,
+    /// The calibration of the taxels.
+    pub calibration: Standing,
+    /// The absolute scale by what a scale shows.
+    pub scale: scale::Standing,
     /// The tare.
     pub tare: Taring,
     /// The requests taken up.

@@ -5,9 +5,9 @@
 //! | tare | in every mode but fault, also in the frame that clears one | refused: [`Taring::Refused`] |
 //! | clear | in fault, with torque off | the fault stands, or there is none |
 //! | commission | in off, with torque off and the array tared; a stop in commission | refused: [`commission::Refusal`] |
-//! | identify | in approach, force and release; with torque on it waits for these while torque is taken up, a tare is under way or another measurement ends | refused: [`Refusal::NotReady`] |
+//! | identify, calibrate | in approach, force and release; with torque on it waits for these while torque is taken up, a tare is under way or another measurement ends | refused: `NotReady` |
 
-use super::{Command, Pipeline, Taring};
+use super::{Command, Pipeline, Taring, Unfit};
 use crate::commission::{self, Task};
 use crate::identify::Refusal;
 use crate::state::Mode;
@@ -19,6 +19,7 @@ pub(super) struct Asked {
     pub clear: bool,
     pub identify: bool,
     pub commission: Option<Task>,
+    pub calibrate: bool,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
@@ -30,15 +31,28 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             tare: command.tare_request != taken.tare,
             clear: command.clear_request != taken.clear,
             identify: command.identify_request != taken.identify,
+            calibrate: command.calibrate_request != taken.calibrate,
             commission: (command.commission_request != taken.commission).then(|| Task::of(command.commission_request)),
         };
         (taken.tare, taken.clear) = (command.tare_request, command.clear_request);
         taken.commission = command.commission_request;
+        let forgets = command.forget_request != taken.forget;
+        taken.forget = command.forget_request;
         // So it stays where nothing comes of it.
         if asked.commission.is_some_and(|task| task != Task::Stop) && !self.commission.running() {
             self.commission.refuse(commission::Refusal::NotReady);
         }
+        if forgets {
+            self.forget();
+        }
         asked
+    }
+
+    /// Forgets what presses and a scale told: parameters or gains are others now, or the host wants so.
+    pub(super) fn forget(&mut self) {
+        self.calibrator.forget();
+        self.scale.forget();
+        (self.status.calibration, self.status.scale) = (self.calibrator.standing(), self.scale.standing());
     }
 
     /// Answers what was asked for in a frame that a fault ended.
@@ -52,6 +66,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.status.identification = self.press.outcome();
         }
         self.status.commissioning = self.commission.outcome();
+        if asked.calibrate {
+            self.status.taken.calibrate = command.calibrate_request;
+            self.calibrator.refuse(Unfit::NotReady);
+            self.status.calibration = self.calibrator.standing();
+        }
     }
 
     /// Answers what was asked for, by what became of the mode.
@@ -69,10 +88,18 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         let about_to_drive =
             mode == Mode::Tare || self.tared && matches!(before, Mode::Off | Mode::Tare | Mode::Identify);
-        if asked.identify && (mode == Mode::Identify || !command.torque || !about_to_drive) {
+        if asked.identify && (self.press.running() || !command.torque || !about_to_drive) {
             self.status.taken.identify = command.identify_request;
-            if mode != Mode::Identify {
+            if !self.press.running() {
                 self.press.refuse(Refusal::NotReady);
+            }
+        }
+        // The one waits for the other, and for what a press before left to be worked out.
+        let waits = about_to_drive || self.tared && (mode == Mode::Identify || self.calibrator.busy());
+        if asked.calibrate && (self.calibrator.running() || !command.torque || !waits) {
+            self.status.taken.calibrate = command.calibrate_request;
+            if !self.calibrator.running() {
+                self.calibrator.refuse(Unfit::NotReady);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! What is known of each taxel beforehand: its gain, and whether to leave it out.
 
 use super::row::weight;
-use super::{GAIN_BITS, GAIN_MAX, GAIN_ONE};
+use super::{GAIN_BITS, GAIN_MAX, GAIN_ONE, Gains};
 use lanes::place;
 
 /// All columns of a row.
@@ -85,6 +85,13 @@ const fn weights<const COLUMNS: usize>(gains: &[u16; COLUMNS]) -> Weights<COLUMN
 impl<const ROWS: usize, const COLUMNS: usize> Calibration<ROWS, COLUMNS> {
     /// Gains of one, and every taxel counts.
     pub const NONE: Self = Self { weights: [weights(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
+
+    /// Of gains, and every taxel counts.
+    pub fn of(gains: &Gains<ROWS, COLUMNS>) -> Self {
+        let mut calibration = Self::NONE;
+        calibration.weights.iter_mut().zip(gains.rows()).for_each(|(to, gains)| *to = weights(gains));
+        calibration
+    }
 
     /// Takes gains in Q14 (`gains[row][column]`, [`GAIN_ONE`] is 1) and a mask with a bit for each column to leave out.
     ///

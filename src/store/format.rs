@@ -1,40 +1,57 @@
 //! A record's bytes.
 
-use super::names::{COUNT, NUMBERS};
+use super::names::{COUNT, NUMBERS, gains_number, gains_stand_apart};
 use super::{CRC, Record, old};
+use crate::pressure::Gains;
 
 const MAGIC: [u8; 4] = *b"FTPR";
 const HEADER_BYTES: usize = 12;
 /// More values than this no firmware writes.
-const VALUES_MAX: usize = 256;
+const VALUES_MAX: usize = 512;
 /// What flash reads after an erase.
 pub const BLANK: u8 = 0xFF;
 /// Where records may begin: every so many bytes.
 pub const GRID: usize = 16;
 
-/// From this firmware's record to the next one.
+/// From a record of this firmware whose gains are all 1 to the next one.
 pub const SLOT_BYTES: usize = slot_bytes(COUNT);
 
-const fn slot_bytes(count: usize) -> usize {
+/// From a record of so many values to the next one.
+pub const fn slot_bytes(count: usize) -> usize {
     (HEADER_BYTES + 8 * count + 4).next_multiple_of(GRID)
 }
 
-/// A record as it is written to flash.
-pub fn encode(record: &Record, sequence: u32) -> [u8; SLOT_BYTES] {
-    let mut slot = [BLANK; SLOT_BYTES];
-    let header = [u32::from_le_bytes(MAGIC), sequence, COUNT as u32];
+impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
+    /// From the longest record of this array to the next one.
+    pub const SLOT_MAX: usize = {
+        assert!(gains_stand_apart(ROWS, COLUMNS), "the gains' numbers are those of other values: rename one");
+        slot_bytes(COUNT + Gains::<ROWS, COLUMNS>::WORDS)
+    };
+
+    fn stored_gains(&self) -> usize {
+        if self.gains == Gains::ONE { 0 } else { Gains::<ROWS, COLUMNS>::WORDS }
+    }
+
+    /// From this record to the next one.
+    pub fn slot_bytes(&self) -> usize {
+        slot_bytes(COUNT + self.stored_gains())
+    }
+}
+
+/// A record as it is written to flash, word by word, up to where the next one may begin.
+pub fn words<const ROWS: usize, const COLUMNS: usize>(
+    record: &Record<ROWS, COLUMNS>,
+    sequence: u32,
+) -> impl Iterator<Item = u32> {
+    let (gains, length) = (record.stored_gains(), record.slot_bytes() / 4);
+    let header = [u32::from_le_bytes(MAGIC), sequence, (COUNT + gains) as u32];
     let values = NUMBERS.iter().zip(record.values()).flat_map(|(number, value)| [*number, value as u32]);
-    let words = header.into_iter().chain(values);
+    let first = const { gains_number(ROWS, COLUMNS) };
+    let gains = (0..gains).flat_map(move |word| [first.wrapping_add(word as u32), record.gains.word(word)]);
+    let body = header.into_iter().chain(values).chain(gains);
     let mut check = CRC.digest();
-    let mut places = slot.as_chunks_mut().0.iter_mut();
-    for (word, place) in words.zip(places.by_ref()) {
-        *place = word.to_le_bytes();
-        check.update(place);
-    }
-    if let Some(place) = places.next() {
-        *place = check.finalize().to_le_bytes();
-    }
-    slot
+    body.clone().for_each(|word| check.update(&word.to_le_bytes()));
+    body.chain([check.finalize()]).chain(core::iter::repeat(u32::from_le_bytes([BLANK; 4]))).take(length)
 }
 
 /// A whole record in flash.

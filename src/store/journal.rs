@@ -8,7 +8,7 @@
 //!   sector where the newest one's is full: each start says so until the next save, which goes behind that. An erase
 //!   that was cut short at such a time looks the same, and is told too.
 
-use super::format::{self, Found, GRID, SLOT_BYTES, encode};
+use super::format::{self, Found, GRID, words};
 use super::{Record, Remark, taken};
 
 /// One of the two.
@@ -64,9 +64,9 @@ pub enum SaveError<E> {
 
 /// What a start has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Loaded {
+pub struct Loaded<const ROWS: usize, const COLUMNS: usize> {
     /// The newest whole record, or the defaults.
-    pub record: Record,
+    pub record: Record<ROWS, COLUMNS>,
     /// Whether nothing was lost or refused.
     pub sound: bool,
 }
@@ -96,7 +96,11 @@ impl Journal {
 
     /// The newest whole record, as far as this firmware can take it. `tell` hears what it cannot.
     #[inline(never)]
-    pub fn load(&self, flash: &impl Flash, mut tell: impl FnMut(Remark)) -> Loaded {
+    pub fn load<const ROWS: usize, const COLUMNS: usize>(
+        &self,
+        flash: &impl Flash,
+        mut tell: impl FnMut(Remark),
+    ) -> Loaded<ROWS, COLUMNS> {
         let [own, other] = self.stands;
         let bytes = flash.bytes(self.current);
         let found = own.newest.and_then(|whole| Some((whole, format::read(bytes.get(whole.start..)?)?)));
@@ -108,7 +112,8 @@ impl Journal {
             return Loaded { record: Record::DEFAULT, sound: blank };
         };
         // A save goes to the other sector only where there is no room behind the newest, and the other one was erased.
-        let room = bytes.len().saturating_sub(whole.end) >= SLOT_BYTES;
+        // What it was to save may have been longer or shorter than that.
+        let room = bytes.len().saturating_sub(whole.end) >= Record::<ROWS, COLUMNS>::SLOT_MAX;
         let torn = own.end > whole.end || (!room && other.newest.is_none() && other.end > 0);
         if torn {
             tell(Remark::Torn);
@@ -117,16 +122,16 @@ impl Journal {
         Loaded { record, sound: taken && !torn }
     }
 
-    /// Erases the sector without the newest whole record where both are nearly full; says whether it did. For the
-    /// start: the core may stand for seconds.
+    /// Erases the sector without the newest whole record where both are nearly full, or have no room for a record of
+    /// `slot_max` bytes; says whether it did. For the start: the core may stand for seconds.
     ///
     /// # Errors
     /// The flash refuses, or is not blank afterwards.
-    pub fn make_room<F: Flash>(&mut self, flash: &mut F) -> Result<bool, SaveError<F::Error>> {
+    pub fn make_room<F: Flash>(&mut self, flash: &mut F, slot_max: usize) -> Result<bool, SaveError<F::Error>> {
         let [own, other] = self.stands;
         let low = |sector, stand: Stand| {
             let size = flash.bytes(sector).len();
-            size.saturating_sub(stand.end) < (size / 4).max(SLOT_BYTES)
+            size.saturating_sub(stand.end) < (size / 4).max(slot_max)
         };
         let erased = self.current.other();
         if !low(self.current, own) || (other.newest.is_none() && !low(erased, other)) {
@@ -143,14 +148,15 @@ impl Journal {
     /// # Errors
     /// There is no room, or the flash does not hold the record afterwards.
     #[inline(never)]
-    pub fn save<F: Flash>(
+    pub fn save<const ROWS: usize, const COLUMNS: usize, F: Flash>(
         &mut self,
         flash: &mut F,
-        record: &Record,
+        record: &Record<ROWS, COLUMNS>,
         between: impl FnMut(),
     ) -> Result<(), SaveError<F::Error>> {
         let [own, other] = self.stands;
-        let room = |sector, stand: Stand| flash.bytes(sector).len().saturating_sub(stand.end) >= SLOT_BYTES;
+        let length = record.slot_bytes();
+        let room = |sector, stand: Stand| flash.bytes(sector).len().saturating_sub(stand.end) >= length;
         if !room(self.current, own) {
             if other.newest.is_some() || !room(self.current.other(), other) {
                 return Err(SaveError::Full);
@@ -160,9 +166,9 @@ impl Journal {
         }
         let start = self.stands[0].end;
         let sequence = self.sequence.wrapping_add(1);
-        let written = write(flash, self.current, start, &encode(record, sequence), between);
+        let written = write(flash, self.current, start, || words(record, sequence), between);
         if written.is_ok() {
-            let end = start + SLOT_BYTES;
+            let end = start + length;
             self.sequence = sequence;
             self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence: Some(sequence) }) };
         } else {
@@ -173,21 +179,22 @@ impl Journal {
     }
 }
 
-fn write<F: Flash>(
+fn write<F: Flash, W: Iterator<Item = u32>>(
     flash: &mut F,
     sector: Sector,
     start: usize,
-    slot: &[u8; SLOT_BYTES],
+    words: impl Fn() -> W,
     mut between: impl FnMut(),
 ) -> Result<(), SaveError<F::Error>> {
-    for (place, word) in slot.as_chunks().0.iter().enumerate() {
+    for (place, word) in words().enumerate() {
         between();
-        if *word != [format::BLANK; 4] {
-            flash.program(sector, start + 4 * place, u32::from_le_bytes(*word)).map_err(SaveError::Flash)?;
+        if word.to_le_bytes() != [format::BLANK; 4] {
+            flash.program(sector, start + 4 * place, word).map_err(SaveError::Flash)?;
         }
     }
-    let held = flash.bytes(sector).get(start..start + SLOT_BYTES);
-    if held == Some(slot) { Ok(()) } else { Err(SaveError::Verify) }
+    let held = flash.bytes(sector).get(start..).unwrap_or_default().as_chunks().0;
+    let mut held = held.iter().map(|held| u32::from_le_bytes(*held));
+    if words().all(|word| held.next() == Some(word)) { Ok(()) } else { Err(SaveError::Verify) }
 }
 
 /// How a sector stands.

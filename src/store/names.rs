@@ -3,10 +3,11 @@
 use super::{BAUD_RATES, CRC, ID_MAX, Record};
 use crate::contact::FitLevel;
 use crate::params::Params;
+use crate::pressure::Gains;
 
 /// Values that stand before the parameters.
 const HEAD_COUNT: usize = 4;
-/// How many values this firmware has.
+/// How many values this firmware has without the gains.
 pub const COUNT: usize = HEAD_COUNT + Params::COUNT;
 
 /// Name, least and largest value of those before the parameters. The names are stored: they stay.
@@ -36,6 +37,30 @@ const fn numbers() -> [u32; COUNT] {
     numbers
 }
 
+/// The number under which an array's first two gains are stored; the next two are stored under the next one. Of another
+/// array's it is another.
+pub const fn gains_number(rows: usize, columns: usize) -> u32 {
+    let shape =
+        [b'0' + rows as u8 / 10, b'0' + rows as u8 % 10, b'x', b'0' + columns as u8 / 10, b'0' + columns as u8 % 10];
+    let mut digest = CRC.digest();
+    digest.update(b"gains_");
+    digest.update(&shape);
+    digest.finalize()
+}
+
+/// Whether no other value is stored under the numbers of an array's gains.
+pub const fn gains_stand_apart(rows: usize, columns: usize) -> bool {
+    let numbers = numbers();
+    let mut place = 0;
+    while place < COUNT {
+        if (numbers[place].wrapping_sub(gains_number(rows, columns)) as usize) < rows * columns {
+            return false;
+        }
+        place += 1;
+    }
+    true
+}
+
 const _: () = {
     let numbers = numbers();
     let mut one = 0;
@@ -54,8 +79,8 @@ pub fn ranges() -> impl Iterator<Item = (&'static str, i32, i32)> {
     HEAD.into_iter().chain(Params::RANGES.iter().map(|(name, _, min, max)| (*name, *min, *max)))
 }
 
-impl Record {
-    /// The values in order.
+impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
+    /// The values in order, without the gains.
     pub(super) fn values(&self) -> [i32; COUNT] {
         let head = [self.id, self.baud_code, self.return_delay_2us, self.fit_level as u8];
         let mut values = [0; COUNT];
@@ -66,7 +91,7 @@ impl Record {
         values
     }
 
-    /// The inverse, for values in their ranges.
+    /// The inverse, for values in their ranges; gains of 1.
     pub(super) fn from_values(values: &[i32; COUNT]) -> Self {
         let [id, baud_code, return_delay_2us, fit_level, rest @ ..] = values;
         let [id, baud_code, return_delay_2us, fit_level] =
@@ -77,6 +102,7 @@ impl Record {
             return_delay_2us,
             fit_level: FitLevel::from_number(fit_level),
             params: Params::from_array(rest),
+            gains: Gains::ONE,
         }
     }
 }

@@ -2,9 +2,10 @@
 
 use super::Record;
 use super::format::Found;
-use super::names::{NUMBERS, ranges};
+use super::names::{NUMBERS, gains_number, ranges};
 use crate::config::ConfigError;
 use crate::params::{ParamError, Params};
+use crate::pressure::Gains;
 
 /// What is to be told of a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,11 +29,23 @@ pub enum Remark {
 }
 
 /// The values that this firmware knows, and whether all of those were taken.
+///
+/// Gains are taken all or not at all.
 #[inline(never)]
-pub fn take(found: &Found<'_>, mut tell: impl FnMut(Remark)) -> (Record, bool) {
-    let mut values = Record::DEFAULT.values();
+pub fn take<const ROWS: usize, const COLUMNS: usize>(
+    found: &Found<'_>,
+    mut tell: impl FnMut(Remark),
+) -> (Record<ROWS, COLUMNS>, bool) {
+    let mut values = Record::<ROWS, COLUMNS>::DEFAULT.values();
     let mut sound = true;
+    let (mut gains, mut taken) = (Gains::ONE, 0);
+    let first = const { gains_number(ROWS, COLUMNS) };
     for (number, value) in found.values() {
+        let word = number.wrapping_sub(first) as usize;
+        if word < Gains::<ROWS, COLUMNS>::WORDS {
+            taken += usize::from(gains.set_word(word, value.cast_unsigned()));
+            continue;
+        }
         let mut known = values.iter_mut().zip(ranges()).zip(&NUMBERS);
         match known.find(|(_, own)| **own == number) {
             None => tell(Remark::Unknown { number, value }),
@@ -48,7 +61,15 @@ pub fn take(found: &Found<'_>, mut tell: impl FnMut(Remark)) -> (Record, bool) {
             tell(Remark::New(name));
         }
     }
-    (Record::from_values(&values), sound)
+    let mut record = Record::from_values(&values);
+    if taken == Gains::<ROWS, COLUMNS>::WORDS {
+        record.gains = gains;
+    } else if found.values().any(|(number, _)| (number.wrapping_sub(first) as usize) < Gains::<ROWS, COLUMNS>::WORDS) {
+        sound = false;
+        let [min, max] = [Gains::<ROWS, COLUMNS>::MIN, Gains::<ROWS, COLUMNS>::MAX].map(i32::from);
+        tell(Remark::Refused(ParamError { name: "gains", value: taken as i32, min, max }));
+    }
+    (record, sound)
 }
 
 /// Makes something of the parameters; those that contradict each other go back to their defaults, and `tell` hears why.

@@ -1,5 +1,6 @@
 //! The commands, one module each.
 
+pub mod calibrate;
 pub mod commission;
 pub mod info;
 pub mod latency;

@@ -3,7 +3,9 @@
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
-use fingertip_cli::commands::{commission, info, latency, params, press, record, recover, scan, stream, tare, view};
+use fingertip_cli::commands::{
+    calibrate, commission, info, latency, params, press, record, recover, scan, stream, tare, view,
+};
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
 use std::process::ExitCode;
@@ -57,6 +59,9 @@ enum Command {
     Commission(commission::Command),
     /// Touch, hold a force for a while, let go
     Press(press::Args),
+    /// Find the taxels' gains by presses onto a hard flat plate, and the scale of forces by a kitchen scale
+    #[command(subcommand)]
+    Calibrate(calibrate::Command),
     /// Clear what stopped the motor, and say what stands in the way
     Recover,
     /// Measure how long answers take: reads without a pause
@@ -97,6 +102,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
         Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
+        Command::Calibrate(command) => calibrate::run(command, &mut connect()?, cli.json),
         Command::Recover => recover::run(&mut connect()?, cli.json),
         Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
         Command::Completions { shell } => {

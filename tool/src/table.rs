@@ -88,7 +88,7 @@ fn begins_alike(a: &str, b: &str) -> bool {
 
 /// Whether it outlives a reset once it is saved.
 pub fn is_stored(register: &Register) -> bool {
-    matches!(register.access, Access::Stored | Access::StoredLive)
+    register.count == 1 && matches!(register.access, Access::Stored | Access::StoredLive)
 }
 
 /// All that are.

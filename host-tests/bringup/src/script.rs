@@ -38,6 +38,11 @@ const UNASKED: Command = Command {
     tare_request: 1,
     clear_request: 0,
     identify_request: 0,
+    commission_request: 0,
+    calibrate_request: 0,
+    forget_request: 0,
+    shown_request: 0,
+    shown_mn: 0,
 };
 
 /// How the force answered to a goal.

@@ -3,6 +3,7 @@
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
 use crc::{CRC_64_XZ, Crc, Table};
+use fingertip::calibrate::{Standing, scale};
 use fingertip::command::Command;
 use fingertip::contact::Contact;
 use fingertip::contact::FitLevel;
@@ -13,7 +14,7 @@ use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::units::{CoreCycles, Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x04";
+pub const MAGIC: [u8; 8] = *b"fingert\x05";
 
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,7 +29,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 13 + 11;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 13 + 18;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -50,12 +51,15 @@ impl Record {
         put(&[u8::from(*bridge_fault)]);
         put(&answer.0.to_le_bytes());
         // A recording asks for no commissioning.
-        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =
-            command;
+        let Command { torque, goal, bus_watchdog_ms, fit_level, commission_request: _, .. } = command;
+        let Command { tare_request, clear_request, identify_request, .. } = command;
+        let Command { calibrate_request, forget_request, shown_request, shown_mn, .. } = command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
         put(&bus_watchdog_ms.to_le_bytes());
         put(&[*fit_level as u8, *tare_request, *clear_request, *identify_request]);
+        put(&[*calibrate_request, *forget_request, *shown_request]);
+        put(&shown_mn.to_le_bytes());
         bytes
     }
 
@@ -81,6 +85,10 @@ impl Record {
             clear_request: u8::from_le_bytes(take(&mut rest)),
             identify_request: u8::from_le_bytes(take(&mut rest)),
             commission_request: 0,
+            calibrate_request: u8::from_le_bytes(take(&mut rest)),
+            forget_request: u8::from_le_bytes(take(&mut rest)),
+            shown_request: u8::from_le_bytes(take(&mut rest)),
+            shown_mn: i32::from_le_bytes(take(&mut rest)),
         };
         Self { frame, sense, command }
     }
@@ -125,6 +133,8 @@ impl Digest {
             speed,
             duty: applied,
             identification,
+            calibration,
+            scale,
             tare,
             taken,
             // No recording asks for one.
@@ -145,7 +155,15 @@ impl Digest {
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
             self.0.update(&bits.to_le_bytes());
         }
-        let Taken { tare: tares, clear: clears, identify: identifies, commission: _ } = taken;
+        let Taken { tare: tares, clear: clears, identify: identifies, commission: _, .. } = taken;
+        let Taken { calibrate: calibrates, forget: forgets, shown, .. } = taken;
+        let Standing { state, progress, presses, reached, proposals } = calibration;
+        self.0.update(&[state.number(), state.refusal(), progress, presses, proposals, calibrates, forgets]);
+        self.0.update(&reached.to_le_bytes());
+        let scale::Standing { refusal, points, factor_ppm, sigma_ppm } = scale;
+        self.0.update(&[refusal.map_or(0, |refusal| refusal as u8), points, shown]);
+        self.0.update(&factor_ppm.to_le_bytes());
+        self.0.update(&sigma_ppm.to_le_bytes());
         self.0.update(&[identification.number(), identification.refusal(), tare as u8, tares, clears, identifies]);
         self.0.update(&limits.0.to_le_bytes());
         self.0.update(&duty.0.to_le_bytes());

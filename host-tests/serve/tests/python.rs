@@ -98,6 +98,14 @@ fn the_examples_stream_show_set_and_recover() {
 
     let drive = served.example("commission.py", &["--yes", "--save"]);
     assert!(drive.contains("torque_constant_unm_per_a ") && drive.ends_with("accepted\n"), "{drive}");
+    // A wall is a plate, and its finger has no spread: what is proposed is near to 1.
+    let arguments = ["--modulus", "--presses", "2", "--no-wait", "--holds", "1.5", "--shown", "160", "--save"];
+    let calibrated = served.example("calibrate.py", &arguments);
+    assert!(
+        calibrated.contains("press 2: ") && calibrated.ends_with("done: tare before the next press\n"),
+        "{calibrated}"
+    );
+    assert!(calibrated.contains("forces times 1.04") || calibrated.contains("forces times 1.05"), "{calibrated}");
 
     served.command("fault supply-low");
     served.command("mend");

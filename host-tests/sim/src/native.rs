@@ -3,6 +3,7 @@
 //! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came
 //! of a frame acts three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
 
+pub mod bench;
 mod clock;
 mod digest;
 pub mod served;
@@ -18,14 +19,14 @@ use crate::mechanics::contact::Place;
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::scene::controller;
-use crate::watch::{Controller, Cost, Step, Summary, Watch};
+use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
 pub use clock::Clock;
 use core::ops::Range;
 use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
-use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
 
@@ -64,6 +65,21 @@ pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Sum
     simulate_from::<E>(scene, Begun::default(), watch)
 }
 
+/// [`simulate`] with gains of the first finger's taxels, Q14.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_calibrated(
+    scene: &Scene,
+    gains: &fingertip::shipped::Gains,
+    watch: &mut dyn Watch,
+) -> Result<Summary, SimError> {
+    let mut board = Board::<Named>::new(scene, Begun::default())?;
+    board.units[0].pipeline.calibrate(&Calibration::of(gains));
+    board.calibration = Some(watch::Gains { gains_q14: *gains.rows(), masks: [0; ROWS] });
+    board.whole(scene, Instant::now(), watch)
+}
+
 /// Where time stands when a run begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Begun {
@@ -79,17 +95,7 @@ pub struct Begun {
 /// As [`simulate`].
 pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
-    let mut board = Board::<E>::new(scene, begun)?;
-    board.tare(watch);
-    let set_up_s = started.elapsed().as_secs_f64();
-    board.run(scene, watch);
-    Ok(Summary {
-        virtual_s: board.time_s(),
-        set_up_s,
-        wall_s: started.elapsed().as_secs_f64() - set_up_s,
-        ledger: board.costs(scene),
-        digest: board.digest.hex(),
-    })
+    Board::<E>::new(scene, begun)?.whole(scene, started, watch)
 }
 
 /// A finger's controller and what lies between it and the world.
@@ -116,6 +122,8 @@ struct Board<E: Set> {
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
+    /// What the first finger was given beside its parameters.
+    calibration: Option<watch::Gains>,
 }
 
 impl<E: Set> Board<E> {
@@ -155,12 +163,28 @@ impl<E: Set> Board<E> {
             slot_s,
             longest_s,
             digest: Digest::new(),
+            calibration: None,
+        })
+    }
+
+    /// Tares and runs.
+    fn whole(mut self, scene: &Scene, started: Instant, watch: &mut dyn Watch) -> Result<Summary, SimError> {
+        self.tare(watch);
+        let set_up_s = started.elapsed().as_secs_f64();
+        self.run(scene, watch);
+        Ok(Summary {
+            virtual_s: self.time_s(),
+            set_up_s,
+            wall_s: started.elapsed().as_secs_f64() - set_up_s,
+            ledger: self.costs(scene),
+            digest: self.digest.hex(),
         })
     }
 
     fn tare(&mut self, watch: &mut dyn Watch) {
-        let controller = Controller { params: self.params, calibration: None };
-        watch.begin(&vec![controller; self.units.len()]);
+        let mut controllers = vec![Controller { params: self.params, calibration: None }; self.units.len()];
+        controllers[0].calibration = self.calibration.take();
+        watch.begin(&controllers);
         let tare_frames = TARE_FRAMES + 2;
         self.start = self.clock;
         self.start.go_on(f64::from(tare_frames) * self.slot_s * SLOTS as f64);

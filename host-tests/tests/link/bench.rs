@@ -8,9 +8,9 @@ use fingertip::link::{Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
+use fingertip::shipped::Record;
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, Proposal, REGISTERS, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
-use fingertip::store::Record;
 
 /// The ID of the device under test.
 pub const ID: u8 = 1;
@@ -38,6 +38,7 @@ pub struct Bench {
     tare: [[i32; COLUMNS]; ROWS],
     /// The time, which stands.
     pub tick_ms: u32,
+    pub proposal: Proposal,
 }
 
 impl Bench {
@@ -58,6 +59,7 @@ impl Bench {
             taxels: by_place(|place| 20_000 + place),
             tare: by_place(|place| (300 + place) << TARE_BITS),
             tick_ms: 0x1_8123,
+            proposal: Proposal::NONE,
         }
     }
 
@@ -83,7 +85,7 @@ impl Bench {
         if tare != self.status.taken.tare {
             self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
         }
-        self.status.taken = Taken { tare, clear, identify, commission };
+        self.status.taken = Taken { tare, clear, identify, commission, ..self.status.taken };
     }
 
     /// What the bus sends in return, packet by packet.
@@ -111,6 +113,7 @@ impl Bench {
             taxels: &self.taxels,
             pascals_per_sum_q32: 10 << 32,
             tare: &self.tare,
+            proposal: &self.proposal,
         };
         let mut reply = Reply::new();
         let mut replies = Vec::new();
@@ -141,6 +144,12 @@ impl Bench {
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, u8> {
         let answer = self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat());
         if answer.number() == 0 { Ok(answer.data) } else { Err(answer.number()) }
+    }
+
+    /// Writes a parameter.
+    pub fn write_parameter(&mut self, name: &str, value: i32) {
+        let register = REGISTERS.iter().find(|register| register.name == name).expect("a parameter");
+        self.write(register.address, &value.to_le_bytes()).expect("a write");
     }
 
     /// Writes bytes.

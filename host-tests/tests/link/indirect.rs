@@ -178,7 +178,7 @@ fn indirection_reaches_every_parameter() {
     let mut bench = Bench::new();
     let last = address::PARAMS + 4 * (Params::COUNT as u16 - 1);
     let stored = REGISTERS.iter().filter(|register| register.access == Access::Stored && register.address >= 64);
-    assert_eq!(stored.count(), Params::COUNT);
+    assert_eq!(stored.count(), Params::COUNT + 1, "and the gains");
     lead(&mut bench, BLOCKS[0].0, 0, last, 4);
     let value = bench.read(last, 4).expect("a parameter");
     assert_eq!(bench.write(BLOCKS[0].1, &value), Ok(()));

@@ -1,9 +1,11 @@
 //! What each instruction does, and when it is answered.
 
 use fingertip::contact::FitLevel;
-use fingertip::link::{Actions, Settings};
+use fingertip::link::Actions;
+use fingertip::params::Params;
+use fingertip::shipped::Record;
+use fingertip::shipped::Settings;
 use fingertip::shipped::address;
-use fingertip::store::Record;
 
 use crate::bench::{Answer, Bench, ID, hex, packet};
 
@@ -80,16 +82,20 @@ fn reboot_is_answered_first() {
 
 #[test]
 fn factory_reset_keeps_what_it_is_told_to() {
-    let mut params = Record::DEFAULT.params;
+    let mut params = Params::DEFAULT;
     params.pitch_um = 2_000;
     params.direction_confirmed = 1;
-    let record = Record { id: 9, baud_code: 4, return_delay_2us: 3, fit_level: FitLevel::AllRows, params };
+    let record =
+        Record { id: 9, baud_code: 4, return_delay_2us: 3, fit_level: FitLevel::AllRows, params, ..Record::DEFAULT };
     for (kind, id, baud_code) in [(0x01, 9, 3), (0x02, 9, 4), (0xFF, 1, 3)] {
         let mut bench = Bench::with(record);
         assert_eq!(bench.ask(0x06, &[kind]), Answer { id: 9, error: 0, data: vec![] });
         assert_eq!(bench.server.settings().record, Record { id, baud_code, ..Record::DEFAULT });
         let actions = bench.server.take_actions();
-        assert_eq!(actions, Actions { reboot: false, save: true, configure: true, baud: baud_code != 4 });
+        assert_eq!(
+            actions,
+            Actions { reboot: false, save: true, configure: true, calibrate: false, baud: baud_code != 4 }
+        );
     }
     let mut bench = Bench::with(record);
     assert_eq!(bench.ask_as(BROADCAST, 0x06, &[0xFF]), None);

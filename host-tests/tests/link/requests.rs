@@ -1,10 +1,11 @@
 //! Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went
 //! can be read.
 
+use fingertip::calibrate::{Refusal as Unfit, Standing, State, scale};
 use fingertip::command::Command;
 use fingertip::identify::{Identification, Refusal};
 use fingertip::pipeline::Taring;
-use fingertip::shipped::address;
+use fingertip::shipped::{Gains, address};
 use fingertip::state::{Fault, Limits, Mode};
 
 use crate::bench::{Bench, ID, packet};
@@ -143,4 +144,77 @@ fn an_old_outcome_is_never_taken_for_that_of_a_new_request() {
     assert_eq!(bench.number(address::IDENTIFY_STATE, 1), 1);
     bench.take_up();
     assert_eq!(bench.number(address::IDENTIFY_STATE, 1), 3);
+}
+
+/// A press needs torque and a tare, as a measurement of the modulus; what it proposes is accepted with torque off, where
+/// there is something.
+#[test]
+fn a_calibration_is_asked_for_and_accepted_where_that_can_be() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.write(address::CALIBRATE, &[1]), RESULT, "no torque");
+    assert_eq!(bench.write(address::CALIBRATE, &[3]), RESULT, "no proposal");
+    assert_eq!(bench.write(address::SCALE, &[3]), RESULT, "no number");
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("a write");
+    assert_eq!(bench.write(address::CALIBRATE, &[1]), Ok(()));
+    assert_eq!((bench.server.command().calibrate_request, bench.number(address::CALIBRATE_STATE, 1)), (1, 1));
+    bench.status.calibration =
+        Standing { state: State::Refused(Unfit::Soft), presses: 1, reached: 70, ..Standing::default() };
+    bench.status.taken.calibrate = 1;
+    bench.status.scale = scale::Standing { points: 2, factor_ppm: 1_250_000, sigma_ppm: 900, refusal: None };
+    assert_eq!((bench.number(address::CALIBRATE_STATE, 1), bench.number(address::CALIBRATE_REFUSAL, 1)), (3, 1));
+    assert_eq!(bench.number(address::CALIBRATE_TAXELS, 2), 70);
+    for place in 0..100 {
+        assert!(bench.proposal.gains.set(place, 12_000 + 50 * place as u16));
+        bench.proposal.sigmas[place / 10][place % 10] = place as u8;
+    }
+    assert_eq!(bench.number(address::PROPOSED_GAINS + 2 * 99, 2), 12_000 + 50 * 99);
+    assert_eq!(bench.number(address::PROPOSED_SIGMAS + 42, 1), 42);
+    // With torque on neither is accepted, nor while a press is worked out.
+    assert_eq!(bench.write(address::CALIBRATE, &[3]), Err(7));
+    assert_eq!(bench.write(address::SCALE, &[3]), Err(7));
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("a write");
+    bench.server.take_actions();
+    let standing = bench.status.calibration;
+    bench.status.calibration.state = State::Running;
+    assert_eq!(bench.write(address::CALIBRATE, &[3]), RESULT);
+    bench.status.calibration = standing;
+    let params = bench.server.settings().record.params;
+    assert_eq!(bench.server.settings().record.gains, Gains::ONE);
+    assert_eq!(bench.write(address::CALIBRATE, &[3]), Ok(()));
+    assert_eq!(bench.server.settings().record.gains, bench.proposal.gains);
+    assert_eq!((bench.server.settings().record.params, bench.number(address::SAVED_STATE, 1)), (params, 1));
+    let actions = bench.server.take_actions();
+    assert!(actions.calibrate && !actions.configure);
+    // A quarter more force for each code: fewer codes for a kPa, and a tip that is harder by that.
+    assert_eq!(bench.write(address::SCALE, &[3]), Ok(()));
+    let after = bench.server.settings().record.params;
+    assert_eq!((after.codes_per_kpa_milli, after.modulus_pa), (19_200, 312_500));
+    assert!(bench.server.take_actions().configure);
+}
+
+/// What the factor would make of a parameter must be in its range.
+#[test]
+fn a_factor_that_leads_out_of_range_changes_nothing() {
+    let mut bench = Bench::new();
+    bench.write_parameter("modulus_pa", 1_900_000);
+    bench.status.scale = scale::Standing { points: 1, factor_ppm: 1_100_000, sigma_ppm: 900, refusal: None };
+    let before = *bench.server.settings();
+    assert_eq!(bench.write(address::SCALE, &[3]), Err(4));
+    assert_eq!(*bench.server.settings(), before);
+}
+
+#[test]
+fn a_scale_s_number_is_passed_on_and_waits_for_the_loop() {
+    let mut bench = Bench::new();
+    assert_eq!(bench.number(address::SCALE_POINTS, 1), 0);
+    bench.write(address::SCALE_SHOWS_MN, &1_234i32.to_le_bytes()).expect("a write");
+    let command = bench.server.command();
+    assert_eq!((command.shown_request, command.shown_mn, bench.number(address::SCALE_POINTS, 1)), (1, 1_234, 255));
+    bench.status.taken.shown = 1;
+    bench.status.scale.refusal = Some(scale::Refusal::Contradiction);
+    assert_eq!((bench.number(address::SCALE_POINTS, 1), bench.number(address::SCALE_REFUSAL, 1)), (0, 5));
+    for address in [address::CALIBRATE, address::SCALE] {
+        bench.write(address, &[2]).expect("a write");
+    }
+    assert_eq!(bench.server.command().forget_request, 2);
 }

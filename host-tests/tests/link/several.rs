@@ -1,8 +1,8 @@
 //! Sync, Bulk, Fast Sync and Fast Bulk instructions: several devices on one bus, each hearing what the others send.
 
 use fingertip::link::crc;
+use fingertip::shipped::Record;
 use fingertip::shipped::address;
-use fingertip::store::Record;
 
 use crate::bench::{Bench, answer, hex, packet};
 

@@ -2,7 +2,9 @@
 
 use crate::fleet::{crc32, named, names, of_before, of_values};
 use crate::nor::{Nor, bits, record};
-use fingertip::store::{Flash as _, Journal, Loaded, Record, Remark, SLOT_BYTES, SaveError, Sector, encode};
+use fingertip::shipped::{Loaded, Record};
+use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector};
+use host_tests::encode;
 
 const SIZE: usize = 8 * SLOT_BYTES;
 
@@ -36,7 +38,7 @@ fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
             journal.load(&nor, |remark| assert_eq!(remark, Remark::NoneWhole)),
             Loaded { record: Record::DEFAULT, sound: false }
         );
-        assert_eq!(journal.make_room(&mut nor), Ok(both));
+        assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(both));
         assert_eq!(journal.save(&mut nor, &record(1), || ()), Ok(()));
         let journal = Journal::new(&nor);
         assert_eq!(journal.load(&nor, |_| ()), Loaded { record: record(1), sound: true });
@@ -148,7 +150,7 @@ fn a_sector_with_older_records_is_not_written_before_it_is_erased() {
     assert_eq!(journal.save(&mut nor, &record(7), || ()), Ok(()));
     assert_eq!(journal.save(&mut nor, &record(8), || ()), Err(SaveError::Full));
     let mut journal = Journal::new(&nor);
-    assert_eq!(journal.make_room(&mut nor), Ok(true));
+    assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(true));
     assert_eq!(journal.save(&mut nor, &record(8), || ()), Ok(()));
     assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(8), sound: true });
 }

@@ -2,7 +2,8 @@
 
 use crate::nor::record;
 use fingertip::params::Params;
-use fingertip::store::{Record, number};
+use fingertip::shipped::Record;
+use fingertip::store::number;
 
 /// CRC-32 (ISO-HDLC), bit by bit.
 pub fn crc32(bytes: &[u8]) -> u32 {

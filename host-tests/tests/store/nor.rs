@@ -4,12 +4,22 @@
 //! the word that was programmed any of its bits undone, and of an erase any mixture: see [`Cut`].
 
 use fingertip::params::Params;
-use fingertip::store::{Flash, Journal, Loaded, Record, SaveError, Sector};
+use fingertip::shipped::{Loaded, Record, TAXELS};
+use fingertip::store::{Flash, Journal, SLOT_BYTES, SaveError, Sector};
 
 /// A record that another pitch does not make.
 pub fn record(number: i32) -> Record {
     let params = Params { pitch_um: 500 + number, ..Params::DEFAULT };
     Record { id: (number % 253) as u8, baud_code: 4, return_delay_2us: 7, params, ..Record::DEFAULT }
+}
+
+/// The same with gains that no other number has, in every taxel.
+pub fn with_gains(number: i32) -> Record {
+    let mut record = record(number);
+    for place in 0..TAXELS {
+        assert!(record.gains.set(place, 8_192 + (131 * place as u16).wrapping_add(7 * number as u16) % 24_000));
+    }
+    record
 }
 
 /// SplitMix64: the same bits in every run.
@@ -149,6 +159,8 @@ impl Flash for Nor {
 pub struct Board {
     pub nor: Nor,
     journal: Journal,
+    /// The longest record that it saves.
+    pub slot: usize,
     /// The newest record that is known to be whole.
     pub kept: Option<Record>,
     /// The record that was being saved when the power was lost.
@@ -166,7 +178,17 @@ pub struct Board {
 impl Board {
     pub fn new(nor: Nor, kept: Option<Record>) -> Self {
         let journal = Journal::new(&nor);
-        Self { nor, journal, kept, tried: None, trace: false, told: false, erase_torn: false, false_alarms: 0 }
+        Self {
+            nor,
+            journal,
+            slot: SLOT_BYTES,
+            kept,
+            tried: None,
+            trace: false,
+            told: false,
+            erase_torn: false,
+            false_alarms: 0,
+        }
     }
 
     /// Starts as the board does, and checks what comes up: the old values or the new ones, and a fault where the new
@@ -185,7 +207,7 @@ impl Board {
             self.false_alarms += 1;
         }
         self.tried = None;
-        let made = self.journal.make_room(&mut self.nor);
+        let made = self.journal.make_room(&mut self.nor, self.slot);
         if self.nor.done.contains(&Done::Erase) {
             self.erase_torn = !self.nor.powered;
             // What told it may be erased by now.

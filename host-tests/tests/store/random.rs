@@ -73,9 +73,9 @@ proptest! {
         }
         let mut journal = Journal::new(&nor);
         let loaded = journal.load(&nor, |_| ());
-        prop_assert_eq!(loaded.record, fingertip::store::Record::DEFAULT);
+        prop_assert_eq!(loaded.record, fingertip::shipped::Record::DEFAULT);
         prop_assert_eq!(loaded.sound, [Sector::A, Sector::B].iter().all(|sector| nor.bytes(*sector).iter().all(|byte| *byte == 0xFF)));
-        let _ = journal.make_room(&mut nor);
+        let _ = journal.make_room(&mut nor, SLOT_BYTES);
         let _ = journal.save(&mut nor, &record(1), || ());
     }
 }

@@ -1,10 +1,11 @@
 //! What a firmware takes of another firmware's values, and what it says of the rest.
 
-use crate::fleet::{BEFORE, LACKED, OTHERS, Other, named, of_values};
-use crate::nor::{Nor, record};
+use crate::fleet::{BEFORE, LACKED, OTHERS, Other, crc32, named, of_values};
+use crate::nor::{Nor, record, with_gains};
 use fingertip::params::{ParamError, Params};
-use fingertip::shipped::Config;
-use fingertip::store::{Journal, Loaded, Record, Remark, SLOT_BYTES, Sector, number, settle};
+use fingertip::shipped::{Config, Gains, Loaded, Record};
+use fingertip::store::{Journal, Remark, SLOT_BYTES, Sector, number, settle};
+use host_tests::encode;
 
 fn start(bytes: &[u8]) -> (Loaded, Vec<Remark>) {
     let mut nor = Nor::blank(4 * SLOT_BYTES);
@@ -63,6 +64,60 @@ fn a_value_out_of_its_range_is_its_default_and_a_fault() {
             assert_eq!(named(&loaded.record), values);
         }
     }
+}
+
+/// The gains as their documentation has them: two in a value, the first in its low half.
+fn with_gains_of(record: &Record, words: core::ops::Range<u32>, change: impl Fn(u32, u32) -> u32) -> Vec<u8> {
+    let mut bytes = of_values(&named(record), 1);
+    let values = bytes.len().saturating_sub(16) / 8;
+    let count = named(record).len() + words.len();
+    assert!(values <= count);
+    bytes.truncate(12 + 8 * named(record).len());
+    bytes[8..12].copy_from_slice(&(count as u32).to_le_bytes());
+    for word in words {
+        bytes.extend((crc32(b"gains_10x10").wrapping_add(word)).to_le_bytes());
+        bytes.extend(change(word, record.gains.word(word as usize)).to_le_bytes());
+    }
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    bytes.resize(bytes.len().next_multiple_of(16), 0xFF);
+    bytes
+}
+
+#[test]
+fn gains_are_stored_two_in_a_value_behind_the_parameters() {
+    let record = with_gains(4);
+    let bytes = with_gains_of(&record, 0..50, |_, gains| gains);
+    assert_eq!(bytes, encode(&record, 1));
+    assert_eq!(start_of(&bytes), (Loaded { record, sound: true }, vec![]));
+}
+
+#[test]
+fn gains_are_taken_all_or_not_at_all() {
+    let whole = with_gains(4);
+    let expected = Record { gains: Gains::ONE, ..whole };
+    let refused = |bytes: &[u8], taken| {
+        let error = ParamError { name: "gains", value: taken, min: 8_192, max: 32_767 };
+        assert_eq!(start_of(bytes), (Loaded { record: expected, sound: false }, vec![Remark::Refused(error)]));
+    };
+    refused(&with_gains_of(&whole, 0..49, |_, gains| gains), 49);
+    refused(&with_gains_of(&whole, 1..50, |_, gains| gains), 49);
+    for bad in [0, 8_191, 0x8000, 0xFFFF] {
+        refused(
+            &with_gains_of(&whole, 0..50, |word, gains| if word == 17 { gains & 0xFFFF | bad << 16 } else { gains }),
+            49,
+        );
+    }
+    // None, or another array's: what this firmware has no name for.
+    let (loaded, remarks) = start_of(&with_gains_of(&whole, 50..60, |_, gains| gains));
+    assert_eq!(loaded, Loaded { record: expected, sound: true });
+    assert_eq!(remarks.len(), 10);
+}
+
+fn start_of(bytes: &[u8]) -> (Loaded, Vec<Remark>) {
+    let mut nor = Nor::blank(4 * Record::SLOT_MAX);
+    nor.sector(Sector::A)[..bytes.len()].copy_from_slice(bytes);
+    let mut remarks = Vec::new();
+    (Journal::new(&nor).load(&nor, |remark| remarks.push(remark)), remarks)
 }
 
 #[test]

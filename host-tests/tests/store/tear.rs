@@ -1,8 +1,10 @@
 //! Power lost at every word of a save and of an erase, twice in a row, from every state that the sectors may be in.
 
 use crate::fleet::{OTHERS, Other};
-use crate::nor::{Board, Cut, Done, Nor, RESTS, Rest, bits, record};
-use fingertip::store::{Record, SLOT_BYTES, Sector, encode};
+use crate::nor::{Board, Cut, Done, Nor, RESTS, Rest, bits, record, with_gains};
+use fingertip::shipped::Record;
+use fingertip::store::{SLOT_BYTES, Sector};
+use host_tests::encode;
 
 /// Slots of a small sector.
 const SLOTS: usize = 5;
@@ -181,6 +183,39 @@ fn sectors_of_the_real_size_are_torn_too() {
     }
     println!("{cases} cases with sectors of 128 KiB");
     assert!(cases > 1_000);
+}
+
+/// Gains come and go: a record with them is longer. Whatever is cut, what comes up is one record as a whole, and old or
+/// new.
+#[test]
+fn gains_torn_anywhere_are_the_old_ones_or_the_new_ones() {
+    let size = 4 * Record::SLOT_MAX;
+    let made = |number: i32| if number % 3 == 0 { record(number) } else { with_gains(number) };
+    let mut cases = 0;
+    for count in 0..12 {
+        let mut board = Board::new(Nor::blank(size), None);
+        board.slot = Record::SLOT_MAX;
+        for number in 0..count {
+            board.start(None);
+            assert_eq!(board.save(made(number)), Ok(()));
+        }
+        let next = made(count);
+        let mut whole = board.clone();
+        whole.start(None);
+        assert_eq!(whole.save(next), Ok(()));
+        for cut in cuts(&whole.nor.done, size / 4, 61, true) {
+            let mut torn = board.clone();
+            torn.start(Some(cut));
+            let _ = torn.save(next);
+            torn.start(None);
+            torn.start(None);
+            assert_eq!(torn.save(with_gains(100)), Ok(()), "{count} records, {cut:?}");
+            torn.start(None);
+            cases += 1;
+        }
+    }
+    println!("{cases} cases of records with gains");
+    assert!(cases > 4_000);
 }
 
 #[test]

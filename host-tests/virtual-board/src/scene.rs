@@ -25,9 +25,9 @@ use crate::surroundings::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
 use fingertip::params::Params;
-use fingertip::shipped::{Config, TARE_FRAMES, address};
-use fingertip::store::{self, Record};
+use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
 use host::{Host, Shown};
+use host_tests::encode;
 use rigless::soc::Width;
 use sim::SimError;
 use sim::effects::link::{self, Stages as _};
@@ -89,8 +89,7 @@ impl Boards {
         let start_ns = (BOOT_NS + tare_ns + SET_UP_NS).next_multiple_of(MS);
         let moves_from_s = -(MS as f64) * 1e-9;
         let record = Record { params, baud_code: BAUD_CODE, return_delay_2us: 0, ..Record::DEFAULT };
-        let options =
-            Options { presets: vec![(flash::SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() };
+        let options = Options { presets: vec![(flash::SECTOR.start, encode(&record, 0))], ..Options::default() };
         let mut rigs = Vec::new();
         let clock = Clock::new(start_ns);
         for (number, finger) in Finger::all(scene, clock, moves_from_s)?.into_iter().enumerate() {

@@ -6,7 +6,9 @@ mod common;
 
 use common::{WAIT_NS, image, read_u8, read_u32};
 use fingertip::link::table::address;
-use fingertip::store::{Record, SLOT_BYTES, encode};
+use fingertip::shipped::Record;
+use fingertip::store::SLOT_BYTES;
+use host_tests::encode;
 use host_tests::plant::{Setup, World};
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
 use virtual_board::{Options, Rig};

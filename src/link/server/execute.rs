@@ -47,6 +47,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             instruction::FAST_BULK_READ if !own => self.fast_bulk_read(params, snapshot, reply),
             _ => {
                 let result = self.change(packet, own);
+                self.accept(snapshot);
                 self.conclude(packet, level, result, reply);
             }
         }
@@ -109,19 +110,30 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         Ok(())
     }
 
-    fn staged(&self) -> Staged {
-        Staged { settings: self.settings, actions: self.actions, stand: self.stand, clocks: self.clocks }
+    fn staged(&self) -> Staged<ROWS, COLUMNS> {
+        Staged { settings: self.settings, actions: self.actions, accept: false, stand: self.stand, clocks: self.clocks }
     }
 
-    fn commit(&mut self, mut staged: Staged) {
+    fn commit(&mut self, mut staged: Staged<ROWS, COLUMNS>) {
         let (before, after) = (&self.settings.record, &staged.settings.record);
         staged.actions.configure |= before.params != after.params;
+        staged.actions.calibrate |= before.gains != after.gains;
         staged.actions.baud |= before.baud_code != after.baud_code;
         if before != after {
             staged.settings.saved = Saved::Changed;
         }
         self.settings = staged.settings;
         self.actions = staged.actions;
+        self.accept |= staged.accept;
+    }
+
+    /// Makes proposed gains those in force, where that was asked for.
+    fn accept(&mut self, snapshot: &Snapshot<'_, ROWS, COLUMNS>) {
+        if core::mem::take(&mut self.accept) {
+            let mut staged = self.staged();
+            staged.settings.record.gains = snapshot.proposal.gains;
+            self.commit(staged);
+        }
     }
 
     /// Reg Write: checked now, written by Action.
@@ -156,7 +168,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         }
         let mut staged = self.staged();
         staged.settings.record = record;
-        staged.settings.check::<ROWS, COLUMNS>(true, staged.clocks)?;
+        staged.settings.check(true, staged.clocks)?;
         staged.actions.save = true;
         staged.stand.check(&staged.settings.command, &staged.settings.command, staged.actions)?;
         self.commit(staged);

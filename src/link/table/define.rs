@@ -78,13 +78,17 @@ macro_rules! control_table {
         }
 
         /// Sets a register that can be written.
-        pub(super) fn set(staged: &mut Staged, address: u16, value: i64) -> Result<(), StatusError> {
+        pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
+            staged: &mut Staged<ROWS, COLUMNS>,
+            address: u16,
+            value: i64,
+        ) -> Result<(), StatusError> {
             match address {
                 $($($address => {
                     if !($min..=$max).contains(&value) {
                         return Err(StatusError::Range);
                     }
-                    let set: fn(&mut Staged, i64) -> Result<(), StatusError> = $set;
+                    let set: fn(&mut Staged<ROWS, COLUMNS>, i64) -> Result<(), StatusError> = $set;
                     set(staged, value)
                 })?)*
                 _ => Err(StatusError::Access),

@@ -4,12 +4,16 @@
 
 use crate::frame::Shape;
 
-use super::{Access, Cell, Kind, Register, View};
+use crate::link::packet::StatusError;
+use crate::pressure::{GAIN_MAX, GAIN_ONE};
+
+use super::registers::FIXED;
+use super::{Access, Cell, Kind, Register, Staged, View};
 
 /// Where the first picture begins, whatever the shape.
 pub(super) const FIRST: u16 = 768;
 /// How many there are.
-pub(super) const COUNT: usize = 3;
+pub const COUNT: usize = 6;
 /// Name, largest value, unit and resolution of each, and what it means.
 const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
     ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row; 0 before the first tare."),
@@ -21,32 +25,73 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
         " Converter codes of the last frame, row by row; the last row is that of the columns with no row driven.",
     ),
     ("TARE_CODES", 4095, "", 1, " Zero of each taxel in converter codes, row by row."),
+    (
+        "GAINS",
+        GAIN_MAX as i64,
+        "1/16384",
+        1,
+        " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.",
+    ),
+    (
+        "PROPOSED_GAINS",
+        GAIN_MAX as i64,
+        "1/16384",
+        1,
+        " The gains that the presses propose; those in force where none reached a taxel.",
+    ),
+    (
+        "PROPOSED_SIGMAS",
+        255,
+        "permille",
+        1,
+        " Their standard uncertainty, at most 254; 255 where no press reached the taxel.",
+    ),
 ];
+
 /// Where they are in an array's table.
-pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; 3] {
+pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
     let taxels = Shape::<ROWS, COLUMNS>::TAXELS as u16;
     let codes = (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16;
     let first = cell(FIRST, taxels);
     let second = cell(after(&first), codes);
     let third = cell(after(&second), taxels);
-    [first, second, third]
+    let gains = Cell { access: Access::Stored, ..cell(after(&third), taxels) };
+    let proposed = cell(after(&gains), taxels);
+    // Right behind them.
+    let sigmas = Cell { kind: Kind::U8, ..cell(proposed.address + 2 * taxels, taxels) };
+    [first, second, third, gains, proposed, sigmas]
 }
 
 const fn cell(address: u16, count: u16) -> Cell {
     Cell { address, of: address, count, kind: Kind::U16, access: Access::ReadOnly }
 }
 
-/// Where the pressures, the raw codes and the tare's begin in an array's table.
-pub const fn picture_addresses<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
-    let [pressures, codes, tare] = cells::<ROWS, COLUMNS>();
-    [pressures.address, codes.address, tare.address]
+/// Where each of them begins, in an array's table.
+pub const fn at<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
+    let cells = cells::<ROWS, COLUMNS>();
+    let mut addresses = [0; COUNT];
+    let mut place = 0;
+    while place < COUNT {
+        addresses[place] = cells[place].address;
+        place += 1;
+    }
+    addresses
 }
 
-/// Where they end.
+/// Where the table ends.
 pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
-    let [_, _, last] = cells::<ROWS, COLUMNS>();
-    last.address + last.kind.width() * last.count
+    let [.., last] = cells::<ROWS, COLUMNS>();
+    let mut end = last.address + last.kind.width() * last.count;
+    let mut place = 0;
+    while place < FIXED.len() {
+        let Register { address, kind, count, .. } = FIXED[place];
+        if address + kind.width() * count > end {
+            end = address + kind.width() * count;
+        }
+        place += 1;
+    }
+    end
 }
 
 /// The next multiple of 256.
@@ -55,15 +100,24 @@ const fn after(cell: &Cell) -> u16 {
 }
 
 /// As their documentation has them.
-pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; 3] {
+pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let cells = cells::<ROWS, COLUMNS>();
-    [register(0, &cells), register(1, &cells), register(2, &cells)]
+    [
+        register(0, &cells),
+        register(1, &cells),
+        register(2, &cells),
+        register(3, &cells),
+        register(4, &cells),
+        register(5, &cells),
+    ]
 }
 
-const fn register(picture: usize, cells: &[Cell; 3]) -> Register {
+const fn register(picture: usize, cells: &[Cell; COUNT]) -> Register {
     let (name, max, unit, scale, doc) = PICTURES[picture];
     let Cell { address, count, kind, access, .. } = cells[picture];
-    Register { name, address, kind, count, access, unit, scale, min: 0, max, default: None, doc }
+    let stored = matches!(access, Access::Stored);
+    let (min, default) = if stored { (GAIN_ONE as i64 / 2, Some(GAIN_ONE as i64)) } else { (0, None) };
+    Register { name, address, kind, count, access, unit, scale, min, max, default, doc }
 }
 
 /// The value of an element; 0 where there is no such picture.
@@ -72,7 +126,7 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     address: u16,
     element: usize,
 ) -> u32 {
-    let [pressures, codes, tare] = const { cells::<ROWS, COLUMNS>() };
+    let [pressures, codes, tare, gains, proposed, sigmas] = const { cells::<ROWS, COLUMNS>() };
     let snapshot = view.snapshot;
     let value = if address == pressures.address {
         if view.tared() { snapshot.pressure_10pa(element) } else { 0 }
@@ -80,10 +134,31 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
         snapshot.frame.code(element / COLUMNS, element % COLUMNS)
     } else if address == tare.address {
         snapshot.tare_codes(element)
+    } else if address == gains.address {
+        view.settings().record.gains.get(element)
+    } else if address == proposed.address {
+        snapshot.proposal.gains.get(element)
+    } else if address == sigmas.address {
+        snapshot.proposal.sigmas.as_flattened().get(element).copied().unwrap_or(0).into()
     } else {
         0
     };
     value.into()
+}
+
+/// Sets an element of a picture that can be written; false where the address is not one's.
+pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    address: u16,
+    element: u16,
+    value: i64,
+) -> Result<bool, StatusError> {
+    let [_, _, _, gains, ..] = const { cells::<ROWS, COLUMNS>() };
+    if address != gains.address {
+        return Ok(false);
+    }
+    let set = u16::try_from(value).is_ok_and(|gain| staged.settings.record.gains.set(element.into(), gain));
+    if set { Ok(true) } else { Err(StatusError::Range) }
 }
 
 #[cfg(test)]
@@ -92,10 +167,10 @@ mod tests {
 
     #[test]
     fn pictures_stand_apart() {
-        let addresses = |cells: [super::Cell; 3]| cells.map(|cell| cell.address);
-        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280]);
-        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280]);
-        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048]);
-        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072]);
+        let addresses = |cells: [super::Cell; super::COUNT]| cells.map(|cell| cell.address);
+        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280, 1_536, 1_792, 1_992]);
+        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280, 1_536, 1_792, 1_810]);
+        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048, 2_560, 3_072, 3_584]);
+        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072, 4_096, 5_120, 6_144]);
     }
 }

@@ -14,11 +14,15 @@ use crate::contact::FitLevel;
 use crate::link::packet::StatusError;
 use crate::link::settings::goal_mn;
 use crate::link::snapshot::hardware_error;
-use crate::store::Record;
+use crate::store;
 
 use super::values::{
-    bump, permille, set_accept, set_commission, set_goal, set_recover, set_torque, set_watchdog, short, watchdog,
+    bump, permille, set_accept, set_calibrate, set_commission, set_goal, set_recover, set_scale, set_torque,
+    set_watchdog, short, watchdog,
 };
+/// The defaults go by no shape.
+type Record = store::Record<3, 3>;
+
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
 
 /// Model number: the letters FT.
@@ -317,6 +321,55 @@ control_table! {
     /// Bytes that came faster than they were taken.
     510 LINE_OVERRUN: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.snapshot.health.line_errors[2]);
+    /// 1 presses once onto a hard flat plate, to find the taxels' gains: backs off, presses slowly, lets go. Move finger or
+    /// plate between presses. Refused with a result error without torque and before a tare. 2 forgets all presses. 3 makes
+    /// the proposed gains those in force, with torque off; save_parameters keeps them. Reads 0.
+    1736 CALIBRATE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
+        |_, _| 0,
+        set_calibrate;
+    /// The press that was last asked for: 0 none since reset, 1 running or being worked out, 2 taken into the proposal, 3
+    /// refused.
+    1737 CALIBRATE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
+        |view, _| view.calibrate_state();
+    /// Why a press was not taken; 0 it was. 1 soft, 2 moving, 3 off the array, 4 not flat, 5 too few taxels pressed, 6
+    /// contact lost, 7 no contact, 8 stalled, 9 interrupted, 10 no torque or no tare, 11 beyond half or twice of the modulus.
+    1738 CALIBRATE_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
+        |view, _| u32::from(view.snapshot.status.calibration.state.refusal());
+    /// How far the press is, with what is worked out after it.
+    1739 CALIBRATE_PROGRESS: U8 ReadOnly, "percent" * 1, 0 to 100,
+        |view, _| u32::from(view.snapshot.status.calibration.progress);
+    /// Presses that the proposal is made of.
+    1740 CALIBRATE_PRESSES: U8 ReadOnly, "" * 1, 0 to 200,
+        |view, _| u32::from(view.snapshot.status.calibration.presses);
+    /// Taxels that a press reached: the others keep their gain.
+    1742 CALIBRATE_TAXELS: U16 ReadOnly, "" * 1, 0 to 512,
+        |view, _| u32::from(view.snapshot.status.calibration.reached);
+    /// What a scale under the plate shows while a force is held: a number for the absolute scale. Reads the last one.
+    1744 SCALE_SHOWS_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
+        |view, _| view.settings().command.shown_mn as u32,
+        |staged, value| {
+            staged.settings.command.shown_mn = value as i32;
+            bump(&mut staged.settings.command.shown_request, 1);
+            Ok(())
+        };
+    /// Why the last number was not taken; 0 it was. 1 no force held for long enough, 2 off the array, 3 less than 100 mN, 4
+    /// beyond half or twice of what the array reads, 5 contradicts the numbers before, 6 eight already.
+    1748 SCALE_REFUSAL: U8 ReadOnly, "" * 1, 0 to 6,
+        |view, _| view.snapshot.status.scale.refusal.map_or(0, |refusal| refusal as u32);
+    /// Numbers taken; 255 while the last one waits for the loop.
+    1749 SCALE_POINTS: U8 ReadOnly, "" * 1, 0 to 255,
+        |view, _| view.scale_points();
+    /// 2 forgets all numbers and presses. 3 takes the proposed factor, with torque off: codes_per_kpa_milli is divided by it
+    /// and modulus_pa multiplied; save_parameters keeps them. Reads 0.
+    1750 SCALE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
+        |_, _| 0,
+        set_scale;
+    /// What a force that is read is to be multiplied by; 0 where there is no number.
+    1752 SCALE_FACTOR_PPM: U32 ReadOnly, "ppm" * 1, 0 to 4_000_000,
+        |view, _| view.snapshot.status.scale.factor_ppm;
+    /// Its standard uncertainty.
+    1756 SCALE_SIGMA_PPM: U32 ReadOnly, "ppm" * 1, 0 to 1_000_000,
+        |view, _| view.snapshot.status.scale.sigma_ppm;
     /// Asks the drive what it is like, with torque off and the tip in the air: 1 jogs, which proves the direction, 2 jogs
     /// and measures, 0 stops what is under way. Refused with a result error with torque on, in a fault and before a
     /// tare. Reads 0.

@@ -14,7 +14,10 @@ const WATCHDOG_MS: u16 = 20;
 
 /// Torque enable: refused while a fault or a tripped watchdog stands, and where nobody confirmed which way the motor
 /// goes; off takes the goal back.
-pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     let on = value != 0;
     let unconfirmed = staged.settings.record.params.direction_confirmed == 0;
     if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed) {
@@ -33,7 +36,10 @@ pub(super) fn set_torque(staged: &mut Staged, value: i64) -> Result<(), StatusEr
 }
 
 /// Commission: a task.
-pub(super) fn set_commission(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_commission<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     let task = Task::of(value as u8);
     let command = &mut staged.settings.command;
     command.commission_request = task.after(command.commission_request);
@@ -41,7 +47,10 @@ pub(super) fn set_commission(staged: &mut Staged, value: i64) -> Result<(), Stat
 }
 
 /// Takes what commissioning found into the parameters.
-pub(super) fn set_accept(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_accept<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     let params = &mut staged.settings.record.params;
     match (value, staged.stand.commissioned) {
         (0, _) => {}
@@ -57,7 +66,10 @@ pub(super) fn set_accept(staged: &mut Staged, value: i64) -> Result<(), StatusEr
 }
 
 /// Goal force: refused while a tripped watchdog stands.
-pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_goal<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped {
         return Err(StatusError::Range);
     }
@@ -66,7 +78,10 @@ pub(super) fn set_goal(staged: &mut Staged, value: i64) -> Result<(), StatusErro
 }
 
 /// Bus watchdog: 0 resets a tripped one.
-pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_watchdog<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if staged.settings.watchdog_tripped && value != 0 {
         return Err(StatusError::Range);
     }
@@ -76,7 +91,10 @@ pub(super) fn set_watchdog(staged: &mut Staged, value: i64) -> Result<(), Status
 }
 
 /// Recover: a tripped watchdog, torque, goal and fault in one.
-pub(super) fn set_recover(staged: &mut Staged, value: i64) -> Result<(), StatusError> {
+pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
     if value == 0 || !staged.stand.faulted && !staged.settings.watchdog_tripped {
         return Ok(());
     }
@@ -89,8 +107,48 @@ pub(super) fn set_recover(staged: &mut Staged, value: i64) -> Result<(), StatusE
     Ok(())
 }
 
+/// Calibrate: a press, to forget, or to accept.
+pub(super) fn set_calibrate<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    let command = &mut staged.settings.command;
+    match value {
+        1 => bump(&mut command.calibrate_request, 1),
+        2 => bump(&mut command.forget_request, 1),
+        3 if command.torque => return Err(StatusError::Access),
+        3 if !staged.stand.proposed => return Err(StatusError::Result),
+        3 => staged.accept = true,
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Scale: to forget, or to accept.
+pub(super) fn set_scale<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    let factor_ppm = i64::from(staged.stand.factor_ppm);
+    match value {
+        2 => bump(&mut staged.settings.command.forget_request, 1),
+        3 if staged.settings.command.torque => return Err(StatusError::Access),
+        3 if factor_ppm == 0 => return Err(StatusError::Result),
+        3 => {
+            let params = &mut staged.settings.record.params;
+            let by = |value: i32, over: i64, under: i64| {
+                (i64::from(value) * over + under / 2).checked_div(under).unwrap_or(0) as i32
+            };
+            params.codes_per_kpa_milli = by(params.codes_per_kpa_milli, 1_000_000, factor_ppm);
+            params.modulus_pa = by(params.modulus_pa, factor_ppm, 1_000_000);
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
 /// The bus watchdog as it reads.
-pub(super) fn watchdog(settings: &Settings) -> i32 {
+pub(super) fn watchdog<const ROWS: usize, const COLUMNS: usize>(settings: &Settings<ROWS, COLUMNS>) -> i32 {
     if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }
 }
 

@@ -1,5 +1,6 @@
 //! What a read sees: the device's own state, and the picture of the loop.
 
+use crate::calibrate::State as Press;
 use crate::commission::{Commissioning, Drive};
 use crate::contact::Contact;
 use crate::identify::{Identification, Modulus};
@@ -22,7 +23,7 @@ pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
-    pub(super) fn settings(&self) -> &'a Settings {
+    pub(super) fn settings(&self) -> &'a Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
 
@@ -98,6 +99,23 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
             return Commissioning::Running(0).number().into();
         }
         status.commissioning.number().into()
+    }
+
+    /// As the tare's: what has not been taken up is running.
+    pub(super) fn calibrate_state(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.calibrate_request != status.taken.calibrate {
+            return Press::Running.number().into();
+        }
+        status.calibration.state.number().into()
+    }
+
+    pub(super) fn scale_points(&self) -> u32 {
+        let status = &self.snapshot.status;
+        if self.settings().command.shown_request != status.taken.shown {
+            return u8::MAX.into();
+        }
+        status.scale.points.into()
     }
 
     pub(super) fn refused(&self, error: StatusError) -> u32 {

@@ -11,13 +11,14 @@ mod host;
 use core::arch::asm;
 use core::hint::black_box;
 use cortex_m_semihosting::debug;
+use fingertip::calibrate::parts::{Equations, Pose, Readings, STEPS, Series, Sums, add_part};
 use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::params::Params;
-use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
+use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, Proposal, ROWS};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Duty, Millimetres};
 use host::{File, command_line, fail, say};
@@ -42,6 +43,7 @@ struct Bench<'a> {
     reference: Reference,
     limits: Limits,
     duty: Duty,
+    press: Press,
 }
 
 type Kernel = extern "C" fn(&mut Bench);
@@ -61,7 +63,7 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 20] = [
+const KERNELS: [(&str, Kernel, When); 24] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
@@ -82,7 +84,63 @@ const KERNELS: [(&str, Kernel, When); 20] = [
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
     ("contact, over the edge, full", read_full, Edge),
+    ("calibration, a frame's readings", gather, Always),
+    ("calibration, a taxel for the pose", find_pose, Always),
+    ("calibration, a ninth of a taxel's expectation", expect, Always),
+    ("calibration, a taxel's gain", propose, Always),
 ];
+
+/// What a press left, as it is evaluated.
+struct Press {
+    readings: Readings<ROWS, COLUMNS>,
+    travel: [Option<i64>; STEPS],
+    reading: Series,
+    expected: Series,
+    pose: Pose,
+    equations: Equations,
+    proposal: Proposal,
+}
+
+impl Press {
+    /// A taxel a third of the radius off the axis, in Q30.
+    const PLACE: [i64; 2] = [1 << 28, 1 << 28];
+    const PITCH: i64 = (1 << 30) * 15 / 100;
+    const STEP: i64 = 12_500_000;
+
+    fn new() -> Self {
+        let mut travel = [None; STEPS];
+        let mut reading = [0; STEPS];
+        for (step, (x, u)) in (1..).zip(travel.iter_mut().zip(&mut reading)) {
+            (*x, *u) = (Some(step * Self::STEP), (step * Self::STEP - (1 << 26)).max(0));
+        }
+        let (readings, proposal) = (Readings::NONE, Proposal::NONE);
+        let (pose, equations) = (Pose::default(), Equations::NONE);
+        Self { readings, travel, reading, expected: [0; STEPS], pose, equations, proposal }
+    }
+}
+
+extern "C" fn gather(bench: &mut Bench) {
+    bench.press.readings.take(1 << 24, 3 << 24, &bench.picture);
+}
+
+extern "C" fn find_pose(bench: &mut Bench) {
+    let Press { pose, travel, reading, equations, .. } = &mut bench.press;
+    if let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) {
+        equations.take(&zero, travel, reading);
+    }
+}
+
+extern "C" fn expect(bench: &mut Bench) {
+    let Press { pose, travel, expected, .. } = &mut bench.press;
+    *expected = [0; STEPS];
+    add_part(expected, pose, Press::PLACE, Press::PITCH, 1, travel, Press::STEP);
+}
+
+extern "C" fn propose(bench: &mut Bench) {
+    let Press { travel, reading, expected, proposal, .. } = &mut bench.press;
+    let sums = Sums::of(reading, expected, travel);
+    proposal.set(44, &sums, 16_384, bench.config);
+}
 
 extern "C" fn nothing(_: &mut Bench) {}
 
@@ -183,6 +241,7 @@ fn main() -> ! {
         reference: Reference::default(),
         limits: Limits::default(),
         duty: Duty::ZERO,
+        press: Press::new(),
     };
     for _ in 0..count {
         let mut bytes = [0; Record::BYTES];

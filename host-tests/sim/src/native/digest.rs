@@ -77,6 +77,9 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         identification,
         // What it does is in the mode and the duty.
         commissioning: _,
+        // No scene asks for it.
+        calibration: _,
+        scale: _,
         tare,
         taken,
     } = *status;

@@ -16,9 +16,9 @@ use broken::Broken;
 pub use broken::Kind;
 use fingertip::link::{Crash, Health, Reply, ResetCause};
 use fingertip::pipeline::Status;
-use fingertip::shipped::{CLOCKS, Config, Pipeline, ROWS, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, Calibration, Config, Pipeline, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
-use fingertip::store::{Record, settle};
+use fingertip::store::settle;
 use host_tests::plant::Bridge;
 use object::Object;
 use std::collections::VecDeque;
@@ -179,6 +179,7 @@ impl<E: Set> Bus<E> {
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
                 tare: &tare,
+                proposal: pipeline.proposal(),
             };
             let taken = device.server.feed(bytes, &snapshot, &mut reply);
             bytes = &bytes[taken..];
@@ -219,6 +220,7 @@ impl Device {
         let (mut params, mut sound) = (self.flash.params, true);
         let config = settle(&mut params, Config::shipped, |_| sound = false);
         let mut pipeline = Pipeline::new(&config.expect("the defaults make a configuration"));
+        pipeline.calibrate(&Calibration::of(&self.flash.gains));
         if !sound {
             pipeline.stop(Fault::BrokenParameters);
         }
@@ -247,6 +249,9 @@ impl Device {
                 }
                 Err(_) => pipeline.stop(Fault::BrokenParameters),
             }
+        }
+        if actions.calibrate {
+            pipeline.calibrate(&Calibration::of(&record.gains));
         }
         if actions.save {
             let rests = matches!(pipeline.status().mode, Mode::Off | Mode::Fault);

@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::params::Params;
-use fingertip::shipped::address;
-use fingertip::store::{self, Record};
+use fingertip::shipped::{Record, address};
+use host_tests::encode;
 use host_tests::plant::{Setup, World};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -109,5 +109,5 @@ pub fn holding() -> Rig {
 /// The same on a bus of another speed, by its code, or with another pause before an answer: for what has much to say.
 pub fn holding_on_a_bus(baud_code: u8, return_delay_2us: u8) -> Rig {
     let record = Record { baud_code, return_delay_2us, ..Record::DEFAULT };
-    hold(&Options { presets: vec![(SECTOR.start, store::encode(&record, 0).to_vec())], ..Options::default() })
+    hold(&Options { presets: vec![(SECTOR.start, encode(&record, 0))], ..Options::default() })
 }

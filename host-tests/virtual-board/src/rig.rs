@@ -15,7 +15,7 @@ use crate::scene::finger::Finger;
 use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
 use fingertip::params::Params;
-use fingertip::store::{self, Record};
+use fingertip::shipped::Record;
 use host_tests::plant::World;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
@@ -44,8 +44,8 @@ impl Options {
     /// A board whose flash holds that its motor goes the right way: torque is refused before that is known.
     pub fn confirmed() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
-        let record = store::encode(&Record { params, ..Record::DEFAULT }, 0);
-        Self { presets: vec![(SECTOR.start, record.to_vec())], ..Self::default() }
+        let record = host_tests::encode(&Record { params, ..Record::DEFAULT }, 0);
+        Self { presets: vec![(SECTOR.start, record)], ..Self::default() }
     }
 }
 

@@ -27,7 +27,7 @@ pub use proposal::{Proposal, UNKNOWN};
 #[doc(hidden)]
 pub mod parts {
     pub use super::expected::add_part;
-    pub use super::pose::{Equations, Pose, Zero};
+    pub use super::pose::{Equations, Line, Pose};
     pub use super::proposal::Sums;
     pub use super::series::{Readings, STEPS, Series};
 }
@@ -43,7 +43,7 @@ use crate::state::Limits;
 use crate::units::Millimetres;
 use judge::Totals;
 use number::BITS;
-use pose::{Equations, Pose, Zero};
+use pose::{Equations, Line, Pose, System, Zero};
 use proposal::Sums;
 use series::{Readings, STEPS, Series};
 
@@ -165,8 +165,10 @@ pub struct Calibrator<const ROWS: usize, const COLUMNS: usize> {
     centre: [i64; 2],
     pose: Pose,
     equations: Equations,
+    system: System,
     /// Of the taxel at work.
     zero: Option<Zero>,
+    line: Option<Line>,
     /// What the zeros miss the model by, in tip radii.
     scatter: i64,
     expected: Series,
@@ -191,12 +193,16 @@ enum Phase {
     Settle(usize),
     /// In a round of the pose, where a taxel's line should cross zero,
     Zero(u8, usize),
-    /// and where it does.
+    /// where it does,
     Line(u8, usize),
-    /// The pose anew.
-    Solve(u8),
-    /// A part of a taxel's expectation.
+    /// and what that says of the pose.
+    Take(u8, usize),
+    /// The pose anew: an unknown of it.
+    Solve(u8, u8),
+    /// A part of a taxel's expectation,
     Expect(usize, u8),
+    /// and what it reads of that.
+    Compare(usize),
     /// Whether the press is to be taken.
     Judge,
     /// A taxel's proposal.
@@ -223,7 +229,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
             centre: [0; 2],
             pose: Pose { touch: 0, axis: [0; 2], tilt: [0; 2], roundness: 0 },
             equations: Equations::NONE,
+            system: System::NONE,
             zero: None,
+            line: None,
             scatter: 0,
             expected: [0; STEPS],
             totals: Totals::NONE,
@@ -367,19 +375,25 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
             }
             Phase::Line(round, place) => {
                 let (row, column) = (place / COLUMNS, place % COLUMNS);
-                if let Some(zero) = self.zero.filter(|_| !self.bad(row, column)) {
-                    self.equations.take(&zero, &self.travel, &self.readings.of(row, column));
-                }
-                self.follow(place, 60, |place| Phase::Zero(round, place), Phase::Solve(round))
+                let zero = self.zero.filter(|_| !self.bad(row, column));
+                let reading = self.readings.of(row, column);
+                self.line = zero.and_then(|zero| Line::of(&zero, &self.travel, &reading));
+                Phase::Take(round, place)
             }
-            Phase::Solve(round) => self.solve(round),
+            Phase::Take(round, place) => {
+                if let (Some(zero), Some(line)) = (&self.zero, &self.line) {
+                    self.equations.take(zero, line);
+                }
+                self.follow(place, 60, |place| Phase::Zero(round, place), Phase::Solve(round, 0))
+            }
+            Phase::Solve(round, step) => self.solve(round, step),
             Phase::Expect(place, part) => {
                 self.expect(place, part, config);
-                if part + 1 < expected::PARTS {
-                    Phase::Expect(place, part + 1)
-                } else {
-                    self.follow(place, 80, |place| Phase::Expect(place, 0), Phase::Judge)
-                }
+                if part + 1 < expected::PARTS { Phase::Expect(place, part + 1) } else { Phase::Compare(place) }
+            }
+            Phase::Compare(place) => {
+                self.compare(place / COLUMNS, place % COLUMNS);
+                self.follow(place, 80, |place| Phase::Expect(place, 0), Phase::Judge)
             }
             Phase::Judge => return self.conclude(config),
             Phase::Propose(place) => {
@@ -401,21 +415,28 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
         if place + 1 < Self::TAXELS { same(place + 1) } else { then }
     }
 
-    fn solve(&mut self, round: u8) -> Phase {
+    fn solve(&mut self, round: u8, step: u8) -> Phase {
         // The last round only judges.
         if round + 1 == ROUNDS {
             (self.totals, self.expected) = (Totals::NONE, [0; STEPS]);
             return Phase::Expect(0, 0);
         }
-        if round <= FREE_ROUNDS {
-            self.scatter = if round == FREE_ROUNDS { self.equations.misfit() } else { 0 };
+        if step == 0 {
+            if round <= FREE_ROUNDS {
+                self.scatter = if round == FREE_ROUNDS { self.equations.misfit() } else { 0 };
+            }
+            self.system = self.equations.system(&self.pose, self.scatter);
+        } else if step <= System::PIVOTS {
+            self.system.eliminate(step - 1);
+        } else {
+            self.pose = self.system.solve(&self.pose);
+            self.equations = Equations::NONE;
+            return Phase::Zero(round + 1, 0);
         }
-        self.pose = self.equations.solve(&self.pose, self.scatter);
-        self.equations = Equations::NONE;
-        Phase::Zero(round + 1, 0)
+        Phase::Solve(round, step + 1)
     }
 
-    /// A part of what a taxel should read; with the last one it is compared.
+    /// A part of what a taxel should read.
     fn expect(&mut self, place: usize, part: u8, config: &Shaped<ROWS, COLUMNS>) {
         let (row, column) = (place / COLUMNS, place % COLUMNS);
         let at = taxel(row, column, config);
@@ -424,9 +445,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
         }
         let step = self.depth_goal(config) / STEPS as i64;
         expected::add_part(&mut self.expected, &self.pose, at, pitch(config), part, &self.travel, step);
-        if part + 1 < expected::PARTS {
-            return;
-        }
+    }
+
+    /// What a taxel reads of what it should.
+    fn compare(&mut self, row: usize, column: usize) {
         let sums = if self.bad(row, column) {
             Sums::NONE
         } else {

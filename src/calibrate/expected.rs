@@ -3,6 +3,8 @@
 //! The square is cut into 3 x 3; in each part the compression is a slope, so the mean over the rim is a parabola as wide
 //! as the part's own spread, which takes in the travel of a step too.
 
+use crate::contact::parts::Divisor;
+
 use super::number::{ONE, div, mul, root};
 use super::pose::Pose;
 use super::series::{STEPS, Series};
@@ -28,11 +30,11 @@ pub fn add_part(
     let (x, y) = (mul(x, part / 2), mul(y, part / 2));
     // Half of the compression's spread, as of one that is even.
     let spread = root(mul(x, x) + mul(y, y) + mul(step / 2, step / 2)).max(ONE >> 12);
-    let inverse_spread_q20 = (ONE << 20).checked_div(4 * spread).unwrap_or(0);
+    let inverse_spread_q20 = i64::from(Divisor::new((4 * spread).unsigned_abs()).divide(ONE, 20));
     let inverse = div(ONE, column.length);
     let share = inverse / (SIDE * SIDE);
     // The tip is round: in the mean over the part that costs as much as a^2 (3 / L^2 - 1) / (24 L) of compression.
-    let rounder = mul(mul(part, part), mul(inverse, 3 * mul(inverse, inverse) - ONE) / 24);
+    let rounder = mul(mul(part, part), mul(inverse, (3 * mul(inverse, inverse) - ONE) / 16)) * 2 / 3;
     let before = column.length - rounder - ONE - pose.touch + pose.lift(&column);
     for (to, travel) in expected.iter_mut().zip(travel) {
         let Some(travel) = travel else { continue };

@@ -5,7 +5,7 @@
 //! line in x, and the line's zero, `z = x_c + 1 - L - t rho`, does not depend on g: so the pose is found from the zeros
 //! of all lines, whatever the gains are, by least squares. The tilt and the axis' place differ by what L differs from 1.
 
-use super::number::{BITS, ONE, div, held, mul, root};
+use super::number::{BITS, ONE, div, held, mean, mul, root};
 use super::series::{STEPS, Series};
 
 /// Unknowns: x_c, the axis along columns and rows, the tilt along both, the roundness.
@@ -59,7 +59,7 @@ impl Pose {
 
     /// How steep the compression is there, along the columns and the rows.
     pub fn slope(&self, column: &Column) -> [i64; 2] {
-        let round = div(ONE, column.length) + self.roundness;
+        let round = held(div(ONE, column.length) + self.roundness);
         let [x, y] = column.from_axis;
         [self.tilt[0] - mul(x, round), self.tilt[1] - mul(y, round)]
     }
@@ -74,7 +74,7 @@ impl Pose {
         }
         let zero = self.touch + ONE - div(ONE, inverse) - self.lift(&column);
         let [slope_x, slope_y] = self.slope(&column);
-        let from = zero + mul(pitch, slope_x.abs() + slope_y.abs()) / 2 + MARGIN;
+        let from = zero + mul(pitch, held(slope_x.abs() + slope_y.abs())) / 2 + MARGIN;
         let [x, y] = column.from_axis;
         let apart = (mul(x, x) + mul(y, y)) / 2;
         Some(Zero { zero, from, slopes: [ONE, slope_x, slope_y, -x, -y, apart] })
@@ -100,7 +100,8 @@ pub struct Column {
 }
 
 /// A taxel's line.
-struct Line {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Line {
     zero: i64,
     /// How far it is bent: the part of a parabola against its rise, both in the standard deviation of its travel; above 0
     /// where it rises less and less. None of a short one.
@@ -108,8 +109,9 @@ struct Line {
 }
 
 impl Line {
-    /// Over the steps beyond a travel.
-    fn of(travel: &[Option<i64>; STEPS], reading: &Series, from: i64) -> Option<Self> {
+    /// Over the steps in which all of it is pressed; None where these are too few.
+    pub fn of(zero: &Zero, travel: &[Option<i64>; STEPS], reading: &Series) -> Option<Self> {
+        let from = zero.from;
         let steps = || travel.iter().zip(reading).filter_map(|(x, u)| x.filter(|x| *x > from).map(|x| (x, *u)));
         let (mut count, mut x_sum, mut u_sum) = (0, 0, 0);
         for (x, u) in steps() {
@@ -118,20 +120,20 @@ impl Line {
         if count < STEPS_LEAST {
             return None;
         }
-        let (x_mean, u_mean) = (x_sum / count, u_sum / count);
+        let (x_mean, u_mean) = (mean(x_sum, count), mean(u_sum, count));
         let (mut square, mut product) = (0, 0);
         for (x, u) in steps() {
             square += mul(x - x_mean, x - x_mean);
             product += mul(x - x_mean, u - u_mean);
         }
         let slope = div(product, square);
-        let spread = square / count;
+        let spread = mean(square, count);
         let mut bent = 0;
         for (x, u) in steps() {
             let left = u - u_mean - mul(slope, x - x_mean);
             bent -= mul(left, mul(x - x_mean, x - x_mean) - spread);
         }
-        let bend = (count >= BEND_STEPS).then(|| div(bent / count, mul(slope, mul(spread, root(spread)))));
+        let bend = (count >= BEND_STEPS).then(|| div(mean(bent, count), mul(slope, mul(spread, root(spread)))));
         // What conducts hardly at all has no zero.
         (slope > ONE / 8).then(|| Self { zero: x_mean - div(u_mean, slope), bend })
     }
@@ -165,9 +167,8 @@ impl Equations {
         leaning: [0; 3],
     };
 
-    /// Takes a taxel, where enough of its line is seen.
-    pub fn take(&mut self, zero: &Zero, travel: &[Option<i64>; STEPS], reading: &Series) {
-        let Some(line) = Line::of(travel, reading, zero.from) else { return };
+    /// Takes a taxel.
+    pub fn take(&mut self, zero: &Zero, line: &Line) {
         let (residual, bend, slopes) = (held(line.zero - zero.zero), line.bend, zero.slopes);
         for ((squares, right), one) in self.squares.iter_mut().zip(&mut self.right).zip(slopes) {
             for (sum, other) in squares.iter_mut().zip(slopes) {
@@ -207,10 +208,10 @@ impl Equations {
         root((mean.min(ONE << 10)) >> 10)
     }
 
-    /// A pose nearer to the solution, where the zeros miss the model by so much anyhow.
+    /// What is to be solved for a pose nearer to the solution, where the zeros miss the model by so much anyhow.
     ///
     /// What the model leaves is the same for all taxels and not each one's own: it counts as much as all of them together.
-    pub fn solve(mut self, pose: &Pose, scatter: i64) -> Pose {
+    pub fn system(mut self, pose: &Pose, scatter: i64) -> System {
         let scatter = scatter.max(SCATTER_LEAST);
         let whole = self.squares[0][0];
         let known =
@@ -225,8 +226,53 @@ impl Equations {
                 *right -= mul(weight, value);
             }
         }
-        let step = solve(self.squares, self.right);
-        let [touch, x, y, tilt_x, tilt_y, round] = step.map(|step| step.max(-ONE / 4).min(ONE / 4));
+        let shift = whole.max(1).leading_zeros().saturating_sub(63 - BITS);
+        let mut system = System::NONE;
+        for ((row, squares), right) in system.0.iter_mut().zip(self.squares).zip(self.right) {
+            for (to, from) in row.iter_mut().zip(squares.into_iter().chain([right])) {
+                *to = from << shift;
+            }
+        }
+        system
+    }
+}
+
+/// A symmetric system, its largest numbers near to 1: solved by elimination, a pivot in a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct System([[i64; UNKNOWNS + 1]; UNKNOWNS]);
+
+impl System {
+    /// Of nothing.
+    pub const NONE: Self = Self([[0; UNKNOWNS + 1]; UNKNOWNS]);
+    /// Pivots before [`System::solve`].
+    pub const PIVOTS: u8 = UNKNOWNS as u8 - 1;
+
+    /// Takes an unknown out of the rows below its own.
+    pub fn eliminate(&mut self, pivot: u8) {
+        let pivot = usize::from(pivot);
+        let own = self.0.get(pivot).copied().unwrap_or_default();
+        let divisor = own.get(pivot).copied().unwrap_or(0);
+        for row in self.0.iter_mut().skip(pivot + 1) {
+            let share = row.get(pivot).map_or(0, |first| div(*first, divisor));
+            for (to, own) in row.iter_mut().zip(&own).skip(pivot) {
+                *to -= mul(share, *own);
+            }
+        }
+    }
+
+    /// The pose that they say, from the one that they were made for.
+    pub fn solve(&self, pose: &Pose) -> Pose {
+        let mut solution = [0; UNKNOWNS];
+        for (place, row) in self.0.iter().enumerate().rev() {
+            let mut left = row.last().copied().unwrap_or(0);
+            for (factor, known) in row.iter().zip(solution).skip(place + 1) {
+                left -= mul(*factor, known);
+            }
+            if let (Some(to), Some(divisor)) = (solution.get_mut(place), row.get(place)) {
+                *to = div(left, *divisor);
+            }
+        }
+        let [touch, x, y, tilt_x, tilt_y, round] = solution.map(|step: i64| step.max(-ONE / 4).min(ONE / 4));
         // No tilt beyond 45 degrees, no axis beyond a radius.
         let moved = |from: i64, step: i64| (from + step).max(-ONE).min(ONE);
         Pose {
@@ -238,35 +284,26 @@ impl Equations {
     }
 }
 
-/// Solves a symmetric system by elimination, its largest numbers first brought near to 1.
-fn solve(squares: [[i64; UNKNOWNS]; UNKNOWNS], right: [i64; UNKNOWNS]) -> [i64; UNKNOWNS] {
-    let shift = squares[0][0].max(1).leading_zeros().saturating_sub(63 - BITS);
-    let mut rows = [[0; UNKNOWNS + 1]; UNKNOWNS];
-    for ((row, squares), right) in rows.iter_mut().zip(squares).zip(right) {
-        for (to, from) in row.iter_mut().zip(squares.into_iter().chain([right])) {
-            *to = from << shift;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A taxel in the middle, whose line is one of 1.25 times what it should be.
+    #[test]
+    fn a_line_has_its_zero_whatever_its_gain() {
+        let pose = Pose { touch: -ONE / 50, ..Pose::default() };
+        let zero = pose.zero([ONE / 20, -ONE / 30], ONE * 3 / 20).expect("the tip is there");
+        let mut travel = [None; STEPS];
+        let mut reading = [0; STEPS];
+        for (step, (x, u)) in (1..).zip(travel.iter_mut().zip(&mut reading)) {
+            *x = Some(step * ONE / 80);
+            *u = ((step * ONE / 80 - zero.zero) * 5 / 4).max(0);
         }
+        for gain in [1, 3, 5] {
+            let line = Line::of(&zero, &travel, &reading.map(|u| u * gain / 4)).expect("it is seen");
+            assert!((line.zero - zero.zero).abs() < ONE / 1_000_000, "{} {}", line.zero, zero.zero);
+            assert!(line.bend.expect("it is long").abs() < ONE / 1_000);
+        }
+        assert_eq!(Line::of(&zero, &travel, &[0; STEPS]), None);
     }
-    for pivot in 0..UNKNOWNS {
-        let own = rows.get(pivot).copied().unwrap_or_default();
-        let divisor = own.get(pivot).copied().unwrap_or(0);
-        for row in rows.iter_mut().skip(pivot + 1) {
-            let share = row.get(pivot).map_or(0, |first| div(*first, divisor));
-            for (to, own) in row.iter_mut().zip(&own).skip(pivot) {
-                *to -= mul(share, *own);
-            }
-        }
-    }
-    let mut solution = [0; UNKNOWNS];
-    for place in (0..UNKNOWNS).rev() {
-        let Some(row) = rows.get(place) else { continue };
-        let mut left = row.last().copied().unwrap_or(0);
-        for (factor, known) in row.iter().zip(solution).skip(place + 1) {
-            left -= mul(*factor, known);
-        }
-        if let (Some(to), Some(divisor)) = (solution.get_mut(place), row.get(place)) {
-            *to = div(left, *divisor);
-        }
-    }
-    solution
 }

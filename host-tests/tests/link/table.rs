@@ -58,8 +58,6 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
         (u16::MAX, 2, StatusError::Access),
         (address::FRICTION_BACK_SIGMA + 2, 1, StatusError::Access),
         (address::FRICTION_BACK_SIGMA + 1, 2, StatusError::Access),
-        (address::PROPOSED_SIGMAS + 100, 1, StatusError::Access),
-        (address::PROPOSED_SIGMAS + 99, 2, StatusError::Access),
     ] {
         assert_eq!(bench.read(address, length), Err(error as u8), "{length} at {address}");
     }

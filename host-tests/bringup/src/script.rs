@@ -38,6 +38,7 @@ const UNASKED: Command = Command {
     tare_request: 1,
     clear_request: 0,
     identify_request: 0,
+    commission_request: 0,
 };
 
 /// How the force answered to a goal.

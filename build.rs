@@ -1,11 +1,11 @@
-//! Hands the linker its scripts, for images on the bare-metal target only.
+//! Hands the linker its scripts, for the flash image only: who takes the core as a library has memory of their own.
 
 use std::{env, error::Error, fs, path::PathBuf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=memory.x");
-    if env::var("CARGO_CFG_TARGET_OS")? != "none" {
+    if env::var("CARGO_CFG_TARGET_OS")? != "none" || env::var_os("CARGO_FEATURE_FIRMWARE").is_none() {
         return Ok(());
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?);

@@ -26,22 +26,25 @@ use crate::units::Duty;
 use budget::Budget;
 
 /// The loop's state between frames. The example at the crate's top closes a loop with it.
+///
+/// In the order of the fields: what every frame uses lies in the first 4 KiB, which an instruction reaches by itself.
 #[derive(Clone, Debug)]
+#[repr(C)]
 pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
-    config: Shaped<ROWS, COLUMNS>,
-    array: Array<ROWS, COLUMNS>,
-    budget: Budget<ROWS, COLUMNS>,
-    fit: Fit<ROWS, COLUMNS>,
+    status: Status,
+    tared: bool,
     motion: SpeedLoop,
     monitor: Monitor,
     guard: Guard,
     goal: Goal,
+    fit: Fit<ROWS, COLUMNS>,
+    array: Array<ROWS, COLUMNS>,
+    config: Shaped<ROWS, COLUMNS>,
+    budget: Budget<ROWS, COLUMNS>,
+    scale: Scale,
     press: Press,
     commission: Run,
     calibrator: Calibrator<ROWS, COLUMNS>,
-    scale: Scale,
-    status: Status,
-    tared: bool,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {

@@ -12,7 +12,7 @@ use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::encoder::Encoder;
-use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, REPORT, Report, SAVE, SAVED};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED, STANDING, Standing};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::health;
@@ -219,20 +219,20 @@ impl State {
     }
 
     fn publish(&mut self) {
-        let report = Report { status: *self.parts.pipeline.status(), ..self.report };
-        REPORT.set(report);
-        let (pipeline, frame) = (&self.parts.pipeline, &self.frame);
+        let (pipeline, frame, report) = (&self.parts.pipeline, &self.frame, &self.report);
+        let status = pipeline.status();
+        STANDING.set(Standing { mode: status.mode, fault: status.fault, missed_frames: status.missed_frames });
         // Where the link is just answering, it has the next one.
         PICTURE.visit(|picture| {
-            let stale = picture.report.is_none_or(|before| before.status.calibration != report.status.calibration);
-            if stale {
-                picture.proposal = *pipeline.proposal();
-            }
-            picture.report = Some(report);
+            picture.report = Some(Report { status: *status, ..*report });
             picture.frame = *frame;
             picture.taxels.copy_from_slice(&pipeline.array().picture().taxels);
             picture.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
             picture.tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
+            if picture.proposals != status.calibration.proposals {
+                picture.proposals = status.calibration.proposals;
+                picture.proposal = *pipeline.proposal();
+            }
         });
     }
 

@@ -11,6 +11,7 @@ use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, Gains, Proposal, ROWS, Record};
+use fingertip::state::{Fault, Mode};
 
 use super::flash::SaveError;
 use super::guard::Stopwatch;
@@ -30,6 +31,17 @@ pub struct Report {
     pub loop_time: Stopwatch,
     /// The longest of those.
     pub loop_time_max: Stopwatch,
+}
+
+/// What the LED and the log show.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+pub struct Standing {
+    /// The loop's mode.
+    pub mode: Mode,
+    /// Why it stopped.
+    pub fault: Option<Fault>,
+    /// Frames that were not taken.
+    pub missed_frames: u32,
 }
 
 /// Why a record was not saved.
@@ -62,12 +74,14 @@ pub struct Picture {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
     pub tare: [[i32; COLUMNS]; ROWS],
-    /// The gains that presses propose.
+    /// Which proposal of gains, by its count,
+    pub proposals: u8,
+    /// and the gains.
     pub proposal: Proposal,
 }
 
-/// The newest report.
-pub static REPORT: Shared<Report> = Shared::new();
+/// What the loop is doing.
+pub static STANDING: Shared<Standing> = Shared::new();
 /// What the host wants.
 pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
@@ -85,6 +99,7 @@ pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     taxels: [[0; COLUMNS]; ROWS],
     pascals_per_sum_q32: 0,
     tare: [[0; COLUMNS]; ROWS],
+    proposals: 0,
     proposal: Proposal::NONE,
 });
 

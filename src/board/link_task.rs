@@ -76,23 +76,24 @@ impl LinkTask {
     }
 
     async fn carry_out(&mut self, actions: Actions) {
-        let settings = *self.server.settings();
+        let baud = self.server.settings().baud();
+        let record = &self.server.settings().record;
         if actions.configure {
             // The newest count where control has not yet taken those before.
             PARAMS.take(|_| ());
-            PARAMS.fill(|params| *params = settings.record.params);
+            PARAMS.fill(|params| *params = record.params);
         }
         if actions.calibrate {
             GAINS.take(|_| ());
-            GAINS.fill(|gains| *gains = settings.record.gains);
+            GAINS.fill(|gains| *gains = record.gains);
         }
         if actions.save {
-            let saved = self.save(&settings.record).await;
+            let saved = save(record).await;
             self.server.note_saved(saved);
         }
         if actions.baud {
-            info!("bus at {} baud", settings.baud());
-            if let Err(cause) = self.bus.set_baud(settings.baud()) {
+            info!("bus at {} baud", baud);
+            if let Err(cause) = self.bus.set_baud(baud) {
                 error!("bus speed: {}", cause);
             }
         }
@@ -100,27 +101,27 @@ impl LinkTask {
             crash::reboot();
         }
     }
+}
 
-    /// Has control write to flash, which makes the core wait: never while the motor is driven.
-    async fn save(&mut self, record: &Record) -> bool {
-        // What an earlier save left is void.
-        SAVE.take(|_| ());
-        SAVED.reset();
-        SAVE.fill(|place| *place = *record);
-        WAKE.signal(());
-        let saved = SAVED.wait().await;
-        match saved {
-            Ok(()) => info!("parameters saved"),
-            Err(NotSaved::Busy) => warn!("parameters not saved: the motor is driven or a tare is under way"),
-            Err(NotSaved::Failed(cause)) => log_save_error(cause),
-        }
-        saved.is_ok()
+/// Has control write to flash, which makes the core wait: never while the motor is driven.
+async fn save(record: &Record) -> bool {
+    // What an earlier save left is void.
+    SAVE.take(|_| ());
+    SAVED.reset();
+    SAVE.fill(|place| *place = *record);
+    WAKE.signal(());
+    let saved = SAVED.wait().await;
+    match saved {
+        Ok(()) => info!("parameters saved"),
+        Err(NotSaved::Busy) => warn!("parameters not saved: the motor is driven or a tare is under way"),
+        Err(NotSaved::Failed(cause)) => log_save_error(cause),
     }
+    saved.is_ok()
 }
 
 /// What the bus may read, of the newest picture.
 fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
-    let Picture { report, frame, taxels, pascals_per_sum_q32, tare, proposal } = picture;
+    let Picture { report, frame, taxels, pascals_per_sum_q32, tare, proposals: _, proposal } = picture;
     let report = report.unwrap_or_default();
     Snapshot {
         status: report.status,

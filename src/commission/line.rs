@@ -74,7 +74,7 @@ mod tests {
         let fitted = line.fit().expect("it rises");
         assert_eq!((fitted.speed, fitted.zero), (3 << 16, (40 << 8) / 3));
         let mut steep = Line::default();
-        (0..3_000).for_each(|frame| steep.add(frame.saturating_mul(2_000_000)));
+        (0..3_000_i32).for_each(|frame| steep.add(frame.saturating_mul(2_000_000)));
         assert!(steep.full() && steep.frames() == FRAMES_MAX);
         steep.fit();
         let mut falls = Line::default();

@@ -1,9 +1,9 @@
 //! The one table of checks: what the image measures, what is expected, why, and what to do where it is otherwise.
 
 use crate::script::Bench;
+use crate::steps;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Pipeline};
-use serde_json::Value;
 use std::sync::OnceLock;
 
 /// A figure of the image's report against what is expected.
@@ -230,17 +230,6 @@ const CYCLES: [(&str, &str); 3] = [
     ("finger_most_cycles", "a frame of the simulated finger, the longest"),
 ];
 
-/// The demonstration's figures, which the simulated finger's are judged by.
-const DEMO: &str = include_str!("../../../docs/demo.json");
-/// As the report names them, as the demonstration does, in words, their unit, and by how much they may differ at least.
-const STEP_FIGURES: [(&str, &str, &str, &str, &str, f64); 3] = [
-    ("rise", "ms", "rise_ms", "rise, 10 to 90 %", "ms", 0.0),
-    ("overshoot", "percent", "overshoot_percent", "overshoot", "%", 0.2),
-    ("settled", "ms", "settling_ms", "settled to 2 %", "ms", 0.0),
-];
-/// A tenth.
-const SHARE: f64 = 0.1;
-
 /// What the loop on the simulated finger comes to; worked out once.
 fn loop_bits() -> u32 {
     static BITS: OnceLock<u32> = OnceLock::new();
@@ -293,23 +282,6 @@ pub fn checks() -> Vec<Check> {
         then: "the step or the finger computes other bits: image and host are of different sources, or tell us",
         unseen: None,
     });
-    let demo: Value = serde_json::from_str(DEMO).expect("docs/demo.json is JSON");
-    let steps = demo["steps"].as_array().expect("docs/demo.json has steps");
-    for (place, step) in steps.iter().enumerate() {
-        for (figure, ends, theirs, words, unit, least) in STEP_FIGURES {
-            let expected = step[theirs].as_f64().unwrap_or(f64::NAN);
-            let allowed = f64::max(expected * SHARE, least);
-            let [from, to] = ["from_n", "to_n"].map(|key| step[key].as_f64().unwrap_or(f64::NAN));
-            checks.push(Check {
-                name: format!("{figure}_{}_{ends}", place + 1),
-                what: format!("simulated finger, {from:.1} to {to:.1} N: {words}"),
-                unit,
-                within: [f64::max(expected - allowed, 0.0), expected + allowed],
-                source: "docs/demo.json, within a tenth",
-                then: "the step computes something else than on the emulated board: tell us, with the JSON file",
-                unseen: None,
-            });
-        }
-    }
+    checks.extend(steps::checks());
     checks
 }

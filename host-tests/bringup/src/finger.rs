@@ -14,7 +14,7 @@ use fingertip::units::{CoreCycles, Duty};
 const RADIUS_MM: f32 = 10.0;
 const MODULUS_KPA: f32 = 250.0;
 /// pi Y, so that F = pi Y d^2, N/mm^2.
-const FORCE_PER_MM2: f32 = PI * MODULUS_KPA * 1e-3;
+pub(crate) const FORCE_PER_MM2: f32 = PI * MODULUS_KPA * 1e-3;
 const PITCH_MM: f32 = 1.5;
 /// The virtual ground, the preload and the slope of a taxel, in codes.
 const GROUND: f32 = 0.3 / 3.3 * 4_096.0;
@@ -29,9 +29,9 @@ const INERTIA_KG_M2: f32 = 0.71e-7;
 const FRICTION_NM: f32 = 0.12e-3;
 /// What a gear of 70 % adds to the friction, as a share of the load.
 const FRICTION_SHARE: f32 = 1.0 / 0.7 - 1.0;
-const MM_PER_RAD: f32 = 12.0 / 43.0;
+pub(crate) const MM_PER_RAD: f32 = 12.0 / 43.0;
 const NM_PER_N: f32 = MM_PER_RAD * 1e-3;
-const COUNTS_PER_RAD: f32 = 1_600.0 / (2.0 * PI);
+pub(crate) const COUNTS_PER_RAD: f32 = 1_600.0 / (2.0 * PI);
 const SOURCE_V: f32 = 6.0;
 const SOURCE_OHM: f32 = 0.1;
 

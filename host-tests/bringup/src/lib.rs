@@ -14,3 +14,5 @@ pub mod checks;
 pub mod judge;
 #[cfg(feature = "host")]
 pub mod listen;
+#[cfg(feature = "host")]
+pub mod steps;

@@ -18,7 +18,7 @@ const GAIN_ONE: u16 = 16_384;
 fn start() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_gain(&mut rig, 44, GAIN_ONE / 4 * 5);
     write_gain(&mut rig, 35, GAIN_ONE / 4 * 3);

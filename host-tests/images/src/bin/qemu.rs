@@ -25,6 +25,10 @@ use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
 use images::record::{Digest, MAGIC, Record};
 use images::same_bits::Comparison;
+use static_cell::StaticCell;
+
+/// As large as half of the stack.
+static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
@@ -87,7 +91,7 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     let count = u32::from_le_bytes(count);
 
     let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
-    let mut pipeline = Pipeline::new(&config);
+    let pipeline = PIPELINE.init_with(|| Pipeline::new(&config));
     let mut digest = Digest::new();
     let loop_ticks = ticks(syst, spin);
     let empty_ticks = ticks(syst, || {});

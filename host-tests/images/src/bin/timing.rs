@@ -24,6 +24,11 @@ use fingertip::units::{Duty, Millimetres};
 use host::{File, command_line, fail, say};
 use images::record::{MAGIC, Record};
 use images::single::{self, Refined};
+use static_cell::StaticCell;
+
+/// Too large for the stack.
+static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
+static PRESS: StaticCell<Press> = StaticCell::new();
 
 /// What the kernels read and write.
 struct Bench<'a> {
@@ -31,7 +36,7 @@ struct Bench<'a> {
     /// With a characteristic that is no line, and creep.
     curved: &'a Config,
     record: Record,
-    pipeline: Pipeline,
+    pipeline: &'static mut Pipeline,
     array: Array,
     picture: Picture,
     contact: Contact,
@@ -43,7 +48,7 @@ struct Bench<'a> {
     reference: Reference,
     limits: Limits,
     duty: Duty,
-    press: Press,
+    press: &'static mut Press,
 }
 
 type Kernel = extern "C" fn(&mut Bench);
@@ -124,7 +129,7 @@ extern "C" fn gather(bench: &mut Bench) {
 }
 
 extern "C" fn find_pose(bench: &mut Bench) {
-    let Press { pose, travel, reading, equations, .. } = &mut bench.press;
+    let Press { pose, travel, reading, equations, .. } = &mut *bench.press;
     let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) else { return };
     if let Some(line) = Line::of(&zero, travel, reading) {
         equations.take(&zero, &line);
@@ -132,13 +137,13 @@ extern "C" fn find_pose(bench: &mut Bench) {
 }
 
 extern "C" fn expect(bench: &mut Bench) {
-    let Press { pose, travel, expected, .. } = &mut bench.press;
+    let Press { pose, travel, expected, .. } = &mut *bench.press;
     *expected = [0; STEPS];
     add_part(expected, pose, Press::PLACE, Press::PITCH, 1, travel, Press::STEP);
 }
 
 extern "C" fn propose(bench: &mut Bench) {
-    let Press { travel, reading, expected, proposal, .. } = &mut bench.press;
+    let Press { travel, reading, expected, proposal, .. } = &mut *bench.press;
     let sums = Sums::of(reading, expected, travel);
     proposal.set(44, &sums, 16_384, bench.config);
 }
@@ -231,7 +236,7 @@ fn main() -> ! {
         config: &config,
         curved: &curved,
         record: Record::from_bytes(&[0; Record::BYTES]),
-        pipeline: Pipeline::new(&config),
+        pipeline: PIPELINE.init_with(|| Pipeline::new(&config)),
         array: Array::new(),
         picture: Picture::EMPTY,
         contact: Contact::default(),
@@ -242,7 +247,7 @@ fn main() -> ! {
         reference: Reference::default(),
         limits: Limits::default(),
         duty: Duty::ZERO,
-        press: Press::new(),
+        press: PRESS.init_with(Press::new),
     };
     for _ in 0..count {
         let mut bytes = [0; Record::BYTES];

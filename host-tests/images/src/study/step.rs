@@ -15,13 +15,17 @@ use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::Duty;
 use images::record::Record;
+use static_cell::StaticCell;
+
+/// Too large for the stack.
+static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 
 /// What the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
     fit_level: FitLevel,
     record: Record,
-    pipeline: Pipeline,
+    pipeline: &'a mut Pipeline,
     duty: Duty,
     array: Array,
     picture: Picture,
@@ -108,12 +112,13 @@ extern "C" fn guard(bench: &mut Bench) {
 }
 
 impl<'a> Bench<'a> {
-    fn new(fit_level: FitLevel, config: &'a Config) -> Self {
+    fn new(fit_level: FitLevel, config: &'a Config, pipeline: &'a mut Pipeline) -> Self {
+        *pipeline = Pipeline::new(config);
         Self {
             config,
             fit_level,
             record: Record::from_bytes(&[0; Record::BYTES]),
-            pipeline: Pipeline::new(config),
+            pipeline,
             duty: Duty::ZERO,
             array: Array::new(),
             picture: Picture::EMPTY,
@@ -139,10 +144,11 @@ fn record(inputs: &mut Inputs) -> Record {
 pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let start = inputs.place();
+    let pipeline = PIPELINE.init_with(|| Pipeline::new(config));
     for (name, fit_level) in STEPS {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(fit_level, config);
+        let mut bench = Bench::new(fit_level, config, pipeline);
         for _ in 0..count {
             bench.record = record(inputs);
             pass_on(*region, step, &mut bench);
@@ -152,7 +158,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(FitLevel::default(), config);
+        let mut bench = Bench::new(FitLevel::default(), config, pipeline);
         for n in 0..count.min(PART_RECORDS) {
             bench.record = record(inputs);
             step(&mut bench);

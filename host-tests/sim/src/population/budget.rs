@@ -26,11 +26,7 @@ pub struct Cause {
 
 /// Every cause, as the population names them.
 pub const CAUSES: [Cause; 12] = [
-    cause(
-        "taxels' gains, 0 to 10 % rms apart",
-        &["effects.gain_spread.rms_percent"],
-        "a better array, or gains from presses",
-    ),
+    cause("taxels' gains, 0 to 10 % rms apart", &["effects.gain_spread.rms_percent"], "a better array"),
     cause("the array's gain, known to 2 % rms", &["gain_off"], "a press on a scale"),
     cause("the modulus, known to 5 % rms", &["modulus_off"], "`identify`, or a scale"),
     cause("the radius, known to 1 % rms", &["radius_off"], "a calliper"),

@@ -2,7 +2,11 @@
 
 use clap::{Parser, Subcommand};
 use host_tests::{kept, say};
-use std::path::PathBuf;
+use sensor::gains::{self, Found};
+use sensor::presses::Presses;
+use sensor::table::Refusal;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Fits a sensor's characteristic and creep to recordings.
@@ -35,25 +39,69 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
     },
+    /// Fits the taxels' gains and the scale to presses under a load cell, each press left out in turn
+    ///
+    /// Columns: force_N, the force on the tip; r0c0, r0c1 and so on, the raw code of each taxel by row and column; and
+    /// press, a name for each press, where it is known. Begin free of contact, which gives the tare; press slowly, at
+    /// ten places or more, each wholly on the array. The characteristic has to be a line: curve_permille 0.
+    #[command(after_help = "Examples:\n  \
+        cargo xtask sensor gains presses.csv --judge others.csv --parameters array.toml\n  \
+        fingertip params restore array.toml --save\n\n\
+        Exits with 0, or with 2 where a file cannot be used: nothing is written then.")]
+    Gains {
+        /// The recording to fit to
+        #[arg(value_name = "FIT.csv")]
+        fit: PathBuf,
+        /// The recording to judge on, of the same array
+        #[arg(long, value_name = "JUDGE.csv")]
+        judge: Option<PathBuf>,
+        /// Writes every figure, its unit in the key's name
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// Writes gains and scale, for `fingertip params restore`
+        #[arg(long, value_name = "FILE")]
+        parameters: Option<PathBuf>,
+    },
 }
 
 fn main() -> ExitCode {
-    let Command::Fit { fit, judge, json } = Cli::parse().command;
-    let answer = match sensor::fit(&fit, judge.as_deref()) {
-        Ok(answer) => answer,
+    let done = match Cli::parse().command {
+        Command::Fit { fit, judge, json } => sensor::fit(&fit, judge.as_deref()).and_then(|answer| {
+            write(json.as_deref(), || as_json(&answer))?;
+            say::text(&answer);
+            Ok(())
+        }),
+        Command::Gains { fit, judge, json, parameters } => gains(&fit, judge.as_deref()).and_then(|found| {
+            write(json.as_deref(), || as_json(&found))?;
+            write(parameters.as_deref(), || found.parameters())?;
+            say::text(&found);
+            Ok(())
+        }),
+    };
+    match done {
+        Ok(()) if say::end() => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::from(2),
         Err(refusal) => {
             say::aside(format_args!("error: {refusal}"));
-            return ExitCode::from(2);
-        }
-    };
-    if let Some(json) = json {
-        let text = serde_json::to_string_pretty(&answer).unwrap_or_default() + "\n";
-        if let Err(error) = kept::Lock::take(&json).and_then(|lock| lock.write(text)) {
-            let why = "name a file in a folder that can be written";
-            say::aside(format_args!("error: {} cannot be written ({error}): {why}", json.display()));
-            return ExitCode::from(2);
+            ExitCode::from(2)
         }
     }
-    say::text(&answer);
-    if say::end() { ExitCode::SUCCESS } else { ExitCode::from(2) }
+}
+
+fn gains(fit: &Path, judge: Option<&Path>) -> Result<Found, Refusal> {
+    let presses = Presses::read(fit)?;
+    gains::fit(&presses, judge.map(Presses::read).transpose()?.as_ref())
+}
+
+fn as_json(answer: &impl Serialize) -> String {
+    serde_json::to_string_pretty(answer).unwrap_or_default() + "\n"
+}
+
+/// Writes a file where one is asked for.
+fn write(path: Option<&Path>, text: impl FnOnce() -> String) -> Result<(), Refusal> {
+    let Some(path) = path else { return Ok(()) };
+    kept::Lock::take(path).and_then(|lock| lock.write(text())).map_err(|error| {
+        let why = "name a file in a folder that can be written";
+        Refusal(format!("{} cannot be written ({error}): {why}", path.display()))
+    })
 }

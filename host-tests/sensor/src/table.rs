@@ -57,10 +57,7 @@ impl Table {
     /// # Errors
     /// Says what is wrong, in which line, and what to do.
     pub fn read(path: &Path) -> Result<Self, Refusal> {
-        let file = path.display().to_string();
-        let bytes = std::fs::read(path)
-            .map_err(|error| Refusal(format!("{file}: cannot be read ({error}): name a CSV file that exists")))?;
-        Self::parse(&file, &bytes)
+        Self::parse(&path.display().to_string(), &bytes(path)?)
     }
 
     /// Reads what a file holds.
@@ -68,41 +65,19 @@ impl Table {
     /// # Errors
     /// As [`Table::read`].
     pub fn parse(file: &str, bytes: &[u8]) -> Result<Self, Refusal> {
-        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-        let refuse = |line: u64, why: String| Refusal(format!("{file}, line {line}: {why}"));
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
-        let header = reader
-            .headers()
-            .map_err(|_| refuse(1, "this is not text: save the recording as CSV in UTF-8".into()))?
-            .clone();
-        let (kind, places) = columns(&header).map_err(|why| refuse(1, why))?;
-        let names = if kind == Kind::Cycles { CYCLES } else { HOLDS };
-        let mut rows = Vec::new();
-        for record in reader.records() {
-            let record = record.map_err(|error| {
-                let line = error.position().map_or(0, csv::Position::line);
-                let why = match error.kind() {
-                    csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                        format!("{len} fields where the header has {expected_len}: complete the line or take it out")
-                    }
-                    _ => "not text in UTF-8: save the recording as CSV in UTF-8".into(),
-                };
-                refuse(line, why)
-            })?;
-            let line = record.position().map_or(0, csv::Position::line);
+        let row = |(kind, places): &(Kind, [usize; 4]), record: &csv::StringRecord, line| {
+            let names = if *kind == Kind::Cycles { CYCLES } else { HOLDS };
             let field = |at: usize| record.get(places[at]).unwrap_or_default();
             let mut numbers = [0.0; 3];
             for (at, number) in numbers.iter_mut().enumerate() {
-                *number = value(names[at + 1], field(at + 1)).map_err(|why| refuse(line, why))?;
+                *number = value(names[at + 1], field(at + 1))?;
             }
             if field(0).is_empty() {
-                return Err(refuse(line, format!("{} is empty: name what the row belongs to", names[0])));
+                return Err(format!("{} is empty: name what the row belongs to", names[0]));
             }
-            rows.push(Row { of: field(0).into(), numbers, line });
-        }
-        if rows.is_empty() {
-            return Err(refuse(2, "no rows after the header: give a recording".into()));
-        }
+            Ok(Row { of: field(0).into(), numbers, line })
+        };
+        let ((kind, _), rows) = rows(file, bytes, columns, row)?;
         Ok(Self { file: file.into(), kind, rows })
     }
 
@@ -110,6 +85,46 @@ impl Table {
     pub fn refuse(&self, line: u64, why: impl Display) -> Refusal {
         Refusal(format!("{}, line {line}: {why}", self.file))
     }
+}
+
+/// What the header says, and every row by it; at least one.
+pub(crate) fn rows<H, R>(
+    file: &str,
+    bytes: &[u8],
+    header: impl Fn(&csv::StringRecord) -> Result<H, String>,
+    row: impl Fn(&H, &csv::StringRecord, u64) -> Result<R, String>,
+) -> Result<(H, Vec<R>), Refusal> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let refuse = |line: u64, why: String| Refusal(format!("{file}, line {line}: {why}"));
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(bytes);
+    let names = reader.headers();
+    let names = names.map_err(|_| refuse(1, "this is not text: save the recording as CSV in UTF-8".into()))?;
+    let header = header(names).map_err(|why| refuse(1, why))?;
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| {
+            let line = error.position().map_or(0, csv::Position::line);
+            let why = match error.kind() {
+                csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
+                    format!("{len} fields where the header has {expected_len}: complete the line or take it out")
+                }
+                _ => "not text in UTF-8: save the recording as CSV in UTF-8".into(),
+            };
+            refuse(line, why)
+        })?;
+        let line = record.position().map_or(0, csv::Position::line);
+        rows.push(row(&header, &record, line).map_err(|why| refuse(line, why))?);
+    }
+    if rows.is_empty() {
+        return Err(refuse(2, "no rows after the header: give a recording".into()));
+    }
+    Ok((header, rows))
+}
+
+/// What a file holds.
+pub(crate) fn bytes(path: &Path) -> Result<Vec<u8>, Refusal> {
+    let refuse = |error| format!("{}: cannot be read ({error}): name a CSV file that exists", path.display());
+    std::fs::read(path).map_err(|error| Refusal(refuse(error)))
 }
 
 /// What the header is of, and where its columns are; others may stand beside them.
@@ -142,7 +157,7 @@ fn columns(header: &csv::StringRecord) -> Result<(Kind, [usize; 4]), String> {
     ))
 }
 
-fn value(name: &str, text: &str) -> Result<f64, String> {
+pub(crate) fn value(name: &str, text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if !value.is_finite() => Err(format!("{name} is {text}: take the row out")),
         Ok(value) if value.abs() > LARGEST => {

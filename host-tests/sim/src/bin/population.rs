@@ -7,11 +7,14 @@ use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    if args.board != Board::Native {
-        host_tests::say::aside(
-            "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
-        );
-        return ExitCode::from(2);
+    match args.board {
+        Board::Native => cli::answer(&args, &native::board),
+        Board::Calibrated => cli::answer(&args, &native::calibrated::board),
+        Board::Virtual => {
+            host_tests::say::aside(
+                "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
+            );
+            ExitCode::from(2)
+        }
     }
-    cli::answer(&args, &native::board)
 }

@@ -25,22 +25,9 @@ pub fn scene(seed: u64, plate: Plate, tables: &str) -> Scene {
     read("plate.toml", &text, &[]).unwrap_or_else(|errors| panic!("{errors}\n{text}"))
 }
 
-/// Presses once, from a tare on; how the press ended.
+/// Presses once; how the press ended.
 pub fn press(bench: &mut Bench<Named>) -> State {
-    bench.tare();
-    bench.command().calibrate_request += 1;
-    let asked = bench.command().calibrate_request;
-    for _ in 0..60_000 {
-        let status = bench.step();
-        assert_eq!(status.fault, None);
-        let state = status.calibration.state;
-        if status.taken.calibrate == asked && state.number() > 1 {
-            bench.command().torque = false;
-            bench.step();
-            return state;
-        }
-    }
-    panic!("no end");
+    sim::native::calibrated::press(bench).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Three presses at these plates.

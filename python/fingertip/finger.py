@@ -259,7 +259,7 @@ class Fingertip(Bus):
             raise FingertipError("nobody confirmed yet which way the motor goes: jog(), watch, confirm_direction()")
         was_on = self.read(reg.TORQUE_ENABLE)
         if silence_s is not None:
-            self.write(reg.BUS_WATCHDOG, round(silence_s / 0.02))
+            self.write(reg.BUS_WATCHDOG, 20 * round(silence_s / 0.02))
             self._watched = True
         self.write(reg.TORQUE_ENABLE, 1)
         try:

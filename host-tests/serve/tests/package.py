@@ -48,6 +48,7 @@ with Fingertip(sys.argv[1], timeout_ms=float(sys.argv[2])) as finger:
     def read_and_restart(register):
         value = read(register)
         if register is registers.FRAME_COUNTER:
+            finger.read = read
             restart(finger)
         return value
 
@@ -55,14 +56,20 @@ with Fingertip(sys.argv[1], timeout_ms=float(sys.argv[2])) as finger:
         finger.tare()
         finger.read = read_and_restart
         refused(task, Restarted)
-        finger.read = read
+
+    # A number is written as it is read, in the register's unit.
+    finger.write(registers.BUS_WATCHDOG, 500)
+    assert finger.read(registers.BUS_WATCHDOG) == 500
+    finger.write(registers.BUS_WATCHDOG, 0)
+    for value in [10, 2560, -20]:
+        refused(lambda: finger.write(registers.BUS_WATCHDOG, value), ValueError)
 
     # The watchdog is there as long as it presses.
     for silence_s in [0.0, 3.0, float("nan")]:
         refused(lambda: finger.press(1.0, silence_s), ValueError)
     finger.tare()
     finger.press(0.5, silence_s=2.54)
-    assert finger.read(registers.BUS_WATCHDOG) == 127
+    assert finger.read(registers.BUS_WATCHDOG) == 2540
     finger.release()
     assert finger.read(registers.BUS_WATCHDOG) == 0
 

@@ -1,5 +1,6 @@
 """Registers read and written, by `dynamixel-sdk`."""
 
+import os
 import time
 from typing import Any, List, Optional, Type
 
@@ -56,7 +57,8 @@ class Bus:
         try:
             opened = self._port.openPort() and self._port.setBaudRate(baud)
         except OSError as why:
-            raise FingertipError(f"cannot open {port}: {why}") from why
+            reason = os.strerror(why.errno) if why.errno else why
+            raise FingertipError(f"cannot open {port}: {reason}") from None
         if not opened:
             raise FingertipError(f"cannot open {port} at {baud} baud")
 

@@ -163,9 +163,8 @@ fn tell(client: &mut Client, json: bool) -> Result<(), Error> {
         say_json(&all.into());
         return Ok(());
     }
-    say(
-        "inertia and friction hold where resistance_mohm does: nothing on the board tells the current, so resistance cannot be",
-    );
+    say("inertia and friction hold where resistance_mohm does: nothing on the board tells the current, so resistance \
+         cannot be");
     say("measured here, nor the gear's play: docs/commissioning.md says why. Next: `fingertip commission accept`");
     Ok(())
 }

@@ -72,8 +72,8 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         (pressed, Err(second)) => {
             let why = pressed.err().map_or(String::new(), |why| format!("{why}; "));
             return Err(format!(
-                "{why}letting go failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of silence, with \
-                 fault 7; `fingertip recover` turns torque off"
+                "{why}letting go failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of silence, \
+                 with fault 7; `fingertip recover` turns torque off"
             )
             .into());
         }

@@ -124,7 +124,8 @@ fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error
         Err(second) => {
             let names: Vec<String> = changed.iter().map(|(register, ..)| name(register)).collect();
             Error::Other(format!(
-                "{why}; and putting back failed: {second}. Only some are set, of {}: a reboot brings back what was saved",
+                "{why}; and putting back failed: {second}. Only some are set, of {}: \
+                 a reboot brings back what was saved",
                 names.join(", ")
             ))
         }

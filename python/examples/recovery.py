@@ -25,7 +25,7 @@ def main() -> None:
         if finger.state().fault:
             finger.recover()
         finger.tare()
-        finger.press(arguments.newtons)
+        finger.press(arguments.newtons, silence_s=2.0)
         try:
             while time.monotonic() < until:
                 state = finger.state()
@@ -34,7 +34,7 @@ def main() -> None:
                     try:
                         finger.recover()
                         # A fault lets go and the tare stays: nothing else is to be set up anew.
-                        finger.press(arguments.newtons)
+                        finger.press(arguments.newtons, silence_s=2.0)
                         recovered += 1
                     except FingertipError as why:
                         # What causes it is still there: later perhaps.

@@ -28,7 +28,8 @@ def main() -> None:
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:
         if arguments.press:
             finger.tare()
-            finger.press(arguments.press)
+            # Should this program be killed, the motor stops; slower streams would stop it themselves.
+            finger.press(arguments.press, silence_s=None if 0 < arguments.rate_hz < 2 else 1.0)
         try:
             with open(arguments.file, "w", newline="") as file:
                 table = csv.writer(file)

@@ -4,8 +4,9 @@
 
     with Fingertip("/dev/ttyACM0") as finger:
         finger.tare()                    # nothing may touch the tip
-        finger.press(1.5)                # approaches, touches, holds 1.5 N
-        print(finger.state().force_n)
+        finger.press(1.5)                # returns at once; approaches, touches, holds 1.5 N
+        for state in finger.stream(rate_hz=10, seconds=1.0):
+            print(state.time_s, state.force_n)
         finger.release()                 # lets go, torque off
 
 Times are the controller's own; registers and their units are in `fingertip.registers`.

@@ -1,5 +1,6 @@
 """Registers read and written, by `dynamixel-sdk`."""
 
+import os
 import time
 from typing import Any, List, Optional, Type
 
@@ -56,7 +57,8 @@ class Bus:
         try:
             opened = self._port.openPort() and self._port.setBaudRate(baud)
         except OSError as why:
-            raise FingertipError(f"cannot open {port}: {why}") from why
+            reason = os.strerror(why.errno) if why.errno else why
+            raise FingertipError(f"cannot open {port}: {reason}") from None
         if not opened:
             raise FingertipError(f"cannot open {port} at {baud} baud")
 
@@ -99,9 +101,12 @@ class Bus:
 
     def write(self, register: Register, value: int) -> None:
         """Sets a register, in the unit that its name ends with."""
-        if not register.least <= value <= register.largest:
-            raise ValueError(f"{register.name} of {value}: {register.least} to {register.largest} are allowed")
-        data = value.to_bytes(register.width, "little", signed=register.signed)
+        raw, rest = divmod(value, register.scale)
+        if rest or not register.least <= raw <= register.largest:
+            least, largest = register.least * register.scale, register.largest * register.scale
+            steps = f" in steps of {register.scale}" if register.scale != 1 else ""
+            raise ValueError(f"{register.name} of {value}: {least} to {largest}{steps} are allowed")
+        data = raw.to_bytes(register.width, "little", signed=register.signed)
         self.write_bytes(register.address, data, f"set {register.name} to {value}")
 
     def _check(self, doing: str, result: int, error: int) -> None:

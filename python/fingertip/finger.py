@@ -3,7 +3,7 @@
 import time
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Dict, Iterator, List, Mapping, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, Type
 
 from . import registers as reg
 from .bus import Bus, FingertipError, NoAnswer, Refused, numbers
@@ -21,7 +21,8 @@ _PARAMETERS = [
 _PATIENCE_S = 10.0
 _COMMISSION_S = 60.0
 _JOG, _MEASURE = 1, 2
-_RUNNING, _REFUSED = 1, 4
+_NO_TASK, _RUNNING, _REFUSED = 0, 1, 4
+_DONE = {_JOG: 2, _MEASURE: 3}
 _REASONS = {
     1: "a stop, torque, a fault, a tare or new parameters ended it",
     2: "tare first, with torque off; nothing may touch the tip",
@@ -95,6 +96,7 @@ class Fingertip(Bus):
         super().__init__(port, device_id, baud, timeout_ms)
         self._last: Optional[Tuple[int, int]] = None  # time and frame of the last state
         self._time_us = 0
+        self._watched = False  # the bus watchdog is this object's
         try:
             model = self.ping()
             if model != _MODEL:
@@ -106,6 +108,16 @@ class Fingertip(Bus):
 
     def __enter__(self) -> "Fingertip":
         return self
+
+    def __exit__(self, kind: Optional[Type[BaseException]], why: Any, trace: Any) -> None:
+        """Gives the port back. Whatever else than the block's end ends it, as Ctrl-C, turns torque off before."""
+        try:
+            if kind is not None:
+                self.write(reg.TORQUE_ENABLE, 0)
+        except FingertipError:
+            pass  # what ended the block is what is told
+        finally:
+            super().__exit__(kind, why, trace)
 
     def state(self, pressures: bool = True) -> State:
         """Reads state and time in one packet, with the pressures or without: that is five times as short.
@@ -207,14 +219,20 @@ class Fingertip(Bus):
             self.save()
 
     def _commission(self, task: int) -> None:
+        if self.read(reg.COMMISSION_STATE) == _RUNNING:
+            raise FingertipError("the tip is moving for a jog or a measurement: wait until it ends")
         self.write(reg.COMMISSION, task)
         begun, frame_s = self.read(reg.FRAME_COUNTER), 1e-9 * self.read(reg.FRAME_PERIOD_NS)
         try:
-            state = _RUNNING
+            state, frames = _RUNNING, 0
             # By the controller's own time: a simulated one may be slower than a real one.
-            while state == _RUNNING and (self.read(reg.FRAME_COUNTER) - begun) % 2**32 * frame_s < _COMMISSION_S:
+            while state == _RUNNING and frames * frame_s < _COMMISSION_S:
                 time.sleep(0.02)
                 state = self.read(reg.COMMISSION_STATE)
+                frames = (self.read(reg.FRAME_COUNTER) - begun) % 2**32
+                if frames >= 2**31:
+                    # Frames count back.
+                    state = _NO_TASK
         except BaseException:
             self.write(reg.COMMISSION, 0)
             raise
@@ -224,12 +242,18 @@ class Fingertip(Bus):
         if state == _REFUSED:
             refusal = self.read(reg.COMMISSION_REFUSAL)
             raise FingertipError(f"refused: {_REASONS.get(refusal, refusal)}")
+        if state != _DONE[task]:
+            # A controller that started anew knows of no task.
+            raise Restarted("it came to no end: the controller started anew, or its parameters were set")
 
-    def press(self, newtons: float) -> None:
+    def press(self, newtons: float, silence_s: Optional[float] = None) -> None:
         """Asks for a force: the tip approaches, touches and holds it. Returns at once.
 
-        Where the force is refused, torque is as it was.
+        Where the force is refused, torque is as it was. A program that is killed leaves the tip pressing, unless
+        `silence_s` says for how long nothing may be asked of the controller before it stops the motor: fault 7.
         """
+        if silence_s is not None and not 0.02 <= silence_s <= 2.54:
+            raise ValueError(f"silence_s of {silence_s}: 0.02 to 2.54 are allowed")
         goal_mn = round(1000 * newtons)
         if not reg.GOAL_FORCE_MN.least <= goal_mn <= reg.GOAL_FORCE_MN.largest:
             raise ValueError(f"{newtons} N: 0 to {reg.GOAL_FORCE_MN.largest / 1000} N are allowed")
@@ -238,6 +262,9 @@ class Fingertip(Bus):
         if not self.read(reg.DIRECTION_CONFIRMED):
             raise FingertipError("nobody confirmed yet which way the motor goes: jog(), watch, confirm_direction()")
         was_on = self.read(reg.TORQUE_ENABLE)
+        if silence_s is not None:
+            self.write(reg.BUS_WATCHDOG, 20 * round(silence_s / 0.02))
+            self._watched = True
         self.write(reg.TORQUE_ENABLE, 1)
         try:
             self.write(reg.GOAL_FORCE_MN, goal_mn)
@@ -257,6 +284,9 @@ class Fingertip(Bus):
                     break
                 time.sleep(0.01)
         self.write(reg.TORQUE_ENABLE, 0)
+        if self._watched:
+            self.write(reg.BUS_WATCHDOG, 0)
+            self._watched = False
 
     def recover(self) -> Fault:
         """Clears what stopped the motor; torque is off then, and the goal 0. Returns what it was."""
@@ -297,9 +327,12 @@ class Fingertip(Bus):
 
     def save(self) -> None:
         """Keeps the parameters over a reset."""
+        meant = self.parameters()
         self.write(reg.SAVE_PARAMETERS, 1)
         if self._wait(reg.SAVED_STATE, _CHANGED) != _SAME:
             raise FingertipError("the save failed: the flash holds what it did")
+        if self.parameters() != meant:
+            raise Restarted("the controller started anew before it saved: the flash holds what it did")
 
     def _wait(self, register: reg.Register, while_it_is: int) -> int:
         """Reads a register until it is something else, or the time is over."""

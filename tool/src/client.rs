@@ -14,6 +14,8 @@ use std::time::{Duration, Instant};
 const ALERT: u8 = 0x80;
 /// How long to wait for a device that is not expected to be there.
 const PROBE: Duration = Duration::from_secs(1);
+/// How often what may be asked twice is asked on a noisy line.
+const TRIES: usize = 3;
 /// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
 const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
@@ -26,7 +28,8 @@ pub struct Reach {
     #[arg(long, short, global = true, env = "FINGERTIP_PORT")]
     pub port: Option<String>,
     /// Bus speed
-    #[arg(long, short, global = true, default_value_t = 1_000_000, value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
+    #[arg(long, short, global = true, default_value_t = 1_000_000)]
+    #[arg(value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
     pub baud: u32,
     /// The controller's address on the bus
     #[arg(long, short, global = true, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=252))]
@@ -159,6 +162,20 @@ impl Client {
             }
         }
         Ok(found)
+    }
+
+    /// Asks again where the line was at fault. What is asked must do no harm a second time.
+    ///
+    /// # Errors
+    /// The last one's.
+    pub fn again<T>(&mut self, ask: impl Fn(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
+        for _ in 1..TRIES {
+            match ask(self) {
+                Err(why) if why.is_noise() => {}
+                other => return other,
+            }
+        }
+        ask(self)
     }
 
     /// Reads bytes of the table.

@@ -36,7 +36,7 @@ fn say_json(value: &Value) {
 }
 
 /// How long Ctrl-C may go unseen in a pause.
-const GLANCE: Duration = Duration::from_millis(50);
+const INTERRUPT_EVERY: Duration = Duration::from_millis(50);
 
 /// Set by Ctrl-C and by the end of a terminal.
 #[derive(Clone, Debug)]
@@ -65,7 +65,7 @@ impl Interrupt {
         while !self.came()
             && let Some(left) = until.checked_duration_since(Instant::now())
         {
-            std::thread::sleep(left.min(GLANCE));
+            std::thread::sleep(left.min(INTERRUPT_EVERY));
         }
     }
 }

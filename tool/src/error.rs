@@ -2,6 +2,9 @@
 
 use crate::table::meaning_of_error;
 
+/// A controller's number for an instruction that came damaged.
+const DAMAGED: u8 = 3;
+
 /// A command could not be carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -70,6 +73,11 @@ impl Error {
     /// Whether the controller refused with this number.
     pub fn refused_with(&self, wanted: u8) -> bool {
         matches!(self, Self::Refused { number, .. } if *number == wanted)
+    }
+
+    /// Whether the line may be what was wrong, so that it may go well the next time.
+    pub fn is_noise(&self) -> bool {
+        matches!(self, Self::Silent { .. } | Self::Damaged { .. }) || self.refused_with(DAMAGED)
     }
 
     /// A file that cannot be read or written.

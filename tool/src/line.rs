@@ -9,6 +9,8 @@ use std::time::Duration;
 /// What a TCP port's name begins with: `tcp:127.0.0.1:7000`.
 const TCP: &str = "tcp:";
 const BUFFER: usize = 1024;
+/// What the system says of a file that is no terminal.
+const NO_TERMINAL: i32 = rustix::io::Errno::NOTTY.raw_os_error();
 /// What a served finger says to a second client begins with this.
 const BUSY: &[u8] = b"busy: ";
 
@@ -40,7 +42,10 @@ impl Line {
             stream.set_nodelay(true)?;
             return Ok(Self::Tcp(stream));
         }
-        let serial = SerialPort::open(port, baud)?;
+        let serial = SerialPort::open(port, baud).map_err(|why| match why.raw_os_error() {
+            Some(NO_TERMINAL) => io::Error::new(ErrorKind::InvalidInput, "it is no serial port"),
+            _ => why,
+        })?;
         // Two hosts on one line take each other's answers.
         flock(&serial, FlockOperation::NonBlockingLockExclusive)
             .map_err(|_| io::Error::new(ErrorKind::ResourceBusy, "another program has it open"))?;

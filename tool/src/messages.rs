@@ -1,5 +1,5 @@
-//! A state as messages for what shows recordings: the topics and the names of the scenes', so that what shows those shows
-//! these. The numbers are `fingertip.Scalars`, the pressures a picture in grey.
+//! A state as messages for what shows recordings: the topics and the names of the scenes', so that what shows those
+//! shows these (`tests/messages.rs`). The numbers are `fingertip.Scalars`, the pressures a picture in grey.
 
 use crate::state::{SHAPE, State};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
@@ -112,11 +112,12 @@ fn scalars_schema() -> Value {
 /// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it.
 fn image_schema() -> Value {
     let count = json!({ "type": "integer", "minimum": 0 });
+    let nsec = json!({ "type": "integer", "minimum": 0, "maximum": 999_999_999 });
     json!({
         "title": "foxglove.RawImage",
         "type": "object",
         "properties": {
-            "timestamp": { "type": "object", "title": "time", "properties": { "sec": count, "nsec": count } },
+            "timestamp": { "type": "object", "title": "time", "properties": { "sec": count, "nsec": nsec } },
             "frame_id": { "type": "string" },
             "width": count,
             "height": count,

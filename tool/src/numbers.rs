@@ -1,4 +1,5 @@
-//! Numbers on the command line: what is no time or rate is not understood, so nothing waits for ever or ends in a panic.
+//! Numbers on the command line: what is no time or rate is not understood, so nothing waits for ever or ends in a
+//! panic.
 
 use std::ops::RangeInclusive;
 

@@ -140,7 +140,8 @@ pub fn meaning_of_error(number: u8) -> &'static str {
         5 => "the data do not cover whole registers",
         6 => "a value beyond what other registers allow",
         7 => {
-            "the register cannot be written, or not while torque is on (`fingertip press` and `torque_enable` turn it on)"
+            "the register cannot be written, or not while torque is on (`fingertip press` and `torque_enable` \
+             turn it on)"
         }
         _ => "an error that this program does not know",
     }

@@ -1,8 +1,8 @@
 //! A simulated fingertip behind a port, for any client of the bus: paced to the clock, and idle between frames.
 //!
 //! [`Port`] is where clients come in: a pseudo-terminal or a TCP port. [`serve`] moves a [`Finger`] on with the clock,
-//! hands it what comes in, and sends what it answers. One thread does all: it sleeps until a byte comes in, an answer is
-//! due, or a [`TICK`] is over. [`Pace`] counts what is promised: real time, and answers in time.
+//! hands it what comes in, and sends what it answers. One thread does all: it sleeps until a byte comes in, an
+//! answer is due, or a [`TICK`] is over. [`Pace`] counts what is promised: real time, and answers in time.
 
 #[cfg(feature = "native")]
 pub mod native;

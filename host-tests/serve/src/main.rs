@@ -24,7 +24,8 @@ const DELAY: Duration = Duration::from_micros(500);
 #[command(
     name = "serve",
     version,
-    after_help = "Examples:\n  serve\n  serve raspberry --pty /tmp/finger\n  serve my-scene.toml --tcp 7000 --set effects.noise.rms_codes=3\n  \
+    after_help = "Examples:\n  serve\n  serve raspberry --pty /tmp/finger\n  \
+    serve my-scene.toml --tcp 7000 --set effects.noise.rms_codes=3\n  \
     echo move 3 | serve wall --pty /tmp/finger"
 )]
 struct Args {

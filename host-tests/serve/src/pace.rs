@@ -143,8 +143,8 @@ impl Served {
     pub fn text(&self) -> String {
         let Self { virtual_s, wall_s, received, sent, answers, late, longest_s } = self;
         format!(
-            "served   {virtual_s:.1} s of virtual time in {wall_s:.1} s: {:.2} of real time\n         {received} bytes in, \
-             {sent} out, {answers} answers, {late} of them late, the longest after {:.1} ms",
+            "served   {virtual_s:.1} s of virtual time in {wall_s:.1} s: {:.2} of real time\n         \
+             {received} bytes in, {sent} out, {answers} answers, {late} of them late, the longest after {:.1} ms",
             virtual_s / wall_s,
             longest_s * 1e3
         )

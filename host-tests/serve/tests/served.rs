@@ -125,6 +125,7 @@ fn a_file_is_no_link() {
     std::fs::write(&path, "mine").expect("a file");
     let why = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
     assert!(why.contains(&format!("cannot make the link {}", path.display())), "{why}");
+    assert!(why.contains("name another link, or remove the file"), "{why}");
     assert_eq!(std::fs::read_to_string(&path).expect("it is there"), "mine");
     std::fs::remove_file(&path).expect("it is there");
 }

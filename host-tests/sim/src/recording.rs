@@ -18,6 +18,7 @@ mod write;
 
 pub use check::check;
 pub use replay::{Difference, Replay, replay};
+pub use schemas::{SCALARS, all as schemas};
 pub use write::Recorder;
 
 use crate::watch::Controller;

@@ -1,9 +1,10 @@
 //! The page of the control table, and the model files made of it.
 
+use fingertip::link::table::indirect::BLOCK;
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use host_tests::control_table::{COMMAND, markdown, step};
-use host_tests::model_file::text;
+use host_tests::model_file::{items, text};
 
 #[test]
 fn the_page_is_fresh() {
@@ -19,6 +20,28 @@ fn the_model_files_are_fresh() {
         let file = std::fs::read_to_string(&path).expect("the model file can be read");
         assert!(file == text(direct), "{path} is stale: write it anew with `{COMMAND}`");
     }
+}
+
+/// What the description asks a driver for is in the model file, and fits the indirect addresses.
+#[test]
+fn the_description_for_ros2_control_asks_for_what_there_is() {
+    let path = concat!(env!("FINGERTIP_ROOT"), "/examples/dynamixel/fingertip.ros2_control.xacro");
+    let file = std::fs::read_to_string(path).expect("the description can be read");
+    let (_, gpio) = file.split_once("<gpio").expect("a GPIO");
+    let items = items();
+    let bytes = |tag: &str| {
+        let names = gpio.split(tag).skip(1).map(|rest| rest.split('"').next().unwrap_or_default());
+        // What is the driver's own.
+        let names: Vec<&str> = names.filter(|name| !["type", "ID"].contains(name)).collect();
+        assert!(!names.is_empty(), "no {tag}");
+        let item = |name: &&str| items.iter().find(|item| item.name == **name);
+        names
+            .iter()
+            .map(|name| usize::from(item(name).unwrap_or_else(|| panic!("no item {name}")).bytes))
+            .sum::<usize>()
+    };
+    assert!(bytes("<state_interface name=\"") <= BLOCK && bytes("<command_interface name=\"") <= BLOCK);
+    bytes("<param name=\"");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! One write that does what a fault asks for, goals that end with torque, and what is not told before a tare.
 
-use fingertip::link::packet::StatusError;
+use fingertip::link::packet::{BROADCAST, StatusError, instruction};
 use fingertip::shipped::{TAXELS, address};
 use fingertip::state::{Fault, Limits};
 use fingertip::units::Newtons;
@@ -55,6 +55,35 @@ fn recover_leaves_what_the_single_writes_leave() {
         assert_eq!(recovered(&one), recovered(&single), "{fault:?}");
         assert_eq!(recovered(&[(address::MIRROR_RECOVER, 1)]), recovered(&single), "{fault:?}");
     }
+}
+
+/// As `dynamixel_hardware_interface` does with `Recover` as a command interface: goal and recover go out in each cycle by
+/// indirect addresses, unanswered. What it writes with an answer it takes for refused, as that has the alert.
+#[test]
+fn a_driver_that_sends_goal_and_recover_in_each_cycle_recovers() {
+    let mut bench = Bench::new();
+    let led: Vec<u8> = [address::SHORT_GOAL_MN, address::SHORT_GOAL_MN + 1, RECOVER].map(u16::to_le_bytes).concat();
+    bench.write(address::INDIRECT_ADDRESS_1, &led).expect("torque is off");
+    let cycle = |bench: &mut Bench, mn: i16, recover: u8| {
+        let [low, high] = mn.to_le_bytes();
+        let [at, at_high] = address::INDIRECT_DATA_1.to_le_bytes();
+        let params = [at, at_high, 3, 0, crate::bench::ID, low, high, recover];
+        assert_eq!(bench.ask_as(BROADCAST, instruction::SYNC_WRITE, &params), None);
+    };
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
+    cycle(&mut bench, 1_000, 0);
+    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_000);
+    bench.set_fault(Some(Fault::Bridge));
+    cycle(&mut bench, 1_000, 0);
+    let [at, at_high] = address::TORQUE_ENABLE.to_le_bytes();
+    assert_eq!(bench.ask(instruction::WRITE, &[at, at_high, 0]).error, 0x80, "carried out, with the alert");
+    cycle(&mut bench, 0, 1);
+    bench.take_up();
+    cycle(&mut bench, 0, 0);
+    assert_eq!((bench.number(address::FAULT, 1), bench.number(address::TORQUE_ENABLE, 1)), (0, 0));
+    assert_eq!(bench.ask(instruction::WRITE, &[at, at_high, 1]).error, 0);
+    cycle(&mut bench, 500, 0);
+    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 500);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! `fingertip commission`.
 
 use super::{Interrupt, no_fault, say, say_json};
-use crate::{Client, Error, table};
+use crate::state::ANEW;
+use crate::{Client, Error, numbers, table};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use serde_json::json;
@@ -13,7 +14,12 @@ const JOG: i64 = 1;
 const MEASURE: i64 = 2;
 /// Of `COMMISSION_STATE`.
 const RUNNING: i64 = 1;
+const JOGGED: i64 = 2;
+const MEASURED: i64 = 3;
 const REFUSED: i64 = 4;
+/// Why nothing else goes while the tip moves, whoever asked for it.
+const UNDER_WAY: &str =
+    "the tip is moving for a jog or a measurement: wait until it ends, or `fingertip commission stop`";
 /// Of `COMMISSION_ACCEPT`.
 const DIRECTION: i64 = 1;
 const DRIVE: i64 = 2;
@@ -44,7 +50,7 @@ pub enum Command {
 #[derive(Debug, clap::Args)]
 pub struct Within {
     /// How long to wait for the end; a real controller needs 10 s
-    #[arg(long, default_value_t = 600.0)]
+    #[arg(long, default_value_t = 600.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
@@ -55,7 +61,7 @@ pub struct Within {
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Jog(within) => {
-            carry_out(JOG, within, client)?;
+            carry_out(JOG, JOGGED, within, client)?;
             if json {
                 say_json(&json!({ "direction_proven": true }));
             } else {
@@ -66,7 +72,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Measure(within) => {
-            carry_out(MEASURE, within, client)?;
+            carry_out(MEASURE, MEASURED, within, client)?;
             tell(client, json)
         }
         Command::Confirm => accept(DIRECTION, "the direction is confirmed", "there is no jog to confirm", client, json),
@@ -75,13 +81,13 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
     }
 }
 
-fn carry_out(task: i64, within: &Within, client: &mut Client) -> Result<(), Error> {
-    no_fault(client)?;
+fn carry_out(task: i64, done: i64, within: &Within, client: &mut Client) -> Result<(), Error> {
+    free(client)?;
     let interrupt = Interrupt::catch()?;
     client.set(address::COMMISSION, task).map_err(|why| {
         Error::from(format!("{why}: tare first (`fingertip tare`), with torque off and nothing at the tip"))
     })?;
-    let until = Instant::now() + Duration::from_secs_f64(within.within_s.clamp(0.0, 1e6));
+    let until = Instant::now() + Duration::from_secs_f64(within.within_s);
     let state = loop {
         let state = client.number(address::COMMISSION_STATE)?;
         if state != RUNNING {
@@ -98,7 +104,14 @@ fn carry_out(task: i64, within: &Within, client: &mut Client) -> Result<(), Erro
         no_fault(client)?;
         return Err(format!("refused: {}", reason(refusal)).into());
     }
-    Ok(())
+    // Only what came to its end counts: a controller that started anew knows of no task.
+    if state == done { Ok(()) } else { Err(format!("it came to no end: {ANEW}, or its parameters were set").into()) }
+}
+
+/// Fails where the motor is stopped, or the tip is moving already.
+fn free(client: &mut Client) -> Result<(), Error> {
+    no_fault(client)?;
+    if client.number(address::COMMISSION_STATE)? == RUNNING { Err(UNDER_WAY.into()) } else { Ok(()) }
 }
 
 /// What the refusal's number means, and what to do.
@@ -150,14 +163,14 @@ fn tell(client: &mut Client, json: bool) -> Result<(), Error> {
         say_json(&all.into());
         return Ok(());
     }
-    say(
-        "inertia and friction hold where resistance_mohm does: nothing on the board tells the current, so resistance cannot be",
-    );
+    say("inertia and friction hold where resistance_mohm does: nothing on the board tells the current, so resistance \
+         cannot be");
     say("measured here, nor the gear's play: docs/commissioning.md says why. Next: `fingertip commission accept`");
     Ok(())
 }
 
 fn accept(what: i64, done: &str, nothing: &str, client: &mut Client, json: bool) -> Result<(), Error> {
+    free(client)?;
     client.set(address::COMMISSION_ACCEPT, what).map_err(|why| Error::from(format!("{nothing}: {why}")))?;
     if json {
         say_json(&json!({ "accepted": what }));

@@ -47,8 +47,9 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         }));
     } else {
         say(format_args!(
-            "{} reads of {LENGTH} bytes, {per_s:.0} a second; an answer takes {median_ms:.2} ms in the middle, {most_ms:.2} ms \
-             at 99 %, {longest_ms:.2} ms at most ({delay_us} us of it return delay); {unanswered} unanswered",
+            "{} reads of {LENGTH} bytes, {per_s:.0} a second; an answer takes {median_ms:.2} ms in the middle, \
+             {most_ms:.2} ms at 99 %, {longest_ms:.2} ms at most ({delay_us} us of it return delay); \
+             {unanswered} unanswered",
             took.len()
         ));
     }

@@ -4,6 +4,7 @@ mod file;
 mod set;
 
 use super::{say, say_json};
+use crate::state::ANEW;
 use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::link::table::Register;
@@ -151,6 +152,7 @@ fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> 
 }
 
 fn save(client: &mut Client, json: bool) -> Result<(), Error> {
+    let meant = read_all(client)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
     // The core stands while the flash is written, and may stay silent for that long.
     let timeout = client.set_timeout(SAVE_WITHIN);
@@ -162,7 +164,12 @@ fn save(client: &mut Client, json: bool) -> Result<(), Error> {
         }
     };
     client.set_timeout(timeout);
-    match saved? {
+    let saved = saved?;
+    // One that started anew has what the flash had, and calls that the same.
+    if saved == SAME && read_all(client)? != meant {
+        return Err(format!("not saved: {ANEW}, and has what the flash holds. Set them again").into());
+    }
+    match saved {
         SAME if json => Ok(()),
         SAME => {
             say("saved: a reset keeps them");

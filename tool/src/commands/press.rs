@@ -64,9 +64,20 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let pressed = press(args, goal_mn as i64, client, json, &interrupt);
     // Whatever came of it, and first of all.
     let let_go = let_go(args, client);
-    client.set(address::BUS_WATCHDOG, watchdog)?;
-    let held = pressed?;
-    let_go?;
+    // While torque may be on, nothing but the watchdog stops the motor once this program has ended.
+    let let_go = let_go.and_then(|()| client.again(|client| client.set(address::BUS_WATCHDOG, watchdog)));
+    let held = match (pressed, let_go) {
+        (Ok(held), Ok(())) => held,
+        (Err(why), Ok(())) => return Err(why),
+        (pressed, Err(second)) => {
+            let why = pressed.err().map_or(String::new(), |why| format!("{why}; "));
+            return Err(format!(
+                "{why}letting go failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of silence, \
+                 with fault 7; `fingertip recover` turns torque off"
+            )
+            .into());
+        }
+    };
     let mean_mn = held.sum_mn / f64::from(held.count.max(1));
     let held_s = held.to_s - held.from_s;
     if json {
@@ -101,7 +112,7 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
     }
     let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), None::<Held>);
     loop {
-        let state = State::read(client)?;
+        let state = client.again(State::read)?;
         let time_s = clock.time_s(&state).ok_or(ANEW)?;
         if state.fault != 0 {
             return Err(stopped(state.fault));
@@ -144,10 +155,10 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
 
 /// Lets go, and turns torque off once nothing is touched: the tip is then clear of the object.
 fn let_go(args: &Args, client: &mut Client) -> Result<(), Error> {
-    client.set(address::GOAL_FORCE_MN, 0)?;
+    client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
     let begun = Instant::now();
     loop {
-        let state = State::read(client)?;
+        let state = client.again(State::read)?;
         let clear = state.mode == Mode::Release as i64 && state.speed_um_per_s.abs() < 1_000 && state.force_mn < 10;
         let off = state.mode == Mode::Off as i64;
         if state.fault != 0 || clear || off || begun.elapsed().as_secs_f64() > args.within_s {
@@ -155,5 +166,5 @@ fn let_go(args: &Args, client: &mut Client) -> Result<(), Error> {
         }
         std::thread::sleep(LOOK);
     }
-    client.set(address::TORQUE_ENABLE, 0)
+    client.again(|client| client.set(address::TORQUE_ENABLE, 0))
 }

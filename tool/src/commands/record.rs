@@ -143,7 +143,7 @@ fn take(
                     }
                 }
             }
-            Err(why @ (Error::Silent { .. } | Error::Damaged { .. })) => {
+            Err(why) if why.is_noise() => {
                 counts.missed += 1;
                 row += 1;
                 if row >= LOST_MAX {

@@ -52,7 +52,9 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }
     if touched {
-        return Err("something seemed to touch the tip while it was tared: forces read too low by that. Free the tip and tare again".into());
+        return Err("something seemed to touch the tip while it was tared: forces read too low by that. \
+             Free the tip and tare again"
+            .into());
     }
     Ok(())
 }

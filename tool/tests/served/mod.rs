@@ -30,6 +30,39 @@ pub struct Served {
 struct Told {
     native: Native<Named>,
     commands: Receiver<(String, Sender<Result<String, String>>)>,
+    /// How many more packets it hears before it is deaf, how many those are that it does not hear, and how many came.
+    ears: Option<(u64, u64, u64)>,
+    /// An instruction to all that comes as soon as the finger's state has this word.
+    trap: Option<(String, u8)>,
+}
+
+impl Told {
+    /// What is no command of a served finger.
+    fn told(&mut self, command: &str) -> Option<Result<String, String>> {
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let number = |text: &str| text.parse().expect("a number");
+        match words[..] {
+            // As another host on the bus would.
+            ["raw", instruction_number] => {
+                self.native.0.hear(&instruction(number(instruction_number) as u8));
+                Some(Ok(String::new()))
+            }
+            ["trap", word, instruction_number] => {
+                self.trap = Some((word.into(), number(instruction_number) as u8));
+                Some(Ok(String::new()))
+            }
+            ["deaf", "after", packets, "for", lost] => {
+                self.ears = Some((number(packets), number(lost), 0));
+                Some(Ok(String::new()))
+            }
+            ["deaf", "no", "more"] => {
+                self.ears = None;
+                Some(Ok(String::new()))
+            }
+            ["unheard"] => Some(Ok(self.ears.map_or(0, |(.., unheard)| unheard).to_string())),
+            _ => None,
+        }
+    }
 }
 
 impl serve::Finger for Told {
@@ -41,22 +74,28 @@ impl serve::Finger for Told {
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
-            let done = match command.strip_prefix("raw ") {
-                // As another host on the bus would.
-                Some(number) => {
-                    self.native.0.hear(&instruction(number.parse().expect("an instruction's number")));
-                    Ok(String::new())
-                }
-                None => self.native.command(&command),
-            };
+            let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
             (0..20).for_each(|_| self.native.0.frame());
             answer.send(done).expect("somebody waits for it");
+        }
+        if let Some((_, number)) =
+            self.trap.take_if(|(word, _)| self.native.command("state").is_ok_and(|state| state.contains(word.as_str())))
+        {
+            self.native.0.hear(&instruction(number));
         }
         self.native.run_until(time_s)
     }
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        if let Some((left, lost, unheard)) = &mut self.ears {
+            if *left > 0 {
+                *left -= 1;
+            } else if *unheard < *lost {
+                *unheard += 1;
+                return Ok(());
+            }
+        }
         self.native.hear(bytes)
     }
 
@@ -85,7 +124,7 @@ impl Served {
         let (commands, commanded) = channel();
         let thread = std::thread::spawn(move || {
             let native = Native(Bus::new(&scene).expect("a world"));
-            let mut told = Told { native, commands: commanded };
+            let mut told = Told { native, commands: commanded, ears: None, trap: None };
             let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
             served.map(drop).unwrap_or_else(|never| match never {});
         });
@@ -113,6 +152,25 @@ impl Served {
     /// A file of this test.
     pub fn file(&self, name: &str) -> String {
         self.folder.join(name).display().to_string()
+    }
+
+    /// Kills a command once the finger heard so many of its packets; whether it got so far before it ended.
+    pub fn killed_after(&self, packets: u64, arguments: &[&str]) -> bool {
+        self.command(&format!("deaf after {packets} for {}", u64::MAX));
+        let mut child = self.start(arguments);
+        let killed = loop {
+            if self.command("unheard") != "0" {
+                break true;
+            }
+            if child.try_wait().expect("it was started").is_some() {
+                break false;
+            }
+            std::thread::yield_now();
+        };
+        let _ = child.kill();
+        child.wait().expect("it ends");
+        self.command("deaf no more");
+        killed
     }
 
     pub fn start(&self, arguments: &[&str]) -> Child {

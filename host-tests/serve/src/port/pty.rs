@@ -80,6 +80,9 @@ impl Link {
         // A link that an earlier run left behind is replaced; a file is not.
         if path.is_symlink() {
             std::fs::remove_file(path)?;
+        } else if path.exists() {
+            let why = "a file of this name is there: name another link, or remove the file";
+            return Err(cannot_make(path, &io::Error::new(io::ErrorKind::AlreadyExists, why)));
         }
         std::os::unix::fs::symlink(&device, path).map_err(|why| cannot_make(path, &why))?;
         Ok(Self { path: path.into(), device, _lock: lock })

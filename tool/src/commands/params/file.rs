@@ -22,7 +22,8 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
     let pong = client.ping()?;
     let mut text = format!(
         "# A fingertip's stored parameters, by `fingertip params backup`; `restore` sets them again.\n\
-         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n{COUNT} = {}\n\n[{TABLE}]\n",
+         # Units stand in the names; what is left out stays as it is.\nfirmware_version = {}\ntable_version = {}\n\
+         {COUNT} = {}\n\n[{TABLE}]\n",
         pong.firmware,
         information >> 16,
         values.len()
@@ -53,7 +54,8 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
         && (count != table.len() as i64 || !text.ends_with('\n'))
     {
         let why = format!(
-            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. Where that is meant, take out the line `{COUNT}`",
+            "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. \
+             Where that is meant, take out the line `{COUNT}`",
             table.len()
         );
         return Err(Error::file("read", path, why));

@@ -46,30 +46,35 @@ pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>,
     let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
     changed.retain(|(_, from, to)| from != to);
     if after != before {
-        client.write(address::PARAMS, &after)?;
+        client.again(|client| client.write(address::PARAMS, &after)).map_err(|why| unsure(&why))?;
     }
     // Those of the bus come last: behind them the controller is found elsewhere.
     let (bus, plain): (Vec<Value>, Vec<Value>) = others.into_iter().partition(|(register, _)| is_bus(register));
     for (register, value) in plain.into_iter().chain(bus) {
-        let done = client.number(register.address).and_then(|from| {
-            if from != value {
-                set_one(register, value, client)?;
+        let done = client.again(|client| client.number(register.address)).and_then(|from| {
+            if from == value {
+                return Ok(());
             }
-            Ok(from)
+            // Before it is known: where its answer is lost it is set all the same.
+            changed.push((register, from, value));
+            set_one(register, value, client)
         });
-        match done {
-            Ok(from) if from != value => changed.push((register, from, value)),
-            Ok(_) => {}
-            Err(why) => return Err(put_back(&before, &changed, client, &why)),
+        if let Err(why) = done {
+            return Err(put_back(&before, &changed, client, &why));
         }
     }
     for (register, _, to) in &changed {
-        let now = client.number(register.address)?;
+        let now = client.again(|client| client.number(register.address)).map_err(|why| unsure(&why))?;
         if now != *to {
             return Err(format!("{} was set to {to}, but reads {now}: the others are set", name(register)).into());
         }
     }
     Ok(changed)
+}
+
+/// What an answer that was lost leaves open.
+fn unsure(why: &Error) -> Error {
+    Error::Other(format!("{why}. Whether they are set is not known: `fingertip params get` tells"))
 }
 
 fn set_one(register: &'static Register, value: i64, client: &mut Client) -> Result<(), Error> {
@@ -106,8 +111,11 @@ fn check_together(bytes: &[u8]) -> Result<(), Error> {
 
 /// Undoes what was set, and says how it stands.
 fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error) -> Error {
-    let mut undone =
-        if changed.iter().any(|(r, ..)| is_param(r)) { client.write(address::PARAMS, params) } else { Ok(()) };
+    let mut undone = if changed.iter().any(|(r, ..)| is_param(r)) {
+        client.again(|client| client.write(address::PARAMS, params))
+    } else {
+        Ok(())
+    };
     for (register, from, _) in changed.iter().rev().filter(|(register, ..)| !is_param(register)) {
         undone = undone.and_then(|()| set_one(register, *from, client));
     }
@@ -116,7 +124,8 @@ fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error
         Err(second) => {
             let names: Vec<String> = changed.iter().map(|(register, ..)| name(register)).collect();
             Error::Other(format!(
-                "{why}; and putting back failed: {second}. Only some are set, of {}: a reboot brings back what was saved",
+                "{why}; and putting back failed: {second}. Only some are set, of {}: \
+                 a reboot brings back what was saved",
                 names.join(", ")
             ))
         }

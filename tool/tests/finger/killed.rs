@@ -1,0 +1,118 @@
+//! What a killed command leaves behind: KILL after each of its packets, or after some of them where there are hundreds.
+
+use crate::served::Served;
+use fingertip::link::packet::instruction::REBOOT;
+use std::fs;
+
+#[test]
+fn a_restore_leaves_the_old_parameters_or_the_new_ones() {
+    let finger = Served::begin("wall");
+    let get = || finger.json(&["params", "get"]);
+    let (old, new) = (finger.file("old.toml"), finger.file("new.toml"));
+    let beside = ["fit_level", "return_delay_time"];
+    finger.done(&["params", "backup", &old]);
+    finger.done(&["params", "set", "modulus_pa=300000", "clearance_um=500", "fit_level=4", "return_delay_time=100"]);
+    finger.done(&["params", "backup", &new]);
+    let after = get();
+    finger.done(&["params", "restore", &old, "--save"]);
+    let before = get();
+    let mut seen = [0; 3];
+    for packets in 0.. {
+        if !finger.killed_after(packets, &["params", "restore", &new, "--save"]) {
+            break;
+        }
+        let now = get();
+        let side = |name: &str| if now[name] == after[name] { &after } else { &before };
+        let all_of = |side: &serde_json::Value| {
+            let names = side.as_object().expect("a map").iter();
+            names.filter(|(name, _)| !beside.contains(&name.as_str())).all(|(name, value)| now[name] == *value)
+        };
+        // Until the next reset: the parameters go together, those beside them one by one, each whole.
+        assert!(all_of(side("modulus_pa")), "killed after {packets}: {now}");
+        assert!(beside.iter().all(|name| now[*name] == side(name)[*name]), "killed after {packets}: {now}");
+        // What differs is told.
+        let differing = finger.json(&["params", "diff", &new]);
+        assert_eq!(differing.as_object().map(serde_json::Map::is_empty), Some(now == after), "killed after {packets}");
+        // Behind a reset: all old, or all new.
+        finger.command(&format!("raw {REBOOT}"));
+        let kept = get();
+        assert!(kept == before || kept == after, "killed after {packets}: {kept}");
+        seen[usize::from(now == after) + usize::from(kept == after)] += 1;
+        finger.done(&["params", "restore", &old, "--save"]);
+    }
+    assert!(seen.iter().sum::<i32>() >= 20 && seen.iter().all(|count| *count > 0), "{seen:?}");
+    assert_eq!(get(), after, "the last one came to its end");
+    assert!(!fs::exists(finger.file("new.toml.new")).expect("a folder"));
+}
+
+#[test]
+fn a_press_leaves_a_motor_that_stops() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let points = (0..12).chain((12..).step_by(12));
+    let mut stopped = 0;
+    for packets in points {
+        if !finger.killed_after(packets, &["press", "0.5", "--seconds", "0.1", "--within-s", "3600"]) {
+            break;
+        }
+        stopped += i32::from(at_rest(&finger, packets).contains("BusSilent"));
+        finger.done(&["recover"]);
+        assert_eq!(finger.json(&["info"])["torque_enable"], 0, "killed after {packets}");
+    }
+    assert!(stopped > 0);
+    finger.done(&["press", "0.5", "--seconds", "0.1", "--within-s", "3600"]);
+}
+
+/// Nobody asks it anything: it stops by itself, or was not moving.
+fn at_rest(finger: &Served, point: u64) -> String {
+    let rests = |state: &String| state.contains(": Off") || state.contains("BusSilent");
+    let state = (0..5_000).map(|_| finger.command("state")).find(rests);
+    state.unwrap_or_else(|| panic!("at {point}: {}", finger.command("state")))
+}
+
+#[test]
+fn a_press_whose_packets_are_lost_does_not_press_on() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    for (packets, lost) in [(30, 1), (30, 2), (30, 3), (31, 5), (32, 6), (33, 40)] {
+        finger.command(&format!("deaf after {packets} for {lost}"));
+        let press = ["--timeout-ms", "50", "press", "0.5", "--seconds", "1", "--within-s", "3600"];
+        let output = finger.start(&press).wait_with_output().expect("it ends");
+        at_rest(&finger, lost);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() || said.contains("fingertip: "), "{said}");
+        finger.command("deaf no more");
+        finger.done(&["recover"]);
+    }
+}
+
+#[test]
+fn a_controller_that_starts_anew_was_not_commissioned() {
+    let finger = Served::begin("wall");
+    for task in ["jog", "measure"] {
+        finger.done(&["tare"]);
+        finger.command(&format!("trap Commission {REBOOT}"));
+        let why = finger.refused(&["commission", task]);
+        assert!(why.contains("it came to no end") && why.contains("started anew"), "{task}: {why}");
+    }
+}
+
+#[test]
+fn a_motion_that_somebody_else_began_is_told() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    // Killed once the tip moves, which it goes on with by itself.
+    assert!(finger.killed_after(6, &["commission", "measure"]));
+    assert!(finger.command("state").contains("Commission"));
+    for command in ["jog", "measure", "confirm", "accept"] {
+        let why = finger.refused(&["commission", command]);
+        assert!(why.contains("the tip is moving") && why.contains("`fingertip commission stop`"), "{command}: {why}");
+    }
+    assert!(finger.command("state").contains("Commission"), "it was left alone");
+    finger.done(&["commission", "stop"]);
+    finger.command("fault supply-low");
+    for command in ["jog", "measure", "confirm", "accept"] {
+        let why = finger.refused(&["commission", command]);
+        assert!(why.contains("fault 9 (supply low)"), "{command}: {why}");
+    }
+}

@@ -1,6 +1,7 @@
 //! `fingertip params`: what outlives a reset.
 
 mod file;
+mod gains;
 mod set;
 
 use super::{say, say_json};
@@ -9,6 +10,7 @@ use crate::table::{self, name};
 use crate::{Client, Error};
 use fingertip::link::table::Register;
 use fingertip::params::Params;
+use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::address;
 use serde_json::{Map, json};
 use std::path::PathBuf;
@@ -84,16 +86,17 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
         }
         Command::Save => save(client, json),
         Command::Backup { file, force } => {
-            let all = read_all(client)?;
-            file::write(file, *force, client, &all)?;
-            told(json, &all, &format!("{} parameters in {}", all.len(), file.display()));
+            let kept = file::Kept { values: read_all(client)?, gains: Some(gains::read(client)?) };
+            file::write(file, *force, client, &kept)?;
+            let count = kept.values.len();
+            told(json, &kept.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
             Ok(())
         }
         Command::Restore { file, save } => {
-            let mut values = file::read(file)?;
+            let file::Kept { mut values, gains } = file::read(file)?;
             // Who moves a device to another address or speed means it, and says so by `set`.
             values.retain(|(register, _)| !is_bus(register));
-            change(&values, *save, client, json)
+            restore(&values, gains.as_deref(), *save, client, json)
         }
         Command::Diff { file } => diff(file.as_deref(), client, json),
     }
@@ -132,6 +135,28 @@ fn read_all(client: &mut Client) -> Result<Vec<Value>, Error> {
         Ok((register, value))
     };
     table::stored().map(read).collect()
+}
+
+/// As [`change`], with the taxels' gains.
+fn restore(
+    values: &[Value],
+    gains: Option<&[Vec<u16>]>,
+    save: bool,
+    client: &mut Client,
+    json: bool,
+) -> Result<(), Error> {
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
+    }
+    let before = gains.map_or(Ok(None), |gains| gains::set(gains, client))?;
+    if before.is_some() && !json {
+        say("the taxels' gains are others now: tare");
+    }
+    change(values, save, client, json).map_err(|why| match before.map(|before| gains::set(&before, client)) {
+        None => why,
+        Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
+        Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
+    })
 }
 
 /// Sets them, saves them where that is asked for, and says what changed.
@@ -181,11 +206,18 @@ fn save(client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Result<(), Error> {
-    let now = read_all(client)?;
-    let (other, what) = match file {
-        Some(path) => (file::read(path)?, path.display().to_string()),
-        None => (table::stored().filter_map(|r| Some((r, r.default?))).collect(), "the defaults".into()),
+    let (now, gains_now) = (read_all(client)?, gains::read(client)?);
+    let (other, other_gains, what) = match file {
+        Some(path) => {
+            let file::Kept { values, gains } = file::read(path)?;
+            (values, gains, path.display().to_string())
+        }
+        None => {
+            let ones = gains_now.iter().map(|row| vec![GAIN_ONE; row.len()]).collect();
+            (table::stored().filter_map(|r| Some((r, r.default?))).collect(), Some(ones), "the defaults".into())
+        }
     };
+    let gains_differ = other_gains.filter(|other| *other != gains_now);
     let in_other =
         |register: &Register| other.iter().find(|(r, _)| r.address == register.address).map(|(_, value)| *value);
     let differing: Vec<(&Register, i64, Option<i64>)> = now
@@ -195,12 +227,18 @@ fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Resu
         .collect();
     if json {
         let line = |(r, now, other): &(&Register, i64, Option<i64>)| (name(r), json!({ "now": now, "other": other }));
-        say_json(&json!(differing.iter().map(line).collect::<Map<_, _>>()));
+        let gains = gains_differ.iter().map(|other| ("gains".to_owned(), json!({ "now": gains_now, "other": other })));
+        say_json(&json!(differing.iter().map(line).chain(gains).collect::<Map<_, _>>()));
         return Ok(());
     }
     for (register, value, other) in &differing {
         let other = other.map_or("not there".into(), |other| other.to_string());
         say(format_args!("{:26} {value:>9}  in {what}: {other}", name(register)));
+    }
+    if let Some(other) = gains_differ {
+        let pairs = || gains_now.iter().flatten().zip(other.iter().flatten());
+        let count = pairs().filter(|(now, other)| now != other).count();
+        say(format_args!("the gains of {count} of {} taxels differ from {what}", pairs().count()));
     }
     say(format_args!("{} of {} differ from {what}", differing.len(), now.len()));
     Ok(())

@@ -174,8 +174,31 @@ fn a_backup_is_restored_whole() {
     finger.done(&["params", "restore", &file]);
     assert_eq!(finger.json(&["params", "diff", &file]), serde_json::json!({}));
 
-    // A damaged file changes nothing, and all that is wrong with it is told.
+    // The taxels' gains are in it, and come back with it.
     let text = fs::read_to_string(&file).expect("it was written");
+    let gains = "row_3 = [16384, 16384, 16384, 16384, ";
+    assert!(text.contains(gains), "{text}");
+    fs::write(&file, text.replace(gains, "row_3 = [16384, 16384, 16384, 20000, ")).expect("a file");
+    finger.done(&["params", "restore", &file]);
+    assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);
+    let other =
+        text.replace(gains, "row_3 = [16384, 16384, 16384, 8191, ").replace("clearance_um = 500", "clearance_um = 600");
+    for (text, why) in [
+        (other, "from 8192 to 32767"),
+        (text.replace("row_9", "row_8a"), "lacks row_9"),
+        (text.replace(gains, "row_3 = [16384, 16384, 16384, "), "10 rows of 10 gains"),
+        (text.replace("row_3 = ", "row_3 = 1 #"), "row_3"),
+    ] {
+        fs::write(&file, text).expect("a file");
+        let said = finger.refused(&["params", "restore", &file]);
+        assert!(said.contains(why), "{said}");
+        assert_eq!(finger.json(&["params", "diff"])["gains"]["now"][3][3], 20_000);
+    }
+    fs::write(&file, &text).expect("a file");
+    finger.done(&["params", "restore", &file]);
+    assert_eq!(finger.json(&["params", "diff", &file]), serde_json::json!({}));
+
+    // A damaged file changes nothing, and all that is wrong with it is told.
     for (from, to, why) in [
         ("modulus_pa = 300000", "modulus_pa = 3", "modulus_pa of 3"),
         ("modulus_pa = 300000", "modulus_pb = 3", "no register `modulus_pb`"),

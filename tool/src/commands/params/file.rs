@@ -4,7 +4,7 @@ use super::{Value, twice};
 use crate::table::{self, name};
 use crate::whole::Part;
 use crate::{Client, Error};
-use fingertip::shipped::address;
+use fingertip::shipped::{Gains, address};
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{ErrorKind, Write as _};
@@ -12,11 +12,23 @@ use std::path::Path;
 use toml_edit::Document;
 
 const TABLE: &str = "parameters";
+/// The taxels', in rows.
+const GAINS: &str = "gains";
 /// How many there are: a file that was cut has fewer, or a last line without an end.
 const COUNT: &str = "entries";
 
+/// What it holds.
+pub(super) struct Kept {
+    /// Of registers with a name.
+    pub values: Vec<Value>,
+    /// The taxels' gains, in rows; none where the file has none.
+    pub gains: Option<Vec<Vec<u16>>>,
+}
+
 /// Writes it, whole or not at all.
-pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Value]) -> Result<(), Error> {
+pub(super) fn write(path: &Path, force: bool, client: &mut Client, kept: &Kept) -> Result<(), Error> {
+    let Kept { values, gains } = kept;
+    let gains = gains.as_deref().unwrap_or_default();
     let failed = |why: std::io::Error| Error::file("write", path, why);
     let information = client.number(address::MODEL_INFORMATION)?;
     let pong = client.ping()?;
@@ -26,12 +38,18 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
          {COUNT} = {}\n\n[{TABLE}]\n",
         pong.firmware,
         information >> 16,
-        values.len()
+        values.len() + gains.len()
     );
     for (register, value) in values {
         let doc = register.doc.trim();
         // Writing to a string does not fail.
         let _ = writeln!(text, "{} = {value}  # {doc} {} to {}.", name(register), register.min, register.max);
+    }
+    if !gains.is_empty() {
+        let _ = writeln!(text, "\n# What each taxel's reading is multiplied by, in 16384ths.\n[{GAINS}]");
+    }
+    for (row, gains) in gains.iter().enumerate() {
+        let _ = writeln!(text, "row_{row} = {gains:?}");
     }
     if path.exists() && !force {
         return Err(format!("{} is there already: --force writes over it", path.display()).into());
@@ -42,7 +60,7 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, values: &[Val
 }
 
 /// Reads it.
-pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
+pub(super) fn read(path: &Path) -> Result<Kept, Error> {
     let text = fs::read_to_string(path).map_err(|why| match why.kind() {
         ErrorKind::InvalidData => Error::file("read", path, "it is no text"),
         _ => Error::file("read", path, why),
@@ -50,13 +68,15 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
     let document = Document::parse(text.as_str()).map_err(|why| Error::file("read", path, why))?;
     let table = document.get(TABLE).and_then(|item| item.as_table());
     let table = table.ok_or_else(|| Error::file("read", path, format_args!("it has no table [{TABLE}]")))?;
+    let rows = document.get(GAINS).and_then(|item| item.as_table());
+    let entries = table.len() + rows.map_or(0, |rows| rows.len());
     if let Some(count) = document.get(COUNT).and_then(|item| item.as_integer())
-        && (count != table.len() as i64 || !text.ends_with('\n'))
+        && (count != entries as i64 || !text.ends_with('\n'))
     {
         let why = format!(
             "it was cut, or changed: it has {} of {count} entries, and its last line may not be whole. \
              Where that is meant, take out the line `{COUNT}`",
-            table.len()
+            entries
         );
         return Err(Error::file("read", path, why));
     }
@@ -69,5 +89,24 @@ pub(super) fn read(path: &Path) -> Result<Vec<Value>, Error> {
         }
     }
     wrong.extend(twice(&values));
-    if wrong.is_empty() { Ok(values) } else { Err(Error::file("read", path, wrong.join("; "))) }
+    let mut gains = rows.map(|_| Vec::new());
+    for (row, key) in (0..).map(|row| (row, format!("row_{row}"))).take(rows.map_or(0, |rows| rows.len())) {
+        let numbers = rows.and_then(|rows| rows.get(&key)).and_then(|item| item.as_array());
+        let gain = |value: &toml_edit::Value| {
+            value
+                .as_integer()
+                .and_then(|gain| u16::try_from(gain).ok())
+                .filter(|gain| (Gains::MIN..=Gains::MAX).contains(gain))
+        };
+        match (numbers.map(|numbers| numbers.iter().map(gain).collect::<Option<Vec<u16>>>()), &mut gains) {
+            (Some(Some(row)), Some(gains)) => gains.push(row),
+            (None, _) => wrong.push(format!("[{GAINS}] lacks {key}: rows count from 0")),
+            _ => wrong.push(format!(
+                "[{GAINS}] row_{row}: a gain is a whole number from {} to {}",
+                Gains::MIN,
+                Gains::MAX
+            )),
+        }
+    }
+    if wrong.is_empty() { Ok(Kept { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
 }

@@ -113,7 +113,7 @@ extern "C" fn guard(bench: &mut Bench) {
 
 impl<'a> Bench<'a> {
     fn new(fit_level: FitLevel, config: &'a Config, pipeline: &'a mut Pipeline) -> Self {
-        *pipeline = Pipeline::new(config);
+        renew(pipeline, config);
         Self {
             config,
             fit_level,
@@ -133,6 +133,18 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// A function of its own, because a pipeline is large and takes stack only here.
+#[inline(never)]
+fn begin(config: &Config) -> &'static mut Pipeline {
+    PIPELINE.init_with(|| Pipeline::new(config))
+}
+
+/// The same.
+#[inline(never)]
+fn renew(pipeline: &mut Pipeline, config: &Config) {
+    *pipeline = Pipeline::new(config);
+}
+
 fn record(inputs: &mut Inputs) -> Record {
     let mut bytes = [0; Record::BYTES];
     inputs.read(&mut bytes);
@@ -144,7 +156,7 @@ fn record(inputs: &mut Inputs) -> Record {
 pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let start = inputs.place();
-    let pipeline = PIPELINE.init_with(|| Pipeline::new(config));
+    let pipeline = begin(config);
     for (name, fit_level) in STEPS {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);

@@ -9,7 +9,6 @@ use std::path::Path;
 const STEP: usize = 34;
 /// Where the arrows leave, px.
 const LEFT: usize = 150;
-const WIDTH: usize = 430;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let core = Path::new(env!("FINGERTIP_ROOT")).join("src");
@@ -19,10 +18,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     names.push("lanes");
     let y = |name: &str| names.iter().position(|other| *other == name).map(|place| STEP * place + STEP);
     let height = STEP * (names.len() + 1);
+    // Three quarters of the reach below, and some air.
+    let width = LEFT + height * 45 / 100 + 10;
     println!(
-        "<svg width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" xmlns=\"http://www.w3.org/2000/svg\">"
+        "<svg width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" xmlns=\"http://www.w3.org/2000/svg\">"
     );
-    println!("<rect width=\"{WIDTH}\" height=\"{height}\" fill=\"#FFFFFF\"/>");
+    println!("<rect width=\"{width}\" height=\"{height}\" fill=\"#FFFFFF\"/>");
     println!("<g fill=\"none\" stroke=\"#14285A\" stroke-opacity=\"0.45\">");
     for stage in &stages {
         let from = y(&stage.name).ok_or("a stage has its place")?;

@@ -17,6 +17,9 @@ pub struct Clocks {
     pub conversion_cycles: u32,
     /// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
     pub trigger_cycles: u32,
+    /// A slot is a whole multiple of so many ticks, so that what a board keeps in step with the frames finds whole
+    /// ticks in it; 1, or 0, where nothing asks for it.
+    pub slot_step: u32,
 }
 
 impl Clocks {
@@ -106,7 +109,9 @@ impl ScanTiming {
         let settle = (u64::from(settle_ns) * u64::from(clocks.timer_hz)).div_ceil(1_000_000_000);
         let conversion = u64::from(sample_cycles) + u64::from(clocks.conversion_cycles);
         let cycles = lanes::pairs(columns) as u64 * conversion + u64::from(clocks.trigger_cycles);
-        let slot = cycles.saturating_mul(clocks.ticks_per_converter_cycle.into()).saturating_add(settle);
+        let needed = cycles.saturating_mul(clocks.ticks_per_converter_cycle.into()).saturating_add(settle);
+        let step = u64::from(clocks.slot_step.max(1));
+        let slot = needed.div_ceil(step).saturating_mul(step);
         if slot > u64::from(u16::MAX) {
             return Err(ScanError::SlotTooLong { ticks: u32::try_from(slot).unwrap_or(u32::MAX) });
         }
@@ -131,6 +136,13 @@ impl ScanTiming {
     pub const fn frame(self) -> ScanTicks {
         ScanTicks(self.slot.0 * self.slots as u32)
     }
+
+    /// The longest time, at most `longest`, that fits a whole number of times into a frame.
+    pub fn whole_part(self, longest: ScanTicks) -> ScanTicks {
+        let frame = self.frame().0;
+        let fewest = frame.div_ceil(longest.0.max(1)).max(1);
+        (fewest..=frame).find_map(|count| (frame % count == 0).then_some(ScanTicks(frame / count))).unwrap_or_default()
+    }
 }
 
 #[cfg(test)]
@@ -145,6 +157,7 @@ mod tests {
         sample_cycles: &[3, 15, 28],
         conversion_cycles: 12,
         trigger_cycles: 5,
+        slot_step: 1,
     };
 
     fn timing(settle_ns: u32, sample_cycles: u16, shape: [usize; 2]) -> Result<ScanTiming, ScanError> {
@@ -176,6 +189,32 @@ mod tests {
             ScanTiming::new(settle_ns as u32, sample_cycles as u16, [10, 10], &clocks).unwrap().deadline.0
         };
         assert_eq!(of(2 * CLOCKS.core_hz) / 2, of(CLOCKS.core_hz));
+    }
+
+    #[test]
+    fn a_slot_is_as_short_as_its_step_allows() {
+        for settle_ns in 1_000..3_000 {
+            let of = |slot_step| ScanTiming::new(settle_ns, 15, [10, 10], &Clocks { slot_step, ..CLOCKS }).unwrap();
+            let ([free, zero, stepped], settle) = ([1, 0, 12].map(|step| of(step).slot.0), of(12).settle);
+            assert_eq!([free, zero], [free; 2]);
+            assert!(stepped % 12 == 0 && (free..free + 12).contains(&stepped), "{stepped} for {free}");
+            assert_eq!(settle, of(1).settle);
+        }
+    }
+
+    /// What the shipped board makes of it: a PWM of 25 to 50 kHz in step with whatever scan is asked for.
+    #[test]
+    fn a_frame_is_a_whole_number_of_its_parts() {
+        let clocks = Clocks { slot_step: 12, ..CLOCKS };
+        for settle_ns in (0..340_000).step_by(37) {
+            let Ok(timing) = ScanTiming::new(settle_ns, 15, [10, 10], &clocks) else { continue };
+            let part = timing.whole_part(ScanTicks(6_720)).0;
+            assert_eq!(timing.frame().0 % part, 0);
+            assert!((3_360..=6_720).contains(&part), "{part} ticks of {:?}", timing.frame());
+        }
+        let timing = timing(1_000, 15, [10, 10]).unwrap();
+        assert_eq!(timing.whole_part(ScanTicks(0)), ScanTicks(1));
+        assert_eq!(timing.whole_part(timing.frame()), timing.frame());
     }
 
     #[test]

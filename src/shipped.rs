@@ -21,7 +21,8 @@ pub const BANK_COLUMNS: usize = Shape::<ROWS, COLUMNS>::BANK_COLUMNS;
 /// Frames of a tare.
 pub const TARE_FRAMES: u32 = Array::TARE_FRAMES;
 
-/// The STM32F446's clocks: core and TIM8 at 168 MHz, converters at 21 MHz with 12 bits (RM0390, 13).
+/// The STM32F446's clocks: core and TIM8 at 168 MHz, converters at 21 MHz with 12 bits (RM0390, 13). Slots
+/// of whole dozens of ticks let the bridge's PWM of 25 to 50 kHz keep step with the frames.
 pub const CLOCKS: Clocks = Clocks {
     timer_hz: 168_000_000,
     core_hz: 168_000_000,
@@ -29,6 +30,7 @@ pub const CLOCKS: Clocks = Clocks {
     sample_cycles: &[3, 15, 28, 56, 84, 112, 144, 480],
     conversion_cycles: 12,
     trigger_cycles: 5,
+    slot_step: 12,
 };
 
 impl Config {

@@ -13,12 +13,13 @@ use embassy_stm32::pac::timer::vals::{Bkp, Ocm, Ossi, Ossr};
 use embassy_stm32::peripherals::{PA8, PA9, PB12, PC9, TIM1};
 use embassy_stm32::{Peri, pac, rcc};
 use fingertip::pipeline::Bridge as Wanted;
-use fingertip::units::Duty;
+use fingertip::scan::ScanTiming;
+use fingertip::units::{Duty, ScanTicks};
 
 use super::{guard, pins};
 
-/// 168 MHz / 6720 = 25 kHz.
-const PERIOD_TICKS: u16 = 6_720;
+/// The longest period, 168 MHz / 6720 = 25 kHz. TIM1 and the scan's TIM8 count the same clock.
+const LONGEST: ScanTicks = ScanTicks(6_720);
 /// The driver wants 1 ms from nSLEEP to its first output; nFAULT means nothing before.
 const WAKE_TICKS: u32 = guard::HZ / 1_000;
 const TIM1_FUNCTION: u8 = 1;
@@ -42,6 +43,7 @@ pub struct Bridge {
     woken: Option<u32>,
     ready: bool,
     driving: bool,
+    period_ticks: u16,
 }
 
 impl Bridge {
@@ -56,7 +58,8 @@ impl Bridge {
         pins::low_output(nsleep.into(), Speed::Low);
         rcc::enable_and_reset::<TIM1>();
         let timer = pac::TIM1;
-        timer.arr().write(|w| w.set_arr(PERIOD_TICKS - 1));
+        let period_ticks = LONGEST.0 as u16;
+        timer.arr().write(|w| w.set_arr(period_ticks - 1));
         timer.cr1().modify(|w| w.set_arpe(true));
         timer.ccmr_output(0).modify(|w| {
             for channel in 0..2 {
@@ -80,7 +83,15 @@ impl Bridge {
         pins::timer_input(nfault, TIM1_FUNCTION, Pull::Up);
         pins::timer_output(in1, TIM1_FUNCTION, Speed::High);
         pins::timer_output(in2, TIM1_FUNCTION, Speed::High);
-        Self { woken: None, ready: false, driving: false }
+        Self { woken: None, ready: false, driving: false, period_ticks }
+    }
+
+    /// Begins a period, and makes a frame a whole number of them: from a start of the scan on, the edges of a duty meet
+    /// the same rows in each frame.
+    pub fn keep_step(&mut self, timing: ScanTiming) {
+        self.period_ticks = timing.whole_part(LONGEST).0 as u16;
+        pac::TIM1.arr().write(|w| w.set_arr(self.period_ticks - 1));
+        pac::TIM1.egr().write(|w| w.set_ug(true));
     }
 
     /// Does what the pipeline says; a driver that sleeps is not woken to brake.
@@ -109,7 +120,7 @@ impl Bridge {
     /// Cuts the bridge and remembers it.
     pub fn sleep(&mut self) {
         make_safe();
-        *self = Self { woken: None, ready: false, driving: false };
+        *self = Self { woken: None, ready: false, driving: false, period_ticks: self.period_ticks };
     }
 
     /// Whether an awake driver reports a fault, or the hardware cut an output that should be on.
@@ -138,10 +149,11 @@ impl Bridge {
     }
 
     fn drive(&mut self, duty: Duty) {
-        let low = ticks_low(duty);
+        let period = self.period_ticks;
+        let low = ticks_low(duty, period);
         let (in1, in2) = if duty < Duty::ZERO { (low, 0) } else { (0, low) };
-        pac::TIM1.ccr(0).write(|w| w.set_ccr(PERIOD_TICKS - in1));
-        pac::TIM1.ccr(1).write(|w| w.set_ccr(PERIOD_TICKS - in2));
+        pac::TIM1.ccr(0).write(|w| w.set_ccr(period - in1));
+        pac::TIM1.ccr(1).write(|w| w.set_ccr(period - in2));
         if !self.driving {
             // The compare values are preloaded: bring them in before the outputs come on. Forget an old break.
             pac::TIM1.egr().write(|w| w.set_ug(true));
@@ -155,7 +167,7 @@ impl Bridge {
 }
 
 /// The share of the period for which one input is low, ticks, rounded.
-fn ticks_low(duty: Duty) -> u16 {
+fn ticks_low(duty: Duty, period: u16) -> u16 {
     let share = u32::from(duty.0.unsigned_abs().min(Duty::FULL.unsigned_abs()));
-    ((share * u32::from(PERIOD_TICKS) + (1 << 14)) >> 15) as u16
+    ((share * u32::from(period) + (1 << 14)) >> 15) as u16
 }

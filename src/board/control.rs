@@ -213,6 +213,7 @@ impl State {
         self.discard_next = true;
         self.lost = false;
         self.parts.scan.start(timing);
+        self.parts.bridge.keep_step(timing);
         self.seen = super::scan::newest().sequence;
         guard::restart(guard::now(), FRAMES_TO_START, timing);
         self.parts.watchdogs.expect_frames(timing);

@@ -23,6 +23,7 @@ use core::ops::{Deref, DerefMut};
 ///     sample_cycles: &[4, 8, 16],
 ///     conversion_cycles: 13,
 ///     trigger_cycles: 4,
+///     slot_step: 1,
 /// };
 /// let config = Shaped::<4, 4>::new(&Params { sample_cycles: 8, ..Params::DEFAULT }, &clocks)?;
 /// assert_eq!(config.timing.frame_ns, 26_406); // five slots of 338 ticks

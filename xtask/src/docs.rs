@@ -12,11 +12,12 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the package and its example that print their text.
-const GENERATED: [(&str, (&str, &str)); 7] = [
+const GENERATED: [(&str, (&str, &str)); 8] = [
     ("docs/control-table.md", ("host-tests", "control-table")),
     ("docs/scenes.md", ("sim", "scenes-page")),
     ("docs/budget.md", ("sim", "budget-page")),
     ("docs/pictures/imports.svg", ("host-tests", "imports")),
+    ("docs/pictures/schematic.svg", ("host-tests", "schematic")),
     ("examples/dynamixel/fingertip.model", ("host-tests", "model-file")),
     ("examples/dynamixel/fingertip_direct.model", ("host-tests", "model-file-direct")),
     ("python/fingertip/registers.py", ("host-tests", "python-package")),

@@ -38,6 +38,11 @@ impl PwmTimer {
         }
     }
 
+    /// Ticks from period to period, as written last.
+    pub fn period_ticks(&self, registers: &RegisterFile) -> u64 {
+        registers.get(Register::Arr) + 1
+    }
+
     /// The bridge's nFAULT.
     pub fn drive_break(&mut self, level: Level, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         self.timer.drive_break(level, registers, context);
@@ -45,7 +50,7 @@ impl PwmTimer {
 
     /// What is written is in use by then: the period under way has ended, at a whole instant.
     fn wake(&mut self, registers: &RegisterFile, now: VirtualNanos) {
-        let cycles = (registers.get(Register::Arr) + 1) * (registers.get(Register::Psc) + 1);
+        let cycles = self.period_ticks(registers) * (registers.get(Register::Psc) + 1);
         self.awake_until_ns = now.0 + (cycles * 1_000_000_000).div_ceil(self.clock_hz.max(1)) + 1;
     }
 }

@@ -4,7 +4,9 @@
 
 mod common;
 
-use common::image;
+use common::{image, write_param};
+use fingertip::params::Params;
+use fingertip::shipped::Config;
 use host_tests::plant::{Setup, World};
 use virtual_board::measure::PinEdge;
 use virtual_board::{Fault, Options, Rig};
@@ -68,5 +70,23 @@ fn the_guard_pin_pulses_where_the_guard_trips() {
     for [high, period] in widths {
         // It trips again each 1.75 frames.
         assert!((100..30_000).contains(&high) && period.abs_diff(FRAME_NS * 7 / 4) < 5_000, "{high} of {period} ns");
+    }
+}
+
+/// The edges of a duty come at the same places of each frame, whatever the scan.
+#[test]
+fn the_bridge_keeps_step_with_the_scan() {
+    let mut rig = running();
+    for settle_ns in [2_400, 1_001, 7_777, 60_000] {
+        write_param(&mut rig, "settle_ns", settle_ns);
+        let params = Params { settle_ns: settle_ns as i32, ..Params::DEFAULT };
+        let frame = Config::shipped(&params).expect("a scan").timing.frame().0;
+        let period = rig
+            .with(|stand| {
+                let (timer, registers) = stand.session.board_mut().part.pwm_timer();
+                timer.period_ticks(registers) as u32
+            })
+            .expect("it runs");
+        assert!(frame % period == 0 && (3_360..=6_720).contains(&period), "{period} ticks in a frame of {frame}");
     }
 }

@@ -50,8 +50,13 @@ struct Cell {
 }
 
 impl Cell {
-    fn bytes(&self) -> u16 {
+    const fn bytes(&self) -> u16 {
         self.kind.width() * self.count
+    }
+
+    /// The byte after its last.
+    const fn end(&self) -> u16 {
+        self.address + self.bytes()
     }
 
     /// The cell that a byte belongs to; none in a gap.
@@ -73,7 +78,6 @@ impl Cell {
     /// All but the parameters.
     fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
-        // The pictures first: of larger arrays they reach beyond where the registers of this one's calibration stand.
         pictures.iter().chain(&registers::CELLS).chain(&indirect::CELLS).chain(&mirrors::CELLS)
     }
 

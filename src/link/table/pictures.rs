@@ -1,6 +1,6 @@
 //! The pictures of the array: registers whose number of values, and so their place, goes by its shape.
 //!
-//! The first one begins at [`FIRST`], and each of the others at the next multiple of 256.
+//! The first one begins at [`FIRST`], or at [`FIRST_OF_MANY`], and each of the others at the next multiple of 256.
 
 use crate::frame::Shape;
 
@@ -8,10 +8,12 @@ use crate::link::packet::StatusError;
 use crate::pressure::{GAIN_MAX, GAIN_ONE};
 
 use super::registers::FIXED;
-use super::{Access, Cell, Kind, Register, Staged, View};
+use super::{Access, Cell, Kind, Register, Staged, View, address};
 
-/// Where the first picture begins, whatever the shape.
+/// Where the first picture begins.
 pub(super) const FIRST: u16 = 768;
+/// Where it begins of an array whose pictures would reach from there into other registers: beyond all of these.
+const FIRST_OF_MANY: u16 = 8_192;
 /// How many there are.
 pub const COUNT: usize = 6;
 /// Name, largest value, unit and resolution of each, and what it means.
@@ -51,9 +53,18 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
 /// Where they are in an array's table.
 pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
+    let few = cells_from::<ROWS, COLUMNS>(FIRST);
+    let [.., gains, proposed, sigmas] = &few;
+    let apart = gains.end() <= address::CALIBRATE
+        && address::SCALE_SIGMA_PPM < proposed.address
+        && sigmas.end() <= address::COMMISSION;
+    if apart { few } else { cells_from::<ROWS, COLUMNS>(FIRST_OF_MANY) }
+}
+
+const fn cells_from<const ROWS: usize, const COLUMNS: usize>(address: u16) -> [Cell; COUNT] {
     let taxels = Shape::<ROWS, COLUMNS>::TAXELS as u16;
     let codes = (Shape::<ROWS, COLUMNS>::SLOTS * COLUMNS) as u16;
-    let first = cell(FIRST, taxels);
+    let first = cell(address, taxels);
     let second = cell(after(&first), codes);
     let third = cell(after(&second), taxels);
     let gains = Cell { access: Access::Stored, ..cell(after(&third), taxels) };
@@ -82,7 +93,7 @@ pub const fn at<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
 /// Where the table ends.
 pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
     let [.., last] = cells::<ROWS, COLUMNS>();
-    let mut end = last.address + last.kind.width() * last.count;
+    let mut end = last.end();
     let mut place = 0;
     while place < FIXED.len() {
         let Register { address, kind, count, .. } = FIXED[place];
@@ -96,7 +107,7 @@ pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
 
 /// The next multiple of 256.
 const fn after(cell: &Cell) -> u16 {
-    (cell.address + cell.kind.width() * cell.count).next_multiple_of(256)
+    cell.end().next_multiple_of(256)
 }
 
 /// As their documentation has them.
@@ -163,14 +174,30 @@ pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::cells;
+    use super::*;
+    use crate::params::Params;
+    use std::vec::Vec;
+
+    fn addresses<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
+        // Each byte belongs to one register: a picture beside another's place would hide it.
+        let mut cells: Vec<_> = Cell::all::<ROWS, COLUMNS>().map(|cell| (cell.address, cell.end())).collect();
+        cells.push((address::PARAMS, address::PARAMS + 4 * Params::RANGES.len() as u16));
+        cells.sort_unstable();
+        for pair in cells.windows(2) {
+            assert!(pair[0].1 <= pair[1].0, "{ROWS} x {COLUMNS}: {pair:?}");
+        }
+        at::<ROWS, COLUMNS>()
+    }
 
     #[test]
     fn pictures_stand_apart() {
-        let addresses = |cells: [super::Cell; super::COUNT]| cells.map(|cell| cell.address);
-        assert_eq!(addresses(cells::<10, 10>()), [768, 1_024, 1_280, 1_536, 1_792, 1_992]);
-        assert_eq!(addresses(cells::<3, 3>()), [768, 1_024, 1_280, 1_536, 1_792, 1_810]);
-        assert_eq!(addresses(cells::<16, 16>()), [768, 1_280, 2_048, 2_560, 3_072, 3_584]);
-        assert_eq!(addresses(cells::<16, 32>()), [768, 1_792, 3_072, 4_096, 5_120, 6_144]);
+        assert_eq!(addresses::<10, 10>(), [768, 1_024, 1_280, 1_536, 1_792, 1_992]);
+        assert_eq!(addresses::<3, 3>(), [768, 1_024, 1_280, 1_536, 1_792, 1_810]);
+        assert_eq!(addresses::<4, 4>(), [768, 1_024, 1_280, 1_536, 1_792, 1_824]);
+        assert_eq!(addresses::<8, 8>(), [768, 1_024, 1_280, 1_536, 1_792, 1_920]);
+        assert_eq!(addresses::<3, 32>(), [768, 1_024, 1_280, 1_536, 1_792, 1_984]);
+        assert_eq!(addresses::<10, 11>(), [8_192, 8_448, 8_704, 8_960, 9_216, 9_436]);
+        assert_eq!(addresses::<16, 16>(), [8_192, 8_704, 9_472, 9_984, 10_496, 11_008]);
+        assert_eq!(addresses::<16, 32>(), [8_192, 9_216, 10_496, 11_520, 12_544, 13_568]);
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 
+mod elapsed;
+
+use elapsed::{BusClock, FrameClock};
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
@@ -23,7 +26,6 @@ use super::watchdog::Watchdogs;
 
 /// The first frame may come this many frame times after the start, before the guard trips.
 const FRAMES_TO_START: u32 = 4;
-const TICKS_PER_MS: u32 = guard::HZ / 1_000;
 
 /// Everything that control owns.
 pub struct Control {
@@ -287,61 +289,4 @@ fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
         pipeline.configure(&config);
         true
     })
-}
-
-/// The stopwatch in microseconds, beyond its wrap.
-struct FrameClock {
-    last: u32,
-    part_ticks: u32,
-    time_us: u32,
-}
-
-impl FrameClock {
-    const fn new() -> Self {
-        Self { last: 0, part_ticks: 0, time_us: 0 }
-    }
-
-    /// The time of an instant at most half a wrap of the stopwatch later than the last one. A frame that ended before
-    /// its loss was noticed counts as from then.
-    fn at_us(&mut self, instant: u32) -> u32 {
-        let passed = instant.wrapping_sub(self.last);
-        if passed.cast_signed() < 0 {
-            return self.time_us;
-        }
-        let ticks = passed + self.part_ticks;
-        self.last = instant;
-        self.part_ticks = ticks % guard::TICKS_PER_US;
-        self.time_us = self.time_us.wrapping_add(ticks / guard::TICKS_PER_US);
-        self.time_us
-    }
-}
-
-/// How long the bus has been silent, measured where a hanging link cannot stop the clock.
-struct BusClock {
-    packets: u32,
-    last: u32,
-    part_ticks: u32,
-    silent_ms: u16,
-}
-
-impl BusClock {
-    const fn new() -> Self {
-        Self { packets: 0, last: 0, part_ticks: 0, silent_ms: 0 }
-    }
-
-    fn silent_ms(&mut self, packets: u32) -> u16 {
-        let now = guard::now();
-        self.part_ticks += now.wrapping_sub(self.last);
-        self.last = now;
-        if packets != self.packets {
-            self.packets = packets;
-            self.part_ticks = 0;
-            self.silent_ms = 0;
-        }
-        while self.part_ticks >= TICKS_PER_MS {
-            self.part_ticks -= TICKS_PER_MS;
-            self.silent_ms = self.silent_ms.saturating_add(1);
-        }
-        self.silent_ms
-    }
 }

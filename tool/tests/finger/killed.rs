@@ -45,6 +45,33 @@ fn a_restore_leaves_the_old_parameters_or_the_new_ones() {
     assert!(!fs::exists(finger.file("new.toml.new")).expect("a folder"));
 }
 
+/// A controller that starts anew has what the flash holds, and calls that saved.
+#[test]
+fn a_save_during_which_the_controller_starts_anew_is_not_told_as_one() {
+    let finger = Served::begin("wall");
+    let modulus = || finger.json(&["params", "get"])["modulus_pa"].as_i64().expect("a number");
+    let kept = modulus();
+    let mut refused = 0;
+    for packets in 0.. {
+        finger.done(&["params", "set", "modulus_pa=300000"]);
+        finger.command(&format!("restart after {packets}"));
+        let output = finger.writing_to(&["params", "save"], std::process::Stdio::null());
+        let restarted = finger.command("restarted") == "true";
+        finger.command(&format!("raw {REBOOT}"));
+        let now = modulus();
+        if !restarted {
+            assert!(output.status.success() && now == 300_000, "{output:?}");
+            break;
+        }
+        // Before the first packet there is nothing yet that could be lost.
+        let lost = output.status.success() && now != 300_000;
+        assert!(!lost || packets <= 1, "restarted after {packets}: {output:?}");
+        refused += i32::from(!output.status.success());
+        finger.done(&["params", "set", &format!("modulus_pa={kept}"), "--save"]);
+    }
+    assert!(refused > 0, "{refused} refused");
+}
+
 #[test]
 fn a_press_leaves_a_motor_that_stops() {
     let finger = Served::begin("wall");

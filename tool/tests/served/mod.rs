@@ -3,6 +3,7 @@
 
 use fingertip::link::Reply;
 use fingertip::link::packet::BROADCAST;
+use fingertip::link::packet::instruction::REBOOT;
 use fingertip::link::sender;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
@@ -34,6 +35,8 @@ struct Told {
     ears: Option<(u64, u64, u64)>,
     /// An instruction to all that comes as soon as the finger's state has this word.
     trap: Option<(String, u8)>,
+    /// How many more packets it hears before it starts anew.
+    restart: Option<u64>,
 }
 
 impl Told {
@@ -51,6 +54,11 @@ impl Told {
                 self.trap = Some((word.into(), number(instruction_number) as u8));
                 Some(Ok(String::new()))
             }
+            ["restart", "after", packets] => {
+                self.restart = Some(number(packets));
+                Some(Ok(String::new()))
+            }
+            ["restarted"] => Some(Ok(self.restart.is_none().to_string())),
             ["deaf", "after", packets, "for", lost] => {
                 self.ears = Some((number(packets), number(lost), 0));
                 Some(Ok(String::new()))
@@ -96,6 +104,11 @@ impl serve::Finger for Told {
                 return Ok(());
             }
         }
+        if self.restart.take_if(|left| *left == 0).is_some() {
+            self.native.0.hear(&instruction(REBOOT));
+            (0..20).for_each(|_| self.native.0.frame());
+        }
+        self.restart = self.restart.map(|left| left - 1);
         self.native.hear(bytes)
     }
 
@@ -124,7 +137,7 @@ impl Served {
         let (commands, commanded) = channel();
         let thread = std::thread::spawn(move || {
             let native = Native(Bus::new(&scene).expect("a world"));
-            let mut told = Told { native, commands: commanded, ears: None, trap: None };
+            let mut told = Told { native, commands: commanded, ears: None, trap: None, restart: None };
             let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
             served.map(drop).unwrap_or_else(|never| match never {});
         });

@@ -132,11 +132,11 @@ fn main() -> ! {
     rows::run(kept.frames);
     converters::sample_instant(&mut scan, config.timing);
 
-    let (bench, pipeline) = (BENCH.take(), PIPELINE.init_with(|| Pipeline::new(config)));
+    let (bench, pipeline) = (BENCH.take(), make_pipeline(config));
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
     scan.stop();
-    *pipeline = Pipeline::new(config);
+    renew(pipeline, config);
     report::number("loop_bits", bench.digest(pipeline));
     kernels::run(config, bench, pipeline);
     report::end();
@@ -147,6 +147,17 @@ fn main() -> ! {
 fn make_config() -> &'static Config {
     let Ok(config) = Config::shipped(&Params::DEFAULT) else { host::fail("the default parameters are refused") };
     CONFIG.init(config)
+}
+
+/// These two are functions of their own, because a pipeline that is being made takes most of the stack only here.
+#[inline(never)]
+fn make_pipeline(config: &Config) -> &'static mut Pipeline {
+    PIPELINE.init_with(|| Pipeline::new(config))
+}
+
+#[inline(never)]
+fn renew(pipeline: &mut Pipeline, config: &Config) {
+    *pipeline = Pipeline::new(config);
 }
 
 fn count_cycles() {

@@ -141,7 +141,8 @@ impl ScanTiming {
     pub fn whole_part(self, longest: ScanTicks) -> ScanTicks {
         let frame = self.frame().0;
         let fewest = frame.div_ceil(longest.0.max(1)).max(1);
-        (fewest..=frame).find_map(|count| (frame % count == 0).then_some(ScanTicks(frame / count))).unwrap_or_default()
+        let count = (fewest..=frame).find(|count| frame.is_multiple_of(*count)).unwrap_or(1);
+        ScanTicks(frame / count)
     }
 }
 

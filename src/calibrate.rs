@@ -1,12 +1,12 @@
 //! The taxels' gains from presses onto a hard flat plate, without a load cell.
 //!
 //! A press goes slowly into the plate while the encoder tells how deep ([`crate::identify::Press`]); every taxel's mean
-//! reading is kept for 24 steps of the travel ([`Readings`]). What comes then is spread over frames, a part of a taxel in
+//! reading is kept for 24 steps of the travel (`Readings`). What comes then is spread over frames, a part of a taxel in
 //! each:
 //!
-//! 1. the pose, from where the lines of the taxels cross zero, which no gain moves ([`Pose`]),
-//! 2. what each taxel should read by the model ([`expected`]), and by how much it reads more,
-//! 3. whether that was a press on something hard and flat that stood still ([`judge`]),
+//! 1. the pose, from where the lines of the taxels cross zero, which no gain moves (`Pose`),
+//! 2. what each taxel should read by the model (`expected`), and by how much it reads more,
+//! 3. whether that was a press on something hard and flat that stood still (`judge`),
 //! 4. the proposal, from all presses together ([`Proposal`]).
 //!
 //! The scale is fixed by the modulus of the parameters: what all taxels have in common is Y times their gain, and only a

@@ -198,7 +198,7 @@ mod tests {
             let of = |slot_step| ScanTiming::new(settle_ns, 15, [10, 10], &Clocks { slot_step, ..CLOCKS }).unwrap();
             let ([free, zero, stepped], settle) = ([1, 0, 12].map(|step| of(step).slot.0), of(12).settle);
             assert_eq!([free, zero], [free; 2]);
-            assert!(stepped % 12 == 0 && (free..free + 12).contains(&stepped), "{stepped} for {free}");
+            assert!(stepped.is_multiple_of(12) && (free..free + 12).contains(&stepped), "{stepped} for {free}");
             assert_eq!(settle, of(1).settle);
         }
     }

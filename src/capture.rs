@@ -12,10 +12,10 @@
 //! | 0 | the letters `FTC` and [`VERSION`] |
 //! | 4 | rows, columns, why it ended, 0 |
 //! | 8 | a number for the names and the order of the parameters |
-//! | 12 | frames, bits of all frames, digest after the last one, missed frames before the first one |
-//! | 28 | numbers of the requests taken up before, as in [`Taken`](crate::pipeline::Taken); 0 |
-//! | 36 | from frame to frame, ns |
-//! | 40 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
+//! | 12 | frames, bits of all frames, digest after the last one, check sum of the bits, missed frames before the first one |
+//! | 32 | numbers of the requests taken up before, as in [`Taken`](crate::pipeline::Taken); 0 |
+//! | 40 | from frame to frame, ns |
+//! | 44 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
 //! | then | the frames, without a gap |
 //!
 //! Of a frame only what changed is written: numbers as [`bits`] of their difference to the frame before, codes with a

@@ -17,11 +17,13 @@ pub(super) struct Place {
     count: u32,
     /// Where their word will be.
     at: usize,
+    /// Of the words before.
+    check: u32,
 }
 
 impl Place {
     /// At the beginning.
-    pub const START: Self = Self { held: 0, count: 0, at: 0 };
+    pub const START: Self = Self { held: 0, count: 0, at: 0, check: 0 };
 
     /// Bits written.
     pub fn bits(&self) -> u32 {
@@ -57,15 +59,17 @@ impl<'a> Writer<'a> {
                 None => self.full = true,
             }
             place.at += 4;
+            place.check = mix(place.check, word);
         }
     }
 
-    /// Brings what is not yet a word to its place.
-    pub fn flush(&mut self) {
+    /// Brings what is not yet a word to its place; the check sum of all.
+    pub fn finish(self) -> u32 {
         let place = self.place;
         if let Some(to) = self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
             *to = (place.held as u32).to_le_bytes();
         }
+        mix(place.check, place.held as u32)
     }
 
     /// A folded number of at most `all` bits.
@@ -132,6 +136,24 @@ impl<'a> Reader<'a> {
         let folded = self.folded(width, 32)?;
         Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
     }
+}
+
+/// The check sum of so many bits as [`Writer::finish`] tells it.
+pub(super) fn check(bytes: &[u8], bits: u32) -> u32 {
+    let mut sum = 0;
+    for place in 0..=bits / 32 {
+        let rest = bytes.get(4 * place as usize..).unwrap_or_default();
+        let mut word = [0; 4];
+        word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
+        sum = mix(sum, u32::from_le_bytes(word));
+    }
+    sum
+}
+
+/// Turned, mixed, multiplied by an odd number (2^32 over the golden ratio): no word that differs is lost.
+#[inline(always)]
+pub(super) const fn mix(sum: u32, word: u32) -> u32 {
+    (sum.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
 }
 
 /// A difference of 16 bits, folded.

@@ -1,5 +1,6 @@
 //! A running digest of all that steps report: quick enough for the board.
 
+use super::bits::mix;
 use crate::calibrate::{self, scale};
 use crate::commission::Drive;
 use crate::contact::Contact;
@@ -104,9 +105,8 @@ const fn pack(bytes: [u8; 4]) -> u32 {
 struct Words(u32);
 
 impl Words {
-    /// Turned, mixed, multiplied by an odd number (2^32 over the golden ratio): no word that differs is lost.
     #[inline(always)]
     fn add(&mut self, word: u32) {
-        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1);
+        self.0 = mix(self.0, word);
     }
 }

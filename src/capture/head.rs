@@ -17,6 +17,8 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     pub bits: u32,
     /// The digest after the last one.
     pub digest: u32,
+    /// The check sum of its frames' bits.
+    pub check: u32,
     /// Frames missed since reset, before the first one.
     pub missed_frames: u32,
     /// Requests taken up before.
@@ -31,7 +33,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 
 const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
 /// Bytes before the parameters.
-const FIXED: usize = 40;
+const FIXED: usize = 44;
 
 /// A number for the names and the order of the parameters (FNV-1a of 32 bits).
 const LAYOUT: u32 = {
@@ -74,7 +76,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         };
         put(MAGIC);
         put([ROWS as u8, COLUMNS as u8, self.ended as u8, 0]);
-        for word in [LAYOUT, self.frames, self.bits, self.digest, self.missed_frames] {
+        for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
             put(word.to_le_bytes());
         }
         put([tare, clear, identify, calibrate]);
@@ -84,12 +86,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
     }
 
-    /// Says in one that was written why the capture ended, and its frames, bits and digest.
-    pub(super) fn close(bytes: &mut [u8], ended: Ended, words: [u32; 3]) {
+    /// Says in one that was written why the capture ended, and its frames, bits, digest and check sum.
+    pub(super) fn close(bytes: &mut [u8], ended: Ended, words: [u32; 4]) {
         if let Some(place) = bytes.get_mut(6) {
             *place = ended as u8;
         }
-        for (place, word) in bytes.get_mut(12..24).unwrap_or_default().as_chunks_mut::<4>().0.iter_mut().zip(words) {
+        for (place, word) in bytes.get_mut(12..28).unwrap_or_default().as_chunks_mut::<4>().0.iter_mut().zip(words) {
             *place = word.to_le_bytes();
         }
     }
@@ -117,7 +119,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         }
         let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(Refusal::Unfinished)?;
         let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
-        let [digest, missed_frames] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+        let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+        let missed_frames = u32::from_le_bytes(next()?);
         let [tare, clear, identify, calibrate] = next()?;
         let [forget, shown, commission, none] = next()?;
         if zero != 0 || none != 0 {
@@ -136,6 +139,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
             }
         }
         let params = Params::from_array(&values);
-        Ok(Self { ended, frames, bits, digest, missed_frames, taken, frame_ns, params, gains })
+        Ok(Self { ended, frames, bits, digest, check, missed_frames, taken, frame_ns, params, gains })
     }
 }

@@ -1,6 +1,6 @@
 //! The host's side: bytes in, frames out.
 
-use super::bits::{Reader, unfold};
+use super::bits::{self, Reader, unfold};
 use super::{Head, Last, VERSION, width};
 use crate::command::Command;
 use crate::config::ConfigError;
@@ -31,7 +31,7 @@ pub enum Refusal {
     Cut,
     /// There is more than a capture.
     Longer,
-    /// Something in it cannot be.
+    /// It is not as the board wrote it.
     Damaged,
     /// Parameters that make no configuration.
     Config(ConfigError),
@@ -60,7 +60,7 @@ impl core::fmt::Display for Refusal {
             Self::Unfinished => f.write_str("the capture was not ended on the board"),
             Self::Cut => f.write_str("the capture is cut off"),
             Self::Longer => f.write_str("the capture is longer than it says"),
-            Self::Damaged => f.write_str("the capture is damaged: it holds what no board writes"),
+            Self::Damaged => f.write_str("the capture is damaged: it is not as the board wrote it"),
             Self::Config(error) => write!(f, "the capture's parameters make no configuration: {error}"),
             Self::FrameTime { captured, here } => {
                 write!(f, "captured with a frame each {captured} ns; by its parameters it is {here} ns here")
@@ -115,9 +115,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
         if body.len() > need {
             return Err(Refusal::Longer);
         }
-        // What fills the last byte is 0.
-        let used = head.bits % 8;
-        if used != 0 && body.last().is_some_and(|last| last >> used != 0) {
+        if bits::check(body, head.bits) != head.check {
             return Err(Refusal::Damaged);
         }
         let frames = Self { bits: Reader::new(body, head.bits), last: Last::NONE, read: 0, count: head.frames };

@@ -76,6 +76,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
             frames: 0,
             bits: 0,
             digest: 0,
+            check: 0,
             missed_frames,
             taken,
             frame_ns: config.timing.frame_ns,
@@ -138,8 +139,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
                 let (bits, frames) = (self.place.bits(), self.standing.frames);
                 let digest = digest::words(self.last.digest, core::iter::once(why as u32));
                 let (head, body) = self.bytes.split_at_mut(Head::<ROWS, COLUMNS>::BYTES.min(BYTES));
-                Writer::new(body, self.place).flush();
-                Head::<ROWS, COLUMNS>::close(head, why, [frames, bits, digest]);
+                let check = Writer::new(body, self.place).finish();
+                Head::<ROWS, COLUMNS>::close(head, why, [frames, bits, digest, check]);
                 self.standing.state = State::Done;
                 self.standing.ended = why;
                 self.standing.bytes = head.len() as u32 + bits.div_ceil(8);

@@ -7,7 +7,7 @@ use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Gains, ROWS, TAXELS};
 use host_tests::native::Native;
-use host_tests::plant::{Setup, Wall};
+use host_tests::plant::Setup;
 use images::record::Record;
 
 pub type Burst<const BYTES: usize> = Capture<ROWS, COLUMNS, BYTES>;
@@ -21,7 +21,8 @@ impl<const BYTES: usize> Finger<BYTES> {
     /// 0.4 mm from the wall, with gains that differ.
     pub fn new() -> Self {
         let config = Config::shipped(&Params::DEFAULT).expect("the defaults make a configuration");
-        let setup = Setup { wall: Wall { distance_mm: 0.4, ..Wall::default() }, ..Setup::default() };
+        let mut setup = Setup::default();
+        setup.wall.distance_mm = 0.4;
         let mut native = Native::new(&setup, &config);
         native.pipeline.calibrate(&Calibration::of(&gains()));
         Self { native, capture: Box::new(Burst::NEW) }

@@ -113,12 +113,22 @@ proptest! {
             let bits = 8 * bytes.len() as u32;
             head[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
             head[16..20].copy_from_slice(&bits.to_le_bytes());
+            head[24..28].copy_from_slice(&check(&bytes).to_le_bytes());
             bytes = [head, bytes].concat();
         }
-        if let Ok((_, frames)) = Frames::<ROWS, COLUMNS>::new(&bytes) {
+        let read = Frames::<ROWS, COLUMNS>::new(&bytes);
+        prop_assert_eq!(read.is_ok(), real);
+        if let Ok((_, frames)) = read {
             prop_assert!(frames.filter(Result::is_err).count() <= 1);
         }
     }
+}
+
+/// As the board's, so that the frames are reached.
+fn check(bytes: &[u8]) -> u32 {
+    let padded = [bytes, &vec![0; 4 - bytes.len() % 4]].concat();
+    let words = padded.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")));
+    words.fold(0, |check: u32, word| (check.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1))
 }
 
 #[test]
@@ -157,4 +167,38 @@ fn out_of_turn_nothing_is_kept() {
     assert_eq!(capture.data().len(), standing.bytes as usize);
     capture.arm();
     assert!(capture.data().is_empty());
+}
+
+/// As `docs/captures.md` has it.
+#[test]
+fn a_frame_takes_what_its_noise_says() {
+    let config = Config::shipped(&Params::DEFAULT).expect("a configuration");
+    let mut state = 1_u32;
+    let mut uniform = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        f64::from(state) / f64::from(u32::MAX) - 0.5
+    };
+    for (noise, most) in [(0.0, 22.0), (0.5, 34.0), (1.0, 46.0), (2.0, 58.0), (4.0, 72.0)] {
+        let mut pipeline = Pipeline::new(&config);
+        let mut capture = Box::new(Burst::<{ 44 << 10 }>::NEW);
+        capture.arm();
+        capture.begin(&mut pipeline);
+        let mut frame = Frame::EMPTY;
+        while capture.standing().state == State::Recording {
+            frame.sequence += 1;
+            for place in 0..SLOTS * COLUMNS {
+                // Twelve of them make a normal number.
+                let normal: f64 = (0..12).map(|_| uniform()).sum();
+                frame.set_code(place / COLUMNS, place % COLUMNS, (372.3 + noise * normal).round() as u16);
+            }
+            let sense = Sense { supply_mv: 6_000 + (8.0 * uniform()) as u16, answer: CoreCycles(5_000), ..Sense::default() };
+            capture.record(&frame, &sense, &Command::default(), &Status::default());
+        }
+        let frames = capture.standing().frames;
+        let each = capture.data().len() as f64 / f64::from(frames);
+        println!("| {noise} | {each:.0} bytes | {frames} | {:.0} ms |", f64::from(frames) / 10.0);
+        assert!(each < most, "{each} bytes at {noise} codes");
+    }
 }

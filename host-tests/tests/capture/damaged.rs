@@ -5,7 +5,7 @@ use fingertip::capture::{Ended, Refusal, replay};
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
 use fingertip::scan::Clocks;
 
-const BYTES: usize = 2 << 10;
+const BYTES: usize = 1 << 10;
 
 fn verdict(bytes: &[u8]) -> Result<bool, Refusal> {
     replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).map(|replayed| replayed.difference.is_none())

@@ -102,7 +102,7 @@ fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
     let mut bytes = finger.capture.data().to_vec();
     // A creep's share more, though its effect comes late.
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
-    bytes[40 + 4 * place] ^= 1;
+    bytes[44 + 4 * place] ^= 1;
     let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, _| {}).expect("a capture");
     assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((0, Field::Digest)));
     let told = replayed.difference.map(|difference| difference.to_string()).unwrap_or_default();

@@ -52,6 +52,8 @@ pub mod safety;
 
 pub mod pipeline;
 
+pub mod capture;
+
 pub mod store;
 
 pub mod link;

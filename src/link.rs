@@ -44,4 +44,4 @@ mod turn;
 pub use sender::{REPLY_MAX, Reply};
 pub use server::Server;
 pub use settings::{Actions, Settings};
-pub use snapshot::{Crash, CrashCause, Health, ResetCause, Snapshot};
+pub use snapshot::{Captured, Crash, CrashCause, Health, ResetCause, Snapshot};

@@ -2,6 +2,7 @@
 
 pub mod budget;
 mod modes;
+mod renew;
 mod report;
 mod requests;
 

@@ -184,6 +184,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         count
     }
 
+    /// Forgets all but the gains and the mask.
+    pub fn renew(&mut self) {
+        let (rows, mask) = (self.rows, self.mask);
+        *self = Self::new();
+        for (own, Row { gains, moments, .. }) in self.rows.iter_mut().zip(rows) {
+            (own.gains, own.moments) = (gains, moments);
+        }
+        (self.mask, self.picture.bad) = (mask, mask);
+    }
+
     /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         let Calibration { weights, mask } = calibration;

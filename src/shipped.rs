@@ -63,6 +63,10 @@ pub type Fit = crate::contact::Fit<ROWS, COLUMNS>;
 pub type Budget = crate::pipeline::budget::Budget<ROWS, COLUMNS>;
 /// See [`crate::pipeline::Pipeline`].
 pub type Pipeline = crate::pipeline::Pipeline<ROWS, COLUMNS>;
+/// Bytes that a board keeps for a capture: 44 KiB.
+pub const CAPTURE_BYTES: usize = 44 << 10;
+/// See [`crate::capture::Capture`].
+pub type Capture = crate::capture::Capture<ROWS, COLUMNS, CAPTURE_BYTES>;
 /// See [`crate::store::Record`].
 pub type Record = crate::store::Record<ROWS, COLUMNS>;
 /// See [`crate::store::Loaded`].

@@ -5,6 +5,7 @@
 mod elapsed;
 
 use elapsed::{BusClock, FrameClock};
+use fingertip::capture::Ended;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
@@ -14,6 +15,7 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
+use super::capture::Keeper;
 use super::encoder::Encoder;
 use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED, STANDING, Standing};
 use super::flash::Store;
@@ -72,6 +74,7 @@ struct State {
     bus: BusClock,
     time: FrameClock,
     clear_seen: u8,
+    keeper: Keeper,
 }
 
 impl State {
@@ -87,6 +90,7 @@ impl State {
             bus: BusClock::new(),
             time: FrameClock::new(),
             clear_seen: 0,
+            keeper: Keeper::default(),
         }
     }
 
@@ -101,6 +105,7 @@ impl State {
             trace::Pin::Guard.low();
         }
         self.find_frames();
+        self.capture();
         self.take_frame();
         self.check_part();
         self.configure();
@@ -113,6 +118,18 @@ impl State {
         let Command { torque, clear_request, .. } = HEARD.get().command;
         if self.lost && clear_request != self.clear_seen && !torque {
             self.clear_seen = clear_request;
+            self.restart_scan();
+        }
+    }
+
+    /// Begins a capture where it is due. The pipeline is made anew, which may take most of a frame: the scan starts anew.
+    fn capture(&mut self) {
+        self.keeper.take_asked();
+        if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
+            self.parts.bridge.apply(Wanted::Open);
+            self.parts.scan.stop();
+            guard::rest();
+            self.keeper.begin(self.parts.pipeline);
             self.restart_scan();
         }
     }
@@ -146,6 +163,7 @@ impl State {
         self.parts.scan.copy_so_far(&mut self.frame);
         if self.parts.pipeline.check_part(&self.frame) {
             self.parts.bridge.apply(self.parts.pipeline.status().bridge());
+            self.keeper.end(Ended::Cut);
             self.publish();
         }
     }
@@ -168,8 +186,10 @@ impl State {
             && !stopped
         {
             parts.pipeline.stop(fault);
+            self.keeper.end(Ended::Stopped);
         }
 
+        let parts = &mut self.parts;
         let timing = parts.pipeline.config().timing;
         let loop_time = Stopwatch::since(completed.stamp);
         self.report.supply_mv = sense.supply_mv;
@@ -185,6 +205,7 @@ impl State {
         }
         self.clear_seen = command.clear_request;
         self.publish();
+        self.keeper.record(&self.frame, &sense, &command, self.parts.pipeline.status());
     }
 
     /// The guard cut the bridge: latches the fault. The scan starts anew when that is cleared.
@@ -208,6 +229,7 @@ impl State {
     fn stop(&mut self, fault: Fault) {
         self.parts.bridge.sleep();
         self.parts.pipeline.stop(fault);
+        self.keeper.end(Ended::Stopped);
     }
 
     fn restart_scan(&mut self) {
@@ -222,6 +244,7 @@ impl State {
     }
 
     fn publish(&mut self) {
+        self.report.capture = self.keeper.standing();
         let (pipeline, frame, report) = (&self.parts.pipeline, &self.frame, &self.report);
         let status = pipeline.status();
         STANDING.set(Standing { mode: status.mode, fault: status.fault, missed_frames: status.missed_frames });
@@ -243,6 +266,7 @@ impl State {
     /// the scan starts anew.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
+        self.keeper.end(Ended::Configured);
         self.parts.bridge.apply(Wanted::Open);
         self.parts.scan.stop();
         guard::rest();
@@ -256,6 +280,7 @@ impl State {
     /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
     fn calibrate(&mut self) {
         if let Some(gains) = GAINS.take(|gains| *gains) {
+            self.keeper.end(Ended::Configured);
             self.parts.bridge.apply(Wanted::Open);
             self.parts.scan.stop();
             guard::rest();

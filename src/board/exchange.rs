@@ -7,10 +7,11 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
+use fingertip::capture::Standing as CaptureStanding;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Frame, Gains, Proposal, ROWS, Record};
+use fingertip::shipped::{COLUMNS, Capture, Frame, Gains, Proposal, ROWS, Record};
 use fingertip::state::{Fault, Mode};
 
 use super::flash::SaveError;
@@ -31,6 +32,8 @@ pub struct Report {
     pub loop_time: Stopwatch,
     /// The longest of those.
     pub loop_time_max: Stopwatch,
+    /// The capture.
+    pub capture: CaptureStanding,
 }
 
 /// What the LED and the log show.
@@ -103,6 +106,9 @@ pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     proposal: Proposal::NONE,
 });
 
+/// The capture: full once it is done. All zeros before, so the image does not grow by it.
+pub static CAPTURE: Mailbox<Capture> = Mailbox::new(Capture::NEW);
+
 /// A small value that is read and replaced as a whole.
 pub struct Shared<T>(Mutex<CriticalSectionRawMutex, Cell<Option<T>>>);
 
@@ -155,6 +161,11 @@ impl<T> Mailbox<T> {
     /// Empties the box where it is full.
     pub fn take<R>(&self, read: impl FnOnce(&mut T) -> R) -> Option<R> {
         self.turn(FULL, EMPTY, read)
+    }
+
+    /// Changes the value where the box is empty, and leaves it so: for who alone fills it.
+    pub fn work<R>(&self, act: impl FnOnce(&mut T) -> R) -> Option<R> {
+        self.turn(EMPTY, EMPTY, act)
     }
 
     /// Looks at the value, or replaces it, where the box is full, and leaves it there.

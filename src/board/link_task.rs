@@ -4,12 +4,13 @@
 
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
-use fingertip::link::{Actions, Reply};
+use fingertip::link::{Actions, Captured, Reply};
 use fingertip::shipped::{CLOCKS, Record, Server, Snapshot};
 
 use super::bus::Bus;
 use super::crash::{self, Boot};
-use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
+use super::capture;
+use super::exchange::{CAPTURE, GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
 use super::health;
 use super::log::log_save_error;
@@ -56,8 +57,7 @@ impl LinkTask {
         let received = Instant::now();
         while !bytes.is_empty() {
             // Control, which fills the picture, interrupts this task: here it is never under way.
-            let taken = PICTURE.visit(|picture| self.server.feed(bytes, &snapshot(picture, self.boot), reply));
-            let Some(taken) = taken else { return };
+            let Some(taken) = self.feed(bytes, reply) else { return };
             bytes = bytes.get(taken..).unwrap_or_default();
             self.pass_on();
             if !reply.is_empty() {
@@ -69,6 +69,19 @@ impl LinkTask {
             let actions = self.server.take_actions();
             self.carry_out(actions).await;
         }
+    }
+
+    /// How many bytes the server took.
+    fn feed(&mut self, bytes: &[u8], reply: &mut Reply) -> Option<usize> {
+        PICTURE.visit(|picture| {
+            let snapshot = snapshot(picture, self.boot);
+            // A capture that is done is the link's until the next one is armed.
+            let whole = CAPTURE.visit(|capture| {
+                let capture = Captured { data: capture.data(), ..snapshot.capture };
+                self.server.feed(bytes, &Snapshot { capture, ..snapshot }, reply)
+            });
+            whole.unwrap_or_else(|| self.server.feed(bytes, &snapshot, reply))
+        })
     }
 
     fn pass_on(&self) {
@@ -96,6 +109,9 @@ impl LinkTask {
             if let Err(cause) = self.bus.set_baud(baud) {
                 error!("bus speed: {}", cause);
             }
+        }
+        if let Some(arm) = actions.capture {
+            capture::ask(arm);
         }
         if actions.reboot {
             crash::reboot();
@@ -139,6 +155,7 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         pascals_per_sum_q32: *pascals_per_sum_q32,
         tare,
         proposal,
+        capture: Captured { standing: report.capture, data: &[] },
     }
 }
 

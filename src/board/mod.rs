@@ -4,6 +4,7 @@ use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 
 pub mod bridge;
 pub mod bus;
+pub mod capture;
 pub mod clocks;
 pub mod control;
 pub mod converter;

@@ -24,6 +24,8 @@ pub struct Settings<const ROWS: usize, const COLUMNS: usize> {
     pub saved: Saved,
     /// Where the bytes of the indirect data stand; 0 is nowhere.
     pub indirect: [u16; indirect::COUNT],
+    /// Which byte of the capture is read first.
+    pub capture_offset: u32,
 }
 
 /// How the stored registers stand to the flash. The numbers are stable.
@@ -51,6 +53,8 @@ pub struct Actions {
     pub calibrate: bool,
     /// The bus speed changed.
     pub baud: bool,
+    /// A capture is to be armed (true) or ended (false).
+    pub capture: Option<bool>,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
@@ -63,6 +67,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
             watchdog_tripped: false,
             saved: Saved::Same,
             indirect: [0; indirect::COUNT],
+            capture_offset: 0,
         }
     }
 

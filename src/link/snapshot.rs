@@ -1,6 +1,7 @@
 //! What the bus may read of the running controller, gathered by the firmware.
 
 use crate::calibrate::Proposal;
+use crate::capture;
 use crate::frame::Frame;
 use crate::pipeline::Status;
 use crate::pressure::TARE_BITS;
@@ -39,6 +40,17 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub tare: &'a [[i32; COLUMNS]; ROWS],
     /// The gains that presses propose.
     pub proposal: &'a Proposal<ROWS, COLUMNS>,
+    /// The capture.
+    pub capture: Captured<'a>,
+}
+
+/// A capture as the bus may read it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Captured<'a> {
+    /// How it stands.
+    pub standing: capture::Standing,
+    /// Its bytes; none before it is done.
+    pub data: &'a [u8],
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Snapshot<'_, ROWS, COLUMNS> {
@@ -181,6 +193,7 @@ mod tests {
             pascals_per_sum_q32: 8 << 32,
             tare: &tare,
             proposal: &Proposal::NONE,
+            capture: Captured::default(),
         };
         let at = |place| (snapshot.pressure_10pa(place), snapshot.tare_codes(place));
         assert_eq!([0, 1, 2, 100].map(at), [(0, 0), (0, 0), (1, 8), (0, 0)]);

@@ -5,6 +5,7 @@
 //! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
 
 use crate::calibrate::State;
+use crate::capture;
 use crate::command::Command;
 use crate::commission::{Commissioning, Task};
 use crate::params::Params;
@@ -34,6 +35,8 @@ pub(super) struct Stand {
     pub proposed: bool,
     /// The factor that a scale proposes for forces, millionths; 0 none.
     pub factor_ppm: u32,
+    /// Frames are being kept for a capture.
+    pub captures: bool,
 }
 
 /// What stands in the way of recovering from a fault: it would be back at once. The numbers are stable.
@@ -63,6 +66,7 @@ impl Stand {
             // While a press runs, or is worked out, there may be a mixture.
             proposed: status.calibration.presses > 0 && status.calibration.state != State::Running,
             factor_ppm: status.scale.factor_ppm,
+            captures: snapshot.capture.standing.state == capture::State::Recording,
         }
     }
 

@@ -1,6 +1,7 @@
 //! The commands, one module each.
 
 pub mod calibrate;
+pub mod capture;
 pub mod commission;
 pub mod info;
 pub mod latency;
@@ -8,6 +9,7 @@ pub mod params;
 pub mod press;
 pub mod record;
 pub mod recover;
+pub mod replay;
 pub mod scan;
 pub mod stream;
 pub mod tare;

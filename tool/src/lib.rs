@@ -3,6 +3,7 @@
 //! [`Client`] talks DYNAMIXEL Protocol 2.0 by the core's own packets; [`table`] finds registers and what their numbers
 //! mean in the core's own control table. So neither can differ from the firmware of the same version.
 
+pub mod captured;
 pub mod client;
 pub mod commands;
 pub mod error;

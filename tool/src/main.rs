@@ -4,7 +4,7 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
-    calibrate, commission, info, latency, params, press, record, recover, scan, stream, tare, view,
+    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, stream, tare, view,
 };
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
@@ -49,6 +49,10 @@ enum Command {
     Stream(stream::Args),
     /// Record states with the controller's own times, as CSV or MCAP
     Record(record::Args),
+    /// Keep every frame from a tare on, on the board itself, and write a file that replays to the bit
+    Capture(capture::Args),
+    /// Feed captures through the core on this machine, and compare
+    Replay(replay::Args),
     /// Read, write, save, back up and restore the parameters
     #[command(subcommand)]
     Params(params::Command),
@@ -98,6 +102,8 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
         Command::Record(args) => record::run(args, &mut connect()?, cli.json),
+        Command::Capture(args) => capture::run(args, &mut connect()?, cli.json),
+        Command::Replay(args) => replay::run(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
         Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),

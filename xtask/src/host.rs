@@ -29,6 +29,8 @@ pub const SERVE: Program = Program { package: "serve", name: "serve", whole: tru
 pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: false };
 /// The emulated board with all that it can.
 pub const SCENE_BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: true };
+/// `fingertip`, the host's program.
+pub const TOOL: Program = Program { package: "fingertip-cli", name: "fingertip", whole: true };
 /// What recordings of a sensor say.
 pub const SENSOR: Program = Program { package: "sensor", name: "sensor", whole: true };
 

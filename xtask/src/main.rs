@@ -20,6 +20,7 @@ mod progress;
 mod proof;
 mod python;
 mod qemu;
+mod replay;
 mod serve;
 mod sim;
 mod size;
@@ -90,6 +91,8 @@ enum Command {
         after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
     )]
     Serve(sim::Args),
+    /// Feed captures of boards through the core on this machine: it must answer as they did, to the bit
+    Replay(replay::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -150,6 +153,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Budget(args) => sim::budget(args, console),
         Command::Sensor(args) => sim::sensor(args, console),
         Command::Serve(args) => serve::run(args, toolchain, console),
+        Command::Replay(args) => replay::run(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),

@@ -11,8 +11,8 @@ use std::{collections::BTreeMap, fmt::Write as _, fs};
 
 /// Flash that the image may take.
 pub const FLASH_MAX_BYTES: u64 = 128 << 10;
-/// RAM that statics may take; the stack comes on top.
-pub const RAM_MAX_BYTES: u64 = 32 << 10;
+/// RAM that statics may take, 44 KiB of it the memory for captures; the stack comes on top.
+pub const RAM_MAX_BYTES: u64 = 76 << 10;
 /// Where the microcontroller's RAM begins.
 const RAM_BASE: u64 = 0x2000_0000;
 /// Lines of the table of crates.

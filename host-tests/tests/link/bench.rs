@@ -1,10 +1,11 @@
 //! A server with a made-up loop behind it, and a host's side of the talk.
 
+use fingertip::capture::Standing;
 use fingertip::command::Command;
 use fingertip::link::packet::{Packet, StatusError};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
-use fingertip::link::{Crash, CrashCause, Health, Reply, ResetCause};
+use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
@@ -39,6 +40,9 @@ pub struct Bench {
     /// The time, which stands.
     pub tick_ms: u32,
     pub proposal: Proposal,
+    /// The made-up capture, and its bytes.
+    pub capture: Standing,
+    pub captured: Vec<u8>,
 }
 
 impl Bench {
@@ -60,6 +64,8 @@ impl Bench {
             tare: by_place(|place| (300 + place) << TARE_BITS),
             tick_ms: 0x1_8123,
             proposal: Proposal::NONE,
+            capture: Standing::default(),
+            captured: Vec::new(),
         }
     }
 
@@ -114,6 +120,7 @@ impl Bench {
             pascals_per_sum_q32: 10 << 32,
             tare: &self.tare,
             proposal: &self.proposal,
+            capture: Captured { standing: self.capture, data: &self.captured },
         };
         let mut reply = Reply::new();
         let mut replies = Vec::new();

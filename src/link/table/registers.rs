@@ -17,7 +17,7 @@ use crate::link::snapshot::hardware_error;
 use crate::store;
 
 use super::values::{
-    bump, permille, set_accept, set_calibrate, set_commission, set_goal, set_recover, set_scale, set_torque,
+    bump, permille, set_accept, set_calibrate, set_capture, set_commission, set_goal, set_recover, set_scale, set_torque,
     set_watchdog, short, watchdog,
 };
 /// The defaults go by no shape.
@@ -424,6 +424,35 @@ control_table! {
     /// That of the friction on the way back.
     4256 FRICTION_BACK_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.measured().friction_sigma[1]);
+    /// 1 arms a capture: it begins with the next tare and keeps every frame until its memory is full. 0 ends it, or calls
+    /// it off. 1 is refused with an access error with torque on, with a result error while frames are being kept. Reads
+    /// 0.
+    4260 CAPTURE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
+        |_, _| 0,
+        set_capture;
+    /// The capture: 0 none since reset, 1 armed, 2 frames are being kept, 3 done.
+    4261 CAPTURE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
+        |view, _| view.capture_state();
+    /// Why it ended; 0 it did not. 1 its memory is full, 2 asked to, 3 new parameters or gains, 4 the firmware stopped
+    /// the motor, 5 the firmware shorted the motor at a broken array.
+    4262 CAPTURE_ENDED: U8 ReadOnly, "" * 1, 0 to 5,
+        |view, _| view.snapshot.capture.standing.ended as u32;
+    /// Counts the captures begun since reset; wraps.
+    4263 CAPTURE_COUNT: U8 ReadOnly, "" * 1, 0 to 255,
+        |view, _| u32::from(view.snapshot.capture.standing.count);
+    /// Frames kept.
+    4264 CAPTURE_FRAMES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.capture.standing.frames;
+    /// Bytes of the capture, once it is done.
+    4268 CAPTURE_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
+        |view, _| view.snapshot.capture.standing.bytes;
+    /// Which byte of the capture capture_data begins with.
+    4272 CAPTURE_OFFSET: U32 ReadWrite, "" * 1, 0 to 0xFFFF_FFFF = 0,
+        |view, _| view.settings().capture_offset,
+        |staged, value| { staged.settings.capture_offset = value as u32; Ok(()) };
+    /// Bytes of the capture from capture_offset on; 0 where there are no more, and all 0 before it is done.
+    4512 CAPTURE_DATA: U8[248] ReadOnly, "" * 1, 0 to 255,
+        |view, element| u32::from(view.captured(element));
 }
 
 /// A number of at most two digits.

@@ -147,6 +147,22 @@ pub(super) fn set_scale<const ROWS: usize, const COLUMNS: usize>(
     Ok(())
 }
 
+/// Capture: to arm it, or to end it.
+pub(super) fn set_capture<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    let arm = value != 0;
+    if arm && staged.settings.command.torque {
+        return Err(StatusError::Access);
+    }
+    if arm && staged.stand.captures {
+        return Err(StatusError::Result);
+    }
+    staged.actions.capture = Some(arm);
+    Ok(())
+}
+
 /// The bus watchdog as it reads.
 pub(super) fn watchdog<const ROWS: usize, const COLUMNS: usize>(settings: &Settings<ROWS, COLUMNS>) -> i32 {
     if settings.watchdog_tripped { -1 } else { i32::from(settings.command.bus_watchdog_ms / WATCHDOG_MS) }

@@ -1,6 +1,7 @@
 //! What a read sees: the device's own state, and the picture of the loop.
 
 use crate::calibrate::State as Press;
+use crate::capture;
 use crate::commission::{Commissioning, Drive};
 use crate::contact::Contact;
 use crate::identify::{Identification, Modulus};
@@ -116,6 +117,19 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
             return u8::MAX.into();
         }
         status.scale.points.into()
+    }
+
+    /// As the tare's: what was asked for counts already.
+    pub(super) fn capture_state(&self) -> u32 {
+        let state = self.snapshot.capture.standing.state;
+        if self.state.actions().capture == Some(true) { capture::State::Armed as u32 } else { state as u32 }
+    }
+
+    /// A byte of the capture.
+    pub(super) fn captured(&self, element: usize) -> u8 {
+        let offset = self.settings().capture_offset as usize;
+        let byte = offset.checked_add(element).and_then(|place| self.snapshot.capture.data.get(place));
+        byte.copied().unwrap_or(0)
     }
 
     pub(super) fn refused(&self, error: StatusError) -> u32 {

@@ -63,7 +63,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     client.set(address::BUS_WATCHDOG, WATCHDOG_MS / WATCHDOG_UNIT_MS)?;
     let pressed = press(args, goal_mn as i64, client, json, &interrupt);
     // Whatever came of it, and first of all.
-    let let_go = let_go(args, client);
+    let let_go = let_go(args.within_s, client);
     // While torque may be on, nothing but the watchdog stops the motor once this program has ended.
     let let_go = let_go.and_then(|()| client.again(|client| client.set(address::BUS_WATCHDOG, watchdog)));
     let held = match (pressed, let_go) {
@@ -96,7 +96,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 /// The controller refuses torque before.
-fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
+pub(super) fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "direction_confirmed").unwrap_or_default();
     if client.number(address::PARAMS + 4 * place as u16)? != 0 {
         return Ok(());
@@ -154,14 +154,14 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
 }
 
 /// Lets go, and turns torque off once nothing is touched: the tip is then clear of the object.
-fn let_go(args: &Args, client: &mut Client) -> Result<(), Error> {
+pub(super) fn let_go(within_s: f64, client: &mut Client) -> Result<(), Error> {
     client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
     let begun = Instant::now();
     loop {
         let state = client.again(State::read)?;
         let clear = state.mode == Mode::Release as i64 && state.speed_um_per_s.abs() < 1_000 && state.force_mn < 10;
         let off = state.mode == Mode::Off as i64;
-        if state.fault != 0 || clear || off || begun.elapsed().as_secs_f64() > args.within_s {
+        if state.fault != 0 || clear || off || begun.elapsed().as_secs_f64() > within_s {
             break;
         }
         std::thread::sleep(LOOK);

@@ -2,6 +2,7 @@
 //! counts, never by the clock.
 
 mod attacked;
+mod captured;
 mod killed;
 #[path = "../served/mod.rs"]
 mod served;

@@ -14,9 +14,10 @@ use crate::scene::Scene;
 use crate::watch::Truth;
 use broken::Broken;
 pub use broken::Kind;
-use fingertip::link::{Crash, Health, Reply, ResetCause};
+use fingertip::link::{Captured, Crash, Health, Reply, ResetCause};
+use fingertip::capture::Ended;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{CLOCKS, Calibration, Config, Pipeline, ROWS, Record, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, Calibration, Capture, Config, Pipeline, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::settle;
 use host_tests::plant::Bridge;
@@ -55,6 +56,7 @@ struct Device {
     /// As the controller sensed it last.
     supply_mv: u16,
     reboot_s: Option<f64>,
+    capture: Box<Capture>,
 }
 
 impl<E: Set> Bus<E> {
@@ -117,10 +119,17 @@ impl<E: Set> Bus<E> {
             let scanned =
                 device.broken.as_mut().is_none_or(|broken| broken.change(&mut unit.frame, &mut sense, params));
             device.supply_mv = sense.supply_mv;
+            let command = device.server.command();
+            if device.capture.is_due(unit.pipeline.status(), &command) {
+                device.capture.begin(&mut unit.pipeline);
+            }
             let status = if scanned {
-                unit.pipeline.step(&unit.frame, &sense, &device.server.command()).1
+                let status = unit.pipeline.step(&unit.frame, &sense, &command).1;
+                device.capture.record(&unit.frame, &sense, &command, status);
+                status
             } else {
                 unit.pipeline.stop(Fault::LostFrames);
+                device.capture.end(Ended::Stopped);
                 unit.pipeline.status()
             };
             let bridge = Bridge::of(status);
@@ -180,6 +189,7 @@ impl<E: Set> Bus<E> {
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
                 tare: &tare,
                 proposal: pipeline.proposal(),
+                capture: Captured { standing: device.capture.standing(), data: device.capture.data() },
             };
             let taken = device.server.feed(bytes, &snapshot, &mut reply);
             bytes = &bytes[taken..];
@@ -208,6 +218,7 @@ impl Device {
             broken: None,
             supply_mv: 0,
             reboot_s: None,
+            capture: Box::new(Capture::NEW),
         }
     }
 
@@ -241,6 +252,14 @@ impl Device {
         let actions = self.server.take_actions();
         let record = self.server.settings().record;
         let mut slot_s = None;
+        if actions.configure || actions.calibrate {
+            self.capture.end(Ended::Configured);
+        }
+        match actions.capture {
+            Some(true) => self.capture.arm(),
+            Some(false) => self.capture.end(Ended::Asked),
+            None => {}
+        }
         if actions.configure {
             match Config::shipped(&record.params) {
                 Ok(config) => {

@@ -1,0 +1,203 @@
+//! A capture over the bus, on the flash image: it replays to the bit on this machine, also with calibrated gains; and
+//! what becomes of one that is asked for out of turn, interrupted, or read while it is under way.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::{WAIT_NS, image, read_u8, read_u32, write_goal, write_param, write_u8};
+use fingertip::capture::{Ended, Replayed, replay};
+use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
+use fingertip::state::Mode;
+use host_tests::plant::{Setup, World};
+use virtual_board::{Options, Rig};
+
+const NONE: u8 = 0;
+const ARMED: u8 = 1;
+const RECORDING: u8 = 2;
+const DONE: u8 = 3;
+/// Errors of a status packet.
+const RESULT: u8 = 1;
+const ACCESS: u8 = 7;
+/// Bytes of a read.
+const WINDOW: u16 = 248;
+
+/// A board whose tip is 0.4 mm away from a plate.
+fn start() -> Rig {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.4;
+    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    rig
+}
+
+/// Arms, tares, and presses with half a newton from then on.
+fn press(rig: &mut Rig) {
+    write_u8(rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(read_u8(rig, address::CAPTURE_STATE), ARMED);
+    write_u8(rig, address::TARE, 1);
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 500);
+    rig.run_ms(1).expect("it runs");
+}
+
+fn until_done(rig: &mut Rig) {
+    for _ in 0..100 {
+        rig.run_ms(5).expect("it runs");
+        if read_u8(rig, address::CAPTURE_STATE) == DONE {
+            return;
+        }
+    }
+    panic!("state {}, {} frames", read_u8(rig, address::CAPTURE_STATE), read_u32(rig, address::CAPTURE_FRAMES));
+}
+
+fn window(rig: &mut Rig, offset: u32) -> Vec<u8> {
+    let read = rig.client(WAIT_NS, move |bus| {
+        bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
+        bus.read(1, address::CAPTURE_DATA, WINDOW).map(|reply| reply.data.to_vec())
+    });
+    read.expect("the client runs").expect("the image answers")
+}
+
+fn fetch(rig: &mut Rig) -> Vec<u8> {
+    let length = read_u32(rig, address::CAPTURE_BYTES);
+    let mut bytes = Vec::new();
+    while bytes.len() < length as usize {
+        let offset = bytes.len() as u32;
+        bytes.extend(window(rig, offset));
+    }
+    assert!(bytes[length as usize..].iter().all(|byte| *byte == 0), "zeros behind the end");
+    bytes.truncate(length as usize);
+    bytes
+}
+
+/// Replays what was read, which must be as the image answered.
+fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
+    let mut modes = Vec::new();
+    let replayed = replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, status| {
+        if modes.last() != Some(&status.mode) {
+            modes.push(status.mode);
+        }
+    });
+    let replayed = replayed.expect("a capture");
+    assert_eq!(replayed.difference, None);
+    assert_eq!(replayed.head.frames, read_u32(rig, address::CAPTURE_FRAMES));
+    assert_eq!(replayed.head.ended as u8, read_u8(rig, address::CAPTURE_ENDED));
+    (replayed, modes)
+}
+
+/// What a write is refused with.
+fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
+    match written.expect("the client runs") {
+        Err(dynamixel2::TransferError::ReadError(dynamixel2::ReadError::MotorError(error))) => error.raw & 0x7F,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
+    let mut rig = start();
+    // What the finger did before is no part of it.
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    write_goal(&mut rig, 1_000);
+    rig.run_ms(60).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    rig.run_ms(300).expect("it runs");
+    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
+    press(&mut rig);
+    assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u32(&mut rig, address::CAPTURE_BYTES)), (RECORDING, 0));
+    // Read while it is under way: nothing, and no harm.
+    assert_eq!(window(&mut rig, 0), [0; WINDOW as usize]);
+    assert_eq!(refused(&mut rig, address::CAPTURE, 1), ACCESS, "with torque on");
+    until_done(&mut rig);
+    // Keeping frames costs none.
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u32(&mut rig, address::MISSED_FRAMES)), (0, missed));
+    let bytes = fetch(&mut rig);
+    let (replayed, modes) = same(&mut rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.missed_frames), (Ended::Full, missed));
+    assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force]);
+    let per_frame = bytes.len() as f64 / f64::from(replayed.head.frames);
+    println!("{} frames in {} bytes, {per_frame:.1} a frame", replayed.head.frames, bytes.len());
+    assert!(bytes.len() <= CAPTURE_BYTES && replayed.head.frames > 600);
+    println!("the longest loop time: {} us", read_u32(&mut rig, address::LOOP_TIME_MAX_US) & 0xFFFF);
+
+    // The same with gains that are not 1.
+    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    rig.run_ms(300).expect("it runs");
+    let taxels = [(44, 20_480_u16), (35, 12_288), (0, 8_192), (99, 32_767)];
+    for (taxel, gain) in taxels {
+        let place = address::GAINS + 2 * taxel;
+        let written = rig.client(WAIT_NS, move |bus| bus.write_u16(1, place, gain).map(drop));
+        written.expect("the client runs").expect("the image obeys");
+    }
+    rig.run_ms(5).expect("it runs");
+    press(&mut rig);
+    until_done(&mut rig);
+    let again = fetch(&mut rig);
+    let (replayed, modes) = same(&mut rig, &again);
+    assert_eq!(modes.last(), Some(&Mode::Force));
+    assert_eq!(taxels.map(|(taxel, _)| replayed.head.gains.get(taxel.into())), taxels.map(|(_, gain)| gain));
+    assert_eq!(read_u8(&mut rig, address::CAPTURE_COUNT), 2);
+}
+
+#[test]
+fn out_of_turn_and_interrupted() {
+    let mut rig = start();
+    // Armed twice is armed; called off is off.
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
+    write_u8(&mut rig, address::CAPTURE, 0);
+    rig.run_ms(1).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), NONE);
+
+    // Parameters between arming and the tare: those of the tare count.
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    write_param(&mut rig, "modulus_pa", 260_000);
+    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), ARMED);
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(8).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::CAPTURE_STATE), RECORDING);
+    assert_eq!(refused(&mut rig, address::CAPTURE, 1), RESULT, "frames are being kept");
+    write_u8(&mut rig, address::CAPTURE, 0);
+    rig.run_ms(1).expect("it runs");
+    let bytes = fetch(&mut rig);
+    let (replayed, _) = same(&mut rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
+    assert!((60..100).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
+
+    // Parameters in the middle end it; what is there replays with those before.
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    write_param(&mut rig, "modulus_pa", 250_000);
+    let bytes = fetch(&mut rig);
+    let (replayed, modes) = same(&mut rig, &bytes);
+    assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Configured, 260_000));
+    assert_eq!(modes, [Mode::Tare, Mode::Off]);
+
+    // A reset in the middle leaves nothing.
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_ms(5).expect("it runs");
+    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop));
+    rebooted.expect("the client runs").expect("the image obeys");
+    rig.run_ms(30).expect("it runs");
+    assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u8(&mut rig, address::CAPTURE_COUNT)), (NONE, 0));
+    assert_eq!((read_u32(&mut rig, address::CAPTURE_BYTES), window(&mut rig, 0)), (0, vec![0; WINDOW.into()]));
+    write_u8(&mut rig, address::CAPTURE, 1);
+    rig.run_ms(1).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    until_done(&mut rig);
+    let bytes = fetch(&mut rig);
+    same(&mut rig, &bytes);
+}

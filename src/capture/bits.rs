@@ -1,0 +1,170 @@
+//! Bits, and numbers that are mostly small.
+//!
+//! A number is folded (0, -1, 1, -2 .. are 0, 1, 2, 3 ..) and written as its part above a width in ones, a zero, and as
+//! many low bits as the width says (a Rice code). What would take [`ESCAPE`] ones or more is written as these ones and
+//! all its bits.
+
+/// So many ones say that all bits follow.
+const ESCAPE: u32 = 12;
+/// The largest width.
+pub(super) const WIDTH_MAX: u32 = 16;
+
+/// Where the next bit goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Bits that are not yet a word, from the lowest one on: fewer than 32.
+    held: u64,
+    count: u32,
+    /// Where their word will be.
+    at: usize,
+    /// Of the words before.
+    check: u32,
+}
+
+impl Place {
+    /// At the beginning.
+    pub const START: Self = Self { held: 0, count: 0, at: 0, check: 0 };
+
+    /// Bits written.
+    pub fn bits(&self) -> u32 {
+        8 * self.at as u32 + self.count
+    }
+}
+
+/// Writes bits.
+pub(super) struct Writer<'a> {
+    bytes: &'a mut [u8],
+    pub place: Place,
+    /// There was no room for a word: what is behind it is lost.
+    pub full: bool,
+}
+
+impl<'a> Writer<'a> {
+    pub fn new(bytes: &'a mut [u8], place: Place) -> Self {
+        Self { bytes, place, full: false }
+    }
+
+    /// The low bits of a number, at most 32; those above must be 0.
+    #[inline(always)]
+    pub fn put(&mut self, value: u32, count: u32) {
+        let place = &mut self.place;
+        place.held |= u64::from(value) << place.count;
+        place.count += count;
+        if place.count >= 32 {
+            let word = place.held as u32;
+            place.held >>= 32;
+            place.count -= 32;
+            match self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
+                Some(to) => *to = word.to_le_bytes(),
+                None => self.full = true,
+            }
+            place.at += 4;
+            place.check = mix(place.check, word);
+        }
+    }
+
+    /// Brings what is not yet a word to its place; the check sum of all.
+    pub fn finish(self) -> u32 {
+        let place = self.place;
+        if let Some(to) = self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
+            *to = (place.held as u32).to_le_bytes();
+        }
+        mix(place.check, place.held as u32)
+    }
+
+    /// A folded number of at most `all` bits.
+    #[inline(always)]
+    pub fn folded(&mut self, value: u32, width: u32, all: u32) {
+        let ones = value >> width;
+        if ones < ESCAPE {
+            let low = value & ((1 << width) - 1);
+            self.put(low << (ones + 1) | ((1 << ones) - 1), ones + 1 + width);
+        } else {
+            self.put((1 << ESCAPE) - 1, ESCAPE);
+            self.put(value, all);
+        }
+    }
+
+    /// A difference of 32 bits.
+    pub fn signed(&mut self, value: i32, width: u32) {
+        self.folded((value << 1 ^ value >> 31).cast_unsigned(), width, 32);
+    }
+}
+
+/// Reads what [`Writer`] wrote.
+#[derive(Clone, Debug)]
+pub(super) struct Reader<'a> {
+    bytes: &'a [u8],
+    at: u32,
+    /// How many bits there are.
+    end: u32,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(bytes: &'a [u8], bits: u32) -> Self {
+        Self { bytes, at: 0, end: bits }
+    }
+
+    /// Whether all was read.
+    pub fn is_empty(&self) -> bool {
+        self.at == self.end
+    }
+
+    /// A number of so many bits, at most 32; none where they are not there.
+    pub fn get(&mut self, count: u32) -> Option<u32> {
+        let end = self.at.checked_add(count).filter(|&end| end <= self.end)?;
+        let mut value = 0;
+        for (place, bit) in (self.at..end).enumerate() {
+            let byte = self.bytes.get((bit / 8) as usize)?;
+            value |= u32::from(byte >> (bit % 8) & 1) << place;
+        }
+        self.at = end;
+        Some(value)
+    }
+
+    /// A folded number of at most `all` bits.
+    pub fn folded(&mut self, width: u32, all: u32) -> Option<u32> {
+        let mut ones = 0;
+        while ones < ESCAPE && self.get(1)? == 1 {
+            ones += 1;
+        }
+        if ones == ESCAPE { self.get(all) } else { Some(ones << width | self.get(width)?) }
+    }
+
+    /// A difference of 32 bits.
+    pub fn signed(&mut self, width: u32) -> Option<i32> {
+        let folded = self.folded(width, 32)?;
+        Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
+    }
+}
+
+/// The check sum of so many bits as [`Writer::finish`] tells it.
+pub(super) fn check(bytes: &[u8], bits: u32) -> u32 {
+    let mut sum = 0;
+    for place in 0..=bits / 32 {
+        let rest = bytes.get(4 * place as usize..).unwrap_or_default();
+        let mut word = [0; 4];
+        word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
+        sum = mix(sum, u32::from_le_bytes(word));
+    }
+    sum
+}
+
+/// Turned, mixed, multiplied by an odd number (2^32 over the golden ratio): no word that differs is lost.
+#[inline(always)]
+pub(super) const fn mix(sum: u32, word: u32) -> u32 {
+    (sum.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
+}
+
+/// A difference of 16 bits, folded.
+#[inline(always)]
+pub(super) fn fold(value: u16, last: u16) -> u32 {
+    let difference = value.wrapping_sub(last).cast_signed();
+    (difference << 1 ^ difference >> 15).cast_unsigned().into()
+}
+
+/// The inverse of [`fold`].
+pub(super) fn unfold(folded: u32, last: u16) -> u16 {
+    let difference = (folded >> 1) as u16 ^ ((folded & 1) as u16).wrapping_neg();
+    last.wrapping_add(difference)
+}

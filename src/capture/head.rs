@@ -1,0 +1,144 @@
+//! A capture's beginning: what the loop knew before its first frame.
+
+use super::read::Refusal;
+use super::{Ended, VERSION, digest};
+use crate::params::Params;
+use crate::pipeline::Taken;
+use crate::pressure::Gains;
+
+/// What a capture begins with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Head<const ROWS: usize, const COLUMNS: usize> {
+    /// Why it ended.
+    pub ended: Ended,
+    /// Frames in it.
+    pub frames: u32,
+    /// Bits of all its frames.
+    pub bits: u32,
+    /// The digest after the last one.
+    pub digest: u32,
+    /// The check sum of its frames' bits.
+    pub check: u32,
+    /// Frames missed since reset, before the first one.
+    pub missed_frames: u32,
+    /// Requests taken up before.
+    pub taken: Taken,
+    /// From frame to frame.
+    pub frame_ns: u32,
+    /// The parameters in force.
+    pub params: Params,
+    /// The gains in force.
+    pub gains: Gains<ROWS, COLUMNS>,
+}
+
+const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
+/// Bytes before the parameters.
+const FIXED: usize = 44;
+
+/// A number for the names and the order of the parameters (FNV-1a of 32 bits).
+const LAYOUT: u32 = {
+    let (mut hash, mut place) = (0x811C_9DC5_u32, 0);
+    while place < Params::COUNT {
+        let name = Params::RANGES[place].0.as_bytes();
+        let mut at = 0;
+        while at <= name.len() {
+            let byte = if at < name.len() { name[at] } else { 0 };
+            hash = (hash ^ byte as u32).wrapping_mul(0x0100_0193);
+            at += 1;
+        }
+        place += 1;
+    }
+    hash
+};
+
+impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
+    /// Its bytes.
+    pub const BYTES: usize = FIXED + 4 * Params::COUNT + 4 * Gains::<ROWS, COLUMNS>::WORDS;
+
+    /// What the digest of the steps goes on from: all that is known before the first one.
+    pub(super) fn seed(&self) -> u32 {
+        let Taken { tare, clear, identify, calibrate, forget, shown, commission } = self.taken;
+        let taken = [[tare, clear, identify, calibrate], [forget, shown, commission, 0]].map(u32::from_le_bytes);
+        let first = [self.missed_frames, taken[0], taken[1], self.frame_ns];
+        let params = self.params.to_array().map(i32::cast_unsigned);
+        let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
+        digest::words(LAYOUT, first.into_iter().chain(params).chain(gains))
+    }
+
+    pub(super) fn write(&self, bytes: &mut [u8]) {
+        let Taken { tare, clear, identify, calibrate, forget, shown, commission } = self.taken;
+        let mut rest = bytes;
+        let mut put = |word: [u8; 4]| {
+            if let Some((place, after)) = core::mem::take(&mut rest).split_first_chunk_mut() {
+                *place = word;
+                rest = after;
+            }
+        };
+        put(MAGIC);
+        put([ROWS as u8, COLUMNS as u8, self.ended as u8, 0]);
+        for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
+            put(word.to_le_bytes());
+        }
+        put([tare, clear, identify, calibrate]);
+        put([forget, shown, commission, 0]);
+        put(self.frame_ns.to_le_bytes());
+        self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));
+        (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
+    }
+
+    /// Says in one that was written why the capture ended, and its frames, bits, digest and check sum.
+    pub(super) fn close(bytes: &mut [u8], ended: Ended, words: [u32; 4]) {
+        if let Some(place) = bytes.get_mut(6) {
+            *place = ended as u8;
+        }
+        for (place, word) in bytes.get_mut(12..28).unwrap_or_default().as_chunks_mut::<4>().0.iter_mut().zip(words) {
+            *place = word.to_le_bytes();
+        }
+    }
+
+    /// The head of a capture.
+    ///
+    /// # Errors
+    /// These are no capture's bytes, or one of another array, layout or version.
+    pub fn read(bytes: &[u8]) -> Result<Self, Refusal> {
+        let mut words = bytes.as_chunks::<4>().0.iter().copied();
+        let mut next = || words.next().ok_or(Refusal::Cut);
+        let [f, t, c, version] = next()?;
+        if [f, t, c] != *b"FTC" {
+            return Err(Refusal::NoCapture);
+        }
+        if version != VERSION {
+            return Err(Refusal::Version(version));
+        }
+        let [rows, columns, ended, zero] = next()?;
+        if [usize::from(rows), usize::from(columns)] != [ROWS, COLUMNS] {
+            return Err(Refusal::Shape { rows, columns });
+        }
+        if u32::from_le_bytes(next()?) != LAYOUT {
+            return Err(Refusal::Layout);
+        }
+        let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(Refusal::Unfinished)?;
+        let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+        let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+        let missed_frames = u32::from_le_bytes(next()?);
+        let [tare, clear, identify, calibrate] = next()?;
+        let [forget, shown, commission, none] = next()?;
+        if zero != 0 || none != 0 {
+            return Err(Refusal::Damaged);
+        }
+        let taken = Taken { tare, clear, identify, calibrate, forget, shown, commission };
+        let frame_ns = u32::from_le_bytes(next()?);
+        let mut values = [0; Params::COUNT];
+        for value in &mut values {
+            *value = i32::from_le_bytes(next()?);
+        }
+        let mut gains = Gains::ONE;
+        for word in 0..Gains::<ROWS, COLUMNS>::WORDS {
+            if !gains.set_word(word, u32::from_le_bytes(next()?)) {
+                return Err(Refusal::Damaged);
+            }
+        }
+        let params = Params::from_array(&values);
+        Ok(Self { ended, frames, bits, digest, check, missed_frames, taken, frame_ns, params, gains })
+    }
+}

@@ -1,0 +1,180 @@
+//! The board's side: frames in, bytes kept.
+
+use super::bits::{Place, Writer, fold};
+use super::{Ended, Head, Last, Standing, State, digest, width};
+use crate::command::Command;
+use crate::frame::{Frame, Sense};
+use crate::pipeline::{Pipeline, Status};
+use crate::pressure::Gains;
+use crate::state::Mode;
+use crate::units::Duty;
+
+/// A capture, and the memory that it takes: at least 1 KiB. Nothing here waits or fails; what is out of turn does nothing.
+#[derive(Clone, Debug)]
+pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> {
+    standing: Standing,
+    place: Place,
+    last: Last<ROWS, COLUMNS>,
+    bytes: [u8; BYTES],
+}
+
+impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Default for Capture<ROWS, COLUMNS, BYTES> {
+    fn default() -> Self {
+        Self::NEW
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, COLUMNS, BYTES> {
+    /// Nothing asked for. All its bytes are zero.
+    pub const NEW: Self = Self {
+        standing: Standing { state: State::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
+        place: Place::START,
+        last: Last::NONE,
+        bytes: [0; BYTES],
+    };
+
+    /// How it stands.
+    pub fn standing(&self) -> Standing {
+        self.standing
+    }
+
+    /// The capture, once it is done; nothing before.
+    pub fn data(&self) -> &[u8] {
+        let bytes = if self.standing.state == State::Done { self.standing.bytes as usize } else { 0 };
+        self.bytes.get(..bytes).unwrap_or_default()
+    }
+
+    /// Lets it begin at the next tare; what was kept before is forgotten. Not while frames are being kept.
+    pub fn arm(&mut self) {
+        if self.standing.state != State::Recording {
+            self.standing = Standing { state: State::Armed, count: self.standing.count, ..Standing::default() };
+        }
+    }
+
+    /// Whether it should begin: it is armed, and the next step would take up a tare.
+    pub fn is_due(&self, status: &Status, command: &Command) -> bool {
+        self.standing.state == State::Armed
+            && status.mode == Mode::Off
+            && command.tare_request != status.taken.tare
+    }
+
+    /// Begins, with a pipeline that is made anew; the next step is the first one kept. That takes as long as a frame.
+    /// Gains that cannot be stored are no board's: then it is called off.
+    pub fn begin(&mut self, pipeline: &mut Pipeline<ROWS, COLUMNS>) {
+        let mut gains = Gains::<ROWS, COLUMNS>::ONE;
+        let mut places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+        let array = pipeline.array();
+        let known = places.all(|(row, column)| gains.set(row * COLUMNS + column, array.gain(row, column)));
+        if !known || BYTES < Head::<ROWS, COLUMNS>::BYTES {
+            self.standing.state = State::None;
+            return;
+        }
+        let Status { missed_frames, taken, .. } = *pipeline.status();
+        let config = pipeline.config();
+        let head = Head {
+            ended: Ended::No,
+            frames: 0,
+            bits: 0,
+            digest: 0,
+            check: 0,
+            missed_frames,
+            taken,
+            frame_ns: config.timing.frame_ns,
+            params: config.params,
+            gains,
+        };
+        head.write(&mut self.bytes);
+        pipeline.renew(taken, missed_frames);
+        self.place = Place::START;
+        self.last = Last { digest: head.seed(), ..Last::NONE };
+        let count = self.standing.count.wrapping_add(1);
+        self.standing = Standing { state: State::Recording, count, ..Standing::default() };
+    }
+
+    /// Keeps what a step took and answered.
+    pub fn record(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command, status: &Status) {
+        if self.standing.state != State::Recording {
+            return;
+        }
+        let body = self.bytes.get_mut(Head::<ROWS, COLUMNS>::BYTES..).unwrap_or_default();
+        // The last word is for what is less than one.
+        let room = body.len().saturating_sub(4);
+        let mut out = Writer::new(body.get_mut(..room).unwrap_or_default(), self.place);
+        let last = &mut self.last;
+        out.signed(frame.sequence.wrapping_sub(last.frame.sequence).wrapping_sub(1).cast_signed(), width::SEQUENCE);
+        put_sense(&mut out, sense, &last.sense);
+        put_command(&mut out, command, &last.command);
+        let duty = status.duty.0;
+        out.signed(i32::from(duty) - i32::from(last.duty), width::DUTY);
+        let (mode, fault) = (status.mode as u8, status.fault.map_or(0, |fault| fault as u8));
+        let changed = (mode, fault) != (last.mode, last.fault);
+        out.put(changed.into(), 1);
+        if changed {
+            out.put(u32::from(mode) | u32::from(fault) << 8, 16);
+        }
+        let digest = digest::add(last.digest, Duty(duty), status);
+        out.put(digest::short(digest).into(), 16);
+        let (width, mut spread) = (last.width(), 0_u32);
+        let codes = frame.codes.rows.as_flattened().iter().chain(&frame.codes.undriven);
+        let before = last.frame.codes.rows.as_flattened().iter().chain(&last.frame.codes.undriven);
+        codes.zip(before).for_each(|(&code, &before)| {
+            let folded = fold(code, before);
+            spread = spread.wrapping_add(folded);
+            out.folded(folded, width, 16);
+        });
+        let (place, full) = (out.place, out.full);
+        if full {
+            return self.end(Ended::Full);
+        }
+        self.place = place;
+        self.standing.frames += 1;
+        self.last = Last { frame: *frame, sense: *sense, command: *command, duty, mode, fault, spread, digest };
+    }
+
+    /// Ends it, or calls it off where it has not begun.
+    pub fn end(&mut self, why: Ended) {
+        match self.standing.state {
+            State::Armed if why == Ended::Asked => self.standing.state = State::None,
+            State::Recording => {
+                let (bits, frames) = (self.place.bits(), self.standing.frames);
+                let digest = digest::words(self.last.digest, core::iter::once(why as u32));
+                let (head, body) = self.bytes.split_at_mut(Head::<ROWS, COLUMNS>::BYTES.min(BYTES));
+                let check = Writer::new(body, self.place).finish();
+                Head::<ROWS, COLUMNS>::close(head, why, [frames, bits, digest, check]);
+                self.standing.state = State::Done;
+                self.standing.ended = why;
+                self.standing.bytes = head.len() as u32 + bits.div_ceil(8);
+            }
+            State::None | State::Armed | State::Done => {}
+        }
+    }
+}
+
+fn put_sense(out: &mut Writer<'_>, sense: &Sense, last: &Sense) {
+    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
+    out.signed(encoder.wrapping_sub(last.encoder), width::ENCODER);
+    out.signed(i32::from(supply_mv) - i32::from(last.supply_mv), width::SUPPLY);
+    out.signed(i32::from(bus_silent_ms) - i32::from(last.bus_silent_ms), width::SILENT);
+    out.put(bridge_fault.into(), 1);
+    out.signed(answer.0.wrapping_sub(last.answer.0).cast_signed(), width::ANSWER);
+}
+
+fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {
+    let changed = command != last;
+    out.put(changed.into(), 1);
+    if !changed {
+        return;
+    }
+    let Command { torque, goal, bus_watchdog_ms, fit_level, shown_mn, .. } = *command;
+    let Command { tare_request, clear_request, identify_request, commission_request, .. } = *command;
+    let Command { calibrate_request, forget_request, shown_request, .. } = *command;
+    out.put(torque.into(), 1);
+    out.put(goal.to_bits().cast_unsigned(), 32);
+    out.put(bus_watchdog_ms.into(), 16);
+    out.put(fit_level as u32, 8);
+    let requests = [tare_request, clear_request, identify_request, commission_request];
+    for request in requests.into_iter().chain([calibrate_request, forget_request, shown_request]) {
+        out.put(request.into(), 8);
+    }
+    out.put(shown_mn.cast_unsigned(), 32);
+}

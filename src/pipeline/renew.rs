@@ -1,0 +1,29 @@
+//! A pipeline as it is after a start, in place.
+
+use super::{Budget, Calibrator, Fit, Goal, Guard, Monitor, Pipeline, Press, Run, Scale, SpeedLoop, Status, Taken};
+
+impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
+    /// Makes all anew but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests with
+    /// these numbers count as taken up, and so many frames as missed before.
+    pub fn renew(&mut self, taken: Taken, missed_frames: u32) {
+        self.array.renew();
+        self.budget = Budget::new();
+        self.fit = Fit::default();
+        self.motion = SpeedLoop::new();
+        self.monitor = Monitor::default();
+        self.guard = Guard::default();
+        self.goal = Goal::default();
+        self.press = Press::new();
+        self.commission = Run::new();
+        self.scale = Scale::new();
+        renew_calibrator(&mut self.calibrator);
+        self.status = Status { taken, missed_frames, ..Status::default() };
+        self.tared = false;
+    }
+}
+
+/// By itself, because it is large.
+#[inline(never)]
+fn renew_calibrator<const ROWS: usize, const COLUMNS: usize>(calibrator: &mut Calibrator<ROWS, COLUMNS>) {
+    *calibrator = Calibrator::new();
+}

@@ -1,0 +1,35 @@
+//! Captures as files: MCAP, with the capture as the board kept it attached, and what it shows as messages.
+//!
+//! | part | what |
+//! | --- | --- |
+//! | attachment `capture.bin` | the capture, byte for byte (`fingertip::capture`): all that a replay needs |
+//! | metadata `fingertip.capture` | whose it is: board, firmware, image, notes, licence; and for people parameters, gains, frame time |
+//! | `/finger0/scalars`, `/finger0/frame` | as in a scene's recording: what the core on this machine makes of the frames |
+
+mod read;
+mod write;
+
+pub use read::{Kept, of_bytes, open};
+pub use write::{FRAME_SCHEMA, write};
+
+use fingertip::capture::{Refusal, Replayed, Taken, replay};
+use fingertip::pipeline::Status;
+use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
+
+/// The attachment's name, and the metadata record's.
+const ATTACHED: &str = "capture.bin";
+const ABOUT: &str = "fingertip.capture";
+
+/// What is known of a capture beside its bytes, by name.
+pub type About = std::collections::BTreeMap<String, String>;
+
+/// Feeds a capture through the core on this machine.
+///
+/// # Errors
+/// It is none that this version replays.
+pub fn through_the_core(
+    bytes: &[u8],
+    each: impl FnMut(&Taken<ROWS, COLUMNS>, &Status),
+) -> Result<Replayed<ROWS, COLUMNS>, Refusal> {
+    replay(bytes, &CLOCKS, each)
+}

@@ -1,0 +1,125 @@
+//! A capture's file, written.
+
+use super::{ABOUT, ATTACHED, About, through_the_core};
+use crate::messages::Topic;
+use crate::state::State;
+use fingertip::capture::{Head, Taken};
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
+use mcap::records::{MessageHeader, Metadata};
+use mcap::{Attachment, WriteOptions, Writer};
+use serde_json::{Map, Value, json};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+/// Frames from one message of scalars to the next, and from one of codes to the next.
+const SCALARS_EVERY: u32 = 5;
+const CODES_EVERY: u32 = 50;
+/// As a scene's recording has it.
+pub const FRAME_SCHEMA: &str = "fingertip.Frame";
+
+type Captured<'a> = (&'a Taken<ROWS, COLUMNS>, &'a Status);
+
+/// Writes a capture with what is known of it.
+///
+/// # Errors
+/// It is no capture of this version, or it cannot be written.
+pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
+    let mut shown = Vec::new();
+    let replayed = through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
+    let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
+    let out = options.create(to).map_err(|why| why.to_string())?;
+    put(out, bytes, about, &replayed.head, &shown).map_err(|why| why.to_string())
+}
+
+fn put(
+    mut out: Writer<impl Write + Seek>,
+    bytes: &[u8],
+    about: &About,
+    head: &Head<ROWS, COLUMNS>,
+    shown: &[(Taken<ROWS, COLUMNS>, Status)],
+) -> mcap::McapResult<()> {
+    let attached = Attachment {
+        log_time: 0,
+        create_time: 0,
+        name: ATTACHED.into(),
+        media_type: "application/octet-stream".into(),
+        data: Cow::Borrowed(bytes),
+    };
+    out.attach(&attached)?;
+    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
+    let params: Map<String, Value> = names.zip(head.params.to_array().map(Value::from)).collect();
+    let gains: Vec<u16> = (0..TAXELS).map(|place| head.gains.get(place)).collect();
+    let more = [
+        ("params", Value::Object(params).to_string()),
+        ("gains_q14", json!(gains).to_string()),
+        ("codes_per_kpa_milli", head.params.codes_per_kpa_milli.to_string()),
+        ("frame_ns", head.frame_ns.to_string()),
+        ("core_hz", CLOCKS.core_hz.to_string()),
+        ("frames", head.frames.to_string()),
+    ];
+    let metadata = more.into_iter().map(|(name, value)| (name.to_owned(), value));
+    let metadata = about.clone().into_iter().chain(metadata).collect();
+    out.write_metadata(&Metadata { name: ABOUT.into(), metadata })?;
+    let scalars = out.add_schema(Topic::Scalars.schema_name(), "jsonschema", &Topic::Scalars.schema())?;
+    let scalars = out.add_channel(scalars, &Topic::Scalars.name(1), "json", &BTreeMap::new())?;
+    let codes = out.add_schema(FRAME_SCHEMA, "jsonschema", frame_schema().to_string().as_bytes())?;
+    let codes = out.add_channel(codes, "/finger0/frame", "json", &BTreeMap::new())?;
+    let first = shown.first().map_or(0, |(taken, _)| taken.frame.sequence);
+    for (frame, captured) in (0..).zip(shown) {
+        let log_time = u64::from(captured.0.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns);
+        let mut message = |channel_id, message: &[u8]| {
+            let header = MessageHeader { channel_id, sequence: frame, log_time, publish_time: log_time };
+            out.write_to_known_channel(&header, message)
+        };
+        if frame % SCALARS_EVERY == 0 {
+            let state = state((&captured.0, &captured.1), head.frame_ns);
+            message(scalars, &Topic::Scalars.message(log_time as f64 * 1e-9, &state))?;
+        }
+        if frame % CODES_EVERY == 0 {
+            message(codes, codes_of(&captured.0).to_string().as_bytes())?;
+        }
+    }
+    out.finish().map(drop)
+}
+
+fn state((taken, status): Captured<'_>, frame_ns: u32) -> State {
+    let thousandths = |value: f64| (value * 1e3).round() as i64;
+    let contact = &status.contact;
+    State {
+        frame: status.sequence.into(),
+        goal_mn: thousandths(taken.command.goal.0.to_num()),
+        force_mn: thousandths(contact.force.0.to_num()),
+        indentation_um: thousandths(contact.indentation.0.to_num()),
+        centre_x_um: thousandths(contact.centre_x.0.to_num()),
+        centre_y_um: thousandths(contact.centre_y.0.to_num()),
+        travel_um: thousandths(status.travel.0.to_num()),
+        speed_um_per_s: thousandths(status.speed.0.to_num()),
+        duty_permille: (f64::from(status.duty.0) * 1e3 / f64::from(fingertip::units::Duty::FULL)).round() as i64,
+        mode: status.mode as i64,
+        fault: status.fault.map_or(0, |fault| fault as i64),
+        limits: status.limits.0.into(),
+        confidence: contact.confidence.into(),
+        period_ns: frame_ns.into(),
+        ..State::default()
+    }
+}
+
+fn codes_of(taken: &Taken<ROWS, COLUMNS>) -> Value {
+    let codes: Vec<Vec<u16>> =
+        (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect()).collect();
+    json!({ "sequence": taken.frame.sequence, "codes": codes })
+}
+
+/// The schema of [`FRAME_SCHEMA`].
+fn frame_schema() -> Value {
+    let codes = json!({
+        "type": "array",
+        "description": "Converter codes by slot and column; the last slot has no row driven",
+        "items": { "type": "array", "items": { "type": "integer", "minimum": 0, "maximum": 4095 } },
+    });
+    let sequence = json!({ "type": "integer", "description": "Counts frames" });
+    json!({ "title": FRAME_SCHEMA, "type": "object", "properties": { "sequence": sequence, "codes": codes } })
+}

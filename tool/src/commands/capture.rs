@@ -1,0 +1,207 @@
+//! `fingertip capture`.
+
+use super::{Interrupt, aside, no_fault, say, say_json, stopped, wait_for};
+use crate::captured::{self, About};
+use crate::whole::Part;
+use crate::{Client, Error, numbers, table};
+use fingertip::capture::State;
+use fingertip::shipped::address;
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// The motor stops where this program falls silent for longer.
+const WATCHDOG_MS: i64 = 500;
+const WATCHDOG_UNIT_MS: i64 = 20;
+/// How often it looks.
+const LOOK: Duration = Duration::from_millis(5);
+/// `CAPTURE_STATE`.
+const ARMED: i64 = State::Armed as i64;
+const DONE: i64 = State::Done as i64;
+/// What contributed captures are under.
+const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
+
+/// What to capture.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fingertip capture --out tare.mcap    (nothing moves: a tare, and the frames after it)\n  \
+    fingertip capture --press 0.5 --out press.mcap --board \"NUCLEO-F446RE, DRV8876\" --notes \"steel plate, 1 mm away\"\n  \
+    fingertip replay press.mcap")]
+pub struct Args {
+    /// The file, `.mcap`
+    #[arg(long)]
+    out: PathBuf,
+    /// Touch and hold so many newtons from the tare on, until the memory is full; then let go
+    #[arg(long, value_parser = numbers::newtons)]
+    press: Option<f64>,
+    /// End after so many frames; without it, when the memory is full
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// The board: what it is, and what hangs on it
+    #[arg(long, default_value = "not told")]
+    board: String,
+    /// The image on it, by its SHA-256 as `cargo xtask flash` prints it
+    #[arg(long, default_value = "not told")]
+    image: String,
+    /// What else one should know: object, distance, what happened
+    #[arg(long, default_value = "")]
+    notes: String,
+    /// Contribute it to the project under the project's licences
+    #[arg(long)]
+    contribute: bool,
+    /// How long it may take until the capture is done
+    #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
+    within_s: f64,
+}
+
+/// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
+///
+/// # Errors
+/// A fault stands or comes, torque is on, the capture does not come about, or the file cannot be written.
+pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
+    if args.out.extension().is_none_or(|ending| ending != "mcap") {
+        return Err(format!("{}: a name that ends with .mcap is asked for", args.out.display()).into());
+    }
+    let goal_mn = args.press.map(|newtons| (newtons * 1e3).round() as i64);
+    if goal_mn.is_some_and(|goal_mn| !(1..=150_000).contains(&goal_mn)) {
+        return Err("--press: a force from 0.001 to 150 N is asked for".into());
+    }
+    no_fault(client)?;
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
+    }
+    if client.number(address::CAPTURE_STATE)? == State::Recording as i64 {
+        client.set(address::CAPTURE, 0)?;
+    }
+    if goal_mn.is_some() {
+        super::press::direction_confirmed(client)?;
+    }
+    let part = Part::begin(&args.out)?;
+    let interrupt = Interrupt::catch()?;
+    let say_on = |text: &dyn std::fmt::Display| {
+        if !json {
+            aside(text);
+        }
+    };
+    let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
+    let kept = keep(args, goal_mn, client, &interrupt, &say_on);
+    if goal_mn.is_some() {
+        let let_go = super::press::let_go(args.within_s, client)
+            .and_then(|()| client.again(|client| client.set(address::BUS_WATCHDOG, watchdog)));
+        // What went wrong first is what to tell.
+        kept.as_ref().map_err(|why| Error::from(why.to_string()))?;
+        let_go?;
+    }
+    let count = kept?;
+    let bytes = fetch(client, count, &say_on)?;
+    let replayed = captured::through_the_core(&bytes, |_, _| {})
+        .map_err(|why| format!("what the board kept is of no use here: {why}"))?;
+    let about = about(args, client)?;
+    let file = |why: &dyn std::fmt::Display| Error::file("write", &args.out, why);
+    captured::write(part.file().map_err(|why| file(&why))?, &bytes, &about).map_err(|why| file(&why))?;
+    part.place().map_err(|why| file(&why))?;
+    let ended = table::meaning(address::CAPTURE_ENDED, replayed.head.ended as i64);
+    let (frames, seconds) = (replayed.head.frames, f64::from(replayed.head.frames) * f64::from(replayed.head.frame_ns) * 1e-9);
+    let difference = replayed.difference.map(|difference| difference.to_string());
+    if json {
+        say_json(&json!({
+            "file": args.out, "frames": frames, "seconds": seconds, "bytes": bytes.len(), "ended": ended,
+            "replays": difference.is_none(), "difference": difference,
+        }));
+    } else {
+        let replays = difference.as_ref().map_or("replays here to the bit".to_owned(), |at| format!("here it {at}"));
+        say(format_args!("{frames} frames, {seconds:.4} s, {} bytes; ended: {ended}; {replays}", bytes.len()));
+    }
+    // The file is what shows it, so it is kept.
+    match difference {
+        None => Ok(()),
+        Some(at) => Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?").into()),
+    }
+}
+
+/// Has the board keep frames: the number of the capture.
+fn keep(
+    args: &Args,
+    goal_mn: Option<i64>,
+    client: &mut Client,
+    interrupt: &Interrupt,
+    say_on: &dyn Fn(&dyn std::fmt::Display),
+) -> Result<i64, Error> {
+    let within = Duration::from_secs_f64(args.within_s);
+    let before = client.number(address::CAPTURE_COUNT)?;
+    client.set(address::CAPTURE, 1)?;
+    if wait_for(client, address::CAPTURE_STATE, within, |state| state == ARMED)? != ARMED {
+        return Err("the controller does not arm a capture: do frames come in?".into());
+    }
+    say_on(&"armed; taring, nothing may touch the tip");
+    client.set(address::TARE, 1)?;
+    if let Some(goal_mn) = goal_mn {
+        // During the tare, so that the approach begins right after it.
+        client.set(address::BUS_WATCHDOG, WATCHDOG_MS / WATCHDOG_UNIT_MS)?;
+        client.set(address::TORQUE_ENABLE, 1)?;
+        client.set(address::GOAL_FORCE_MN, goal_mn)?;
+    }
+    let until = Instant::now() + within;
+    loop {
+        let block = client.again(|client| client.block(address::CAPTURE_STATE, address::CAPTURE_FRAMES))?;
+        let (state, frames) = (block.number(address::CAPTURE_STATE), block.number(address::CAPTURE_FRAMES));
+        let count = block.number(address::CAPTURE_COUNT);
+        if state == DONE {
+            return Ok(count);
+        }
+        if count == before && state != ARMED {
+            return Err("the capture is gone: the controller started anew, or another host called it off".into());
+        }
+        let enough = args.frames.is_some_and(|wanted| frames >= i64::from(wanted));
+        let late = Instant::now() >= until;
+        if enough || late || interrupt.came() {
+            client.again(|client| client.set(address::CAPTURE, 0))?;
+            if frames > 0 && wait_for(client, address::CAPTURE_STATE, within, |state| state == DONE)? == DONE {
+                return Ok(client.number(address::CAPTURE_COUNT)?);
+            }
+            let fault = client.number(address::FAULT)?;
+            return Err(if fault == 0 { "nothing was kept: no tare began".into() } else { stopped(fault) });
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Reads what was kept.
+fn fetch(client: &mut Client, count: i64, say_on: &dyn Fn(&dyn std::fmt::Display)) -> Result<Vec<u8>, Error> {
+    let length = client.number(address::CAPTURE_BYTES)? as usize;
+    let window = table::register_at(address::CAPTURE_DATA).map_or(1, |register| register.count);
+    let (mut bytes, mut said) = (Vec::with_capacity(length), Instant::now());
+    while bytes.len() < length {
+        let offset = bytes.len() as i64;
+        let part = client.again(|client| {
+            client.set(address::CAPTURE_OFFSET, offset)?;
+            client.read(address::CAPTURE_DATA, window)
+        })?;
+        bytes.extend(part.into_iter().take(length - bytes.len()));
+        if said.elapsed() >= Duration::from_secs(1) {
+            said = Instant::now();
+            say_on(&format_args!("read {} of {length} bytes", bytes.len()));
+        }
+    }
+    let block = client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
+    if [block.number(address::CAPTURE_STATE), block.number(address::CAPTURE_COUNT)] != [DONE, count] {
+        return Err("another host began a capture while this one was read, or the controller started anew".into());
+    }
+    Ok(bytes)
+}
+
+fn about(args: &Args, client: &mut Client) -> Result<About, Error> {
+    let firmware = client.number(address::FIRMWARE_VERSION)?;
+    let table_version = client.number(address::MODEL_INFORMATION)? >> 16;
+    let licence = if args.contribute { LICENCE } else { "not contributed: ask who captured it" };
+    let entries = [
+        ("board", args.board.clone()),
+        ("firmware", format!("{}.{}", firmware / 10, firmware % 10)),
+        ("control_table", table_version.to_string()),
+        ("tool", env!("CARGO_PKG_VERSION").to_owned()),
+        ("image", args.image.clone()),
+        ("notes", args.notes.clone()),
+        ("licence", licence.to_owned()),
+    ];
+    Ok(entries.map(|(name, value)| (name.to_owned(), value)).into())
+}

@@ -1,0 +1,98 @@
+//! `fingertip replay`.
+
+use super::{say, say_json};
+use crate::{Error, captured};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What to replay.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  fingertip replay press.mcap\n  fingertip replay captures")]
+pub struct Args {
+    /// Captures, or folders: all that ends with .mcap in them
+    #[arg(required = true)]
+    paths: Vec<PathBuf>,
+}
+
+/// Feeds captures through the core on this machine; a line for each.
+///
+/// # Errors
+/// One differs or is refused, or there is none.
+pub fn run(args: &Args, json: bool) -> Result<(), Error> {
+    let mut files = Vec::new();
+    for path in &args.paths {
+        find(path, &mut files).map_err(|why| Error::file("read", path, why))?;
+    }
+    let (mut told, mut wrong) = (Vec::new(), 0);
+    for file in &files {
+        let (verdict, good) = replay(file);
+        wrong += usize::from(!good);
+        if json {
+            told.push(verdict);
+        } else {
+            say(format_args!("{}: {}", file.display(), in_words(&verdict)));
+        }
+    }
+    if json {
+        say_json(&Value::Array(told));
+    }
+    match (files.len(), wrong) {
+        (0, _) => Err("no capture there: nothing was replayed".into()),
+        (_, 0) => Ok(()),
+        (all, wrong) => Err(format!("{wrong} of {all} captures do not replay").into()),
+    }
+}
+
+/// What ends with `.mcap`, in the order of the names; a file that is named counts whatever its name.
+fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if !fs::metadata(path)?.is_dir() {
+        files.push(path.into());
+        return Ok(());
+    }
+    let mut inside: Vec<PathBuf> = fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    inside.sort();
+    for path in inside {
+        if path.is_dir() || path.extension().is_some_and(|ending| ending == "mcap") {
+            find(&path, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// What came of a file, and whether that is as it should be.
+fn replay(file: &Path) -> (Value, bool) {
+    let kept = match captured::open(file) {
+        Ok(kept) => kept,
+        Err(why) => return (json!({ "file": file, "refused": why }), false),
+    };
+    let firmware = kept.about.get("firmware").cloned().unwrap_or_default();
+    match captured::through_the_core(&kept.bytes, |_, _| {}) {
+        Err(why) => (json!({ "file": file, "firmware": firmware, "refused": why.to_string() }), false),
+        Ok(replayed) => {
+            let difference = replayed.difference.map(|at| {
+                json!({ "frame": at.frame, "field": at.field.name(), "captured": at.captured, "replayed": at.replayed })
+            });
+            let good = difference.is_none();
+            let frames = replayed.head.frames;
+            (json!({ "file": file, "firmware": firmware, "frames": frames, "difference": difference }), good)
+        }
+    }
+}
+
+fn in_words(verdict: &Value) -> String {
+    let firmware = verdict["firmware"].as_str().unwrap_or_default();
+    if let Some(why) = verdict["refused"].as_str() {
+        let of = if firmware.is_empty() { String::new() } else { format!(" (firmware {firmware})") };
+        return format!("refused: {why}{of}");
+    }
+    let (frames, at) = (&verdict["frames"], &verdict["difference"]);
+    if at.is_null() {
+        return format!("{frames} frames, the same to the bit");
+    }
+    let field = at["field"].as_str().unwrap_or_default();
+    format!(
+        "{frames} frames, differs first at frame {}: {field} captured {}, replayed {}",
+        at["frame"], at["captured"], at["replayed"]
+    )
+}

@@ -1,0 +1,97 @@
+//! Captures from the host's side: taken, kept as files, replayed; and files that are not as they were written.
+
+use super::served::Served;
+use fingertip::shipped::address;
+use fingertip_cli::captured::{of_bytes, through_the_core};
+use fingertip_cli::client::Reach;
+use fingertip_cli::{Client, captured};
+use std::fs;
+
+fn client(finger: &Served) -> Client {
+    let reach = Reach { port: Some(finger.port.clone()), baud: 1_000_000, id: 1, timeout_ms: 600_000 };
+    Client::connect(&reach).expect("it is served")
+}
+
+#[test]
+fn a_capture_is_taken_and_replays() {
+    let finger = Served::begin("wall");
+    let file = finger.file("press.mcap");
+    let taken = finger.json(&["capture", "--press", "0.5", "--out", &file, "--board", "a served one", "--contribute"]);
+    assert_eq!((taken["replays"].as_bool(), taken["ended"].as_str()), (Some(true), Some("its memory is full")), "{taken}");
+    let frames = taken["frames"].as_u64().expect("a number");
+    assert!(frames > 600 && taken["bytes"].as_u64() <= Some(44 << 10), "{taken}");
+    let kept = captured::open(file.as_ref()).expect("a capture");
+    let about = |name: &str| kept.about.get(name).map(String::as_str).unwrap_or_default();
+    assert_eq!((about("board"), about("firmware"), about("frames")), ("a served one", "0.1", &*frames.to_string()));
+    assert!(about("licence").contains("contributed") && about("params").contains("\"modulus_pa\":"), "{kept:?}");
+
+    let told = finger.done(&["replay", &file]);
+    assert_eq!(told, format!("{file}: {frames} frames, the same to the bit\n"));
+    let told = finger.json(&["replay", &file]);
+    assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
+    // It let go.
+    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    // A tare alone, ended early.
+    let file = finger.file("tare.mcap");
+    let told = finger.done(&["capture", "--frames", "30", "--out", &file]);
+    assert!(told.contains("ended: asked to; replays here to the bit"), "{told}");
+}
+
+#[test]
+fn what_cannot_be_captured_is_told() {
+    let finger = Served::begin("wall");
+    let why = finger.refused(&["capture", "--out", &finger.file("press.csv")]);
+    assert!(why.contains(".mcap"), "{why}");
+    let file = finger.file("press.mcap");
+    finger.done(&["params", "set", "direction_confirmed=0"]);
+    let why = finger.refused(&["capture", "--press", "0.5", "--out", &file]);
+    assert!(why.contains("`fingertip commission jog`"), "{why}");
+    finger.done(&["params", "set", "direction_confirmed=1"]);
+    finger.done(&["tare"]);
+    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    let why = finger.refused(&["capture", "--out", &file]);
+    assert!(why.contains("torque is on"), "{why}");
+    client(&finger).set(address::TORQUE_ENABLE, 0).expect("it obeys");
+    finger.command("fault supply-low");
+    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.command("state");
+    let why = finger.refused(&["capture", "--out", &file]);
+    assert!(why.contains("fault 9") && why.contains("`fingertip recover`"), "{why}");
+    assert!(fs::metadata(&file).is_err(), "nothing was written");
+}
+
+#[test]
+fn a_file_that_is_not_as_it_was_written_is_refused() {
+    let finger = Served::begin("wall");
+    let file = finger.file("short.mcap");
+    finger.done(&["capture", "--frames", "10", "--out", &file]);
+    let whole = fs::read(&file).expect("it was written");
+    assert!(of_bytes(&whole).is_ok());
+    let mut bytes = whole.clone();
+    for place in 0..bytes.len() {
+        for change in [0x01, 0x80, 0xFF] {
+            bytes[place] ^= change;
+            assert!(of_bytes(&bytes).is_err(), "byte {place} of {}, changed by {change:#x}", bytes.len());
+            bytes[place] ^= change;
+        }
+    }
+    for length in 0..whole.len() {
+        assert!(of_bytes(&whole[..length]).is_err(), "cut at {length}");
+    }
+    assert!(of_bytes(&[&whole[..], &[0]].concat()).is_err());
+
+    fs::write(&file, &whole[..whole.len() / 2]).expect("it can be written");
+    let why = finger.refused(&["replay", &file]);
+    assert!(why.contains("1 of 1 captures do not replay"), "{why}");
+    // A whole file about a capture that is cut short.
+    let kept = of_bytes(&whole).expect("a capture");
+    let cut = &kept.bytes[..kept.bytes.len() - 1];
+    let why = through_the_core(cut, |_, _| {}).expect_err("it is cut");
+    assert_eq!(why.to_string(), "the capture is cut off");
+    assert!(captured::write(std::io::Cursor::new(Vec::new()), cut, &kept.about).is_err());
+    let why = finger.refused(&["replay", &finger.file("nowhere")]);
+    assert!(why.contains("cannot read"), "{why}");
+    fs::remove_file(&file).expect("it is there");
+    let why = finger.refused(&["replay", std::path::Path::new(&file).parent().expect("a folder").to_str().expect("text")]);
+    assert!(why.contains("no capture there"), "{why}");
+}

@@ -50,7 +50,7 @@ pub struct Presses {
     pub rows: usize,
     /// Columns of taxels.
     pub columns: usize,
-    /// At least [`PRESSED_ROWS`].
+    /// At least `PRESSED_ROWS`.
     pub samples: Vec<Sample>,
     /// Parts of the recording: presses where they are named, fifths where not.
     pub parts: usize,

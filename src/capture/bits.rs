@@ -13,7 +13,7 @@ pub(super) const WIDTH_MAX: u32 = 16;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     /// Bits that are not yet a word, from the lowest one on: fewer than 32.
-    held: u64,
+    held: u32,
     count: u32,
     /// Where their word will be.
     at: usize,
@@ -47,34 +47,79 @@ impl<'a> Writer<'a> {
     /// The low bits of a number, at most 32; those above must be 0.
     #[inline(always)]
     pub fn put(&mut self, value: u32, count: u32) {
-        let place = &mut self.place;
-        place.held |= u64::from(value) << place.count;
-        place.count += count;
-        if place.count >= 32 {
-            let word = place.held as u32;
-            place.held >>= 32;
-            place.count -= 32;
-            match self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
-                Some(to) => *to = word.to_le_bytes(),
-                None => self.full = true,
-            }
-            place.at += 4;
-            place.check = mix(place.check, word);
+        self.place.held |= value << self.place.count;
+        self.place.count += count;
+        if self.place.count >= 32 {
+            self.word(self.place.held);
+            self.place.count -= 32;
+            // What did not fit: none of 32 bits that fill a word.
+            self.place.held = value.checked_shr(count - self.place.count).unwrap_or(0);
         }
+    }
+
+    /// A whole word.
+    #[inline(always)]
+    fn word(&mut self, word: u32) {
+        let place = &mut self.place;
+        match self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
+            Some(to) => *to = word.to_le_bytes(),
+            None => self.full = true,
+        }
+        place.at += 4;
+        place.check = mix(place.check, word);
+    }
+
+    /// Codes as their folded differences to those before, each of 16 bits at most; what these add up to.
+    ///
+    /// [`Writer::folded`] for each, with the word under way in registers: a frame has a hundred of them.
+    #[inline(never)]
+    pub fn codes(&mut self, codes: &[u16], before: &[u16], width: u32) -> u32 {
+        let width = width & 31;
+        let (mut sum, mask) = (0_u32, (1 << width) - 1);
+        let (mut held, mut filled) = (self.place.held, self.place.count);
+        for (&code, &before) in codes.iter().zip(before) {
+            let value = fold(code, before);
+            sum = sum.wrapping_add(value);
+            let ones = value >> width;
+            if ones >= ESCAPE {
+                (self.place.held, self.place.count) = (held, filled);
+                self.escaped(value);
+                (held, filled) = (self.place.held, self.place.count);
+                continue;
+            }
+            let bits = (value & mask) << (ones + 1) | ((1 << ones) - 1);
+            let count = ones + 1 + width;
+            held |= bits << (filled & 31);
+            filled += count;
+            if filled >= 32 {
+                self.word(held);
+                filled -= 32;
+                held = bits >> (count.wrapping_sub(filled) & 31);
+            }
+        }
+        (self.place.held, self.place.count) = (held, filled);
+        sum
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn escaped(&mut self, value: u32) {
+        self.put((1 << ESCAPE) - 1, ESCAPE);
+        self.put(value, 16);
     }
 
     /// Brings what is not yet a word to its place; the check sum of all.
     pub fn finish(self) -> u32 {
         let place = self.place;
         if let Some(to) = self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
-            *to = (place.held as u32).to_le_bytes();
+            *to = place.held.to_le_bytes();
         }
-        mix(place.check, place.held as u32)
+        mix(place.check, place.held)
     }
 
     /// A folded number of at most `all` bits.
     #[inline(always)]
-    pub fn folded(&mut self, value: u32, width: u32, all: u32) {
+    fn folded(&mut self, value: u32, width: u32, all: u32) {
         let ones = value >> width;
         if ones < ESCAPE {
             let low = value & ((1 << width) - 1);

@@ -1,6 +1,6 @@
 //! The board's side: frames in, bytes kept.
 
-use super::bits::{Place, Writer, fold};
+use super::bits::{Place, Writer};
 use super::{Ended, Head, Last, Standing, State, digest, width};
 use crate::command::Command;
 use crate::frame::{Frame, Sense};
@@ -112,14 +112,9 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         }
         let digest = digest::add(last.digest, Duty(duty), status);
         out.put(digest::short(digest).into(), 16);
-        let (width, mut spread) = (last.width(), 0_u32);
-        let codes = frame.codes.rows.as_flattened().iter().chain(&frame.codes.undriven);
-        let before = last.frame.codes.rows.as_flattened().iter().chain(&last.frame.codes.undriven);
-        codes.zip(before).for_each(|(&code, &before)| {
-            let folded = fold(code, before);
-            spread = spread.wrapping_add(folded);
-            out.folded(folded, width, 16);
-        });
+        let (width, codes, before) = (last.width(), &frame.codes, &last.frame.codes);
+        let spread = out.codes(codes.rows.as_flattened(), before.rows.as_flattened(), width);
+        let spread = spread.wrapping_add(out.codes(&codes.undriven, &before.undriven, width));
         let (place, full) = (out.place, out.full);
         if full {
             return self.end(Ended::Full);

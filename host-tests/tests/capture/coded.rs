@@ -180,7 +180,7 @@ fn a_frame_takes_what_its_noise_says() {
         state ^= state << 5;
         f64::from(state) / f64::from(u32::MAX) - 0.5
     };
-    for (noise, most) in [(0.0, 22.0), (0.5, 34.0), (1.0, 46.0), (2.0, 58.0), (4.0, 72.0)] {
+    for (noise, most) in [(0.0, 20.0), (0.5, 33.0), (1.0, 46.0), (2.0, 62.0)] {
         let mut pipeline = Pipeline::new(&config);
         let mut capture = Box::new(Burst::<{ 44 << 10 }>::NEW);
         capture.arm();

@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{WAIT_NS, image, read_u8, read_u32, write_goal, write_param, write_u8};
+use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_param, write_u8};
 use fingertip::capture::{Ended, Replayed, replay};
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
@@ -108,6 +108,7 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);
     rig.run_ms(300).expect("it runs");
     let missed = read_u32(&mut rig, address::MISSED_FRAMES);
+    let before_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
     press(&mut rig);
     assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u32(&mut rig, address::CAPTURE_BYTES)), (RECORDING, 0));
     // Read while it is under way: nothing, and no harm.
@@ -123,7 +124,8 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     let per_frame = bytes.len() as f64 / f64::from(replayed.head.frames);
     println!("{} frames in {} bytes, {per_frame:.1} a frame", replayed.head.frames, bytes.len());
     assert!(bytes.len() <= CAPTURE_BYTES && replayed.head.frames > 600);
-    println!("the longest loop time: {} us", read_u32(&mut rig, address::LOOP_TIME_MAX_US) & 0xFFFF);
+    let longest_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
+    println!("the longest loop time: {before_us} us before, {longest_us} us with the capture");
 
     // The same with gains that are not 1.
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);
@@ -171,7 +173,7 @@ fn out_of_turn_and_interrupted() {
     let bytes = fetch(&mut rig);
     let (replayed, _) = same(&mut rig, &bytes);
     assert_eq!((replayed.head.ended, replayed.head.params.modulus_pa), (Ended::Asked, 260_000));
-    assert!((60..100).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
+    assert!((60..160).contains(&replayed.head.frames), "{} frames", replayed.head.frames);
 
     // Parameters in the middle end it; what is there replays with those before.
     write_u8(&mut rig, address::CAPTURE, 1);

@@ -9,6 +9,7 @@ pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
+pub mod heat;
 pub mod motions;
 mod shaped;
 
@@ -25,6 +26,7 @@ use bounds::{Bounds, Drives};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
+use heat::Heat;
 use motions::{Driven, Motions};
 
 /// The band of the way at rest: this, for the array's noise, mm,
@@ -130,6 +132,8 @@ pub struct Config {
     pub clearance: Millimetres,
     /// What the guard goes by.
     pub bounds: Bounds,
+    /// How the winding heats up.
+    pub heat: Heat,
     /// The bounds of the motions that measure the drive.
     pub motions: Motions,
     /// See [`Params::force_fault_mn`].
@@ -250,6 +254,7 @@ impl Config {
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,
+            heat: Heat::new(p, frame_s, current_limit),
             motions: Motions::new(p, &tip, &Driven { frame_s, mm_per_count, damping: c, mass }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),

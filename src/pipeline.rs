@@ -277,6 +277,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
         self.status.creep = self.goal.creep.force();
+        self.status.winding = self.motion.winding.temperature(&self.config);
         (duty, &self.status)
     }
 

@@ -129,6 +129,7 @@ impl Digest {
             fit_level,
             contact,
             creep,
+            winding,
             travel,
             speed,
             duty: applied,
@@ -150,6 +151,7 @@ impl Digest {
         }
         self.0.update(&force.to_bits().to_le_bytes());
         self.0.update(&creep.to_bits().to_le_bytes());
+        self.0.update(&winding.to_bits().to_le_bytes());
         self.0.update(&speed.to_bits().to_le_bytes());
         let Modulus { modulus, sigma, contact, points } = identification.result();
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
@@ -196,7 +198,7 @@ mod tests {
     use fingertip::identify::{Identification, Refusal};
     use fingertip::pipeline::Taring;
     use fingertip::state::{Fault, Limits, Mode};
-    use fingertip::units::{Millimetres, MillimetresPerSecond};
+    use fingertip::units::{Celsius, Millimetres, MillimetresPerSecond};
 
     #[test]
     fn a_record_survives_the_way_to_bytes_and_back() {
@@ -239,6 +241,7 @@ mod tests {
             with(|status| status.duty = Duty(1)),
             with(|status| status.contact.force = Newtons::from_bits(1)),
             with(|status| status.creep = Newtons::from_bits(1)),
+            with(|status| status.winding = Celsius::from_bits(1)),
             with(|status| status.contact.indentation = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_x = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_y = Millimetres::from_bits(1)),

@@ -128,8 +128,8 @@ control_table! {
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
     /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known
-    /// only from below, 12 guard.
-    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FFF,
+    /// only from below, 12 guard, 13 winding warm.
+    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x3FFF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force. Before the first tare nothing is known of it: this and all that goes by it read 0, and limit
     /// 6 is set.
@@ -424,6 +424,10 @@ control_table! {
     /// That of the friction on the way back.
     4256 FRICTION_BACK_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
         |view, _| u32::from(view.measured().friction_sigma[1]);
+    /// The motor's winding, by the current of the motor's model: errs upwards. After a reset it begins as after a stop at
+    /// winding_max_c.
+    4400 PRESENT_WINDING_MC: I32 ReadOnly, "mdegC" * 1, -40_000 to 8_500_000,
+        |view, _| thousandths(view.snapshot.status.winding.to_bits(), 16) as u32;
 }
 
 /// A number of at most two digits.

@@ -71,6 +71,7 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         contact,
         // What it does is in the duty.
         creep: _,
+        winding: _,
         travel,
         speed,
         duty: applied,

@@ -29,6 +29,7 @@ pub mod goal;
 pub mod observer;
 pub mod pace;
 pub mod profile;
+pub mod warmth;
 pub mod winding;
 
 use crate::config::{BRAKE_SHARE_Q8, Config};

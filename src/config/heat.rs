@@ -5,8 +5,8 @@ use crate::params::Params;
 
 /// Frames of a step of the model.
 pub const FRAMES: u32 = 256;
-/// The current falls from its limit to none over this many K below the largest temperature.
-pub const ALLOWANCE_K: u32 = 16;
+/// The current falls from its limit to none over 2 to the power of this many K below the largest temperature: 16.
+pub const ALLOWANCE_BITS: u32 = 4;
 /// Heat counts so many times as much, a rise is so many times quicker, and a fall slower.
 const MARGIN: f32 = 1.25;
 /// It starts no nearer to the largest temperature than this, K.
@@ -48,7 +48,7 @@ impl Heat {
     /// `current_limit` is g R i_max, Q8 mm/s^2.
     pub(crate) fn new(p: &Params, frame_s: f32, current_limit: i32) -> Self {
         let limit = current_limit.max(1);
-        let bits = limit.ilog2();
+        let bits = 31 - limit.leading_zeros();
         let (down, up) = (bits.saturating_sub(LIMIT_BITS), LIMIT_BITS.saturating_sub(bits));
         let whole = ((limit >> down) << up) as f32;
         let amperes = p.current_max_ma as f32 * 1e-3;

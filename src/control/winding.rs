@@ -15,7 +15,7 @@
 //! range from 0 to its largest target.
 
 use crate::config::Config;
-use crate::config::heat::{ALLOWANCE_K, FRAMES, Heat};
+use crate::config::heat::{ALLOWANCE_BITS, FRAMES, Heat};
 use crate::units::Celsius;
 use fixed::types::I16F16;
 
@@ -93,8 +93,8 @@ impl Winding {
             *lag = (*lag + ((way * i64::from(leak)) >> 19)).max(0);
         }
         let left = (heat.room_q30 - self.above()).max(0);
-        // Q8 of the allowance, which is a power of 2.
-        self.share = (left >> (30 + ALLOWANCE_K.ilog2() - 8)).min(WHOLE.into()) as i32;
+        // Q8 of the allowance.
+        self.share = (left >> (30 + ALLOWANCE_BITS - 8)).min(WHOLE.into()) as i32;
     }
 }
 

@@ -60,6 +60,10 @@ pub struct Status {
     pub contact: Contact,
     /// What of the contact's force is taken for the array's creep: the force that is held is less by this.
     pub creep: Newtons,
+    /// The microcontroller's temperature, where it was measured.
+    pub chip: Option<Celsius>,
+    /// What the goal's force reads more than it is, for the array's temperature.
+    pub drift: Newtons,
     /// The motor's winding, by the current of the motor's model.
     pub winding: Celsius,
     /// Tip travel since torque was enabled.

@@ -428,6 +428,12 @@ control_table! {
     /// winding_max_c.
     4400 PRESENT_WINDING_MC: I32 ReadOnly, "mdegC" * 1, -40_000 to 8_500_000,
         |view, _| thousandths(view.snapshot.status.winding.to_bits(), 16) as u32;
+    /// The microcontroller's temperature, by which the array's is guessed; -273,150 where it was not measured.
+    4404 CHIP_MC: I32 ReadOnly, "mdegC" * 1, -273_150 to 1_000_000,
+        |view, _| view.snapshot.status.chip.map_or(-273_150, |chip| thousandths(chip.to_bits(), 16)) as u32;
+    /// What a force of the goal's size reads more than it is, by the array's temperature coefficients; 0 where they are.
+    4408 PRESENT_DRIFT_MN: I32 ReadOnly, "mN" * 1, -150_000 to 150_000,
+        |view, _| thousandths(view.snapshot.status.drift.to_bits(), 16) as u32;
 }
 
 /// A number of at most two digits.

@@ -6,6 +6,7 @@ use fingertip::config::curve::Curve;
 use fingertip::config::gains::Gains;
 use fingertip::config::heat::{Heat, Lag};
 use fingertip::config::motions::Motions;
+use fingertip::config::warm::Warm;
 use fingertip::config::{self, ConfigError};
 use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
@@ -123,6 +124,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         clearance,
         bounds,
         heat,
+        warm,
         motions,
         force_fault,
         force_max,
@@ -147,6 +149,10 @@ fn add_config(mix: &mut Mix, config: &Config) {
     }
     for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
+    }
+    let Warm { gain_q32_per_k, gain_at_q16, zero_q24_per_k } = *warm;
+    for number in [gain_q32_per_k, gain_at_q16, zero_q24_per_k] {
+        mix.add(number);
     }
     let Heat { most, down, up, lags, start_q30, room_q30, ambient_q16 } = *heat;
     for number in [most, ambient_q16] {

@@ -127,6 +127,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
             bus_silent_ms: 0,
             bridge_fault: false,
             answer: crate::units::CoreCycles(0),
+            chip: None,
         },
         command: Command {
             torque: false,
@@ -167,5 +168,6 @@ mod width {
     pub const SUPPLY: u32 = 2;
     pub const SILENT: u32 = 0;
     pub const ANSWER: u32 = 6;
+    pub const CHIP: u32 = 0;
     pub const DUTY: u32 = 6;
 }

@@ -9,8 +9,10 @@ pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
+pub mod heat;
 pub mod motions;
 mod shaped;
+pub mod warm;
 
 pub use error::ConfigError;
 pub use geometry::Geometry;
@@ -25,7 +27,9 @@ use bounds::{Bounds, Drives};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
+use heat::Heat;
 use motions::{Driven, Motions};
+use warm::Warm;
 
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
@@ -130,6 +134,10 @@ pub struct Config {
     pub clearance: Millimetres,
     /// What the guard goes by.
     pub bounds: Bounds,
+    /// How the array's readings drift with temperature.
+    pub warm: Warm,
+    /// How the winding heats up.
+    pub heat: Heat,
     /// The bounds of the motions that measure the drive.
     pub motions: Motions,
     /// See [`Params::force_fault_mn`].
@@ -250,6 +258,8 @@ impl Config {
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,
+            warm: Warm::new(p, shape),
+            heat: Heat::new(p, frame_s, current_limit),
             motions: Motions::new(p, &tip, &Driven { frame_s, mm_per_count, damping: c, mass }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),

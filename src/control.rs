@@ -12,8 +12,8 @@
 //!
 //! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still
 //! stop there; [`pace`] says how quick the loop is, by the [`gains`](crate::config::gains) of the paces; [`observer`]
-//! estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits. The law that
-//! joins them is
+//! estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits, of which [`winding`]
+//! lowers the current's before the motor is too warm. The law that joins them is
 //!
 //! ```text
 //! g V = k_v (v_ref - v) + a_ref + c v - w
@@ -29,6 +29,8 @@ pub mod goal;
 pub mod observer;
 pub mod pace;
 pub mod profile;
+pub mod warmth;
+pub mod winding;
 
 use crate::config::{BRAKE_SHARE_Q8, Config};
 use crate::state::Limits;
@@ -38,6 +40,7 @@ use drive::Drive;
 use observer::Observer;
 use pace::Pace;
 use profile::Reference;
+use winding::Winding;
 
 /// The state of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,12 +51,14 @@ pub struct SpeedLoop {
     pub drive: Drive,
     /// How quick the loop is.
     pub pace: Pace,
+    /// How warm the motor's winding is.
+    pub winding: Winding,
 }
 
 impl SpeedLoop {
     /// At rest.
     pub const fn new() -> Self {
-        Self { observer: Observer::new(), drive: Drive::new(), pace: Pace::QUICK }
+        Self { observer: Observer::new(), drive: Drive::new(), pace: Pace::QUICK, winding: Winding::new() }
     }
 
     /// The duty that makes the tip follow a speed reference.
@@ -67,6 +72,7 @@ impl SpeedLoop {
     pub fn push(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
         let speed = clamp_bits(self.observer.speed.to_bits(), 28);
         let back_emf = clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4;
+        self.drive.allow(self.winding.share());
         self.drive.apply(voltage, back_emf, supply_mv, config, limits);
         self.drive.duty(supply_mv, config)
     }
@@ -84,6 +90,7 @@ impl SpeedLoop {
             + (reference.acceleration.to_bits() >> 4)
             + back_emf
             - (self.observer.disturbance.to_bits() >> 4);
+        self.drive.allow(self.winding.share());
         let [wanted, back_emf] = [clamp_bits(wanted, 28) << 4, clamp_bits(back_emf, 28) << 4];
         self.drive.apply(wanted, back_emf, supply_mv, config, limits);
     }
@@ -91,6 +98,7 @@ impl SpeedLoop {
     /// Takes the encoder's count of this frame into the observer, which then stands at this instant.
     #[inline(always)]
     pub fn observe(&mut self, encoder: i32, config: &Config) {
+        self.winding.observe(self.drive.acceleration(), config);
         self.observer.update(encoder, self.drive.acceleration(), self.pace.gains(config), config);
     }
 

@@ -4,7 +4,7 @@
 //! columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. That last one reads what the
 //! columns show with nothing selected: the amplifiers' offsets, and a row that is stuck in the driven state.
 
-use crate::units::CoreCycles;
+use crate::units::{Celsius, CoreCycles};
 pub use lanes::Codes;
 
 /// Converters that work side by side.
@@ -80,6 +80,8 @@ pub struct Sense {
     pub bus_silent_ms: u16,
     /// The bridge's driver reports a fault (its nFAULT pin, which also broke the PWM in hardware).
     pub bridge_fault: bool,
+    /// The microcontroller's temperature; none where it was not measured.
+    pub chip: Option<Celsius>,
     /// From the last frame's end to its duty; 0 where that was not measured.
     pub answer: CoreCycles,
 }

@@ -152,6 +152,26 @@ params! {
     /// Whether somebody saw that positive duty moves the tip towards the object, and the jog that the encoder then counts
     /// up: 1 yes, 0 no. Without it the bus refuses torque. See `docs/commissioning.md`.
     direction_confirmed = 0 in 0..=1;
+    /// Largest temperature of the winding, degrees Celsius: below it the current is held back, see limit 13.
+    winding_max_c = 125 in 85..=250;
+    /// Thermal resistance from winding to housing. 0 leaves it out; with housing_k_per_w of 0 as well the winding is taken
+    /// for as warm as its surroundings.
+    winding_k_per_w = 20 in 0..=500;
+    /// Thermal time constant of the winding.
+    winding_time_ms = 5_000 in 2_000..=600_000;
+    /// Thermal resistance from housing to surroundings.
+    housing_k_per_w = 26 in 0..=500;
+    /// Thermal time constant of the housing.
+    housing_time_ms = 400_000 in 2_000..=10_000_000;
+    /// The warmest that it gets around the motor, degrees Celsius.
+    ambient_c = 40 in -40..=60;
+    /// Change of the array's gain for a K, by the microcontroller's temperature. 0 takes none off.
+    array_gain_ppm_per_k = 0 in -10_000..=10_000;
+    /// The microcontroller's temperature at which the array's gain is right, degrees Celsius.
+    array_gain_at_c = 25 in -40..=125;
+    /// Change of every taxel's zero for a K, by the microcontroller's temperature since the zero was last learnt. 0 takes
+    /// none off.
+    array_zero_pa_per_k = 0 in -1_000..=1_000;
 }
 
 impl Default for Params {

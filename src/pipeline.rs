@@ -173,6 +173,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             limits.set(Limits::TAXELS);
         }
 
+        self.goal.warmth.observe(sense.chip, &self.config);
+
         // What the finger does.
         self.motion.observe(sense.encoder, &self.config);
         if starting {
@@ -278,6 +280,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.speed = self.motion.observer.speed;
         self.status.duty = duty;
         self.status.creep = self.goal.creep.force();
+        self.status.chip = sense.chip;
+        self.status.drift = self.goal.warmth.force(command.goal, &self.config);
+        self.status.winding = self.motion.winding.temperature(&self.config);
         (duty, &self.status)
     }
 

@@ -118,6 +118,8 @@ impl Limits {
     pub const FROM_BELOW: u16 = 1 << 11;
     /// The guard holds the duty back, see [`crate::safety::guard`].
     pub const GUARD: u16 = 1 << 12;
+    /// The winding's temperature, by the motor's model, holds the current back.
+    pub const WINDING: u16 = 1 << 13;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

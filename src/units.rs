@@ -57,6 +57,8 @@ quantities! {
     Volts(I16F16);
     /// A current in A (Q16.16), resolution 15 uA.
     Amperes(I16F16);
+    /// A temperature in degrees Celsius (Q16.16), resolution 15 uK.
+    Celsius(I16F16);
 }
 
 /// A time in ticks of the scan's timer, [`crate::scan::Clocks::timer_hz`] a second.

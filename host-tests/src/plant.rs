@@ -186,7 +186,7 @@ impl World {
     /// What the control step learns beside the frame.
     pub fn sense(&self, bus_silent_ms: u16) -> Sense {
         let supply_mv = (self.supply_v() * 1e3 + 0.5).clamp(0.0, f64::from(u16::MAX)) as u16;
-        Sense { encoder: self.counts, supply_mv, bus_silent_ms, bridge_fault: false, answer: CoreCycles(0) }
+        Sense { encoder: self.counts, supply_mv, bus_silent_ms, bridge_fault: false, chip: None, answer: CoreCycles(0) }
     }
 
     /// Mean pressure on a taxel.

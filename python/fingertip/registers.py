@@ -43,7 +43,7 @@ MIRROR_GOAL_MN = Register("mirror_goal_mn", 148, 4, 1, True, 1, False, 0, 150000
 MIRROR_FORCE_MN = Register("mirror_force_mn", 152, 4, 1, True, 1, False, -32768000, 32768000)
 MIRROR_MODE = Register("mirror_mode", 156, 1, 1, False, 1, False, 0, 7)
 MIRROR_FAULT = Register("mirror_fault", 157, 1, 1, False, 1, False, 0, 18)
-MIRROR_LIMITS = Register("mirror_limits", 158, 2, 1, False, 1, False, 0, 8191)
+MIRROR_LIMITS = Register("mirror_limits", 158, 2, 1, False, 1, False, 0, 16383)
 MIRROR_TIME_US = Register("mirror_time_us", 160, 4, 1, False, 1, False, 0, 4294967295)
 MIRROR_TARE = Register("mirror_tare", 164, 1, 1, False, 1, False, 0, 1)
 MIRROR_RECOVER = Register("mirror_recover", 165, 1, 1, False, 1, False, 0, 1)
@@ -57,7 +57,7 @@ SAVE_PARAMETERS = Register("save_parameters", 262, 1, 1, False, 1, False, 0, 1)
 SAVED_STATE = Register("saved_state", 263, 1, 1, False, 1, False, 0, 2)
 PRESENT_MODE = Register("present_mode", 264, 1, 1, False, 1, False, 0, 7)
 FAULT = Register("fault", 265, 1, 1, False, 1, False, 0, 18)
-LIMITS = Register("limits", 266, 2, 1, False, 1, False, 0, 8191)
+LIMITS = Register("limits", 266, 2, 1, False, 1, False, 0, 16383)
 PRESENT_FORCE_MN = Register("present_force_mn", 268, 4, 1, True, 1, False, -32768000, 32768000)
 INDENTATION_UM = Register("indentation_um", 272, 4, 1, True, 1, False, 0, 16000)
 CENTRE_X_UM = Register("centre_x_um", 276, 4, 1, True, 1, False, -20000, 20000)
@@ -152,6 +152,15 @@ CURVE_PERMILLE = Register("curve_permille", 632, 4, 1, True, 1, True, 0, 8000)
 CREEP_PERMILLE = Register("creep_permille", 636, 4, 1, True, 1, True, 0, 300)
 CREEP_TIME_MS = Register("creep_time_ms", 640, 4, 1, True, 1, True, 500, 600000)
 DIRECTION_CONFIRMED = Register("direction_confirmed", 644, 4, 1, True, 1, True, 0, 1)
+WINDING_MAX_C = Register("winding_max_c", 648, 4, 1, True, 1, True, 85, 250)
+WINDING_K_PER_W = Register("winding_k_per_w", 652, 4, 1, True, 1, True, 0, 500)
+WINDING_TIME_MS = Register("winding_time_ms", 656, 4, 1, True, 1, True, 2000, 600000)
+HOUSING_K_PER_W = Register("housing_k_per_w", 660, 4, 1, True, 1, True, 0, 500)
+HOUSING_TIME_MS = Register("housing_time_ms", 664, 4, 1, True, 1, True, 2000, 10000000)
+AMBIENT_C = Register("ambient_c", 668, 4, 1, True, 1, True, -40, 60)
+ARRAY_GAIN_PPM_PER_K = Register("array_gain_ppm_per_k", 672, 4, 1, True, 1, True, -10000, 10000)
+ARRAY_GAIN_AT_C = Register("array_gain_at_c", 676, 4, 1, True, 1, True, -40, 125)
+ARRAY_ZERO_PA_PER_K = Register("array_zero_pa_per_k", 680, 4, 1, True, 1, True, -1000, 1000)
 PICTURE_TIME_US = Register("picture_time_us", 720, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FRAME = Register("picture_frame", 724, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FORCE_MN = Register("picture_force_mn", 728, 4, 1, True, 1, False, -32768000, 32768000)
@@ -163,7 +172,7 @@ PICTURE_TRAVEL_UM = Register("picture_travel_um", 748, 4, 1, True, 1, False, -12
 PICTURE_SPEED_UM_PER_S = Register("picture_speed_um_per_s", 752, 4, 1, True, 1, False, -32768000, 32768000)
 PICTURE_PERIOD_NS = Register("picture_period_ns", 756, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_DUTY_PERMILLE = Register("picture_duty_permille", 760, 2, 1, True, 1, False, -1000, 1000)
-PICTURE_LIMITS = Register("picture_limits", 762, 2, 1, False, 1, False, 0, 8191)
+PICTURE_LIMITS = Register("picture_limits", 762, 2, 1, False, 1, False, 0, 16383)
 PICTURE_MODE = Register("picture_mode", 764, 1, 1, False, 1, False, 0, 7)
 PICTURE_FAULT = Register("picture_fault", 765, 1, 1, False, 1, False, 0, 18)
 PICTURE_TARE_STATE = Register("picture_tare_state", 766, 1, 1, False, 1, False, 0, 3)
@@ -201,14 +210,9 @@ TIME_CONSTANT_SIGMA = Register("time_constant_sigma", 4250, 2, 1, False, 1, Fals
 INERTIA_SIGMA = Register("inertia_sigma", 4252, 2, 1, False, 1, False, 0, 65535)
 FRICTION_FORWARD_SIGMA = Register("friction_forward_sigma", 4254, 2, 1, False, 1, False, 0, 65535)
 FRICTION_BACK_SIGMA = Register("friction_back_sigma", 4256, 2, 1, False, 1, False, 0, 65535)
-CAPTURE = Register("capture", 4260, 1, 1, False, 1, False, 0, 1)
-CAPTURE_STATE = Register("capture_state", 4261, 1, 1, False, 1, False, 0, 3)
-CAPTURE_ENDED = Register("capture_ended", 4262, 1, 1, False, 1, False, 0, 5)
-CAPTURE_COUNT = Register("capture_count", 4263, 1, 1, False, 1, False, 0, 255)
-CAPTURE_FRAMES = Register("capture_frames", 4264, 4, 1, False, 1, False, 0, 4294967295)
-CAPTURE_BYTES = Register("capture_bytes", 4268, 4, 1, False, 1, False, 0, 4294967295)
-CAPTURE_OFFSET = Register("capture_offset", 4272, 4, 1, False, 1, False, 0, 4294967295)
-CAPTURE_DATA = Register("capture_data", 4512, 1, 248, False, 1, False, 0, 255)
+PRESENT_WINDING_MC = Register("present_winding_mc", 4400, 4, 1, True, 1, False, -40000, 8500000)
+CHIP_MC = Register("chip_mc", 4404, 4, 1, True, 1, False, -273150, 1000000)
+PRESENT_DRIFT_MN = Register("present_drift_mn", 4408, 4, 1, True, 1, False, -150000, 150000)
 
 ALL = (
     MODEL_NUMBER,
@@ -343,6 +347,15 @@ ALL = (
     CREEP_PERMILLE,
     CREEP_TIME_MS,
     DIRECTION_CONFIRMED,
+    WINDING_MAX_C,
+    WINDING_K_PER_W,
+    WINDING_TIME_MS,
+    HOUSING_K_PER_W,
+    HOUSING_TIME_MS,
+    AMBIENT_C,
+    ARRAY_GAIN_PPM_PER_K,
+    ARRAY_GAIN_AT_C,
+    ARRAY_ZERO_PA_PER_K,
     PICTURE_TIME_US,
     PICTURE_FRAME,
     PICTURE_FORCE_MN,
@@ -392,12 +405,7 @@ ALL = (
     INERTIA_SIGMA,
     FRICTION_FORWARD_SIGMA,
     FRICTION_BACK_SIGMA,
-    CAPTURE,
-    CAPTURE_STATE,
-    CAPTURE_ENDED,
-    CAPTURE_COUNT,
-    CAPTURE_FRAMES,
-    CAPTURE_BYTES,
-    CAPTURE_OFFSET,
-    CAPTURE_DATA,
+    PRESENT_WINDING_MC,
+    CHIP_MC,
+    PRESENT_DRIFT_MN,
 )

@@ -176,6 +176,8 @@ impl State {
             supply_mv: parts.supply.read_mv(),
             bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
+            // The sensor shares its converter with the scan.
+            chip: None,
             // Before the first frame nothing is known: not 0, which would let any fit level in.
             answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };

@@ -29,6 +29,9 @@ pub(super) fn add(digest: u32, duty: Duty, status: &Status) -> u32 {
         scale,
         tare,
         taken,
+        winding,
+        chip,
+        drift,
     } = status;
     let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
     let mut words = Words(digest);
@@ -38,7 +41,12 @@ pub(super) fn add(digest: u32, duty: Duty, status: &Status) -> u32 {
     words.add(u32::from(limits.0) | u32::from(*bad_taxels) << 16);
     words.add(pack([*confidence, *doubt, 0, 0]));
     words.add(*peak_pa);
-    for bits in [force.to_bits(), creep.to_bits(), speed.to_bits()] {
+    let chip_bits = chip.unwrap_or_default().to_bits();
+    for bits in [force, creep, drift].map(|force| force.to_bits()).into_iter().chain([
+        speed.to_bits(),
+        winding.to_bits(),
+        chip_bits,
+    ]) {
         words.add(bits.cast_unsigned());
     }
     for length in [indentation, centre_x, centre_y, radius, travel] {

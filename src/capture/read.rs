@@ -7,7 +7,7 @@ use crate::config::ConfigError;
 use crate::contact::FitLevel;
 use crate::frame::{Frame, Sense};
 use crate::params::Params;
-use crate::units::{CoreCycles, Duty, Newtons};
+use crate::units::{Celsius, CoreCycles, Duty, Newtons};
 
 /// Why bytes are no capture that this version replays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -178,7 +178,12 @@ fn sense(bits: &mut Reader<'_>, last: &Sense) -> Option<Sense> {
         bus_silent_ms: short(bits, last.bus_silent_ms, width::SILENT)?,
         bridge_fault: bits.get(1)? == 1,
         answer: CoreCycles(last.answer.0.wrapping_add(bits.signed(width::ANSWER)?.cast_unsigned())),
+        chip: if bits.get(1)? == 1 { Some(chip(bits, last)?) } else { None },
     })
+}
+
+fn chip(bits: &mut Reader<'_>, last: &Sense) -> Option<Celsius> {
+    Some(Celsius::from_bits(last.chip.unwrap_or_default().to_bits().wrapping_add(bits.signed(width::CHIP)?)))
 }
 
 fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {

@@ -144,12 +144,16 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
 }
 
 fn put_sense(out: &mut Writer<'_>, sense: &Sense, last: &Sense) {
-    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
+    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip } = *sense;
     out.signed(encoder.wrapping_sub(last.encoder), width::ENCODER);
     out.signed(i32::from(supply_mv) - i32::from(last.supply_mv), width::SUPPLY);
     out.signed(i32::from(bus_silent_ms) - i32::from(last.bus_silent_ms), width::SILENT);
     out.put(bridge_fault.into(), 1);
     out.signed(answer.0.wrapping_sub(last.answer.0).cast_signed(), width::ANSWER);
+    out.put(chip.is_some().into(), 1);
+    if let Some(chip) = chip {
+        out.signed(chip.to_bits().wrapping_sub(last.chip.unwrap_or_default().to_bits()), width::CHIP);
+    }
 }
 
 fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {

@@ -1,7 +1,7 @@
 //! The motions: a jog each way, then strokes to and fro under steps of voltage, each bounded in duty, time and travel.
 //!
 //! ```text
-//! jog forward - rest - jog back - rest - [ stroke - rest ] 15 times
+//! jog forward - rest - jog back - rest - [ stroke - rest ] 15 times - home - rest
 //! ```
 //!
 //! Voltage is given, not closed over the encoder. A stroke ends where the shorted motor will roll out within the way;
@@ -68,6 +68,9 @@ pub struct Run {
     common_mv: [i32; 2],
     jogged: [i32; 2],
     line: Line,
+    /// Where this motion was shorted, and how far the last slow stroke forward rolled on from there.
+    braked: i32,
+    rolled: i32,
     /// The last look at the speed: where and when, and the fastest.
     looked: (i32, u32),
     fastest: i32,
@@ -95,6 +98,8 @@ impl Run {
             common_mv: [0; 2],
             jogged: [0; 2],
             line: Line::NONE,
+            braked: 0,
+            rolled: 0,
             looked: (0, 0),
             fastest: 0,
             gone: 0,
@@ -170,6 +175,7 @@ impl Run {
         self.voltage_mv = 0;
         self.phase = Phase::Rest(refusal);
         self.frames = 0;
+        self.braked = encoder;
         self.stood = (encoder, 0);
     }
 
@@ -193,6 +199,9 @@ impl Run {
 
     /// The next motion, or the end.
     fn next(&mut self, view: &View, config: &Config) {
+        if self.slow_forward() {
+            self.rolled = view.encoder.wrapping_sub(self.braked);
+        }
         self.done = self.done.saturating_add(1);
         self.frames = 0;
         self.begun = view.encoder;
@@ -213,7 +222,7 @@ impl Run {
             return self.end(Commissioning::Directed);
         }
         let stroke = self.done - 2;
-        if stroke >= COUNT {
+        if stroke > COUNT {
             return match self.estimate.drive(self.plan.beyond_mv, self.common_mv, config) {
                 Ok(drive) => self.end(Commissioning::Measured(drive)),
                 Err(refusal) => self.refuse(refusal),
@@ -233,7 +242,12 @@ impl Run {
         }
         self.voltage_mv = if forward { voltage } else { -voltage };
         self.phase = Phase::Stroke;
-        self.outcome = Commissioning::Running((u32::from(self.done) * 100 / (u32::from(COUNT) + 2)) as u8);
+        self.outcome = Commissioning::Running((u32::from(self.done) * 100 / (u32::from(COUNT) + 3)) as u8);
+    }
+
+    /// Whether the stroke that just came to rest was one whose roll the way home goes by.
+    fn slow_forward(&self) -> bool {
+        self.done >= 2 + COUNT_FROM && kind(self.done - 2) == (true, false)
     }
 
     fn end(&mut self, outcome: Commissioning) {

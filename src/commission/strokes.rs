@@ -6,10 +6,10 @@ pub const EACH: u8 = 3;
 pub const COUNT_FROM: u8 = 3;
 /// The first fast one.
 const FAST_FROM: u8 = COUNT_FROM + 2 * EACH;
-/// All.
+/// All that are measured. One more goes home, slowly: the last of them went back.
 pub const COUNT: u8 = FAST_FROM + 2 * EACH;
 
 /// Of the strokes, counted from 0: whether it goes forward, and whether it is fast.
 pub const fn kind(stroke: u8) -> (bool, bool) {
-    (stroke % 2 == 1, stroke >= FAST_FROM)
+    (stroke % 2 == 1, stroke >= FAST_FROM && stroke < COUNT)
 }

@@ -1,6 +1,7 @@
 //! Between the law and the bridge: voltage, current and slew limits, and the supply.
 
 use super::arith::nearest_share;
+use super::winding::WHOLE;
 use crate::config::Config;
 use crate::state::Limits;
 use crate::units::Duty;
@@ -14,10 +15,11 @@ pub struct Drive {
     net: i32,
     /// Share of the current limit that the supply bears, Q8.
     share: i32,
+    /// Share of it that the winding's temperature leaves, Q8.
+    allowed: i32,
 }
 
-/// All of the current limit, and the least that is left of it, Q8.
-const WHOLE: i32 = 1 << 8;
+/// The least of the current limit that a weak supply leaves, Q8.
 const LEAST: i32 = 1 << 4;
 /// What comes back in a frame, Q8.
 const RECOVERS: i32 = 2;
@@ -31,7 +33,7 @@ impl Default for Drive {
 impl Drive {
     /// Nothing at the motor.
     pub const fn new() -> Self {
-        Self { voltage: 0, net: 0, share: WHOLE }
+        Self { voltage: 0, net: 0, share: WHOLE, allowed: WHOLE }
     }
 
     /// g V - c v since the last frame (Q8 mm/s^2).
@@ -49,6 +51,11 @@ impl Drive {
         (self.voltage, self.net) = (0, self.net.saturating_sub(self.voltage));
     }
 
+    /// The share of the current limit that the winding's temperature leaves, Q8.
+    pub fn allow(&mut self, share: i32) {
+        self.allowed = share;
+    }
+
     /// Cuts the wanted g V to what slew, current and voltage allow.
     ///
     /// The current follows from the motor's model, i = (V - k_e omega) / R: holding |g V - c v| to g R i_max holds it.
@@ -56,7 +63,7 @@ impl Drive {
     pub fn apply(&mut self, wanted: i32, back_emf: i32, supply_mv: u16, config: &Config, limits: &mut Limits) {
         let slewed = clamp_around(wanted, self.voltage, config.slew_limit);
         self.spare(supply_mv, config);
-        let within_current = clamp_around(slewed, back_emf, (config.current_limit >> 8) * self.share);
+        let within_current = clamp_around(slewed, back_emf, (config.current_limit >> 8) * self.share.min(self.allowed));
         let most = voltage_limit(supply_mv, config);
         let applied = within_current.max(-most).min(most);
         if applied != wanted {
@@ -64,6 +71,7 @@ impl Drive {
             limits.set(
                 flag(slewed != wanted, Limits::SLEW)
                     | flag(within_current != slewed, Limits::CURRENT)
+                    | flag(within_current != slewed && self.allowed < self.share, Limits::WINDING)
                     | flag(applied != within_current, Limits::VOLTAGE),
             );
         }

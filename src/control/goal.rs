@@ -9,6 +9,7 @@ use crate::contact::Contact;
 use crate::control::SpeedLoop;
 use crate::control::creep::Creep;
 use crate::control::profile::Reference;
+use crate::control::warmth::Warmth;
 use crate::state::{Limits, Mode};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
@@ -40,12 +41,14 @@ pub struct Goal {
     pub felt: Millimetres,
     /// What of the reading is creep.
     pub creep: Creep,
+    /// What of it is warmth.
+    pub warmth: Warmth,
 }
 
 impl Goal {
     /// Torque was just enabled: nothing is known of what there is to touch.
     pub fn start(&mut self) {
-        *self = Self::default();
+        *self = Self { warmth: self.warmth, ..Self::default() };
     }
 
     /// The speed to follow in a mode that drives the bridge.
@@ -128,8 +131,10 @@ impl Goal {
         if held != goal {
             limits.set(Limits::GOAL);
         }
-        // While the force is held the reading creeps away from it. It is led no farther than where it may be.
-        let reading = Newtons(held.0.saturating_add(self.creep.force().0)).min(most).max(held);
+        // While the force is held the reading creeps away from it, and drifts with temperature. It is led no farther than
+        // where it may be.
+        let beside = self.creep.force().0.saturating_add(self.warmth.force(held, config).0);
+        let reading = Newtons(held.0.saturating_add(beside)).min(most).max(config.contact_on);
         let wanted = config.tip.indentation(reading);
         if contact.force < config.contact_off {
             return wanted;

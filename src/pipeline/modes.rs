@@ -33,6 +33,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             Mode::Fault => Mode::Off,
             Mode::Tare => {
                 self.tared = sound && self.array.continue_tare();
+                self.goal.warmth.zero();
                 if self.tared {
                     self.array.judge_tare(&self.config);
                 }
@@ -97,6 +98,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let untouched = sound && (clear || contact.force < self.config.contact_off);
         if self.tared && self.config.params.baseline_follows != 0 && untouched {
             self.array.follow_drift(clear);
+            self.goal.warmth.zero();
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::commission::Commissioning;
 use crate::contact::{Contact, FitLevel};
 use crate::identify::Identification;
 use crate::state::{Fault, Limits, Mode};
-use crate::units::{Duty, Millimetres, MillimetresPerSecond, Newtons};
+use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, Newtons};
 
 /// The numbers of the requests last taken up: a command's number that differs still waits, for a frame or for torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -60,6 +60,12 @@ pub struct Status {
     pub contact: Contact,
     /// What of the contact's force is taken for the array's creep: the force that is held is less by this.
     pub creep: Newtons,
+    /// The microcontroller's temperature, where it was measured.
+    pub chip: Option<Celsius>,
+    /// What the goal's force reads more than it is, for the array's temperature.
+    pub drift: Newtons,
+    /// The motor's winding, by the current of the motor's model.
+    pub winding: Celsius,
     /// Tip travel since torque was enabled.
     pub travel: Millimetres,
     /// Tip speed by the observer.

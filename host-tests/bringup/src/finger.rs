@@ -166,7 +166,14 @@ impl Finger {
         // Rounded down, which the cast does for positive numbers only.
         let whole = counts as i32;
         let encoder = if counts < whole as f32 { whole - 1 } else { whole };
-        Sense { encoder, supply_mv: (self.supply_v * 1e3) as u16, bus_silent_ms: 0, bridge_fault: false, answer }
+        Sense {
+            encoder,
+            supply_mv: (self.supply_v * 1e3) as u16,
+            bus_silent_ms: 0,
+            bridge_fault: false,
+            chip: None,
+            answer,
+        }
     }
 
     /// The codes of the frame that has just ended.

@@ -28,7 +28,7 @@ const WALL_MM: f32 = 5.0;
 const SETTLED_SHARE: f32 = 0.02;
 
 const AT_REST: Sense =
-    Sense { encoder: 0, supply_mv: 6_000, bus_silent_ms: 0, bridge_fault: false, answer: CoreCycles(0) };
+    Sense { encoder: 0, supply_mv: 6_000, bus_silent_ms: 0, bridge_fault: false, chip: None, answer: CoreCycles(0) };
 /// A tare first of all.
 const UNASKED: Command = Command {
     torque: false,

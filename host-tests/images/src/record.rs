@@ -11,10 +11,13 @@ use fingertip::frame::Sense;
 use fingertip::identify::Modulus;
 use fingertip::pipeline::{Status, Taken};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
-use fingertip::units::{CoreCycles, Duty, Newtons};
+use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x05";
+pub const MAGIC: [u8; 8] = *b"fingert\x06";
+
+/// The temperature that was not measured.
+const UNMEASURED: i32 = i32::MIN;
 
 /// The arguments of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +32,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 13 + 18;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 17 + 18;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -44,11 +47,12 @@ impl Record {
         };
         places().for_each(|(slot, column)| put(&frame.code(slot, column).to_le_bytes()));
         put(&frame.sequence.to_le_bytes());
-        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = sense;
+        let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, chip, answer } = sense;
         put(&encoder.to_le_bytes());
         put(&supply_mv.to_le_bytes());
         put(&bus_silent_ms.to_le_bytes());
         put(&[u8::from(*bridge_fault)]);
+        put(&chip.map_or(UNMEASURED, Celsius::to_bits).to_le_bytes());
         put(&answer.0.to_le_bytes());
         // A recording asks for no commissioning.
         let Command { torque, goal, bus_watchdog_ms, fit_level, commission_request: _, .. } = command;
@@ -74,6 +78,8 @@ impl Record {
             supply_mv: u16::from_le_bytes(take(&mut rest)),
             bus_silent_ms: u16::from_le_bytes(take(&mut rest)),
             bridge_fault: take(&mut rest) != [0],
+            chip: Some(Celsius::from_bits(i32::from_le_bytes(take(&mut rest))))
+                .filter(|chip| chip.to_bits() != UNMEASURED),
             answer: CoreCycles(u32::from_le_bytes(take(&mut rest))),
         };
         let command = Command {
@@ -129,6 +135,9 @@ impl Digest {
             fit_level,
             contact,
             creep,
+            chip,
+            drift,
+            winding,
             travel,
             speed,
             duty: applied,
@@ -150,6 +159,9 @@ impl Digest {
         }
         self.0.update(&force.to_bits().to_le_bytes());
         self.0.update(&creep.to_bits().to_le_bytes());
+        self.0.update(&chip.map_or(UNMEASURED, Celsius::to_bits).to_le_bytes());
+        self.0.update(&drift.to_bits().to_le_bytes());
+        self.0.update(&winding.to_bits().to_le_bytes());
         self.0.update(&speed.to_bits().to_le_bytes());
         let Modulus { modulus, sigma, contact, points } = identification.result();
         for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
@@ -201,15 +213,15 @@ mod tests {
     #[test]
     fn a_record_survives_the_way_to_bytes_and_back() {
         let mut bytes = [0; Record::BYTES];
-        bytes.iter_mut().zip(1..=250).for_each(|(byte, value)| *byte = value);
+        bytes.iter_mut().zip(1..=254).for_each(|(byte, value)| *byte = value);
         let record = Record::from_bytes(&bytes);
         assert_eq!(record.frame.code(0, 0), 0x0201);
-        assert_eq!(record.command.identify_request, 248);
+        assert_eq!(record.command.identify_request, 252);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
         // Bytes differ where a truth value was neither 0 nor 1, where a fit level was none, and nowhere else.
         let differing = bytes.iter().zip(&again).enumerate().filter(|(_, (a, b))| a != b).map(|(place, _)| place);
-        assert!(differing.eq([232, 237, 244]));
+        assert!(differing.eq([232, 241, 248]));
     }
 
     #[test]
@@ -239,6 +251,9 @@ mod tests {
             with(|status| status.duty = Duty(1)),
             with(|status| status.contact.force = Newtons::from_bits(1)),
             with(|status| status.creep = Newtons::from_bits(1)),
+            with(|status| status.chip = Some(Celsius::from_bits(1))),
+            with(|status| status.drift = Newtons::from_bits(1)),
+            with(|status| status.winding = Celsius::from_bits(1)),
             with(|status| status.contact.indentation = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_x = Millimetres::from_bits(1)),
             with(|status| status.contact.centre_y = Millimetres::from_bits(1)),

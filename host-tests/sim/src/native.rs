@@ -10,7 +10,7 @@ mod digest;
 pub mod served;
 
 use crate::effects::link::Stages as _;
-use crate::effects::sensor::Readout;
+use crate::effects::sensor::{Readout, Stages as _};
 use crate::effects::set::{Named, Set};
 use crate::host::Host;
 use crate::host::grip::Reading;
@@ -28,6 +28,7 @@ use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::units::Celsius;
 use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
 
@@ -125,6 +126,11 @@ struct Board<E: Set> {
     digest: Digest,
     /// What the first finger was given beside its parameters.
     calibration: Option<watch::Gains>,
+}
+
+/// A temperature as the controller has it.
+fn celsius(degrees: f64) -> Celsius {
+    Celsius::from_bits((degrees * 65_536.0).floor() as i32)
 }
 
 impl<E: Set> Board<E> {
@@ -287,7 +293,8 @@ impl<E: Set> Board<E> {
             unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
             silent_ms = unit.host.silent_ms(time_s);
         }
-        let sense = self.world.sense(finger, silent_ms);
+        let mut sense = self.world.sense(finger, silent_ms);
+        sense.chip = unit.sensor.chip_c(time_s).map(celsius);
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = Bridge::of(status);
         if unit.command.torque {

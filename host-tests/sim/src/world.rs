@@ -236,7 +236,14 @@ impl<E: Set> World<E> {
     pub fn sense(&mut self, finger: usize, bus_silent_ms: u16) -> Sense {
         let finger = &mut self.fingers[finger];
         let supply_mv = (finger.supply_v() * 1e3 + 0.5).clamp(0.0, f64::from(u16::MAX)) as u16;
-        Sense { encoder: finger.count_ahead(0.0), supply_mv, bus_silent_ms, bridge_fault: false, answer: CoreCycles(0) }
+        Sense {
+            encoder: finger.count_ahead(0.0),
+            supply_mv,
+            bus_silent_ms,
+            bridge_fault: false,
+            chip: None,
+            answer: CoreCycles(0),
+        }
     }
 
     /// What is true of a finger, with the pressures if they are wanted.

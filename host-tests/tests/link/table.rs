@@ -68,7 +68,7 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
 fn the_last_fault_and_the_last_limit_are_in_the_table() {
     let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
     assert_eq!(largest(address::FAULT), Fault::BrownOutLevel as i64);
-    assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::GUARD) - 1);
+    assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::WINDING) - 1);
 }
 
 #[test]

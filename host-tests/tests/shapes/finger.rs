@@ -105,7 +105,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let turns = self.shaft.angle_rad / core::f64::consts::TAU;
         let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
-        let sense = Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, answer: CoreCycles(0) };
+        let sense =
+            Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, chip: None, answer: CoreCycles(0) };
         let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
         let status = *status;
         self.digest.add(duty, &status);

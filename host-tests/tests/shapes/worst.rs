@@ -8,7 +8,7 @@ use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::Pipeline;
 use fingertip::pressure::{Array, Calibration, GAIN_MAX};
-use fingertip::units::CoreCycles;
+use fingertip::units::{Celsius, CoreCycles};
 use images::single::{self, Refined};
 use proptest::prelude::*;
 use proptest::test_runner::{Config as Cases, RngSeed};
@@ -248,6 +248,7 @@ fn any_sense() -> impl Strategy<Value = Sense> {
         supply_mv,
         bus_silent_ms,
         bridge_fault,
+        chip: (answer % 2 == 0).then_some(Celsius::from_bits(encoder)),
         answer: CoreCycles(answer),
     })
 }

@@ -2,7 +2,7 @@
 
 use super::{PROVEN, Phase, Run, TRIAL, View};
 use crate::commission::Refusal;
-use crate::commission::strokes::{COUNT_FROM, kind};
+use crate::commission::strokes::{COUNT, COUNT_FROM, kind};
 
 /// Counts that are motion.
 const MOVED: i32 = 2;
@@ -75,9 +75,12 @@ impl Run {
         }
         let off = view.encoder.wrapping_sub(self.origin);
         let off = if self.forward { off } else { off.saturating_neg() };
-        if off.saturating_add(self.plan.roll[place]) >= self.plan.half {
-            let stroke = self.done.saturating_sub(2);
-            let sound = stroke == 0 || self.take(stroke);
+        let stroke = self.done.saturating_sub(2);
+        let home = stroke >= COUNT;
+        // The way home ends by the roll that was seen, not by the one that was planned: it is to end in one place.
+        let (roll, end) = if home { (self.rolled, 0) } else { (self.plan.roll[place], self.plan.half) };
+        if off.saturating_add(roll) >= end {
+            let sound = stroke == 0 || home || self.take(stroke);
             self.brake((!sound).then_some(Refusal::Unsteady), view.encoder);
         } else if self.frames >= self.plan.longest {
             self.brake(Some(Refusal::Unsteady), view.encoder);

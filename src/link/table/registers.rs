@@ -128,8 +128,8 @@ control_table! {
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
     /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not tared, 7
     /// frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare, 11 force known
-    /// only from below, 12 guard.
-    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x1FFF,
+    /// only from below, 12 guard, 13 winding warm.
+    266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x3FFF,
         |view, _| u32::from(view.snapshot.status.limits.0);
     /// Total normal force. Before the first tare nothing is known of it: this and all that goes by it read 0, and limit
     /// 6 is set.
@@ -450,6 +450,16 @@ control_table! {
     4272 CAPTURE_OFFSET: U32 ReadWrite, "" * 1, 0 to 0xFFFF_FFFF = 0,
         |view, _| view.settings().capture_offset,
         |staged, value| { staged.settings.capture_offset = value as u32; Ok(()) };
+    /// The motor's winding, by the current of the motor's model: errs upwards. After a reset it begins as after a stop at
+    /// winding_max_c.
+    4400 PRESENT_WINDING_MC: I32 ReadOnly, "mdegC" * 1, -40_000 to 8_500_000,
+        |view, _| thousandths(view.snapshot.status.winding.to_bits(), 16) as u32;
+    /// The microcontroller's temperature, by which the array's is guessed; -273,150 where it was not measured.
+    4404 CHIP_MC: I32 ReadOnly, "mdegC" * 1, -273_150 to 1_000_000,
+        |view, _| view.snapshot.status.chip.map_or(-273_150, |chip| thousandths(chip.to_bits(), 16)) as u32;
+    /// What a force of the goal's size reads more than it is, by the array's temperature coefficients; 0 where they are.
+    4408 PRESENT_DRIFT_MN: I32 ReadOnly, "mN" * 1, -150_000 to 150_000,
+        |view, _| thousandths(view.snapshot.status.drift.to_bits(), 16) as u32;
     /// Bytes of the capture from capture_offset on; 0 where there are no more, and all 0 before it is done.
     4512 CAPTURE_DATA: U8[248] ReadOnly, "" * 1, 0 to 255,
         |view, element| u32::from(view.captured(element));

@@ -17,10 +17,12 @@ use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
+use fingertip::control::warmth::Warmth;
+use fingertip::control::winding::Winding;
 use fingertip::params::Params;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, Proposal, ROWS};
 use fingertip::state::{Limits, Mode};
-use fingertip::units::{Duty, Millimetres};
+use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
 use images::record::{MAGIC, Record};
 use images::single::{self, Refined};
@@ -33,7 +35,7 @@ static PRESS: StaticCell<Press> = StaticCell::new();
 /// What the kernels read and write.
 struct Bench<'a> {
     config: &'a Config,
-    /// With a characteristic that is no line, and creep.
+    /// With a characteristic that is no line, creep, and a gain that drifts with temperature.
     curved: &'a Config,
     record: Record,
     pipeline: &'static mut Pipeline,
@@ -48,6 +50,9 @@ struct Bench<'a> {
     reference: Reference,
     limits: Limits,
     duty: Duty,
+    winding: Winding,
+    warmth: Warmth,
+    drift: Newtons,
     press: &'static mut Press,
 }
 
@@ -68,7 +73,7 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 24] = [
+const KERNELS: [(&str, Kernel, When); 26] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
@@ -79,6 +84,8 @@ const KERNELS: [(&str, Kernel, When); 24] = [
     ("goal and profile, with creep", creeping, Driving),
     ("speed law and limits", follow, Driving),
     ("duty from the voltage", duty, Driving),
+    ("winding", winding, Always),
+    ("warmth, with a coefficient", warmth, Always),
     ("contact, whole, moments", read_moments, When::Contact),
     ("contact, whole, followed", follow_whole, When::Contact),
     ("contact, whole, one", read_one, When::Contact),
@@ -190,6 +197,15 @@ extern "C" fn duty(bench: &mut Bench) {
     bench.duty = bench.motion.drive.duty(bench.record.sense.supply_mv, bench.config);
 }
 
+extern "C" fn winding(bench: &mut Bench) {
+    bench.winding.observe(bench.motion.drive.acceleration(), bench.config);
+}
+
+extern "C" fn warmth(bench: &mut Bench) {
+    bench.warmth.observe(Some(Celsius::from_bits(30 << 16)), bench.curved);
+    bench.drift = bench.warmth.force(bench.record.command.goal, bench.curved);
+}
+
 fn read(bench: &mut Bench, refined: Refined) {
     bench.contact = single::read(&bench.picture, refined, bench.config);
 }
@@ -230,7 +246,7 @@ fn main() -> ! {
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
     let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
-    let params = Params { curve_permille: 3_300, creep_permille: 66, ..Params::DEFAULT };
+    let params = Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..Params::DEFAULT };
     let Ok(curved) = Config::shipped(&params) else { fail("a curve is refused") };
     let mut bench = Bench {
         config: &config,
@@ -247,6 +263,9 @@ fn main() -> ! {
         reference: Reference::default(),
         limits: Limits::default(),
         duty: Duty::ZERO,
+        winding: Winding::new(),
+        warmth: Warmth::default(),
+        drift: Newtons::ZERO,
         press: PRESS.init_with(Press::new),
     };
     for _ in 0..count {

@@ -12,11 +12,13 @@ use fingertip::control::drive::Drive;
 use fingertip::control::goal::Goal;
 use fingertip::control::observer::Observer;
 use fingertip::control::profile::Reference;
+use fingertip::control::warmth::Warmth;
+use fingertip::control::winding::Winding;
 use fingertip::identify::{DepthFit, Modulus, Refusal, TravelFit};
 use fingertip::model::{Relaxation, RelaxationState, Tip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame, Picture};
 use fingertip::state::{Limits, Mode};
-use fingertip::units::{CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
+use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Row, Total};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
@@ -33,6 +35,8 @@ pub struct Machines {
     pub(super) memory: RelaxationState<3>,
     observer: Observer,
     drive: Drive,
+    winding: Winding,
+    warmth: Warmth,
     motion: SpeedLoop,
     goal: Goal,
     press: Press,
@@ -61,6 +65,8 @@ impl Machines {
             memory: RelaxationState::REST,
             observer: Observer::new(),
             drive: Drive::new(),
+            winding: Winding::new(),
+            warmth: Warmth::default(),
             motion: SpeedLoop::new(),
             goal: Goal::default(),
             press,
@@ -138,7 +144,7 @@ pub const FRAMES: [Step; 6] = [
 ];
 
 /// One step of every other machine for each input.
-pub const STEPS: [Step; 20] = [
+pub const STEPS: [Step; 22] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -208,6 +214,18 @@ pub const STEPS: [Step; 20] = [
         mix.add(m.motion.observer.disturbance.to_bits());
     }),
     ("SpeedLoop::brake", |m, s, mix| mix.add(m.motion.brake(s.displacement.shift, &m.config).to_bits())),
+    ("Winding::observe", |m, s, mix| {
+        m.winding.observe(s.words[1], &m.config);
+        mix.add(m.winding.temperature(&m.config).to_bits());
+        mix.add(m.winding.share());
+    }),
+    ("Warmth::force", |m, s, mix| {
+        m.warmth.observe((s.share_q32 & 15 != 0).then_some(Celsius::from_bits(s.words[0])), &m.config);
+        if s.share_q32 & 0xf0 == 0 {
+            m.warmth.zero();
+        }
+        mix.add(m.warmth.force(s.force, &m.config).to_bits());
+    }),
     ("Goal::reference", |m, s, mix| {
         let mode = match s.share_q32 & 3 {
             0 => Mode::Approach,

@@ -4,7 +4,9 @@ use super::machines::Machines;
 use super::{Mix, Source, frames};
 use fingertip::config::curve::Curve;
 use fingertip::config::gains::Gains;
+use fingertip::config::heat::{Heat, Lag};
 use fingertip::config::motions::Motions;
+use fingertip::config::warm::Warm;
 use fingertip::config::{self, ConfigError};
 use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
@@ -121,6 +123,8 @@ fn add_config(mix: &mut Mix, config: &Config) {
         travel_max,
         clearance,
         bounds,
+        heat,
+        warm,
         motions,
         force_fault,
         force_max,
@@ -145,6 +149,25 @@ fn add_config(mix: &mut Mix, config: &Config) {
     }
     for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
+    }
+    let Warm { gain_q32_per_k, gain_at_q16, zero_q24_per_k } = *warm;
+    for number in [gain_q32_per_k, gain_at_q16, zero_q24_per_k] {
+        mix.add(number);
+    }
+    let Heat { most, down, up, lags, start_q30, room_q30, ambient_q16 } = *heat;
+    for number in [most, ambient_q16] {
+        mix.add(number);
+    }
+    for shift in [down, up] {
+        mix.add(shift);
+    }
+    for kelvin in [start_q30, room_q30] {
+        mix.add(kelvin);
+    }
+    for Lag { gain, rise_q31, fall_q31 } in lags {
+        mix.add(gain);
+        mix.add(rise_q31);
+        mix.add(fall_q31);
     }
     for number in [*frame_s_q39, *counts_max, calm_frames.cast_signed()] {
         mix.add(number);

@@ -47,6 +47,11 @@ pub type Row = [f64; COLUMNS];
 pub trait Pressure: Send {
     /// The row is sampled at this time; times never fall.
     fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row);
+
+    /// The microcontroller's temperature, degrees Celsius, where the effect has one.
+    fn chip_c(&self, _time_s: f64) -> Option<f64> {
+        None
+    }
 }
 
 /// Acts on the conductance of a row's taxels, S.
@@ -77,6 +82,10 @@ pub trait Codes: Send {
 pub trait Stages {
     /// Whether none of the stages holds an effect: the readout is then ideal, and asks for no stage.
     fn none(&self) -> bool;
+    /// The microcontroller's temperature, degrees Celsius, where an effect has one.
+    fn chip_c(&self, _time_s: f64) -> Option<f64> {
+        None
+    }
     /// All effects of the stage, in order.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
     /// As [`Stages::pressure`].
@@ -135,6 +144,10 @@ impl Named {
 impl Stages for Named {
     fn none(&self) -> bool {
         !self.any
+    }
+
+    fn chip_c(&self, time_s: f64) -> Option<f64> {
+        self.pressure.iter().find_map(|effect| effect.part().chip_c(time_s))
     }
 
     fn pressure(&mut self, row: usize, time_s: f64, kpa: &mut Row) {

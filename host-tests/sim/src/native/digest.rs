@@ -40,7 +40,7 @@ impl Digest {
 // Taken apart field by field, so that a field cannot be forgotten.
 
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
-    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer } = *sense;
+    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
     let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =
         *command;
     [
@@ -71,6 +71,9 @@ fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
         contact,
         // What it does is in the duty.
         creep: _,
+        winding: _,
+        chip: _,
+        drift: _,
         travel,
         speed,
         duty: applied,

@@ -51,6 +51,7 @@ const NAMES: [(u32, &str, &[&str]); 3] = [
             "tared touching",
             "from below",
             "guard",
+            "winding",
         ],
     ),
 ];
@@ -118,7 +119,7 @@ fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
 
 // A new mode or fault must not run into the next one's bits.
 const _: () = assert!((Mode::Commission as u32) < FAULTS && FAULTS + (Fault::Unseen as u32) < LIMITS);
-const _: () = assert!(Limits::GUARD == 1 << 12);
+const _: () = assert!(Limits::WINDING == 1 << 13);
 
 #[cfg(test)]
 mod tests {

@@ -231,6 +231,29 @@ fn other_motors_are_measured_too() {
     }
 }
 
+/// Nine in a row, each where the one before ended.
+#[test]
+fn the_tip_ends_where_it_began_however_often_it_is_measured() {
+    const TIMES: usize = 9;
+    let population = drives();
+    let (mut each, mut all) = (Vec::new(), Vec::new());
+    for number in 0..40 {
+        let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
+        let mut host = Host::new(&finger.scene);
+        let place = |host: &mut Host| host.bus.truths()[0].0.travel_mm;
+        let first = place(&mut host);
+        for _ in 0..TIMES {
+            let before = place(&mut host);
+            assert_eq!(host.commission(2), Came::Measured, "drive {number}");
+            assert!(host.travel_mm < TRAVEL_MM, "drive {number}: {} mm", host.travel_mm);
+            each.push(((place(&mut host) - before).abs(), number));
+        }
+        all.push(((place(&mut host) - first).abs(), number));
+    }
+    let [each, all] = [("away after one mm", each), ("after nine mm", all)].map(|(name, ways)| tell(name, ways));
+    assert!(each < 0.2 && all < 0.5, "{each} and {all} mm");
+}
+
 #[test]
 fn two_hundred_drives_are_measured() {
     let population = drives();

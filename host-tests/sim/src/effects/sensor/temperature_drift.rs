@@ -13,6 +13,7 @@ pub const EFFECT: Description = Description {
     about: "The array warms up from the scene's start; its gain and its zero drift along.",
     equations: &[
         "T = warming_k (1 - exp(-t / time_constant_s)), t from the start, 0 before it",
+        "the microcontroller shows 25 + chip_share * warming_k (1 - exp(-t / chip_time_constant_s))",
         "p' = p (1 + a T) + b T, a = gain_percent_per_k / 100, b = zero_kpa_per_k",
     ],
     state: "none: T is a function of time",
@@ -38,6 +39,16 @@ pub const EFFECT: Description = Description {
             about: "Change of the reading without pressure.",
             kind: Kind::Number { min: -1.0, max: 1.0, default: Some(0.01) },
         },
+        Key {
+            name: "chip_share",
+            about: "How much of the array's warming the microcontroller's temperature shows.",
+            kind: Kind::Number { min: -2.0, max: 4.0, default: Some(1.0) },
+        },
+        Key {
+            name: "chip_time_constant_s",
+            about: "The microcontroller's time constant; 0 is that of the array.",
+            kind: Kind::Number { min: 0.0, max: 1e6, default: Some(0.0) },
+        },
     ],
     zero: &[("warming_k", 0.0)],
     build: |build: &Build| {
@@ -47,6 +58,11 @@ pub const EFFECT: Description = Description {
             time_constant_s: number("time_constant_s"),
             gain_per_k: number("gain_percent_per_k") / 100.0,
             zero_kpa_per_k: number("zero_kpa_per_k"),
+            chip_k: number("warming_k") * number("chip_share"),
+            chip_time_constant_s: match number("chip_time_constant_s") {
+                0.0 => number("time_constant_s"),
+                own => own,
+            },
         }))
     },
 };
@@ -56,9 +72,15 @@ struct TemperatureDrift {
     time_constant_s: f64,
     gain_per_k: f64,
     zero_kpa_per_k: f64,
+    chip_k: f64,
+    chip_time_constant_s: f64,
 }
 
 impl Pressure for TemperatureDrift {
+    fn chip_c(&self, time_s: f64) -> Option<f64> {
+        Some(25.0 + self.chip_k * (1.0 - decay(time_s.max(0.0) / self.chip_time_constant_s)))
+    }
+
     fn apply(&mut self, _row: usize, time_s: f64, kpa: &mut Row) {
         let warmer_k = self.warming_k * (1.0 - decay(time_s.max(0.0) / self.time_constant_s));
         let (gain, zero_kpa) = (1.0 + self.gain_per_k * warmer_k, self.zero_kpa_per_k * warmer_k);

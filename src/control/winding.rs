@@ -1,0 +1,105 @@
+//! The winding's temperature, by the current of the motor's model, and what it leaves of the current limit.
+//!
+//! Heat P = i^2 R goes from the winding to the housing and from there to the air. Data sheets give a thermal resistance
+//! and a time constant for each; the temperature is the sum of two lags (a Foster network):
+//!
+//! ```text
+//! T = ambient + T_w + T_h,   tau_w T_w' = R_w P - T_w,   tau_h T_h' = R_h P - T_h
+//! ```
+//!
+//! It errs upwards: heat counts a quarter more than the parameters say, a rise is a quarter quicker and a fall a quarter
+//! slower. R is that of the cold winding with the bridge; at a given voltage a warm one takes less. What is covered and
+//! what is not stands in `docs/control.md`.
+//!
+//! The squares of 256 frames make one step of the lags: at most half of the way each, so neither leaves the
+//! range from 0 to its largest target.
+
+use crate::config::Config;
+use crate::config::heat::{ALLOWANCE_BITS, FRAMES, Heat};
+use crate::units::Celsius;
+use fixed::types::I16F16;
+
+/// All of the current, Q8.
+pub const WHOLE: i32 = 1 << 8;
+/// What a lag holds at most, K in Q30: 4,096 K.
+const MOST: u64 = 1 << 42;
+
+/// The winding's state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Winding {
+    /// Squares of the current since the last step: below 2^62.
+    squares: u64,
+    frames: u32,
+    /// Winding over housing and housing over ambient, K in Q30, 0 to [`MOST`].
+    lags: [i64; 2],
+    /// Whether the lags have their start.
+    started: bool,
+    /// Share of the current limit that is left, Q8.
+    share: i32,
+}
+
+impl Winding {
+    /// Before the first frame.
+    pub const fn new() -> Self {
+        Self { squares: 0, frames: 0, lags: [0; 2], started: false, share: WHOLE }
+    }
+
+    /// Takes what the motor was driven with since the last frame: g R i, Q8 mm/s^2.
+    #[inline(always)]
+    pub fn observe(&mut self, net: i32, config: &Config) {
+        let heat = &config.heat;
+        let net = net.max(-heat.most).min(heat.most);
+        // At most 2^27.
+        let current = i64::from((net >> heat.down) << heat.up);
+        self.squares = self.squares.wrapping_add((current * current).cast_unsigned());
+        self.frames += 1;
+        if self.frames >= FRAMES {
+            self.step(heat);
+        }
+    }
+
+    /// Share of the current limit that is left, Q8.
+    #[inline(always)]
+    pub fn share(&self) -> i32 {
+        self.share
+    }
+
+    /// How warm it is, rounded up.
+    pub fn temperature(&self, config: &Config) -> Celsius {
+        let above = self.above() >> 14;
+        Celsius(I16F16::from_bits((above as i32).saturating_add(config.heat.ambient_q16).saturating_add(1)))
+    }
+
+    /// K above ambient, Q30: at most 2^43.
+    fn above(&self) -> i64 {
+        let [winding, housing] = self.lags;
+        winding + housing
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn step(&mut self, heat: &Heat) {
+        if !self.started {
+            self.started = true;
+            self.lags = [0, heat.start_q30];
+        }
+        // The mean, at most 2^30, rounded up.
+        let mean = ((self.squares / u64::from(FRAMES)) >> 24) + u64::from(self.squares != 0);
+        (self.squares, self.frames) = (0, 0);
+        for (lag, part) in self.lags.iter_mut().zip(&heat.lags) {
+            let target = (mean * u64::from(part.gain)).min(MOST).cast_signed();
+            let way = (target - *lag) >> 12;
+            let leak = if way > 0 { part.rise_q31 } else { part.fall_q31 };
+            *lag = (*lag + ((way * i64::from(leak)) >> 19)).max(0);
+        }
+        let left = (heat.room_q30 - self.above()).max(0);
+        // Q8 of the allowance.
+        self.share = (left >> (30 + ALLOWANCE_BITS - 8)).min(WHOLE.into()) as i32;
+    }
+}
+
+impl Default for Winding {
+    fn default() -> Self {
+        Self::new()
+    }
+}

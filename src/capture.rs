@@ -1,6 +1,6 @@
 //! Captures: a burst of frames kept on the board, which replays to the bit on any machine.
 //!
-//! A capture is armed, and begins at the next tare: the pipeline is then made anew ([`Pipeline::renew`]), so that all
+//! A capture is armed, and begins at the next tare: the pipeline is then made anew ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that all
 //! that the loop knows is known outside as well. From then on each step's frame, sense, command, duty, mode and fault
 //! are kept, with a digest of everything else that the step reported, until the memory is full, the host stops it, or
 //! something acts on the loop that is no step. [`replay()`] feeds them through the core again.
@@ -18,7 +18,7 @@
 //! | 44 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
 //! | then | the frames, without a gap |
 //!
-//! Of a frame only what changed is written: numbers as [`bits`] of their difference to the frame before, codes with a
+//! Of a frame only what changed is written: numbers as bits of their difference to the frame before, codes with a
 //! width that follows their noise.
 
 mod bits;

@@ -1,9 +1,10 @@
 //! Captures: a burst of frames kept on the board, which replays to the bit on any machine.
 //!
-//! A capture is armed, and begins at the next tare: the pipeline is then made anew ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that all
-//! that the loop knows is known outside as well. From then on each step's frame, sense, command, duty, mode and fault
-//! are kept, with a digest of everything else that the step reported, until the memory is full, the host stops it, or
-//! something acts on the loop that is no step. [`replay()`] feeds them through the core again.
+//! A capture is armed, and begins at the next tare: the pipeline is then made anew
+//! ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that all that the loop knows is known outside as well.
+//! From then on each step's frame, sense, command, duty, mode and fault are kept, with a digest of everything else that
+//! the step reported, until the memory is full, the host stops it, or something acts on the loop that is no step.
+//! [`replay()`] feeds them through the core again.
 //!
 //! The layout, little-endian; bits fill a byte from its lowest one on:
 //!

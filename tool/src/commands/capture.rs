@@ -161,7 +161,7 @@ fn keep(
         if enough || late || interrupt.came() {
             client.again(|client| client.set(address::CAPTURE, 0))?;
             if frames > 0 && wait_for(client, address::CAPTURE_STATE, within, |state| state == DONE)? == DONE {
-                return Ok(client.number(address::CAPTURE_COUNT)?);
+                return client.number(address::CAPTURE_COUNT);
             }
             let fault = client.number(address::FAULT)?;
             return Err(if fault == 0 { "nothing was kept: no tare began".into() } else { stopped(fault) });

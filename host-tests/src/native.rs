@@ -1,11 +1,14 @@
 //! The same core on the host, closed over the plant: fast, and without a microcontroller in between.
 
-use crate::plant::{Bridge, DUTY_DELAY_SLOTS, Setup, World};
+use crate::plant::World;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, SLOTS};
 use images::record::Record;
+use sim::bridge::Bridge;
+use sim::native::DUTY_DELAY_SLOTS;
+use sim::setup::Setup;
 
 /// A board with the core running on it.
 pub struct Native {

@@ -13,50 +13,21 @@
 //! assert!(world.pressure_kpa(5, 5) > 0.0);
 //! ```
 
-pub mod cells;
-pub mod drive;
 pub mod readout;
-pub mod setup;
-pub mod tip;
+mod rows;
 
 pub use readout::{ArrayFaults, Row, Taxel};
-pub use setup::Setup;
+pub use sim::bridge::Bridge;
+pub use sim::setup::Setup;
 
 use core::f64::consts::TAU;
-use drive::{Dynamics, Shaft, Source};
 use fingertip::frame::Sense;
-use fingertip::pipeline::{self, Status};
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use fingertip::units::{CoreCycles, Duty};
+use fingertip::units::CoreCycles;
 use serde::{Deserialize, Serialize};
-
-/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
-/// up.
-pub const DUTY_DELAY_SLOTS: usize = 3;
-
-/// What the bridge does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub enum Bridge {
-    /// Both half bridges open.
-    #[default]
-    Coast,
-    /// PWM in slow decay.
-    Driven {
-        /// Share of the supply, -1 to 1; positive presses. 0 brakes.
-        duty: f64,
-    },
-}
-
-impl Bridge {
-    /// What a step means at the bridge.
-    pub fn of(status: &Status) -> Self {
-        match status.bridge() {
-            pipeline::Bridge::Asleep | pipeline::Bridge::Open => Self::Coast,
-            pipeline::Bridge::Brakes => Self::Driven { duty: 0.0 },
-            pipeline::Bridge::Driven(duty) => Self::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) },
-        }
-    }
-}
+use sim::mechanics::decay::decay;
+use sim::mechanics::dynamics::Dynamics;
+use sim::mechanics::rotor::{Shaft, Source};
 
 /// What is wrong with the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -85,7 +56,7 @@ pub struct World {
     bridge: Bridge,
     counts: i32,
     #[serde(skip)]
-    rows: cells::Rows,
+    rows: rows::Rows,
 }
 
 impl World {
@@ -97,7 +68,7 @@ impl World {
             shaft: Shaft::default(),
             bridge: Bridge::Coast,
             counts: 0,
-            rows: cells::Rows::default(),
+            rows: rows::Rows::default(),
         }
     }
 
@@ -217,7 +188,7 @@ impl World {
         previous: &[bool; ROWS],
     ) -> [f64; COLUMNS] {
         let array = self.setup.array;
-        let left = readout::decay(since_edge_s / array.settle_tau_s);
+        let left = decay(since_edge_s / array.settle_tau_s);
         let end = self.settled_volts(driven);
         if left == 0.0 || driven == previous {
             return end;

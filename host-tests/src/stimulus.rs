@@ -5,7 +5,6 @@
 //! seed.
 
 use crate::native::Native;
-use crate::plant::Setup;
 use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::config::newtons;
@@ -14,6 +13,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
+use sim::setup::Setup;
 
 /// Frames in the recording.
 pub const RECORDS: usize = 10_000;

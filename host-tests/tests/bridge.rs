@@ -7,7 +7,7 @@ use fingertip::shipped::{Config, Frame};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
 use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::setup::Setup;
 
 /// Holds 1 N, with the duty that this takes.
 fn holding() -> Native {

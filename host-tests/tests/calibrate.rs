@@ -8,7 +8,7 @@ use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{Calibration, Config, Gains, TAXELS};
 use fingertip::state::Mode;
 use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::setup::Setup;
 
 /// The longest that a press takes, with what is worked out after it.
 const FRAMES_MAX: u32 = 60_000;

@@ -7,9 +7,9 @@ use fingertip::shipped::Config;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Newtons;
 use host_tests::native::Native;
-use host_tests::plant::Setup;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::setup::Setup;
 
 fn config(creep_permille: i32, creep_time_ms: i32) -> Config {
     Config::shipped(&Params { creep_permille, creep_time_ms, ..Params::DEFAULT }).unwrap()

@@ -6,7 +6,7 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::Config;
 use fingertip::state::{Limits, Mode};
 use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::setup::Setup;
 
 fn board() -> Native {
     let config = Config::shipped(&Params::DEFAULT).unwrap();

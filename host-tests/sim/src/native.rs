@@ -9,6 +9,7 @@ mod clock;
 mod digest;
 pub mod served;
 
+use crate::bridge::Bridge;
 use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
 use crate::effects::set::{Named, Set};
@@ -28,8 +29,11 @@ use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
+
+/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
+/// up.
+pub const DUTY_DELAY_SLOTS: usize = 3;
 
 /// Why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,9 +1,8 @@
-//! From pressures to the columns' voltages and codes: zero-potential readout, its row sag, its settling and its
-//! defects.
+//! What can be wrong with the array.
 
-use super::setup::Array;
 use fingertip::shipped::{COLUMNS, ROWS};
 use serde::{Deserialize, Serialize};
+use sim::setup::Array;
 
 /// What can be wrong with a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -58,44 +57,4 @@ impl ArrayFaults {
             Taxel::Shorted => array.short_siemens,
         }
     }
-}
-
-impl Array {
-    /// The conductance where one on the line would be so large: a parabola through it, solved.
-    fn loaded(&self, line: f64) -> f64 {
-        if self.growth == 0.0 {
-            return line;
-        }
-        // As a share of the converter's full range.
-        let range = self.reference_v / (self.feedback_ohm * self.drive_v);
-        2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
-    }
-
-    /// What a driven row of these conductances adds to each column's voltage: R_f G V_drive / (1 + R_on S).
-    pub fn row_volts(&self, siemens: &[f64; COLUMNS]) -> [f64; COLUMNS] {
-        let scale = self.feedback_ohm * self.drive_v / (1.0 + self.row_ohm * siemens.iter().sum::<f64>());
-        siemens.map(|g| g * scale)
-    }
-
-    /// The code of a voltage: rounded down, as a successive-approximation converter does.
-    pub fn code(&self, volts: f64) -> u16 {
-        (volts / self.reference_v * Self::CODES).floor().clamp(0.0, Self::CODES - 1.0) as u16
-    }
-}
-
-/// exp(-x) for x of 0 or more, from the four operations alone, so that every machine gives the same bits.
-///
-/// The diagonal Pade approximant of order 3 at x/1024, squared ten times: relative error below 1e-12 up to x = 12,
-/// below 1e-11 up to x = 40; 0 above.
-pub fn decay(x: f64) -> f64 {
-    if x > 40.0 {
-        return 0.0;
-    }
-    let y = x.max(0.0) / 1024.0;
-    let (even, odd) = (1.0 + y * y / 10.0, y / 2.0 + y * y * y / 120.0);
-    let mut power = (even - odd) / (even + odd);
-    for _ in 0..10 {
-        power *= power;
-    }
-    power
 }

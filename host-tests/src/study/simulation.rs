@@ -2,10 +2,12 @@
 //! pressure is taken.
 
 use super::page::figure;
-use crate::plant::cells::Cell;
-use crate::plant::{Bridge, Setup, World};
+use crate::plant::World;
 use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
+use sim::bridge::Bridge;
+use sim::mechanics::cells::Cell;
+use sim::setup::Setup;
 use std::fmt::Write as _;
 use std::time::Instant;
 

@@ -2,10 +2,10 @@
 
 use super::{free, pressed};
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::cells::Cell;
-use host_tests::plant::setup::Tip;
 use host_tests::plant::{Setup, World};
 use proptest::prelude::*;
+use sim::mechanics::cells::Cell;
+use sim::setup::Tip;
 
 const ORACLE: &str = include_str!("../../oracle/park2003.csv");
 

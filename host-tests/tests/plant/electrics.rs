@@ -2,8 +2,8 @@
 
 use super::pressed;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use host_tests::plant::readout::decay;
 use host_tests::plant::{Row, Setup, Taxel, World};
+use sim::mechanics::decay::decay;
 
 const NONE: [bool; ROWS] = [false; ROWS];
 

@@ -4,6 +4,7 @@ mod cells;
 mod drive;
 mod electrics;
 mod optimal;
+mod same;
 
 use host_tests::plant::{Bridge, Setup, World};
 use proptest::test_runner::{Config, RngSeed};

@@ -1,8 +1,8 @@
 //! The time-optimal bound against closed forms, and against the plant.
 
 use super::STEP_S;
-use host_tests::optimal::{Reason, minimum_time_s, profile};
 use host_tests::plant::{Bridge, Setup, World};
+use sim::optimal::{Reason, minimum_time_s, profile};
 
 const NO_LIMIT: f64 = f64::INFINITY;
 

@@ -3,8 +3,9 @@
 use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
-use host_tests::plant::{World, readout::decay};
+use host_tests::plant::World;
 use serde::{Deserialize, Serialize};
+use sim::mechanics::decay::decay;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

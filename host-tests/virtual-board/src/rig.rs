@@ -44,7 +44,7 @@ impl Options {
     /// A board whose flash holds that its motor goes the right way: torque is refused before that is known.
     pub fn confirmed() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
-        let record = host_tests::encode(&Record { params, ..Record::DEFAULT }, 0);
+        let record = sim::encode(&Record { params, ..Record::DEFAULT }, 0);
         Self { presets: vec![(SECTOR.start, record)], ..Self::default() }
     }
 }
@@ -99,7 +99,7 @@ impl Rig {
     /// # Errors
     /// As [`Rig::new`], or the snapshot is of something else.
     pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
-        let world = World::new(&host_tests::plant::Setup::default());
+        let world = World::new(&sim::setup::Setup::default());
         Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
     }
 

@@ -8,8 +8,8 @@ use common::{WAIT_NS, image, read_u8, read_u32};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
 use fingertip::store::SLOT_BYTES;
-use host_tests::encode;
 use host_tests::plant::{Setup, World};
+use sim::encode;
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
 use virtual_board::{Options, Rig};
 

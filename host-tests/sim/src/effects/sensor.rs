@@ -20,9 +20,9 @@ mod temperature_drift;
 
 use super::{Metered, Part};
 use crate::registry::Description;
+use crate::setup::Array;
 use crate::watch::Cost;
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::setup::Array;
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[

@@ -4,9 +4,9 @@ use super::acting::{Acts, resistive};
 use super::contact::Contact;
 use crate::effects::drive::{Circuit, Friction};
 use crate::effects::{contact, drive};
+use crate::mechanics::rotor::{Rotor, Shaft};
+use crate::{bridge::Bridge, setup::Setup};
 use core::f64::consts::TAU;
-use host_tests::plant::drive::{Rotor, Shaft};
-use host_tests::plant::{Bridge, Setup};
 
 /// Rounds of a step's solution at most, and the share of the speed at which they end.
 const ROUNDS: usize = 40;

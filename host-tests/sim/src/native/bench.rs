@@ -2,6 +2,7 @@
 //! between two presses.
 
 use super::{Begun, Board, SimError};
+use crate::bridge::Bridge;
 use crate::effects::sensor::Stages as _;
 use crate::effects::set::Set;
 use crate::scene::Scene;
@@ -9,7 +10,6 @@ use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::pipeline::{Pipeline, Status};
 use fingertip::shipped::{COLUMNS, ROWS, TARE_FRAMES};
-use host_tests::plant::Bridge;
 
 /// The first finger of a scene.
 pub struct Bench<E: Set> {

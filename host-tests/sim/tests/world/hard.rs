@@ -1,7 +1,7 @@
 //! Numbers that are hard to handle.
 
 use crate::bench::{Last, close, run, scene, world};
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 use sim::effects::set::Named;
 
 /// Against the wall, out again and back, at rest in between; duties change at whole steps of every length tried.

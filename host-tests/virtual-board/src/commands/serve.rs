@@ -1,7 +1,7 @@
 //! `virtual-board serve`.
 
 use host_tests::plant::{Setup, World};
-use host_tests::say;
+use output::say;
 use serve::{Place, Port};
 use std::io::Write as _;
 use std::path::PathBuf;

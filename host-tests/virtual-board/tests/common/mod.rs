@@ -3,8 +3,8 @@
 
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
-use host_tests::encode;
 use host_tests::plant::{Setup, World};
+use sim::encode;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use virtual_board::flash::SECTOR;

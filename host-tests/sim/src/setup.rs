@@ -1,5 +1,6 @@
 //! What the simulated board is made of: plain data, in the units that the names end with.
 
+use fingertip::shipped::COLUMNS;
 use serde::{Deserialize, Serialize};
 
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
@@ -85,6 +86,27 @@ impl Array {
     pub const CODES: f64 = 4096.0;
     /// K = R_f V_drive 4096 / V_ref of the reference finger, codes Ohm.
     const CODES_OHM: f64 = 1.8e7;
+
+    /// The conductance where one on the line would be so large: a parabola through it, solved.
+    pub fn loaded(&self, line: f64) -> f64 {
+        if self.growth == 0.0 {
+            return line;
+        }
+        // As a share of the converter's full range.
+        let range = self.reference_v / (self.feedback_ohm * self.drive_v);
+        2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
+    }
+
+    /// What a driven row of these conductances adds to each column's voltage: R_f G V_drive / (1 + R_on S).
+    pub fn row_volts(&self, siemens: &[f64; COLUMNS]) -> [f64; COLUMNS] {
+        let scale = self.feedback_ohm * self.drive_v / (1.0 + self.row_ohm * siemens.iter().sum::<f64>());
+        siemens.map(|g| g * scale)
+    }
+
+    /// The code of a voltage: rounded down, as a successive-approximation converter does.
+    pub fn code(&self, volts: f64) -> u16 {
+        (volts / self.reference_v * Self::CODES).floor().clamp(0.0, Self::CODES - 1.0) as u16
+    }
 }
 
 impl Default for Array {

@@ -4,15 +4,16 @@ use fingertip::contact::{Contact, from_sums};
 use fingertip::params::Params;
 use fingertip::pressure::{GAIN_ONE, TARE_BITS};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES};
-use host_tests::plant::{Setup, World};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::plant::Plant;
+use sim::setup::Setup;
 
 /// At the full range a code means so much more than at none.
 const GROWTH: f64 = 3.3;
 
 struct Bench {
-    world: World,
+    world: Plant,
     array: Array,
     config: Config,
     frame: Frame,
@@ -27,7 +28,7 @@ impl Bench {
         setup.array.siemens_per_kpa *= 3.0;
         let params = Params { curve_permille, codes_per_kpa_milli: 72_000, ..Params::DEFAULT };
         let config = Config::shipped(&params).unwrap();
-        let mut bench = Self { world: World::new(&setup), array: Array::new(), config, frame: Frame::EMPTY };
+        let mut bench = Self { world: Plant::new(&setup), array: Array::new(), config, frame: Frame::EMPTY };
         for _ in 0..TARE_FRAMES {
             bench.read();
             bench.array.continue_tare();

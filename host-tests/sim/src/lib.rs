@@ -27,6 +27,7 @@ pub mod native;
 pub mod optimal;
 #[cfg(feature = "files")]
 pub mod part;
+pub mod plant;
 #[cfg(feature = "files")]
 pub mod population;
 #[cfg(feature = "files")]

@@ -12,7 +12,7 @@ pub mod served;
 use crate::bridge::Bridge;
 use crate::effects::link::Stages as _;
 use crate::effects::sensor::Readout;
-use crate::effects::set::{Named, Set};
+use crate::effects::set::{Named, Parts, Set};
 use crate::host::Host;
 use crate::host::grip::Reading;
 use crate::ledger;
@@ -21,6 +21,7 @@ use crate::mechanics::contact::Place;
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::scene::controller;
+use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
 pub use clock::Clock;
@@ -133,16 +134,24 @@ struct Board<E: Set> {
 
 impl<E: Set> Board<E> {
     fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
-        let params = controller::params(scene);
-        let config = Config::shipped(&params).map_err(SimError::Controller)?;
-        let setup = controller::setup(scene);
-        let fingers = scene.table("hand").whole("fingers") as usize;
+        let config = Config::shipped(&controller::params(scene)).map_err(SimError::Controller)?;
+        let fingers = 0..scene.table("hand").whole("fingers") as usize;
+        Self::of(scene, begun, &config, &controller::setup(scene), fingers.map(|finger| E::of(scene, finger)))
+    }
+
+    /// Of these parts, a finger for each.
+    fn of(
+        scene: &Scene,
+        begun: Begun,
+        config: &Config,
+        setup: &Setup,
+        fingers: impl Iterator<Item = Parts<E>>,
+    ) -> Result<Self, SimError> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
-        for finger in 0..fingers {
-            let parts = E::of(scene, finger);
+        for parts in fingers {
             effects.push((parts.drive, parts.contact));
             units.push(Unit {
-                pipeline: Pipeline::new(&config),
+                pipeline: Pipeline::new(config),
                 readout: Readout::new(&setup.array),
                 sensor: parts.sensor,
                 link: parts.link,
@@ -152,7 +161,7 @@ impl<E: Set> Board<E> {
                 next: Bridge::Coast,
             });
         }
-        let world = World::<E>::new(&setup, &Surroundings::of(scene), effects);
+        let world = World::<E>::new(setup, &Surroundings::of(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let slot_s = f64::from(config.timing.slot.0) / f64::from(fingertip::shipped::CLOCKS.timer_hz);
@@ -161,7 +170,7 @@ impl<E: Set> Board<E> {
             world,
             units,
             bridges,
-            params,
+            params: config.params,
             clock: Clock::from_start(begun.clock_s),
             start: Clock::default(),
             begun,

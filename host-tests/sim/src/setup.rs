@@ -1,6 +1,5 @@
 //! What the simulated board is made of: plain data, in the units that the names end with.
 
-use fingertip::shipped::COLUMNS;
 use serde::{Deserialize, Serialize};
 
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
@@ -95,12 +94,6 @@ impl Array {
         // As a share of the converter's full range.
         let range = self.reference_v / (self.feedback_ohm * self.drive_v);
         2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
-    }
-
-    /// What a driven row of these conductances adds to each column's voltage: R_f G V_drive / (1 + R_on S).
-    pub fn row_volts(&self, siemens: &[f64; COLUMNS]) -> [f64; COLUMNS] {
-        let scale = self.feedback_ohm * self.drive_v / (1.0 + self.row_ohm * siemens.iter().sum::<f64>());
-        siemens.map(|g| g * scale)
     }
 
     /// The code of a voltage: rounded down, as a successive-approximation converter does.

@@ -1,8 +1,7 @@
-//! What can be wrong with the array.
+//! What can be wrong with a plant.
 
 use fingertip::shipped::{COLUMNS, ROWS};
 use serde::{Deserialize, Serialize};
-use sim::setup::Array;
 
 /// What can be wrong with a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,20 +40,28 @@ pub struct ArrayFaults {
 
 impl ArrayFaults {
     /// Which rows are driven in fact when these are asked for.
-    pub fn driven(&self, asked: &[bool; ROWS]) -> [bool; ROWS] {
+    pub(super) fn driven(&self, asked: &[bool; ROWS]) -> [bool; ROWS] {
         core::array::from_fn(|row| match self.rows[row] {
             Row::Sound => asked[row],
             Row::StuckHigh => true,
             Row::StuckLow => false,
         })
     }
+}
 
-    /// Conductance of a taxel under a pressure.
-    pub fn siemens(&self, array: &Array, row: usize, column: usize, pressure_kpa: f64) -> f64 {
-        match self.taxels[row][column] {
-            Taxel::Sound => array.loaded(array.preload_siemens + array.siemens_per_kpa * pressure_kpa),
-            Taxel::Dead => 0.0,
-            Taxel::Shorted => array.short_siemens,
-        }
-    }
+/// What is wrong with the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Faults {
+    /// The array's defects.
+    pub array: ArrayFaults,
+    /// The encoder's count stands still.
+    pub encoder_frozen: bool,
+    /// The encoder's channels are swapped: it counts down as the tip presses in.
+    pub encoder_reversed: bool,
+    /// The motor's leads are swapped: a positive duty draws the tip back.
+    pub leads_swapped: bool,
+    /// Travels at which the finger meets an end stop, rear and front.
+    pub end_stops_mm: Option<[f64; 2]>,
+    /// Taken from the source's voltage.
+    pub supply_drop_v: f64,
 }

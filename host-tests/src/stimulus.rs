@@ -13,7 +13,6 @@ use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
 use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 /// Frames in the recording.
 pub const RECORDS: usize = 10_000;
@@ -33,8 +32,7 @@ const SEED: u64 = 2003;
 /// # Panics
 /// Never: the default parameters are sound, as the core's own tests show.
 pub fn records() -> Vec<Record> {
-    let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::default();
     let mut random = Rng::with_seed(SEED);
     let mut clears = 0;
     let mut held = Sense::default();

@@ -1,17 +1,15 @@
 //! What the bridge is told by each mode, and by a look at a frame that is still being scanned.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Status};
-use fingertip::shipped::{Config, Frame};
+use fingertip::shipped::Frame;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
 use sim::native::bench::Bench;
-use sim::setup::Setup;
 
 /// Holds 1 N, with the duty that this takes.
 fn holding() -> Bench {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("allowed"));
+    let mut board = Bench::default();
     board.tare();
     board.command().goal = newtons(1_000);
     for _ in 0..5_000 {

@@ -150,7 +150,7 @@ fn the_next_press_waits_until_the_last_one_is_worked_out() {
 
 #[test]
 fn without_torque_or_tare_it_is_refused() {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::default();
     assert_eq!(board.step().calibration.state, State::None);
     board.command().calibrate_request += 1;
     let status = board.step();
@@ -166,9 +166,9 @@ fn it_presses_no_harder_than_allowed_and_lets_go() {
     let mut peak_n = 0.0_f64;
     for _ in 0..20_000 {
         board.step();
-        peak_n = peak_n.max(board.force_n());
+        peak_n = peak_n.max(board.truth().force_n);
     }
     let status = board.step();
-    assert_eq!((status.calibration.state, status.mode, board.force_n()), (State::Done, Mode::Release, 0.0));
+    assert_eq!((status.calibration.state, status.mode, board.truth().force_n), (State::Done, Mode::Release, 0.0));
     assert!((3.7..4.2).contains(&peak_n), "{peak_n} N");
 }

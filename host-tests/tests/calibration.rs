@@ -5,8 +5,7 @@ use fingertip::params::Params;
 use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use fingertip::state::Mode;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
 

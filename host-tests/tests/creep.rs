@@ -82,7 +82,7 @@ fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
     while board.time_s() < seconds {
         board.step();
     }
-    (board.force_n(), board)
+    (board.truth().force_n, board)
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn over_force_is_judged_by_the_reading() {
     };
     let (_, mut board) = hold(&Config::shipped(&params).unwrap(), 2_000, 4.0);
     assert_eq!(board.status().fault, None);
-    let travel = board.travel_mm();
+    let travel = board.truth().travel_mm;
     board.place(travel + 0.2);
     for _ in 0..50 {
         board.step();

@@ -1,17 +1,13 @@
 //! Each fault natively: found in time, latched, and cleared only with torque off.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::Config;
 use fingertip::state::{Fault, Limits, Mode};
 use sim::native::bench::Bench;
-use sim::plant::{Faults, Row, Taxel};
-use sim::setup::Setup;
+use sim::plant::{Faults, Row, Setup, Taxel};
 
 fn holding(goal_mn: i32) -> Bench {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::default();
     board.tare();
     board.command().goal = newtons(goal_mn);
     for _ in 0..5_000 {
@@ -83,7 +79,7 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
         assert_eq!((status.fault, status.duty.0, status.contact), (None, 0, before), "{number}");
         assert!(status.limits.has(Limits::TAXELS));
     }
-    assert!((0.9..1.1).contains(&board.force_n()), "{} N", board.force_n());
+    assert!((0.9..1.1).contains(&board.truth().force_n), "{} N", board.truth().force_n);
     spoil(&mut board, 0, 12);
     assert_eq!(spoil(&mut board, 6, 12).fault, Some(Fault::ArrayBroken));
     assert_eq!(spoil(&mut holding(1_000), 0, 51).fault, Some(Fault::ArrayBroken));
@@ -104,21 +100,20 @@ fn an_encoder_that_stands_still() {
     board.harm(|faults| faults.encoder_frozen = true);
     board.command().goal = newtons(4_000);
     expect(&mut board, Fault::EncoderFrozen, 200);
-    assert!(board.force_n() < 9.0);
+    assert!(board.truth().force_n < 9.0);
 
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::default();
     board.tare();
     board.harm(|faults| faults.encoder_frozen = true);
     board.command().goal = newtons(1_000);
     expect(&mut board, Fault::EncoderFrozen, 100);
-    assert!(board.travel_mm() < 2.0, "{} mm", board.travel_mm());
+    assert!(board.truth().travel_mm < 2.0, "{} mm", board.truth().travel_mm);
 }
 
 /// Noise at no force looks like an indentation that the encoder does not see: it is no fault, however long it lasts.
 #[test]
 fn noise_at_no_force_is_not_a_frozen_encoder() {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::default();
     board.tare();
     for number in 0..5_000 {
         let status = board.step_with(|record| {
@@ -137,17 +132,17 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
 fn a_motor_that_runs_the_wrong_way() {
     for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {
         for goal_mn in [100, 1_000, 7_000] {
-            let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+            let mut board = Bench::default();
             board.tare();
             board.harm(|faults| *faults = Faults { encoder_reversed, leads_swapped, ..Faults::default() });
             board.command().goal = newtons(goal_mn);
             let (_, status) = frames_to_fault(&mut board, 200);
             assert!(matches!(status.fault, Some(Fault::Reversed)), "{:?}", status.fault);
-            assert!(board.travel_mm().abs() <= 0.5, "{} mm", board.travel_mm());
+            assert!(board.truth().travel_mm.abs() <= 0.5, "{} mm", board.truth().travel_mm);
             for _ in 0..5_000 {
                 board.step();
             }
-            assert!(board.travel_mm().abs() <= 1.5, "{} mm", board.travel_mm());
+            assert!(board.truth().travel_mm.abs() <= 1.5, "{} mm", board.truth().travel_mm);
         }
     }
 }
@@ -155,8 +150,7 @@ fn a_motor_that_runs_the_wrong_way() {
 /// An end stop in front without a touch, and one behind on letting go: stopped, not pressed against for ever.
 #[test]
 fn an_end_stop_on_either_side_stops_the_motor() {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::default();
     board.tare();
     board.harm(|faults| faults.end_stops_mm = Some([-1.0, 3.0]));
     board.command().goal = newtons(1_000);
@@ -234,8 +228,7 @@ fn a_fault_stays_until_it_is_cleared_with_torque_off() {
 
 #[test]
 fn torque_waits_for_a_tare() {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Bench::of(&Setup::default(), &config);
+    let mut board = Bench::default();
     board.command().torque = true;
     board.command().goal = newtons(1_000);
     for _ in 0..100 {

@@ -6,8 +6,7 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 /// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames:
 /// the true force and the last status.

@@ -10,23 +10,18 @@ use fingertip::state::{Fault, Mode};
 use images::record::Record;
 use sim::native::bench::Bench;
 use sim::plant::Taxel;
-use sim::setup::Setup;
 
 const NOT_READY: Identification = Identification::Refused(Refusal::NotReady);
 
-fn new() -> Bench {
-    at(Setup::default().wall.distance_mm)
-}
-
 /// With the object so far away.
 fn at(distance_mm: f64) -> Bench {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = distance_mm;
-    Bench::of(&setup, &Config::shipped(&Params::DEFAULT).unwrap())
+    let mut board = Bench::default();
+    board.place_object(distance_mm);
+    board
 }
 
 fn ready() -> Bench {
-    let mut board = new();
+    let mut board = Bench::default();
     board.tare();
     board.step();
     board
@@ -47,7 +42,7 @@ type Spoil = fn(&mut Record);
 const EARLY_AND_LATE: [(Spoil, Fault); 2] = [(broken, Fault::ArrayBroken), (silent, Fault::BusSilent)];
 
 fn broken(record: &mut Record) {
-    let mut board = new();
+    let mut board = Bench::default();
     board.harm(|faults| faults.array.taxels = [[Taxel::Dead; 10]; 10]);
     board.step();
     record.frame.codes = board.frame().codes;
@@ -132,13 +127,13 @@ fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
     for (spoil, fault) in EARLY_AND_LATE {
-        let mut board = new();
+        let mut board = Bench::default();
         board.command().tare_request += 1;
         board.step();
         let status = board.step_with(spoil);
         assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().tare_request += 1;
     board.step();
     board.pipeline().stop(Fault::LostFrames);
@@ -147,7 +142,7 @@ fn a_fault_ends_a_tare_for_all_to_see() {
 
 #[test]
 fn a_second_tare_during_a_tare_begins_anew() {
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().tare_request += 1;
     for _ in 0..100 {
         board.step();
@@ -158,7 +153,7 @@ fn a_second_tare_during_a_tare_begins_anew() {
 
 #[test]
 fn new_parameters_during_a_tare_begin_it_anew() {
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().tare_request += 1;
     for _ in 0..100 {
         board.step();
@@ -182,7 +177,7 @@ fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
 
 #[test]
 fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().tare_request += 1;
     board.step();
     board.command().torque = true;
@@ -206,7 +201,7 @@ fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
 
 #[test]
 fn identify_that_waits_is_refused_once_torque_is_off() {
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().tare_request += 1;
     board.command().torque = true;
     board.command().identify_request += 1;
@@ -219,7 +214,7 @@ fn identify_that_waits_is_refused_once_torque_is_off() {
 
 #[test]
 fn identify_without_a_tare_is_refused() {
-    let mut board = new();
+    let mut board = Bench::default();
     board.command().torque = true;
     board.step();
     board.command().identify_request += 1;
@@ -258,7 +253,7 @@ fn measuring() -> Bench {
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
     let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
     for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
-        let mut board = new();
+        let mut board = Bench::default();
         board.tare();
         board.command().torque = false;
         board.command().goal = newtons(7_000);

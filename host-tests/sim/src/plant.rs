@@ -5,8 +5,7 @@
 //!
 //! ```
 //! use sim::bridge::Bridge;
-//! use sim::plant::Plant;
-//! use sim::setup::Setup;
+//! use sim::plant::{Plant, Setup};
 //!
 //! let mut plant = Plant::new(&Setup::default());
 //! while plant.force_n() < 1.0 {
@@ -18,6 +17,7 @@
 mod faults;
 mod parts;
 
+pub use crate::setup::Setup;
 pub use faults::{ArrayFaults, Faults, Row, Taxel};
 pub use parts::{Drive, Reference, Sensor};
 
@@ -27,7 +27,6 @@ use crate::mechanics::body::Surroundings;
 use crate::mechanics::decay::decay;
 use crate::mechanics::finger::{Finger, Motion};
 use crate::mechanics::rotor::Shaft;
-use crate::setup::Setup;
 use crate::world::World;
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};

@@ -10,8 +10,7 @@ use fastrand::Rng;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Frame, Picture, Pipeline, ROWS};
 use images::record::Record;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 const SEED: u64 = 2003;
 

@@ -6,8 +6,7 @@ use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
 use sim::bridge::Bridge;
 use sim::mechanics::cells::Cell;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
 use std::time::Instant;
 

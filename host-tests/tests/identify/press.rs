@@ -5,8 +5,7 @@ use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Mode;
 use sim::native::bench::Bench;
-use sim::plant::Taxel;
-use sim::setup::Setup;
+use sim::plant::{Setup, Taxel};
 
 /// The longest that a measurement takes.
 const FRAMES_MAX: u32 = 60_000;
@@ -89,7 +88,7 @@ fn from_a_held_force_and_back_to_it() {
         board.step();
     }
     assert_eq!(board.step().mode, Mode::Force);
-    assert!((board.force_n() - 2.0).abs() < 0.02);
+    assert!((board.truth().force_n - 2.0).abs() < 0.02);
 }
 
 #[test]
@@ -100,9 +99,9 @@ fn it_presses_slowly_no_harder_than_allowed_and_lets_go() {
     let mut frames = 0;
     while board.step().identification == Identification::Running || frames == 0 {
         frames += 1;
-        peak_n = peak_n.max(board.force_n());
-        if board.force_n() > 0.2 {
-            fastest_mm_per_s = fastest_mm_per_s.max(board.speed_mm_per_s());
+        peak_n = peak_n.max(board.truth().force_n);
+        if board.truth().force_n > 0.2 {
+            fastest_mm_per_s = fastest_mm_per_s.max(board.truth().speed_mm_per_s);
         }
     }
     assert!((6.9..=7.05).contains(&peak_n), "{peak_n} N");
@@ -110,7 +109,7 @@ fn it_presses_slowly_no_harder_than_allowed_and_lets_go() {
     for _ in 0..3_000 {
         board.step();
     }
-    assert_eq!((board.step().mode, board.force_n()), (Mode::Release, 0.0));
+    assert_eq!((board.step().mode, board.truth().force_n), (Mode::Release, 0.0));
 }
 
 #[test]
@@ -174,7 +173,7 @@ fn torque_off_a_fault_and_new_parameters_interrupt_it() {
 
 #[test]
 fn without_torque_it_is_refused() {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::default();
     assert_eq!(board.step().identification, Identification::None);
     board.command().identify_request += 1;
     let status = board.step();

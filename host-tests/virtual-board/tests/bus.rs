@@ -12,8 +12,7 @@ use fingertip::link::sender::Sender;
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {

@@ -7,8 +7,7 @@ mod common;
 
 use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use fingertip::shipped::address;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The longest that a press takes, with what is worked out after it.

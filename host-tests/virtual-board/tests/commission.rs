@@ -6,8 +6,7 @@ use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_u8};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The parameters that commissioning may change.

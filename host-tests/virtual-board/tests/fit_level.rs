@@ -10,8 +10,7 @@ use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The place of a parameter.

@@ -7,8 +7,7 @@ mod common;
 use common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use std::sync::Mutex;
 use virtual_board::{Options, Rig};
 

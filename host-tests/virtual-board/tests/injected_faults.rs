@@ -10,8 +10,7 @@ use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Fault as Number;
 use sim::bridge::Bridge;
-use sim::plant::{Faults, Plant, Row, Taxel};
-use sim::setup::Setup;
+use sim::plant::{Faults, Plant, Row, Setup, Taxel};
 use std::sync::Mutex;
 use virtual_board::{Fault, Options, Rig};
 

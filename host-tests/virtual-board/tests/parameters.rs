@@ -9,8 +9,7 @@ use fingertip::link::table::address;
 use fingertip::shipped::Record;
 use fingertip::store::SLOT_BYTES;
 use sim::encode;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
 use virtual_board::{Options, Rig};
 

@@ -5,8 +5,7 @@
 mod common;
 
 use common::image;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use virtual_board::measure::PinEdge;
 use virtual_board::{Fault, Options, Rig};
 

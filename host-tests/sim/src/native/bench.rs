@@ -13,6 +13,7 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
@@ -46,10 +47,6 @@ impl<E: Set> Bench<E> {
 
     fn unit(&self) -> &Unit<E> {
         &self.board.units[0]
-    }
-
-    fn finger(&self) -> &Finger<E::Drive, E::Contact> {
-        &self.board.world.fingers()[0]
     }
 
     fn finger_mut(&mut self) -> &mut Finger<E::Drive, E::Contact> {
@@ -121,21 +118,6 @@ impl<E: Set> Bench<E> {
         self.board.world.truth(0, false)
     }
 
-    /// The true contact force.
-    pub fn force_n(&self) -> f64 {
-        self.board.world.force_n(0)
-    }
-
-    /// How far the tip has come.
-    pub fn travel_mm(&self) -> f64 {
-        self.finger().tip_mm()
-    }
-
-    /// Speed of the tip.
-    pub fn speed_mm_per_s(&self) -> f64 {
-        self.finger().speed_mm_per_s()
-    }
-
     /// Puts the tip at rest at a travel, as if carried there.
     pub fn place(&mut self, travel_mm: f64) {
         self.finger_mut().place(travel_mm);
@@ -154,6 +136,13 @@ impl<E: Set> Bench<E> {
             unit.sensor.pressure(row, 0.0, &mut kpa);
             kpa.map(|kpa| kpa / 100.0)
         })
+    }
+}
+
+impl Default for Bench {
+    /// The reference finger under a controller with the default parameters.
+    fn default() -> Self {
+        Self::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("the defaults are allowed"))
     }
 }
 

@@ -4,8 +4,7 @@ use super::{free, pressed};
 use fingertip::shipped::{COLUMNS, ROWS};
 use proptest::prelude::*;
 use sim::mechanics::cells::Cell;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use sim::setup::Tip;
 
 const ORACLE: &str = include_str!("../../../oracle/park2003.csv");

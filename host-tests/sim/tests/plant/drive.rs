@@ -3,8 +3,7 @@
 use super::{STEP_S, free, pressed, run};
 use proptest::prelude::*;
 use sim::bridge::Bridge;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 const FULL: Bridge = Bridge::Driven { duty: 1.0 };
 const RPM: f64 = 60.0 / std::f64::consts::TAU;
@@ -137,23 +136,6 @@ proptest! {
     #![proptest_config(super::cases(256))]
 
     #[test]
-    fn coasting_and_braking_never_create_energy(
-        d in 0.0..4.0f64, kick_s in 0.0..0.02f64, duty in -1.0..1.0f64, step_s in 1e-6..1e-3f64, brake: bool,
-    ) {
-        let mut world = pressed(d);
-        run(&mut world, kick_s, Bridge::Driven { duty });
-        let bridge = if brake { Bridge::Driven { duty: 0.0 } } else { Bridge::Coast };
-        let mut before = energy_j(&world);
-        let start = before;
-        for _ in 0..200 {
-            world.advance(step_s, bridge);
-            let now = energy_j(&world);
-            prop_assert!(now <= before + 1e-12 * start, "{now} after {before}");
-            before = now;
-        }
-    }
-
-    #[test]
     fn a_snapshot_restores_every_bit(d in 0.0..4.0f64, duty in -1.0..1.0f64) {
         let mut world = pressed(d);
         run(&mut world, 1e-3, Bridge::Driven { duty });
@@ -168,36 +150,6 @@ proptest! {
             prop_assert_eq!(world.shaft(), restored.shaft());
             prop_assert_eq!(world.slot_codes(5), restored.slot_codes(5));
         }
-    }
-}
-
-/// Into the wall at speed, back out, to rest and forth again: contact, friction's reversal and the stick are all met.
-fn scenario(step_s: f64, until_s: f64) -> f64 {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.5;
-    let mut world = Plant::new(&setup);
-    let steps = (until_s / step_s).round() as usize;
-    for n in 0..steps {
-        // The bridge changes at 16 ms and 32 ms, whole steps of every length tried.
-        let duty = match (n as f64 + 0.5) * step_s {
-            t if t < 0.016 => 0.6,
-            t if t < 0.032 => -0.5,
-            _ => 0.4,
-        };
-        world.advance(step_s, Bridge::Driven { duty });
-    }
-    world.travel_mm()
-}
-
-#[test]
-fn halving_the_step_quarters_the_error() {
-    for until_s in [0.016, 0.032, 0.048] {
-        let truth = scenario(0.25e-6, until_s);
-        let errors = [160e-6, 80e-6, 40e-6, 20e-6, 10e-6].map(|step_s| (scenario(step_s, until_s) - truth).abs());
-        // Averaged over four halvings.
-        let gain = (errors[0] / errors[4]).powf(0.25);
-        assert!((3.7..4.3).contains(&gain), "{gain} a halving at {until_s} s: {errors:?}");
-        assert!(errors[4] < 1e-6, "{:e} mm at 10 us", errors[4]);
     }
 }
 
@@ -225,20 +177,8 @@ fn a_frozen_encoder_stands_still_and_catches_up() {
 }
 
 #[test]
-fn the_supply_sags_by_the_share_of_the_current_that_it_gives() {
+fn a_supply_that_drops_is_sensed() {
     let mut world = Plant::new(&free());
-    for duty in [1.0, -1.0, 0.5] {
-        world.place(0.0);
-        world.advance(0.0, Bridge::Driven { duty });
-        let current = duty * 6.0 / (2.83 + 0.7 + duty * duty * 0.1);
-        assert!((world.current_a() - current).abs() < 1e-12);
-        assert!((world.supply_v() - (6.0 - 0.1 * duty * current)).abs() < 1e-12);
-    }
-    let mut setup = free();
-    setup.supply.bridge_ohm = 0.0;
-    let mut world = Plant::new(&setup);
-    world.advance(0.0, Bridge::Driven { duty: 0.5 });
-    assert!((world.current_a() - 3.0 / (2.83 + 0.025)).abs() < 1e-12);
     world.faults.supply_drop_v = 2.0;
     world.advance(0.0, Bridge::Coast);
     assert_eq!(world.supply_v(), 4.0);

@@ -3,8 +3,7 @@
 use super::pressed;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::mechanics::decay::decay;
-use sim::plant::{Plant, Row, Taxel};
-use sim::setup::Setup;
+use sim::plant::{Plant, Row, Setup, Taxel};
 
 const NONE: [bool; ROWS] = [false; ROWS];
 
@@ -20,20 +19,6 @@ fn the_boards_reference_figures() {
     assert!((array.preload_siemens * codes_ohm - 40.0).abs() < 1e-9);
     assert!((array.siemens_per_kpa * codes_ohm - 24.0).abs() < 1e-9);
     assert!((array.row_ohm / codes_ohm - 1.667e-6).abs() < 1e-9);
-}
-
-#[test]
-fn a_row_sags_by_its_sum() {
-    let mut world = pressed(2.0);
-    for row in 0..ROWS {
-        let ideal: [f64; COLUMNS] = std::array::from_fn(|column| 40.0 + 24.0 * world.pressure_kpa(row, column));
-        let sag = 1.0 / (1.0 + 30.0 / 1.8e7 * ideal.iter().sum::<f64>());
-        let volts = world.settled_volts(&only(row));
-        for column in 0..COLUMNS {
-            let codes = (volts[column] - 0.3) * 4096.0 / 3.3;
-            assert!((codes - ideal[column] * sag).abs() < 1e-9, "({row}, {column})");
-        }
-    }
 }
 
 #[test]

@@ -8,8 +8,7 @@ mod same;
 
 use proptest::test_runner::{Config, RngSeed};
 use sim::bridge::Bridge;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 /// The step that the tests vouch for.
 const STEP_S: f64 = 10e-6;

@@ -3,8 +3,7 @@
 use super::STEP_S;
 use sim::bridge::Bridge;
 use sim::optimal::{Reason, minimum_time_s, profile};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 const NO_LIMIT: f64 = f64::INFINITY;
 

@@ -30,7 +30,7 @@ fn a_scene_that_names_what_the_plant_holds_is_the_same_to_the_bit() {
         for frame in 0..1_000 {
             assert_eq!(named.step(), plant.step(), "{goal_mn} mN, frame {frame}");
             assert_eq!(named.frame(), plant.frame(), "{goal_mn} mN, frame {frame}");
-            assert_eq!(named.force_n(), plant.force_n(), "{goal_mn} mN, frame {frame}");
+            assert_eq!(named.truth().force_n, plant.truth().force_n, "{goal_mn} mN, frame {frame}");
         }
         assert_eq!(plant.status().mode, if goal_mn > 0 { Mode::Force } else { Mode::Release });
     }

@@ -1,7 +1,6 @@
 //! `virtual-board run`.
 
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use std::path::PathBuf;
 use std::time::Instant;
 use virtual_board::{Error, Options, Rig};

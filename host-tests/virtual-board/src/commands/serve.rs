@@ -2,8 +2,7 @@
 
 use output::say;
 use serve::{Place, Port};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;

@@ -4,8 +4,7 @@
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
 use sim::encode;
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use virtual_board::flash::SECTOR;

@@ -1,11 +1,12 @@
 //! Codes to contact: the plant's electrical model against what the core reads back.
 
+mod characteristic;
+
 use fingertip::contact::Contact;
 use fingertip::contact::from_sums;
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
-use sim::plant::Plant;
-use sim::setup::Setup;
+use sim::plant::{Plant, Setup};
 
 struct Bench {
     world: Plant,
@@ -16,7 +17,11 @@ struct Bench {
 
 impl Bench {
     fn new(setup: &Setup) -> Self {
-        let config = Config::shipped(&Params::DEFAULT).unwrap();
+        Self::with(setup, &Params::DEFAULT)
+    }
+
+    fn with(setup: &Setup, params: &Params) -> Self {
+        let config = Config::shipped(params).unwrap();
         let mut bench = Self { world: Plant::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
         bench.tare();
         bench

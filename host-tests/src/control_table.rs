@@ -1,10 +1,10 @@
 //! Renders the control table's definition as `docs/control-table.md`.
 
-use crate::units;
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, Kind, READ_MAX, Register};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, TAXELS, address};
+use output::units;
 
 /// How this page is made anew.
 pub const COMMAND: &str = "cargo xtask docs";

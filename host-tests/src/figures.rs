@@ -3,13 +3,13 @@
 //! Forces and pressures are the core's. What the array sees is the core's pressure averaged over each taxel of an ideal
 //! 10 x 10 array: simulated, as are the readings of figure 11, to which noise is added. Nothing here was measured.
 
-use crate::heatmap::Pressures;
-use crate::plot::{Curve, Curves, Map, PlotError, curves, maps};
 use fastrand::Rng;
 use fingertip::identify::{DepthFit, Modulus, Refusal};
 use fingertip::model::Tip;
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
+use output::heatmap::Pressures;
+use output::plot::{Curve, Curves, Map, PlotError, curves, maps};
 
 /// Distance from taxel to taxel: the largest contact shown, 14.3 mm across, fits the array.
 pub const PITCH_MM: f64 = 1.5;

@@ -8,12 +8,12 @@ mod reading;
 
 pub use reading::{Noise, Reading, Steps, picture};
 
-use crate::plant::Setup;
-use crate::plant::cells::Cell;
 use core::f64::consts::{PI, TAU};
 use fastrand::Rng;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, ROWS};
+use sim::mechanics::cells::Cell;
+use sim::setup::Setup;
 
 /// Radius of the reference tip.
 pub const RADIUS_MM: f64 = 10.0;

@@ -4,8 +4,6 @@
 //! Made anew where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
 //! seed.
 
-use crate::native::Native;
-use crate::plant::Setup;
 use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::config::newtons;
@@ -14,6 +12,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
+use sim::native::bench::Bench;
 
 /// Frames in the recording.
 pub const RECORDS: usize = 10_000;
@@ -33,17 +32,16 @@ const SEED: u64 = 2003;
 /// # Panics
 /// Never: the default parameters are sound, as the core's own tests show.
 pub fn records() -> Vec<Record> {
-    let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
-    let mut board = Native::new(&Setup::default(), &config);
+    let mut board = Bench::default();
     let mut random = Rng::with_seed(SEED);
     let mut clears = 0;
     let mut held = Sense::default();
     let mut records = Vec::with_capacity(RECORDS);
     for index in 0..RECORDS {
-        board.command.tare_request = 1;
-        board.command.torque = index >= 100;
+        board.command().tare_request = 1;
+        board.command().torque = index >= 100;
         if let Some((_, goal_mn)) = GOALS_MN.iter().find(|(from, _)| *from == index) {
-            board.command.goal = newtons(*goal_mn);
+            board.command().goal = newtons(*goal_mn);
         }
         // What breaks comes before the core, so that the finger does what the core makes of it.
         board.step_with(|record| {

@@ -1,19 +1,17 @@
 //! What the bridge is told by each mode, and by a look at a frame that is still being scanned.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Status};
-use fingertip::shipped::{Config, Frame};
+use fingertip::shipped::Frame;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
-use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::native::bench::Bench;
 
 /// Holds 1 N, with the duty that this takes.
-fn holding() -> Native {
-    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("allowed"));
-    board.tare_and_enable();
-    board.command.goal = newtons(1_000);
+fn holding() -> Bench {
+    let mut board = Bench::default();
+    board.tare();
+    board.command().goal = newtons(1_000);
     for _ in 0..5_000 {
         board.step();
     }
@@ -32,21 +30,22 @@ fn dead(frame: &Frame, count: usize) -> Frame {
 #[test]
 fn a_sound_frame_changes_nothing() {
     let mut board = holding();
-    let before = *board.pipeline.status();
-    let allowed = board.pipeline.config().params.bad_taxels_max as usize;
-    for frame in [board.frame, dead(&board.frame, allowed)] {
-        assert!(!board.pipeline.check_part(&frame));
-        assert_eq!(*board.pipeline.status(), before);
+    let before = *board.status();
+    let allowed = board.pipeline().config().params.bad_taxels_max as usize;
+    for frame in [*board.frame(), dead(board.frame(), allowed)] {
+        assert!(!board.pipeline().check_part(&frame));
+        assert_eq!(*board.status(), before);
     }
 }
 
 #[test]
 fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
     let mut board = holding();
-    let before = *board.pipeline.status();
-    let frame = dead(&board.frame, board.pipeline.config().params.bad_taxels_max as usize + 1);
-    assert!(board.pipeline.check_part(&frame));
-    let after = *board.pipeline.status();
+    let before = *board.status();
+    let broken = board.pipeline().config().params.bad_taxels_max as usize + 1;
+    let frame = dead(board.frame(), broken);
+    assert!(board.pipeline().check_part(&frame));
+    let after = *board.status();
     assert_eq!((after.mode, after.fault, after.duty.0), (Mode::Force, None, 0));
     assert!(before.duty.0 > 0);
 }
@@ -54,10 +53,10 @@ fn a_broken_frame_shorts_the_motor_and_leaves_the_verdict_to_the_step() {
 #[test]
 fn nothing_is_looked_at_while_the_bridge_is_off() {
     let mut board = holding();
-    board.command.torque = false;
+    board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Off);
-    let frame = dead(&board.frame, 10);
-    assert!(!board.pipeline.check_part(&frame));
+    let frame = dead(board.frame(), 10);
+    assert!(!board.pipeline().check_part(&frame));
 }
 
 /// A fault brakes, that of the bridge itself puts it to sleep; off and tare let the motor coast.

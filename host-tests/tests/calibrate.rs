@@ -7,8 +7,8 @@ use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{Calibration, Config, Gains, TAXELS};
 use fingertip::state::Mode;
-use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 /// The longest that a press takes, with what is worked out after it.
 const FRAMES_MAX: u32 = 60_000;
@@ -23,19 +23,19 @@ fn wrong() -> Gains {
     gains
 }
 
-fn board(setup: &Setup, params: &Params, gains: &Gains) -> Native {
-    let mut board = Native::new(setup, &Config::shipped(params).unwrap());
-    board.pipeline.calibrate(&Calibration::of(gains));
-    board.tare_and_enable();
+fn board(setup: &Setup, params: &Params, gains: &Gains) -> Bench {
+    let mut board = Bench::of(setup, &Config::shipped(params).unwrap());
+    board.pipeline().calibrate(&Calibration::of(gains));
+    board.tare();
     board.step();
     board
 }
 
-fn press(board: &mut Native) -> State {
-    board.command.calibrate_request += 1;
+fn press(board: &mut Bench) -> State {
+    board.command().calibrate_request += 1;
     for _ in 0..FRAMES_MAX {
         let status = board.step();
-        if status.taken.calibrate == board.command.calibrate_request && status.calibration.state.number() > 1 {
+        if status.taken.calibrate == board.command().calibrate_request && status.calibration.state.number() > 1 {
             return status.calibration.state;
         }
     }
@@ -43,8 +43,8 @@ fn press(board: &mut Native) -> State {
 }
 
 /// How far proposed gains of taxels that are known to 2 % are off what they should be, at worst.
-fn worst_off(board: &Native) -> (f64, usize) {
-    let proposal = board.pipeline.proposal();
+fn worst_off(board: &mut Bench) -> (f64, usize) {
+    let proposal = board.pipeline().proposal();
     let known = (0..TAXELS).filter(|place| proposal.sigmas[place / 10][place % 10] < 20);
     let off: Vec<f64> =
         known.map(|place| (f64::from(proposal.gains.get(place)) / f64::from(GAIN_ONE) - 1.0).abs()).collect();
@@ -64,18 +64,18 @@ fn wrong_gains_are_set_right_also_of_a_curve() {
         let params = Params { curve_permille, codes_per_kpa_milli, ..Params::DEFAULT };
         let mut board = board(&setup, &params, &wrong());
         assert_eq!(press(&mut board), State::Done, "growth {growth}");
-        let (worst, known) = worst_off(&board);
+        let (worst, known) = worst_off(&mut board);
         println!("growth {growth}: {known} taxels, the worst {:.2} % off", 100.0 * worst);
         assert!(known > 40 && worst < share, "growth {growth}: {worst} of {known}");
-        let gains = board.pipeline.proposal().gains;
+        let gains = board.pipeline().proposal().gains;
         for _ in 0..5_000 {
             board.step();
         }
-        board.command.torque = false;
-        board.pipeline.calibrate(&Calibration::of(&gains));
-        board.tare_and_enable();
+        board.command().torque = false;
+        board.pipeline().calibrate(&Calibration::of(&gains));
+        board.tare();
         assert_eq!(press(&mut board), State::Done, "growth {growth}");
-        let (worst, known) = worst_off(&board);
+        let (worst, known) = worst_off(&mut board);
         println!("    again: {known} taxels, the worst {:.2} % off", 100.0 * worst);
         assert!(known > 40 && worst < 0.02, "growth {growth}: {worst} of {known}");
     }
@@ -84,8 +84,8 @@ fn wrong_gains_are_set_right_also_of_a_curve() {
 #[test]
 fn a_modulus_asked_for_meanwhile_waits_and_so_does_a_press() {
     let mut board = board(&Setup::default(), &Params::DEFAULT, &Gains::ONE);
-    board.command.calibrate_request += 1;
-    board.command.identify_request += 1;
+    board.command().calibrate_request += 1;
+    board.command().identify_request += 1;
     let mut modes = vec![Mode::Off];
     for _ in 0..2 * FRAMES_MAX {
         let status = board.step();
@@ -107,52 +107,52 @@ fn a_modulus_asked_for_meanwhile_waits_and_so_does_a_press() {
 #[test]
 fn the_next_press_waits_until_the_last_one_is_worked_out() {
     let mut board = board(&Setup::default(), &Params::DEFAULT, &Gains::ONE);
-    board.command.calibrate_request += 1;
+    board.command().calibrate_request += 1;
     while board.step().mode != Mode::Identify {}
     while board.step().mode == Mode::Identify {}
-    board.command.calibrate_request += 1;
+    board.command().calibrate_request += 1;
     let mut working = 0;
     while board.step().mode != Mode::Identify {
         working += 1;
         assert!(working < 4_000);
     }
     assert!(working > 1_000, "{working} frames of work");
-    assert_eq!(board.pipeline.status().calibration.presses, 1);
+    assert_eq!(board.status().calibration.presses, 1);
     for _ in 0..FRAMES_MAX {
         if board.step().calibration.state != State::Running {
             break;
         }
     }
-    let standing = board.pipeline.status().calibration;
+    let standing = board.status().calibration;
     assert_eq!((standing.state, standing.presses), (State::Done, 2));
     // What is forgotten is gone at once, and does not come back with the next press.
-    board.command.forget_request += 1;
+    board.command().forget_request += 1;
     let standing = board.step().calibration;
     assert_eq!((standing.presses, standing.reached), (0, 0));
-    assert_eq!(worst_off(&board).1, 0);
+    assert_eq!(worst_off(&mut board).1, 0);
     assert_eq!(press(&mut board), State::Done);
-    assert_eq!(board.pipeline.status().calibration.presses, 1);
+    assert_eq!(board.status().calibration.presses, 1);
     // Forgotten in the middle of the work: nothing is proposed.
-    board.command.calibrate_request += 1;
+    board.command().calibrate_request += 1;
     while board.step().mode != Mode::Identify {}
     while board.step().mode == Mode::Identify {}
     for _ in 0..1_000 {
         board.step();
     }
-    board.command.forget_request += 1;
+    board.command().forget_request += 1;
     let standing = board.step().calibration;
     assert_eq!((standing.state, standing.presses), (State::Refused(Refusal::Interrupted), 0));
     for _ in 0..3_000 {
         board.step();
     }
-    assert_eq!(worst_off(&board).1, 0);
+    assert_eq!(worst_off(&mut board).1, 0);
 }
 
 #[test]
 fn without_torque_or_tare_it_is_refused() {
-    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::default();
     assert_eq!(board.step().calibration.state, State::None);
-    board.command.calibrate_request += 1;
+    board.command().calibrate_request += 1;
     let status = board.step();
     assert_eq!((status.mode, status.calibration.state), (Mode::Off, State::Refused(Refusal::NotReady)));
 }
@@ -162,13 +162,13 @@ fn without_torque_or_tare_it_is_refused() {
 fn it_presses_no_harder_than_allowed_and_lets_go() {
     let params = Params { force_max_mn: 4_000, ..Params::DEFAULT };
     let mut board = board(&Setup::default(), &params, &wrong());
-    board.command.calibrate_request += 1;
+    board.command().calibrate_request += 1;
     let mut peak_n = 0.0_f64;
     for _ in 0..20_000 {
         board.step();
-        peak_n = peak_n.max(board.world.force_n());
+        peak_n = peak_n.max(board.truth().force_n);
     }
     let status = board.step();
-    assert_eq!((status.calibration.state, status.mode, board.world.force_n()), (State::Done, Mode::Release, 0.0));
+    assert_eq!((status.calibration.state, status.mode, board.truth().force_n), (State::Done, Mode::Release, 0.0));
     assert!((3.7..4.2).contains(&peak_n), "{peak_n} N");
 }

@@ -5,13 +5,13 @@ use fingertip::params::Params;
 use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use fingertip::state::Mode;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
 
 /// A frame of a contact of 1.5 mm, and one without contact.
 fn frames() -> [Frame; 2] {
-    let mut world = World::new(&Setup::default());
+    let mut world = Plant::new(&Setup::default());
     let mut frames = [Frame::EMPTY; 2];
     world.fill_frame(&mut frames[1]);
     world.place(world.setup().wall.distance_mm + 1.5);

@@ -4,21 +4,22 @@
 use fingertip::commission::{Commissioning, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
-use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 const TIMES: usize = 9;
 const FRAMES: usize = 100_000;
 
 /// Where the tip is.
-fn place(board: &Native) -> f64 {
-    board.world.travel_mm()
+fn place(board: &mut Bench) -> f64 {
+    board.truth().travel_mm
 }
 
 /// Measures once; how far the tip went from where it was.
-fn measure(board: &mut Native) -> f64 {
+fn measure(board: &mut Bench) -> f64 {
     let begun = place(board);
-    board.command.commission_request = Task::Measure.after(board.command.commission_request);
+    let asked = board.command().commission_request;
+    board.command().commission_request = Task::Measure.after(asked);
     let mut farthest = 0.0_f64;
     for _ in 0..FRAMES {
         let status = board.step();
@@ -53,16 +54,16 @@ fn the_tip_ends_where_it_began_however_often_the_drive_is_measured() {
         setup.motor.torque_nm_per_a *= torque;
         setup.motor.inertia_kg_m2 *= inertia;
         setup.motor.friction_nm = friction_unm * 1e-6;
-        let mut board = Native::new(&setup, &config);
-        board.tare_and_enable();
-        board.command.torque = false;
-        let first = place(&board);
+        let mut board = Bench::of(&setup, &config);
+        board.tare();
+        board.command().torque = false;
+        let first = place(&mut board);
         for _ in 0..TIMES {
-            let before = place(&board);
+            let before = place(&mut board);
             farthest = farthest.max(measure(&mut board));
-            each = each.max((place(&board) - before).abs());
+            each = each.max((place(&mut board) - before).abs());
         }
-        let after = place(&board) - first;
+        let after = place(&mut board) - first;
         println!("R {ohm}, k {torque}, J {inertia}, friction {friction_unm} uN m: {after:.3} mm after {TIMES}");
         all = all.max(after.abs());
     }

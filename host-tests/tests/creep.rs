@@ -6,10 +6,10 @@ use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::{Fault, Mode};
 use fingertip::units::Newtons;
-use host_tests::native::Native;
-use host_tests::plant::Setup;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 fn config(creep_permille: i32, creep_time_ms: i32) -> Config {
     Config::shipped(&Params { creep_permille, creep_time_ms, ..Params::DEFAULT }).unwrap()
@@ -75,14 +75,14 @@ proptest! {
 }
 
 /// A board that holds so much for a time, s; its true force and status.
-fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Native) {
-    let mut board = Native::new(&Setup::default(), config);
-    board.tare_and_enable();
-    board.command.goal = newtons(goal_mn);
+fn hold(config: &Config, goal_mn: i32, seconds: f64) -> (f64, Bench) {
+    let mut board = Bench::of(&Setup::default(), config);
+    board.tare();
+    board.command().goal = newtons(goal_mn);
     while board.time_s() < seconds {
         board.step();
     }
-    (board.world.force_n(), board)
+    (board.truth().force_n, board)
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
     // This array does not creep: the loop presses harder by all that it takes for creep.
     let (force, board) = hold(&config(100, 500), 2_000, 4.0);
     assert!((2.19..2.21).contains(&force), "{force}");
-    let status = board.pipeline.status();
+    let status = board.status();
     assert_eq!((status.mode, status.fault), (Mode::Force, None));
     let [contact, creep]: [f64; 2] = [status.contact.force, status.creep].map(|force| force.0.to_num());
     assert!((contact - force).abs() < 0.01 && (contact - creep - 2.0).abs() < 0.01, "{contact} {creep}");
@@ -103,7 +103,7 @@ fn it_never_leads_beyond_the_largest_force() {
     let params = Params { creep_permille: 300, creep_time_ms: 500, force_max_mn: 3_000, ..Params::DEFAULT };
     let (force, board) = hold(&Config::shipped(&params).unwrap(), 3_000, 3.0);
     assert!((2.98..3.02).contains(&force), "{force}");
-    assert_eq!(board.pipeline.status().fault, None);
+    assert_eq!(board.status().fault, None);
 }
 
 #[test]
@@ -117,11 +117,11 @@ fn over_force_is_judged_by_the_reading() {
         ..Params::DEFAULT
     };
     let (_, mut board) = hold(&Config::shipped(&params).unwrap(), 2_000, 4.0);
-    assert_eq!(board.pipeline.status().fault, None);
-    let travel = board.world.travel_mm();
-    board.world.place(travel + 0.2);
+    assert_eq!(board.status().fault, None);
+    let travel = board.truth().travel_mm;
+    board.place(travel + 0.2);
     for _ in 0..50 {
         board.step();
     }
-    assert_eq!(board.pipeline.status().fault, Some(Fault::OverForce));
+    assert_eq!(board.status().fault, Some(Fault::OverForce));
 }

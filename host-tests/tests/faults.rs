@@ -1,18 +1,15 @@
 //! Each fault natively: found in time, latched, and cleared only with torque off.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::Config;
 use fingertip::state::{Fault, Limits, Mode};
-use host_tests::native::Native;
-use host_tests::plant::{Faults, Row, Setup, Taxel};
+use sim::native::bench::Bench;
+use sim::plant::{Faults, Row, Setup, Taxel};
 
-fn holding(goal_mn: i32) -> Native {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Native::new(&Setup::default(), &config);
-    board.tare_and_enable();
-    board.command.goal = newtons(goal_mn);
+fn holding(goal_mn: i32) -> Bench {
+    let mut board = Bench::default();
+    board.tare();
+    board.command().goal = newtons(goal_mn);
     for _ in 0..5_000 {
         board.step();
     }
@@ -21,7 +18,7 @@ fn holding(goal_mn: i32) -> Native {
 }
 
 /// Steps until a fault; the number of frames that took.
-fn frames_to_fault(board: &mut Native, at_most: u32) -> (u32, Status) {
+fn frames_to_fault(board: &mut Bench, at_most: u32) -> (u32, Status) {
     for frames in 1..=at_most {
         let status = board.step();
         if status.mode == Mode::Fault {
@@ -32,7 +29,7 @@ fn frames_to_fault(board: &mut Native, at_most: u32) -> (u32, Status) {
     panic!("no fault in {at_most} frames");
 }
 
-fn expect(board: &mut Native, fault: Fault, at_most: u32) {
+fn expect(board: &mut Bench, fault: Fault, at_most: u32) {
     let (frames, status) = frames_to_fault(board, at_most);
     assert_eq!(status.fault, Some(fault), "after {frames} frames");
 }
@@ -41,7 +38,7 @@ fn expect(board: &mut Native, fault: Fault, at_most: u32) {
 fn a_row_stuck_low_or_high() {
     for state in [Row::StuckLow, Row::StuckHigh] {
         let mut board = holding(1_000);
-        board.world.faults.array.rows[4] = state;
+        board.harm(|faults| faults.array.rows[4] = state);
         let (_, status) = frames_to_fault(&mut board, 2);
         assert!(matches!(status.fault, Some(Fault::ArrayBroken | Fault::RowStuck)), "{:?}", status.fault);
     }
@@ -50,7 +47,7 @@ fn a_row_stuck_low_or_high() {
 #[test]
 fn all_taxels_saturated() {
     let mut board = holding(1_000);
-    board.world.faults.array.saturated = true;
+    board.harm(|faults| faults.array.saturated = true);
     let (_, status) = frames_to_fault(&mut board, 2);
     assert!(matches!(status.fault, Some(Fault::ArrayBroken | Fault::RowStuck)), "{:?}", status.fault);
 }
@@ -60,7 +57,7 @@ fn twelve_taxels_dead_or_shorted() {
     for state in [Taxel::Dead, Taxel::Shorted] {
         let mut board = holding(1_000);
         for place in 0..12 {
-            board.world.faults.array.taxels[place * 7 / 10][place * 7 % 10] = state;
+            board.harm(|faults| faults.array.taxels[place * 7 / 10][place * 7 % 10] = state);
         }
         expect(&mut board, Fault::ArrayBroken, 2);
     }
@@ -71,7 +68,7 @@ fn twelve_taxels_dead_or_shorted() {
 #[test]
 fn taxels_that_are_bad_for_one_frame_are_no_fault() {
     let mut board = holding(1_000);
-    let spoil = |board: &mut Native, first: usize, count: usize| {
+    let spoil = |board: &mut Bench, first: usize, count: usize| {
         board.step_with(|record| {
             (first..first + count).for_each(|place| record.frame.set_code(place / 10 % 10, place % 10, 0));
         })
@@ -82,7 +79,7 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
         assert_eq!((status.fault, status.duty.0, status.contact), (None, 0, before), "{number}");
         assert!(status.limits.has(Limits::TAXELS));
     }
-    assert!((0.9..1.1).contains(&board.world.force_n()), "{} N", board.world.force_n());
+    assert!((0.9..1.1).contains(&board.truth().force_n), "{} N", board.truth().force_n);
     spoil(&mut board, 0, 12);
     assert_eq!(spoil(&mut board, 6, 12).fault, Some(Fault::ArrayBroken));
     assert_eq!(spoil(&mut holding(1_000), 0, 51).fault, Some(Fault::ArrayBroken));
@@ -91,7 +88,7 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
 #[test]
 fn a_few_bad_taxels_are_a_limit() {
     let mut board = holding(1_000);
-    board.world.faults.array.taxels[0][0] = Taxel::Dead;
+    board.harm(|faults| faults.array.taxels[0][0] = Taxel::Dead);
     let status = board.step();
     assert!(status.limits.has(Limits::TAXELS));
     assert_eq!((status.mode, status.contact.bad_taxels), (Mode::Force, 1));
@@ -100,25 +97,24 @@ fn a_few_bad_taxels_are_a_limit() {
 #[test]
 fn an_encoder_that_stands_still() {
     let mut board = holding(1_000);
-    board.world.faults.encoder_frozen = true;
-    board.command.goal = newtons(4_000);
+    board.harm(|faults| faults.encoder_frozen = true);
+    board.command().goal = newtons(4_000);
     expect(&mut board, Fault::EncoderFrozen, 200);
-    assert!(board.world.force_n() < 9.0);
+    assert!(board.truth().force_n < 9.0);
 
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Native::new(&Setup::default(), &config);
-    board.tare_and_enable();
-    board.world.faults.encoder_frozen = true;
-    board.command.goal = newtons(1_000);
+    let mut board = Bench::default();
+    board.tare();
+    board.harm(|faults| faults.encoder_frozen = true);
+    board.command().goal = newtons(1_000);
     expect(&mut board, Fault::EncoderFrozen, 100);
-    assert!(board.world.travel_mm() < 2.0, "{} mm", board.world.travel_mm());
+    assert!(board.truth().travel_mm < 2.0, "{} mm", board.truth().travel_mm);
 }
 
 /// Noise at no force looks like an indentation that the encoder does not see: it is no fault, however long it lasts.
 #[test]
 fn noise_at_no_force_is_not_a_frozen_encoder() {
-    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
-    board.tare_and_enable();
+    let mut board = Bench::default();
+    board.tare();
     for number in 0..5_000 {
         let status = board.step_with(|record| {
             for (row, column) in (0..10).flat_map(|row| (0..10).map(move |column| (row, column))) {
@@ -136,17 +132,17 @@ fn noise_at_no_force_is_not_a_frozen_encoder() {
 fn a_motor_that_runs_the_wrong_way() {
     for (encoder_reversed, leads_swapped) in [(true, false), (false, true)] {
         for goal_mn in [100, 1_000, 7_000] {
-            let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
-            board.tare_and_enable();
-            board.world.faults = Faults { encoder_reversed, leads_swapped, ..Faults::default() };
-            board.command.goal = newtons(goal_mn);
+            let mut board = Bench::default();
+            board.tare();
+            board.harm(|faults| *faults = Faults { encoder_reversed, leads_swapped, ..Faults::default() });
+            board.command().goal = newtons(goal_mn);
             let (_, status) = frames_to_fault(&mut board, 200);
             assert!(matches!(status.fault, Some(Fault::Reversed)), "{:?}", status.fault);
-            assert!(board.world.travel_mm().abs() <= 0.5, "{} mm", board.world.travel_mm());
+            assert!(board.truth().travel_mm.abs() <= 0.5, "{} mm", board.truth().travel_mm);
             for _ in 0..5_000 {
                 board.step();
             }
-            assert!(board.world.travel_mm().abs() <= 1.5, "{} mm", board.world.travel_mm());
+            assert!(board.truth().travel_mm.abs() <= 1.5, "{} mm", board.truth().travel_mm);
         }
     }
 }
@@ -154,16 +150,15 @@ fn a_motor_that_runs_the_wrong_way() {
 /// An end stop in front without a touch, and one behind on letting go: stopped, not pressed against for ever.
 #[test]
 fn an_end_stop_on_either_side_stops_the_motor() {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Native::new(&Setup::default(), &config);
-    board.tare_and_enable();
-    board.world.faults.end_stops_mm = Some([-1.0, 3.0]);
-    board.command.goal = newtons(1_000);
+    let mut board = Bench::default();
+    board.tare();
+    board.harm(|faults| faults.end_stops_mm = Some([-1.0, 3.0]));
+    board.command().goal = newtons(1_000);
     expect(&mut board, Fault::EncoderFrozen, 2_000);
 
     let mut board = holding(1_000);
-    board.world.faults.end_stops_mm = Some([4.6, 50.0]);
-    board.command.goal = newtons(0);
+    board.harm(|faults| faults.end_stops_mm = Some([4.6, 50.0]));
+    board.command().goal = newtons(0);
     expect(&mut board, Fault::EncoderFrozen, 3_000);
 }
 
@@ -171,15 +166,15 @@ fn an_end_stop_on_either_side_stops_the_motor() {
 fn an_array_that_stands_still() {
     let mut board = holding(1_000);
     // The frames repeat while the motor moves.
-    let frozen = board.frame;
-    let mut sense = board.sense;
-    let mut command = board.command;
+    let frozen = *board.frame();
+    let mut sense = board.record().sense;
+    let mut command = *board.command();
     command.goal = newtons(3_000);
     let mut fault = None;
     for n in 1..500 {
         sense.encoder += 5;
         let frame = fingertip::shipped::Frame { sequence: frozen.sequence + n, ..frozen };
-        fault = board.pipeline.step(&frame, &sense, &command).1.fault;
+        fault = board.pipeline().step(&frame, &sense, &command).1.fault;
         if fault.is_some() {
             break;
         }
@@ -190,53 +185,52 @@ fn an_array_that_stands_still() {
 #[test]
 fn too_much_force() {
     let mut board = holding(5_000);
-    board.world.setup_mut().wall.distance_mm -= 1.5;
+    board.place_object(Setup::default().wall.distance_mm - 1.5);
     expect(&mut board, Fault::OverForce, 2);
 }
 
 #[test]
 fn a_silent_bus() {
     let mut board = holding(1_000);
-    let mut sense = board.sense;
-    let mut command = board.command;
+    let mut sense = board.record().sense;
+    let mut command = *board.command();
     command.bus_watchdog_ms = 40;
     for (silent_ms, expected) in [(39, None), (40, Some(Fault::BusSilent))] {
         sense.bus_silent_ms = silent_ms;
-        let frame = fingertip::shipped::Frame { sequence: board.frame.sequence + 1, ..board.frame };
-        assert_eq!(board.pipeline.step(&frame, &sense, &command).1.fault, expected);
+        let frame = fingertip::shipped::Frame { sequence: board.frame().sequence + 1, ..*board.frame() };
+        assert_eq!(board.pipeline().step(&frame, &sense, &command).1.fault, expected);
     }
 }
 
 #[test]
 fn a_supply_that_sags() {
     let mut board = holding(1_000);
-    board.world.faults.supply_drop_v = 2.0;
+    board.harm(|faults| faults.supply_drop_v = 2.0);
     expect(&mut board, Fault::SupplyLow, 10);
 }
 
 #[test]
 fn a_fault_stays_until_it_is_cleared_with_torque_off() {
     let mut board = holding(1_000);
-    board.world.faults.supply_drop_v = 2.0;
+    board.harm(|faults| faults.supply_drop_v = 2.0);
     expect(&mut board, Fault::SupplyLow, 10);
-    board.world.faults.supply_drop_v = 0.0;
-    board.command.clear_request += 1;
+    board.harm(|faults| faults.supply_drop_v = 0.0);
+    board.command().clear_request += 1;
     assert_eq!(board.step().mode, Mode::Fault, "torque is still on");
-    board.command.torque = false;
+    board.command().torque = false;
     assert_eq!(board.step().mode, Mode::Fault, "the request came with torque on");
-    board.command.clear_request += 1;
+    board.command().clear_request += 1;
     let status = board.step();
     assert_eq!((status.mode, status.fault), (Mode::Off, None));
-    board.command.torque = true;
+    board.command().torque = true;
     assert_eq!(board.step().mode, Mode::Approach);
 }
 
 #[test]
 fn torque_waits_for_a_tare() {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Native::new(&Setup::default(), &config);
-    board.command.torque = true;
-    board.command.goal = newtons(1_000);
+    let mut board = Bench::default();
+    board.command().torque = true;
+    board.command().goal = newtons(1_000);
     for _ in 0..100 {
         let status = board.step();
         assert_eq!(status.mode, Mode::Off);
@@ -247,9 +241,10 @@ fn torque_waits_for_a_tare() {
 #[test]
 fn missed_frames_are_counted() {
     let mut board = holding(1_000);
-    let mut frame = board.frame;
+    let mut frame = *board.frame();
     frame.sequence = frame.sequence.wrapping_add(4);
-    let (_, status) = board.pipeline.step(&frame, &board.sense, &board.command);
+    let record = board.record();
+    let (_, status) = board.pipeline().step(&frame, &record.sense, &record.command);
     assert_eq!(status.missed_frames, 3);
     assert!(status.limits.has(Limits::FRAME_MISSED));
 }

@@ -6,14 +6,14 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 
 /// Pressed in at once after the tare, with the centre so far from the array's middle, and left there for 5,000 frames:
 /// the true force and the last status.
 fn pressed(fit_level: FitLevel, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status) {
     let mut setup = Setup::default();
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
-    let mut world = World::new(&setup);
+    let mut world = Plant::new(&setup);
     let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let command = Command { tare_request: 1, fit_level, ..Command::default() };

@@ -1,28 +1,25 @@
 //! The loop natively: touch, steps, release. The same bounds hold for the flash image on the virtual board.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::Config;
 use fingertip::state::{Limits, Mode};
-use host_tests::native::Native;
-use host_tests::plant::Setup;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
-fn board() -> Native {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
-    let mut board = Native::new(&Setup::default(), &config);
-    board.tare_and_enable();
+fn board() -> Bench {
+    let mut board = Bench::default();
+    board.tare();
     board
 }
 
 /// True force after each frame of a stretch of time.
-fn run(board: &mut Native, goal_mn: i32, seconds: f64) -> (Vec<(f64, f64)>, Status) {
-    board.command.goal = newtons(goal_mn);
+fn run(board: &mut Bench, goal_mn: i32, seconds: f64) -> (Vec<(f64, f64)>, Status) {
+    board.command().goal = newtons(goal_mn);
     let start_s = board.time_s();
     let mut trace = Vec::new();
     let mut status = board.step();
     while board.time_s() - start_s < seconds {
-        trace.push((board.time_s() - start_s, board.world.force_n()));
+        trace.push((board.time_s() - start_s, board.truth().force_n));
         status = board.step();
     }
     (trace, status)
@@ -74,11 +71,11 @@ fn a_zero_goal_lets_go_and_stands_clear() {
     let (trace, status) = run(&mut board, 0, 0.5);
     assert_eq!((status.mode, status.fault), (Mode::Release, None));
     assert_eq!(trace.last().unwrap().1, 0.0);
-    let clear_mm = board.world.setup().wall.distance_mm - board.world.travel_mm();
+    let clear_mm = Setup::default().wall.distance_mm - board.truth().travel_mm;
     assert!((0.8..=1.3).contains(&clear_mm), "stands {clear_mm} mm clear");
-    let before_mm = board.world.travel_mm();
+    let before_mm = board.truth().travel_mm;
     run(&mut board, 0, 0.2);
-    assert!((board.world.travel_mm() - before_mm).abs() < 0.01);
+    assert!((board.truth().travel_mm - before_mm).abs() < 0.01);
 }
 
 #[test]
@@ -94,31 +91,31 @@ fn a_goal_beyond_the_limit_is_cut_and_said() {
 fn an_object_that_goes_away_is_not_chased() {
     let mut board = board();
     run(&mut board, 2_000, 0.5);
-    board.world.setup_mut().wall.distance_mm = 15.0;
+    board.place_object(15.0);
     let (_, status) = run(&mut board, 2_000, 0.05);
     assert_eq!(status.mode, Mode::Approach);
-    let speed = board.world.speed_mm_per_s();
+    let speed = board.truth().speed_mm_per_s;
     assert!((25.0..=35.0).contains(&speed), "{speed} mm/s");
     let (_, status) = run(&mut board, 2_000, 0.6);
     assert_eq!(status.mode, Mode::Force);
-    assert!((board.world.force_n() - 2.0).abs() < 0.015);
+    assert!((board.truth().force_n - 2.0).abs() < 0.015);
 }
 
 #[test]
 fn the_end_of_the_travel_stops_an_approach() {
     let mut board = board();
-    board.world.setup_mut().wall.distance_mm = 40.0;
+    board.place_object(40.0);
     let (_, status) = run(&mut board, 1_000, 1.0);
     assert!(status.limits.has(Limits::TRAVEL));
-    assert!((19.5..=20.5).contains(&board.world.travel_mm()), "{} mm", board.world.travel_mm());
-    assert!(board.world.speed_mm_per_s().abs() < 1.0);
+    assert!((19.5..=20.5).contains(&board.truth().travel_mm), "{} mm", board.truth().travel_mm);
+    assert!(board.truth().speed_mm_per_s.abs() < 1.0);
 }
 
 #[test]
 fn torque_off_lets_the_motor_coast() {
     let mut board = board();
     run(&mut board, 2_000, 0.5);
-    board.command.torque = false;
+    board.command().torque = false;
     let status = board.step();
     assert_eq!((status.mode, status.duty.0), (Mode::Off, 0));
 }
@@ -143,7 +140,7 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
         for _ in 0..3_000 {
             let status = board.step();
             lost += u32::from(status.mode != Mode::Force);
-            let force_n = board.world.force_n();
+            let force_n = board.truth().force_n;
             assert!((0.030..=0.050).contains(&force_n), "{goal_mn} mN: {force_n} N");
         }
         assert_eq!(lost, 0, "{goal_mn} mN");

@@ -7,35 +7,31 @@ use fingertip::params::Params;
 use fingertip::pipeline::Taring;
 use fingertip::shipped::{Config, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};
-use host_tests::native::Native;
-use host_tests::plant::{Setup, Taxel};
 use images::record::Record;
+use sim::native::bench::Bench;
+use sim::plant::Taxel;
 
 const NOT_READY: Identification = Identification::Refused(Refusal::NotReady);
 
-fn new() -> Native {
-    at(Setup::default().wall.distance_mm)
-}
-
 /// With the object so far away.
-fn at(distance_mm: f64) -> Native {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = distance_mm;
-    Native::new(&setup, &Config::shipped(&Params::DEFAULT).unwrap())
+fn at(distance_mm: f64) -> Bench {
+    let mut board = Bench::default();
+    board.place_object(distance_mm);
+    board
 }
 
-fn ready() -> Native {
-    let mut board = new();
-    board.tare_and_enable();
+fn ready() -> Bench {
+    let mut board = Bench::default();
+    board.tare();
     board.step();
     board
 }
 
 /// Stopped by an overload of the bridge that is over.
-fn faulted() -> Native {
+fn faulted() -> Bench {
     let mut board = ready();
     assert_eq!(board.step_with(overloaded).fault, Some(Fault::Bridge));
-    board.command.torque = false;
+    board.command().torque = false;
     board
 }
 
@@ -46,10 +42,10 @@ type Spoil = fn(&mut Record);
 const EARLY_AND_LATE: [(Spoil, Fault); 2] = [(broken, Fault::ArrayBroken), (silent, Fault::BusSilent)];
 
 fn broken(record: &mut Record) {
-    let mut board = new();
-    board.world.faults.array.taxels = [[Taxel::Dead; 10]; 10];
+    let mut board = Bench::default();
+    board.harm(|faults| faults.array.taxels = [[Taxel::Dead; 10]; 10]);
     board.step();
-    record.frame.codes = board.frame.codes;
+    record.frame.codes = board.frame().codes;
 }
 
 fn overloaded(record: &mut Record) {
@@ -64,10 +60,10 @@ fn silent(record: &mut Record) {
 fn pressed(record: &mut Record) {
     let mut board = at(-4.2);
     board.step();
-    record.frame.codes = board.frame.codes;
+    record.frame.codes = board.frame().codes;
 }
 
-fn tares(board: &mut Native) {
+fn tares(board: &mut Bench) {
     for _ in 1..=TARE_FRAMES {
         let status = board.step();
         assert_eq!((status.mode, status.tare), (Mode::Tare, Taring::Running));
@@ -79,8 +75,8 @@ fn tares(board: &mut Native) {
 fn a_tare_that_comes_with_torque_off_is_done() {
     let mut board = ready();
     assert_eq!(board.step().mode, Mode::Release);
-    board.command.torque = false;
-    board.command.tare_request += 1;
+    board.command().torque = false;
+    board.command().tare_request += 1;
     tares(&mut board);
     assert_eq!(board.step().mode, Mode::Off);
 }
@@ -89,7 +85,7 @@ fn a_tare_that_comes_with_torque_off_is_done() {
 #[test]
 fn a_tare_between_torque_off_and_on_is_done() {
     let mut board = ready();
-    board.command.tare_request += 1;
+    board.command().tare_request += 1;
     assert_eq!(board.step().duty.0, 0);
     for _ in 1..TARE_FRAMES {
         assert_eq!(board.step().mode, Mode::Tare);
@@ -101,8 +97,8 @@ fn a_tare_between_torque_off_and_on_is_done() {
 #[test]
 fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
     let mut board = faulted();
-    board.command.clear_request += 1;
-    board.command.tare_request += 1;
+    board.command().clear_request += 1;
+    board.command().tare_request += 1;
     tares(&mut board);
     assert_eq!(board.step().fault, None);
 }
@@ -111,10 +107,10 @@ fn a_tare_that_comes_with_the_clearing_of_a_fault_is_done() {
 fn a_tare_in_a_fault_is_refused_for_all_to_see() {
     let mut board = faulted();
     assert_eq!(board.step().tare, Taring::Done, "that before");
-    board.command.tare_request += 1;
+    board.command().tare_request += 1;
     let status = board.step();
     assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
-    board.command.clear_request += 1;
+    board.command().clear_request += 1;
     let status = board.step();
     assert_eq!((status.mode, status.tare), (Mode::Off, Taring::Refused), "it does not come back by itself");
 }
@@ -122,8 +118,8 @@ fn a_tare_in_a_fault_is_refused_for_all_to_see() {
 #[test]
 fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
     let mut board = ready();
-    board.command.torque = false;
-    board.command.tare_request += 1;
+    board.command().torque = false;
+    board.command().tare_request += 1;
     let status = board.step_with(broken);
     assert_eq!((status.mode, status.tare), (Mode::Fault, Taring::Refused));
 }
@@ -131,38 +127,38 @@ fn a_tare_in_the_frame_of_a_fault_is_refused_for_all_to_see() {
 #[test]
 fn a_fault_ends_a_tare_for_all_to_see() {
     for (spoil, fault) in EARLY_AND_LATE {
-        let mut board = new();
-        board.command.tare_request += 1;
+        let mut board = Bench::default();
+        board.command().tare_request += 1;
         board.step();
         let status = board.step_with(spoil);
         assert_eq!((status.mode, status.fault, status.tare), (Mode::Fault, Some(fault), Taring::Refused));
     }
-    let mut board = new();
-    board.command.tare_request += 1;
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
     board.step();
-    board.pipeline.stop(Fault::LostFrames);
-    assert_eq!(board.pipeline.status().tare, Taring::Refused);
+    board.pipeline().stop(Fault::LostFrames);
+    assert_eq!(board.status().tare, Taring::Refused);
 }
 
 #[test]
 fn a_second_tare_during_a_tare_begins_anew() {
-    let mut board = new();
-    board.command.tare_request += 1;
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
     for _ in 0..100 {
         board.step();
     }
-    board.command.tare_request += 1;
+    board.command().tare_request += 1;
     tares(&mut board);
 }
 
 #[test]
 fn new_parameters_during_a_tare_begin_it_anew() {
-    let mut board = new();
-    board.command.tare_request += 1;
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
     for _ in 0..100 {
         board.step();
     }
-    board.pipeline.configure(&Config::shipped(&Params::DEFAULT).unwrap());
+    board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
     for _ in 1..TARE_FRAMES {
         assert_eq!(board.step().mode, Mode::Tare);
     }
@@ -173,7 +169,7 @@ fn new_parameters_during_a_tare_begin_it_anew() {
 fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
     for (spoil, fault) in EARLY_AND_LATE {
         let mut board = ready();
-        board.command.identify_request += 1;
+        board.command().identify_request += 1;
         let status = board.step_with(spoil);
         assert_eq!((status.mode, status.fault, status.identification), (Mode::Fault, Some(fault), NOT_READY));
     }
@@ -181,47 +177,47 @@ fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
 
 #[test]
 fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
-    let mut board = new();
-    board.command.tare_request += 1;
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
     board.step();
-    board.command.torque = true;
-    board.command.identify_request += 1;
+    board.command().torque = true;
+    board.command().identify_request += 1;
     let mut frames = 0;
     while board.step().mode != Mode::Identify {
         frames += 1;
         assert!(frames < TARE_FRAMES + 5);
-        assert_eq!(board.pipeline.status().identification, Identification::None);
+        assert_eq!(board.status().identification, Identification::None);
     }
     assert_eq!(board.step().identification, Identification::Running);
 
     let mut board = ready();
-    board.command.torque = false;
+    board.command().torque = false;
     board.step();
-    board.command.torque = true;
-    board.command.identify_request += 1;
+    board.command().torque = true;
+    board.command().identify_request += 1;
     assert_eq!(board.step().mode, Mode::Release);
     assert_eq!(board.step().mode, Mode::Identify);
 }
 
 #[test]
 fn identify_that_waits_is_refused_once_torque_is_off() {
-    let mut board = new();
-    board.command.tare_request += 1;
-    board.command.torque = true;
-    board.command.identify_request += 1;
+    let mut board = Bench::default();
+    board.command().tare_request += 1;
+    board.command().torque = true;
+    board.command().identify_request += 1;
     board.step();
     assert_eq!(board.step().identification, Identification::None);
-    board.command.torque = false;
+    board.command().torque = false;
     let status = board.step();
     assert_eq!((status.mode, status.identification), (Mode::Tare, NOT_READY));
 }
 
 #[test]
 fn identify_without_a_tare_is_refused() {
-    let mut board = new();
-    board.command.torque = true;
+    let mut board = Bench::default();
+    board.command().torque = true;
     board.step();
-    board.command.identify_request += 1;
+    board.command().identify_request += 1;
     assert_eq!(board.step().identification, NOT_READY);
 }
 
@@ -237,17 +233,17 @@ fn identify_in_the_frame_in_which_another_ends_begins_anew() {
     for _ in 1..refused_at {
         assert_eq!(board.step().identification, Identification::Running);
     }
-    board.command.identify_request += 1;
+    board.command().identify_request += 1;
     assert_eq!(board.step().identification, Identification::Refused(Refusal::NoContact));
     assert_eq!(board.step().identification, Identification::Running);
 }
 
 /// With nothing to touch.
-fn measuring() -> Native {
+fn measuring() -> Bench {
     let mut board = at(40.0);
-    board.tare_and_enable();
+    board.tare();
     board.step();
-    board.command.identify_request += 1;
+    board.command().identify_request += 1;
     assert_eq!(board.step().identification, Identification::Running);
     board
 }
@@ -257,12 +253,12 @@ fn measuring() -> Native {
 fn the_first_frame_with_torque_is_judged_before_it_drives() {
     let others: [(Spoil, Fault); 2] = [(overloaded, Fault::Bridge), (pressed, Fault::OverForce)];
     for (spoil, fault) in EARLY_AND_LATE.into_iter().chain(others) {
-        let mut board = new();
-        board.tare_and_enable();
-        board.command.torque = false;
-        board.command.goal = newtons(7_000);
+        let mut board = Bench::default();
+        board.tare();
+        board.command().torque = false;
+        board.command().goal = newtons(7_000);
         board.step();
-        board.command.torque = true;
+        board.command().torque = true;
         let status = board.step_with(spoil);
         assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
     }

@@ -8,8 +8,8 @@ use fingertip::pipeline::Taring;
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
-use host_tests::plant::Setup;
-use host_tests::plant::cells::Cell;
+use sim::mechanics::cells::Cell;
+use sim::setup::Setup;
 
 /// Arrays of each test.
 const ARRAYS: u64 = 120;

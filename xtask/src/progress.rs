@@ -12,13 +12,13 @@ use std::{
 /// matter, not their size.
 pub type Slow = &'static [(&'static str, f64)];
 /// What runs on this machine, without the emulator.
-pub const HOST: Slow = &[("fixed", 5.0), ("clap_builder", 5.0), ("fingertip", 4.0), ("host-tests", 10.0)];
+pub const HOST: Slow = &[("fixed", 5.0), ("clap_builder", 5.0), ("fingertip", 4.0), ("sim", 10.0)];
 /// The emulated board.
 pub const EMULATOR: Slow = &[
     ("cranelift-codegen", 90.0),
     ("rigless", 100.0),
     ("virtual-board", 45.0),
-    ("host-tests", 10.0),
+    ("sim", 10.0),
     ("cranelift-assembler-x64", 8.0),
     ("gimli", 4.0),
 ];

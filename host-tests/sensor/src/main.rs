@@ -1,7 +1,7 @@
 //! `sensor`: what recordings of a real sensor say of the parameters.
 
 use clap::{Parser, Subcommand};
-use host_tests::{kept, say};
+use output::{kept, say};
 use sensor::gains::{self, Found};
 use sensor::presses::Presses;
 use sensor::table::Refusal;

@@ -12,7 +12,7 @@ mod port;
 pub use pace::{Pace, Served};
 pub use port::{Place, Port, Stop};
 
-use host_tests::say;
+use output::say;
 use port::Event;
 use std::time::{Duration, Instant};
 

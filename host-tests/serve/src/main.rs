@@ -1,7 +1,7 @@
 //! `serve`: a scene's finger, simulated in real time, for any client of the bus.
 
 use clap::Parser;
-use host_tests::say;
+use output::say;
 use serve::native::Native;
 use serve::{Place, Port};
 use sim::effects::set::Named;

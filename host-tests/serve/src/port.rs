@@ -3,7 +3,7 @@
 mod pty;
 mod tcp;
 
-use host_tests::say;
+use output::say;
 use pty::Pty;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fd::AsFd;

@@ -116,7 +116,7 @@ fn a_link_is_served_by_one_and_gone_with_it() {
     assert!(well, "{complained}");
     assert!(last.starts_with("served ") && last.contains("20 bytes in, 28 out, 2 answers"), "{last}");
     assert!(!path.is_symlink(), "the link is gone");
-    assert!(!host_tests::kept::beside(&path, "lock").exists(), "the lock is gone");
+    assert!(!output::kept::beside(&path, "lock").exists(), "the lock is gone");
 }
 
 #[test]

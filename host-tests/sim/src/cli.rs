@@ -6,7 +6,7 @@ use crate::run::{Run, RunError};
 use crate::scene::{Scene, library, read, text};
 use crate::session;
 use clap::{Parser, ValueEnum};
-use host_tests::say;
+use output::say;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

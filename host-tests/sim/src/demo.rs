@@ -12,10 +12,10 @@ pub use figures::{Check, Forces};
 pub use trace::{Taxels, Trace};
 
 use crate::metrics::{self, Meter};
+use crate::optimal::Unreachable;
 use crate::scene::{Scene, library, read};
-use host_tests::heatmap::Pressures;
-use host_tests::optimal::Unreachable;
-use host_tests::plot::{PlotError, Sample};
+use output::heatmap::Pressures;
+use output::plot::{PlotError, Sample};
 use std::path::PathBuf;
 
 /// The scene's name in the library.

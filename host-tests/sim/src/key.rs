@@ -109,7 +109,7 @@ impl Key {
 
     /// The unit that its name ends with; none where it is a plain number, a word or a text.
     pub fn unit(&self) -> Option<String> {
-        host_tests::units::of(self.name)
+        output::units::of(self.name)
     }
 }
 

@@ -11,6 +11,7 @@
 //! All of it is simulated; nothing here has touched silicon.
 
 pub mod agreement;
+pub mod bridge;
 #[cfg(feature = "files")]
 pub mod cli;
 pub mod demo;
@@ -23,8 +24,10 @@ pub mod ledger;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
+pub mod optimal;
 #[cfg(feature = "files")]
 pub mod part;
+pub mod plant;
 #[cfg(feature = "files")]
 pub mod population;
 #[cfg(feature = "files")]
@@ -36,9 +39,18 @@ pub mod run;
 pub mod scene;
 #[cfg(feature = "files")]
 pub mod session;
+pub mod setup;
 #[cfg(feature = "files")]
 pub mod sweep;
 pub mod watch;
 pub mod world;
 
 pub use native::{SimError, simulate};
+
+/// A record's bytes as they are written to flash.
+pub fn encode<const ROWS: usize, const COLUMNS: usize>(
+    record: &fingertip::store::Record<ROWS, COLUMNS>,
+    sequence: u32,
+) -> Vec<u8> {
+    fingertip::store::words(record, sequence).flat_map(u32::to_le_bytes).collect()
+}

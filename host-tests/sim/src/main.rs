@@ -8,7 +8,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let args = Args::parse();
     if args.board != Board::Native && args.runs() {
-        host_tests::say::aside("this program is the native board: `cargo xtask sim --board ...` runs the flash image");
+        output::say::aside("this program is the native board: `cargo xtask sim --board ...` runs the flash image");
         return ExitCode::from(2);
     }
     cli::answer(&args, &native::board)

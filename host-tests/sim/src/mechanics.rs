@@ -6,9 +6,14 @@
 
 mod acting;
 pub mod body;
+pub mod cells;
 pub mod contact;
+pub mod decay;
+pub mod dynamics;
 pub mod elastic;
 pub mod finger;
 pub mod normal;
 pub mod pressures;
+pub mod rotor;
 pub mod shape;
+pub mod tip;

@@ -9,9 +9,10 @@ mod clock;
 mod digest;
 pub mod served;
 
+use crate::bridge::Bridge;
 use crate::effects::link::Stages as _;
 use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::set::{Named, Set};
+use crate::effects::set::{Named, Parts, Set};
 use crate::host::Host;
 use crate::host::grip::Reading;
 use crate::ledger;
@@ -20,6 +21,7 @@ use crate::mechanics::contact::Place;
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::scene::controller;
+use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
 pub use clock::Clock;
@@ -29,8 +31,11 @@ use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::Celsius;
-use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS};
 use std::time::Instant;
+
+/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
+/// up.
+pub const DUTY_DELAY_SLOTS: usize = 3;
 
 /// Why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -135,16 +140,24 @@ fn celsius(degrees: f64) -> Celsius {
 
 impl<E: Set> Board<E> {
     fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
-        let params = controller::params(scene);
-        let config = Config::shipped(&params).map_err(SimError::Controller)?;
-        let setup = controller::setup(scene);
-        let fingers = scene.table("hand").whole("fingers") as usize;
+        let config = Config::shipped(&controller::params(scene)).map_err(SimError::Controller)?;
+        let fingers = 0..scene.table("hand").whole("fingers") as usize;
+        Self::of(scene, begun, &config, &controller::setup(scene), fingers.map(|finger| E::of(scene, finger)))
+    }
+
+    /// Of these parts, a finger for each.
+    fn of(
+        scene: &Scene,
+        begun: Begun,
+        config: &Config,
+        setup: &Setup,
+        fingers: impl Iterator<Item = Parts<E>>,
+    ) -> Result<Self, SimError> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
-        for finger in 0..fingers {
-            let parts = E::of(scene, finger);
+        for parts in fingers {
             effects.push((parts.drive, parts.contact));
             units.push(Unit {
-                pipeline: Pipeline::new(&config),
+                pipeline: Pipeline::new(config),
                 readout: Readout::new(&setup.array),
                 sensor: parts.sensor,
                 link: parts.link,
@@ -154,7 +167,7 @@ impl<E: Set> Board<E> {
                 next: Bridge::Coast,
             });
         }
-        let world = World::<E>::new(&setup, &Surroundings::of(scene), effects);
+        let world = World::<E>::new(setup, &Surroundings::of(scene), effects);
         let longest_s = scene.table("world").number("step_us") * 1e-6;
         world.check_step(longest_s)?;
         let slot_s = f64::from(config.timing.slot.0) / f64::from(fingertip::shipped::CLOCKS.timer_hz);
@@ -163,7 +176,7 @@ impl<E: Set> Board<E> {
             world,
             units,
             bridges,
-            params,
+            params: config.params,
             clock: Clock::from_start(begun.clock_s),
             start: Clock::default(),
             begun,

@@ -4,7 +4,7 @@
 //! off, or that is damaged otherwise, is not taken up: what it stood for is done again.
 
 use crate::run::RunError;
-use host_tests::kept::{self, Lock};
+use output::kept::{self, Lock};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};

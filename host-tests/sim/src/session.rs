@@ -10,7 +10,7 @@ use crate::report::{Over, Report, Trace, page};
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use crate::watch::Watch;
-use host_tests::{kept, say};
+use output::{kept, say};
 use std::fs;
 use std::path;
 

@@ -24,8 +24,8 @@ use crate::metrics::METRICS;
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
 use files::Rows;
-use host_tests::say;
 use indicatif::{ProgressBar, ProgressStyle};
+use output::say;
 use std::path::{Path, PathBuf};
 
 /// What is asked for.

@@ -8,11 +8,11 @@ use crate::effects::set::Set;
 use crate::mechanics::body::{Body, Surroundings, overlap_s};
 use crate::mechanics::contact::Contact;
 use crate::mechanics::finger::Finger;
+use crate::setup::Tip;
 use crate::watch::Truth;
+use crate::{bridge::Bridge, setup::Setup};
 use fingertip::frame::Sense;
 use fingertip::units::CoreCycles;
-use host_tests::plant::setup::Tip;
-use host_tests::plant::{Bridge, Setup};
 
 /// A step times the fastest oscillation's angular frequency is at most this: its solution then gains a factor of 16 a
 /// round or more.

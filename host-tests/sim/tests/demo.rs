@@ -1,6 +1,6 @@
 //! The demonstration on the native board: its figures, its maps and its pictures.
 
-use host_tests::plot;
+use output::plot;
 use sim::demo::{self, Forces, Run, Taxels, Trace, figures::missed, pictures, table};
 use sim::simulate;
 use sim::watch::{Step, Watch};

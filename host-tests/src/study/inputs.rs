@@ -4,13 +4,13 @@
 
 use crate::fit_cases::Scene;
 use crate::fit_statistics::{FRAMES, GOOD, Series};
-use crate::plant::{Setup, World};
 use crate::stimulus;
 use bringup::script::{Bench, RECORDS};
 use fastrand::Rng;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Frame, Picture, Pipeline, ROWS};
 use images::record::Record;
+use sim::plant::{Plant, Setup};
 
 const SEED: u64 = 2003;
 
@@ -108,7 +108,7 @@ impl Frames {
             let mut setup = Setup::default();
             let distance_mm = setup.wall.distance_mm;
             (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (8.0 * rng.f64() - 4.0, 8.0 * rng.f64() - 4.0);
-            let mut world = World::new(&setup);
+            let mut world = Plant::new(&setup);
             if let Some(d) = d {
                 world.place(distance_mm + f64::from(d) / 65_536.0);
             }

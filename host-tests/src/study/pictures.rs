@@ -2,7 +2,7 @@
 
 use super::front::{Point, beaten_by};
 use super::kernels::Kernel;
-use crate::plot::{Dot, Front, PlotError, front};
+use output::plot::{Dot, Front, PlotError, front};
 
 /// Draws a kernel.
 ///

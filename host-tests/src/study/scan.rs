@@ -1,12 +1,11 @@
 //! What the scan's settings cost in frame rate and gain in crosstalk and noise, by the board's electrical model.
 
 use super::page::figure;
-use crate::plant::Setup;
-use crate::plant::readout::decay;
-use crate::plant::setup::Array;
 use fingertip::params::Params;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, TAXELS};
+use sim::mechanics::decay::decay;
+use sim::setup::{Array, Setup};
 use std::fmt::Write as _;
 
 /// Noise of a conversion, codes: assumed, as the simulated converters have none.

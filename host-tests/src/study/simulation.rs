@@ -2,10 +2,11 @@
 //! pressure is taken.
 
 use super::page::figure;
-use crate::plant::cells::Cell;
-use crate::plant::{Bridge, Setup, World};
 use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
+use sim::bridge::Bridge;
+use sim::mechanics::cells::Cell;
+use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
 use std::time::Instant;
 
@@ -80,7 +81,7 @@ type Integrator = fn(&mut State, f64, Bridge);
 
 /// The plant's world, and the plain integrator's angle and speed.
 struct State {
-    world: World,
+    world: Plant,
     angle_rad: f64,
     speed_rad_per_s: f64,
 }
@@ -109,7 +110,7 @@ fn euler(state: &mut State, dt_s: f64, bridge: Bridge) {
 
 /// The contact force at each instant.
 fn forces(step_us: f64, integrator: Integrator) -> Vec<f64> {
-    let mut state = State { world: World::new(&Setup::default()), angle_rad: 0.0, speed_rad_per_s: 0.0 };
+    let mut state = State { world: Plant::new(&Setup::default()), angle_rad: 0.0, speed_rad_per_s: 0.0 };
     let steps = (SAMPLE_US / step_us).round() as usize;
     let at = |sample: usize| {
         let duty = match sample * 10 / SAMPLES {

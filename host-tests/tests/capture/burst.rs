@@ -1,19 +1,18 @@
 //! A finger that is captured from its tare on.
 
 use fingertip::capture::{Capture, Ended, State};
-use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Gains, ROWS, TAXELS};
-use host_tests::native::Native;
-use host_tests::plant::Setup;
+use fingertip::shipped::{COLUMNS, Calibration, Config, Gains, ROWS, TAXELS};
 use images::record::Record;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 pub type Burst<const BYTES: usize> = Capture<ROWS, COLUMNS, BYTES>;
 
 pub struct Finger<const BYTES: usize> {
-    pub native: Native,
+    pub native: Bench,
     pub capture: Box<Burst<BYTES>>,
 }
 
@@ -23,8 +22,8 @@ impl<const BYTES: usize> Finger<BYTES> {
         let config = Config::shipped(&Params::DEFAULT).expect("the defaults make a configuration");
         let mut setup = Setup::default();
         setup.wall.distance_mm = 0.4;
-        let mut native = Native::new(&setup, &config);
-        native.pipeline.calibrate(&Calibration::of(&gains()));
+        let mut native = Bench::of(&setup, &config);
+        native.pipeline().calibrate(&Calibration::of(&gains()));
         Self { native, capture: Box::new(Burst::NEW) }
     }
 
@@ -36,24 +35,24 @@ impl<const BYTES: usize> Finger<BYTES> {
     /// The same, where somebody changes what the core is given.
     pub fn frame_with(&mut self, change: impl FnOnce(&mut Record)) {
         let Self { native, capture } = self;
-        if capture.is_due(native.pipeline.status(), &native.command) {
-            capture.begin(&mut native.pipeline);
+        if capture.is_due(native.status(), &native.record().command) {
+            capture.begin(native.pipeline());
         }
-        let mut given = Record { frame: Frame::EMPTY, sense: native.sense, command: Command::default() };
+        let mut given = native.record();
         native.step_with(|record| {
             change(record);
             given = *record;
         });
-        capture.record(&given.frame, &given.sense, &given.command, native.pipeline.status());
+        capture.record(&given.frame, &given.sense, &given.command, native.status());
     }
 
     /// Arms, tares, touches and holds until the memory is full.
     pub fn press(&mut self) {
         self.capture.arm();
-        self.native.command.tare_request += 1;
+        self.native.command().tare_request += 1;
         self.frame();
-        self.native.command.torque = true;
-        self.native.command.goal = newtons(800);
+        self.native.command().torque = true;
+        self.native.command().goal = newtons(800);
         self.until_done();
     }
 

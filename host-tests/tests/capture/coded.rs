@@ -9,7 +9,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::state::{Fault, Mode};
-use fingertip::units::{CoreCycles, Duty, Newtons};
+use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 use proptest::prelude::*;
 
 const BYTES: usize = 8 << 10;
@@ -35,7 +35,8 @@ fn step(spread: u16) -> impl Strategy<Value = Step> {
         }
         let (encoder, supply_mv, bus_silent_ms, bridge_fault, answer, wild) = sense;
         let sense = if wild {
-            Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer: CoreCycles(answer) }
+            let chip = answer.is_multiple_of(2).then_some(Celsius::from_bits(encoder.rotate_left(9)));
+            Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, chip, answer: CoreCycles(answer) }
         } else {
             Sense { encoder: encoder & 3, supply_mv: 6_000 | supply_mv & 7, ..Sense::default() }
         };

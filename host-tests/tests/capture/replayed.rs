@@ -40,31 +40,31 @@ fn a_press_replays_to_the_bit_also_with_gains() {
 #[test]
 fn what_the_finger_did_before_does_not_matter() {
     let mut finger = Finger::<{ 8 << 10 }>::new();
-    finger.native.tare_and_enable();
-    finger.native.command.goal = newtons(1_500);
-    finger.native.command.shown_mn = 1_400;
+    finger.native.tare();
+    finger.native.command().goal = newtons(1_500);
+    finger.native.command().shown_mn = 1_400;
     (0..3_000).for_each(|_| {
         finger.native.step();
     });
-    finger.native.command.calibrate_request += 1;
-    finger.native.command.shown_request += 1;
+    finger.native.command().calibrate_request += 1;
+    finger.native.command().shown_request += 1;
     (0..3_000).for_each(|_| {
         finger.native.step();
     });
-    finger.native.command.goal = newtons(0);
+    finger.native.command().goal = newtons(0);
     (0..3_000).for_each(|_| {
         finger.native.step();
     });
     finger.native.step_with(|record| record.sense.bridge_fault = true);
-    assert_eq!(finger.native.pipeline.status().fault, Some(Fault::Bridge));
-    finger.native.command = Command { torque: false, clear_request: 1, ..finger.native.command };
+    assert_eq!(finger.native.status().fault, Some(Fault::Bridge));
+    *finger.native.command() = Command { torque: false, clear_request: 1, ..*finger.native.command() };
     (0..500).for_each(|_| {
         finger.native.step();
     });
     for _ in 0..2 {
         finger.press();
         agrees(&finger);
-        finger.native.command = Command { torque: false, goal: newtons(0), ..finger.native.command };
+        *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
         (0..300).for_each(|_| finger.frame());
     }
     assert_eq!(finger.capture.standing().count, 2);
@@ -74,22 +74,22 @@ fn what_the_finger_did_before_does_not_matter() {
 fn a_fault_is_in_it_and_what_comes_after() {
     let mut finger = Finger::<BYTES>::new();
     finger.capture.arm();
-    finger.native.command.tare_request += 1;
+    finger.native.command().tare_request += 1;
     (0..300).for_each(|_| finger.frame());
-    finger.native.command.torque = true;
-    finger.native.command.goal = newtons(500);
+    finger.native.command().torque = true;
+    finger.native.command().goal = newtons(500);
     (0..100).for_each(|_| finger.frame());
     (0..5).for_each(|_| finger.frame_with(|record| record.sense.supply_mv = 0));
     (0..20).for_each(|_| finger.frame());
-    assert_eq!(finger.native.pipeline.status().fault, Some(Fault::SupplyLow));
+    assert_eq!(finger.native.status().fault, Some(Fault::SupplyLow));
     finger.capture.end(Ended::Asked);
     assert_eq!(agrees(&finger), 425);
     // What acts on the loop between steps ends it; what is there replays.
     let mut finger = Finger::<BYTES>::new();
     finger.capture.arm();
-    finger.native.command.tare_request += 1;
+    finger.native.command().tare_request += 1;
     (0..200).for_each(|_| finger.frame());
-    finger.native.pipeline.stop(Fault::LostFrames);
+    finger.native.pipeline().stop(Fault::LostFrames);
     finger.capture.end(Ended::Stopped);
     (0..20).for_each(|_| finger.frame());
     assert_eq!(finger.capture.standing().state, State::Done);
@@ -111,13 +111,13 @@ fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
     // A duty that is one more than the core's.
     let mut finger = Finger::<BYTES>::new();
     finger.capture.arm();
-    finger.native.command.tare_request += 1;
-    finger.native.command.fit_level = fingertip::contact::FitLevel::TwoRows;
+    finger.native.command().tare_request += 1;
+    finger.native.command().fit_level = fingertip::contact::FitLevel::TwoRows;
     (0..20).for_each(|_| finger.frame());
-    let mut status = *finger.native.pipeline.status();
+    let mut status = *finger.native.status();
     status.duty.0 += 1;
-    let native = &finger.native;
-    finger.capture.record(&native.frame, &native.sense, &native.command, &status);
+    let given = finger.native.record();
+    finger.capture.record(&given.frame, &given.sense, &given.command, &status);
     finger.capture.end(Ended::Asked);
     let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, _| {}).expect("a capture");
     assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((20, Field::Duty)));

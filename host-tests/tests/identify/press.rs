@@ -4,15 +4,15 @@ use fingertip::identify::{Identification, Modulus, Refusal};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Mode;
-use host_tests::native::Native;
-use host_tests::plant::{Setup, Taxel};
+use sim::native::bench::Bench;
+use sim::plant::{Setup, Taxel};
 
 /// The longest that a measurement takes.
 const FRAMES_MAX: u32 = 60_000;
 
-fn board(setup: &Setup) -> Native {
-    let mut board = Native::new(setup, &Config::shipped(&Params::DEFAULT).unwrap());
-    board.tare_and_enable();
+fn board(setup: &Setup) -> Bench {
+    let mut board = Bench::of(setup, &Config::shipped(&Params::DEFAULT).unwrap());
+    board.tare();
     board.step();
     board
 }
@@ -24,8 +24,8 @@ fn with(change: impl FnOnce(&mut Setup)) -> Setup {
 }
 
 /// Asks for a measurement and waits for its end.
-fn identify(board: &mut Native) -> Identification {
-    board.command.identify_request += 1;
+fn identify(board: &mut Bench) -> Identification {
+    board.command().identify_request += 1;
     for _ in 0..FRAMES_MAX {
         let status = board.step();
         if status.identification.number() > 1 {
@@ -78,7 +78,7 @@ fn soft_stiff_and_off_centre() {
 #[test]
 fn from_a_held_force_and_back_to_it() {
     let mut board = board(&Setup::default());
-    board.command.goal = crate::newtons(2.0);
+    board.command().goal = crate::newtons(2.0);
     for _ in 0..6_000 {
         board.step();
     }
@@ -88,20 +88,20 @@ fn from_a_held_force_and_back_to_it() {
         board.step();
     }
     assert_eq!(board.step().mode, Mode::Force);
-    assert!((board.world.force_n() - 2.0).abs() < 0.02);
+    assert!((board.truth().force_n - 2.0).abs() < 0.02);
 }
 
 #[test]
 fn it_presses_slowly_no_harder_than_allowed_and_lets_go() {
     let mut board = board(&with(|setup| setup.tip.modulus_kpa = 350.0));
-    board.command.identify_request += 1;
+    board.command().identify_request += 1;
     let (mut peak_n, mut fastest_mm_per_s) = (0.0_f64, 0.0_f64);
     let mut frames = 0;
     while board.step().identification == Identification::Running || frames == 0 {
         frames += 1;
-        peak_n = peak_n.max(board.world.force_n());
-        if board.world.force_n() > 0.2 {
-            fastest_mm_per_s = fastest_mm_per_s.max(board.world.speed_mm_per_s());
+        peak_n = peak_n.max(board.truth().force_n);
+        if board.truth().force_n > 0.2 {
+            fastest_mm_per_s = fastest_mm_per_s.max(board.truth().speed_mm_per_s);
         }
     }
     assert!((6.9..=7.05).contains(&peak_n), "{peak_n} N");
@@ -109,12 +109,12 @@ fn it_presses_slowly_no_harder_than_allowed_and_lets_go() {
     for _ in 0..3_000 {
         board.step();
     }
-    assert_eq!((board.step().mode, board.world.force_n()), (Mode::Release, 0.0));
+    assert_eq!((board.step().mode, board.truth().force_n), (Mode::Release, 0.0));
 }
 
 #[test]
 fn an_edge_a_bad_taxel_and_nothing_to_touch_are_refused() {
-    let refused = |setup: &Setup, change: fn(&mut Native)| {
+    let refused = |setup: &Setup, change: fn(&mut Bench)| {
         let mut board = board(setup);
         change(&mut board);
         identify(&mut board)
@@ -123,7 +123,7 @@ fn an_edge_a_bad_taxel_and_nothing_to_touch_are_refused() {
         let setup = with(|setup| setup.wall.centre_x_mm = x_mm);
         assert_eq!(refused(&setup, |_| {}), Identification::Refused(Refusal::Edge), "{x_mm} mm");
     }
-    let dead: fn(&mut Native) = |board| board.world.faults.array.taxels[9][0] = Taxel::Dead;
+    let dead: fn(&mut Bench) = |board| board.harm(|faults| faults.array.taxels[9][0] = Taxel::Dead);
     assert_eq!(refused(&Setup::default(), dead), Identification::Refused(Refusal::BadTaxels));
     let nothing = with(|setup| setup.wall.distance_mm = 40.0);
     assert_eq!(refused(&nothing, |_| {}), Identification::Refused(Refusal::NoContact));
@@ -136,8 +136,8 @@ fn an_edge_a_bad_taxel_and_nothing_to_touch_are_refused() {
 fn a_motor_too_weak_for_the_press_gives_what_its_points_support() {
     let weak = |current_max_ma| {
         let params = Params { current_max_ma, ..Params::DEFAULT };
-        let mut board = Native::new(&Setup::default(), &Config::shipped(&params).unwrap());
-        board.tare_and_enable();
+        let mut board = Bench::of(&Setup::default(), &Config::shipped(&params).unwrap());
+        board.tare();
         board.step();
         identify(&mut board)
     };
@@ -151,7 +151,7 @@ fn a_motor_too_weak_for_the_press_gives_what_its_points_support() {
 fn torque_off_a_fault_and_new_parameters_interrupt_it() {
     let started = || {
         let mut board = board(&Setup::default());
-        board.command.identify_request += 1;
+        board.command().identify_request += 1;
         for _ in 0..2_500 {
             assert_eq!(board.step().mode, Mode::Identify);
         }
@@ -159,23 +159,23 @@ fn torque_off_a_fault_and_new_parameters_interrupt_it() {
     };
     let interrupted = Identification::Refused(Refusal::Interrupted);
     let mut board = started();
-    board.command.torque = false;
+    board.command().torque = false;
     let status = board.step();
     assert_eq!((status.mode, status.duty.0, status.identification), (Mode::Off, 0, interrupted));
     let mut board = started();
-    board.world.faults.array.saturated = true;
+    board.harm(|faults| faults.array.saturated = true);
     let status = board.step();
     assert_eq!((status.mode, status.duty.0, status.identification), (Mode::Fault, 0, interrupted));
     let mut board = started();
-    board.pipeline.configure(&Config::shipped(&Params::DEFAULT).unwrap());
+    board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
     assert_eq!(board.step().identification, interrupted);
 }
 
 #[test]
 fn without_torque_it_is_refused() {
-    let mut board = Native::new(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::default();
     assert_eq!(board.step().identification, Identification::None);
-    board.command.identify_request += 1;
+    board.command().identify_request += 1;
     let status = board.step();
     assert_eq!((status.mode, status.identification), (Mode::Off, Identification::Refused(Refusal::NotReady)));
 }

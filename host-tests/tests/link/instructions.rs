@@ -94,7 +94,14 @@ fn factory_reset_keeps_what_it_is_told_to() {
         let actions = bench.server.take_actions();
         assert_eq!(
             actions,
-            Actions { reboot: false, save: true, configure: true, calibrate: false, baud: baud_code != 4 }
+            Actions {
+                reboot: false,
+                save: true,
+                configure: true,
+                calibrate: false,
+                capture: None,
+                baud: baud_code != 4
+            }
         );
     }
     let mut bench = Bench::with(record);

@@ -10,10 +10,13 @@ use fingertip::pipeline::{Pipeline, Status};
 use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
 use fingertip::units::CoreCycles;
-use host_tests::plant::cells::Cell;
-use host_tests::plant::drive::{Dynamics, Shaft, Source};
-use host_tests::plant::{Bridge, DUTY_DELAY_SLOTS, Setup};
 use images::record::Digest;
+use sim::bridge::Bridge;
+use sim::mechanics::cells::Cell;
+use sim::mechanics::dynamics::Dynamics;
+use sim::mechanics::rotor::{Shaft, Source};
+use sim::native::DUTY_DELAY_SLOTS;
+use sim::setup::Setup;
 
 /// The finger with its controller.
 pub struct Finger<const ROWS: usize, const COLUMNS: usize> {

@@ -4,7 +4,7 @@ use crate::fleet::{crc32, named, names, of_before, of_values};
 use crate::nor::{Nor, bits, record};
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector};
-use host_tests::encode;
+use sim::encode;
 
 const SIZE: usize = 8 * SLOT_BYTES;
 

@@ -5,7 +5,7 @@ use crate::nor::{Nor, record, with_gains};
 use fingertip::params::{ParamError, Params};
 use fingertip::shipped::{Config, Gains, Loaded, Record};
 use fingertip::store::{Journal, Remark, SLOT_BYTES, Sector, number, settle};
-use host_tests::encode;
+use sim::encode;
 
 fn start(bytes: &[u8]) -> (Loaded, Vec<Remark>) {
     let mut nor = Nor::blank(4 * SLOT_BYTES);

@@ -4,7 +4,7 @@ use crate::fleet::{OTHERS, Other};
 use crate::nor::{Board, Cut, Done, Nor, RESTS, Rest, bits, record, with_gains};
 use fingertip::shipped::Record;
 use fingertip::store::{SLOT_BYTES, Sector};
-use host_tests::encode;
+use sim::encode;
 
 /// Slots of a small sector.
 const SLOTS: usize = 5;

@@ -11,12 +11,12 @@ use crate::scene::host::Host as SceneHost;
 use crate::surroundings::Surroundings;
 use crate::trace::{Record, Trace};
 use crate::wire::TimedByte;
-use host_tests::plant::Bridge;
 use rigless::emulator::{Access, AccessKind, Host};
 use rigless::session::Session;
 use rigless::snapshot::{self, Reader, Store, Writer};
 use rigless::soc::stm32f427::generated::{DAC, GPIOC, TIM1, USART2};
 use rigless::time::VirtualNanos;
+use sim::bridge::Bridge;
 
 /// The plant's step, and the least of a scene's world.
 pub const STEP_NS: u64 = 10_000;

@@ -4,7 +4,6 @@ use crate::front_end::Shared;
 use crate::part::Part;
 use crate::rig::Options;
 use crate::wire::Wire;
-use host_tests::plant::Bridge;
 use rigless::device::Level;
 use rigless::emulator::CoreSpec;
 use rigless::machine::armv7m::{Core, Fpu, MpuRegions, Variant};
@@ -15,6 +14,7 @@ use rigless::soc::Error;
 use rigless::soc::stm32f427::generated::flash::{Register, optcr};
 use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 use rigless::soc::stm32f427::peripherals::tim::Channel;
+use sim::bridge::Bridge;
 use std::num::{NonZeroU32, NonZeroU64};
 
 /// The clock that the ST-LINK feeds to PH0.

@@ -4,7 +4,7 @@ use crate::demo::flashable::Flashable;
 use crate::{Error, Options, Rig};
 use bringup::judge::{Board, Judgement, judge};
 use bringup::listen::listen;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use std::collections::{HashMap, VecDeque};
 use std::io::{self, Read, Write};
 use std::path::Path;
@@ -23,7 +23,7 @@ pub fn run(
     estimates: &HashMap<String, f64>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<(Judgement, Rig), Error> {
-    let mut rig = Rig::new(image, World::new(&Setup::default()), options)?;
+    let mut rig = Rig::new(image, Plant::new(&Setup::default()), options)?;
     let sha256 = Flashable::of(rig.image())?.sha256();
     let report =
         listen(&mut Port { rig: &mut rig, heard: VecDeque::new() }, frames, progress).map_err(Error::Report)?;

@@ -3,8 +3,9 @@
 use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
-use host_tests::plant::{World, readout::decay};
 use serde::{Deserialize, Serialize};
+use sim::mechanics::decay::decay;
+use sim::plant::Plant;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -270,7 +271,7 @@ impl FrontEnd {
 
 /// A column's voltage under the drive of a place.
 fn column_volts(
-    world: &mut World,
+    world: &mut Plant,
     drives: &[Drive; 3],
     newest: usize,
     column: usize,

@@ -46,12 +46,12 @@ fn main() -> ExitCode {
         #[cfg(feature = "scenes")]
         Command::Population(arguments) => return commands::population::run(&arguments),
     };
-    let shown = host_tests::say::end();
+    let shown = output::say::end();
     match result {
         Ok(()) if shown => ExitCode::SUCCESS,
         Ok(()) => ExitCode::FAILURE,
         Err(error) => {
-            host_tests::say::aside(format_args!("virtual-board: {error}"));
+            output::say::aside(format_args!("virtual-board: {error}"));
             ExitCode::FAILURE
         }
     }

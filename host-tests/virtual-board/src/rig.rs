@@ -16,12 +16,12 @@ use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
-use host_tests::plant::World;
 use rigless::emulator::{self, Start};
 use rigless::image::Image;
 use rigless::session::Session;
 use rigless::snapshot::Snapshot;
 use rigless::time::VirtualNanos;
+use sim::plant::Plant;
 use std::num::NonZeroU64;
 use std::path::Path;
 use std::sync::mpsc;
@@ -44,7 +44,7 @@ impl Options {
     /// A board whose flash holds that its motor goes the right way: torque is refused before that is known.
     pub fn confirmed() -> Self {
         let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
-        let record = host_tests::encode(&Record { params, ..Record::DEFAULT }, 0);
+        let record = sim::encode(&Record { params, ..Record::DEFAULT }, 0);
         Self { presets: vec![(SECTOR.start, record)], ..Self::default() }
     }
 }
@@ -99,7 +99,7 @@ impl Rig {
     /// # Errors
     /// As [`Rig::new`], or the snapshot is of something else.
     pub fn restore(image: &Path, snapshot: &Path, options: &Options) -> Result<Self, Error> {
-        let world = World::new(&host_tests::plant::Setup::default());
+        let world = Plant::new(&sim::setup::Setup::default());
         Self::start(image, world.into(), options, Some(Snapshot::read(snapshot)?))
     }
 
@@ -183,7 +183,7 @@ impl Rig {
     pub fn world<T, F>(&mut self, job: F) -> Result<T, Error>
     where
         T: Send + 'static,
-        F: FnOnce(&mut World) -> T + Send + 'static,
+        F: FnOnce(&mut Plant) -> T + Send + 'static,
     {
         self.with(|stand| match &mut stand.bench.front_end.lock().world {
             Surroundings::Plant(world) => Ok(job(world)),

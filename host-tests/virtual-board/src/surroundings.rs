@@ -2,21 +2,22 @@
 
 use crate::bench::STEP_NS;
 use crate::scene::finger::Finger;
-use host_tests::plant::{Bridge, World};
 use serde::{Deserialize, Serialize};
+use sim::bridge::Bridge;
+use sim::plant::Plant;
 
 /// The world behind the board's pins.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Surroundings {
     /// The plant. A snapshot keeps it.
-    Plant(Box<World>),
+    Plant(Box<Plant>),
     /// A scene's. It has no snapshot: asking for one is an error.
     #[serde(skip)]
     Scene(Box<Finger>),
 }
 
-impl From<World> for Surroundings {
-    fn from(world: World) -> Self {
+impl From<Plant> for Surroundings {
+    fn from(world: Plant) -> Self {
         Self::Plant(Box::new(world))
     }
 }

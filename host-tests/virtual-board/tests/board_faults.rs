@@ -6,17 +6,17 @@ mod common;
 
 use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
 use fingertip::shipped::{REGISTERS, address};
-use host_tests::plant::{Setup, World};
 use rigless::emulator::{Access, AccessKind};
 use rigless::mcu::Operate;
 use rigless::soc::Width;
+use sim::plant::{Plant, Setup};
 use std::sync::Mutex;
 use virtual_board::flash::SECTOR;
 use virtual_board::{Fault, Options, Rig};
 
 /// A board that has run for 20 ms.
 fn running(options: &Options) -> Rig {
-    let mut rig = Rig::new(&image(), World::new(&Setup::default()), options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     rig
 }

@@ -12,7 +12,7 @@ use fingertip::link::sender::Sender;
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
@@ -63,7 +63,7 @@ fn frames_have_true_times() {
 fn before_the_first_tare_no_force_is_told() {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::default()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::default()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     let told = |rig: &mut Rig| {
         let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);

@@ -7,7 +7,7 @@ mod common;
 
 use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use fingertip::shipped::address;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The longest that a press takes, with what is worked out after it.
@@ -18,7 +18,7 @@ const GAIN_ONE: u16 = 16_384;
 fn start() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_gain(&mut rig, 44, GAIN_ONE / 4 * 5);
     write_gain(&mut rig, 35, GAIN_ONE / 4 * 3);

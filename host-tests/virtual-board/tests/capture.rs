@@ -9,7 +9,7 @@ use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_para
 use fingertip::capture::{Ended, Replayed, replay};
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 const NONE: u8 = 0;
@@ -26,7 +26,7 @@ const WINDOW: u16 = 248;
 fn start() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.4;
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     rig
 }

@@ -6,7 +6,7 @@ use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_u8};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The parameters that commissioning may change.
@@ -23,7 +23,7 @@ fn params(rig: &mut Rig) -> [u32; 4] {
 
 /// A board with a blank flash, tared, its tip 5 mm from a wall.
 fn new_board(setup: &Setup) -> Rig {
-    let mut rig = Rig::new(&image(), World::new(setup), &Options::default()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(setup), &Options::default()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");

@@ -10,7 +10,7 @@ use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The place of a parameter.
@@ -32,7 +32,7 @@ fn hold(rig: &mut Rig) {
 fn holding_over_the_edge() -> Rig {
     let mut setup = Setup::default();
     (setup.wall.distance_mm, setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.5, 7.5, 1.0);
-    let mut rig = Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");

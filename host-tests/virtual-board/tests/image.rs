@@ -7,14 +7,14 @@ mod common;
 use common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use std::sync::Mutex;
 use virtual_board::{Options, Rig};
 
 fn rig() -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    Rig::new(&image(), World::new(&setup), &Options::confirmed()).expect("the image starts")
+    Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts")
 }
 
 /// A board that is up.

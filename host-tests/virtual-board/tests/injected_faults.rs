@@ -9,7 +9,8 @@ use common::{WAIT_NS, holding, holding_on_a_bus, image, read_u8, write_goal, wri
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Fault as Number;
-use host_tests::plant::{Bridge, Faults, Row, Setup, Taxel, World};
+use sim::bridge::Bridge;
+use sim::plant::{Faults, Plant, Row, Setup, Taxel};
 use std::sync::Mutex;
 use virtual_board::{Fault, Options, Rig};
 
@@ -114,7 +115,7 @@ fn break_and_time(name: &str, expected: &[Number], limit_us: f64, harm: impl Fn(
     MENDED.lock().expect("nobody panics there").push(rig);
 }
 
-fn world(rig: &mut Rig, change: impl FnOnce(&mut World) + Send + 'static) {
+fn world(rig: &mut Rig, change: impl FnOnce(&mut Plant) + Send + 'static) {
     rig.world(change).expect("it runs");
 }
 
@@ -233,7 +234,7 @@ fn a_panic_or_a_hard_fault_resets_to_off_and_leaves_a_record() {
 fn damaged_parameters_are_a_fault_that_the_bus_tells() {
     let presets = vec![(virtual_board::flash::SECTOR.start, vec![0x55; 64])];
     let options = Options { presets, ..Options::default() };
-    let mut rig = Rig::new(&image(), World::new(&Setup::default()), &options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     assert_eq!(read_u8(&mut rig, address::FAULT), Number::BrokenParameters as u8);
     let refused = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::TORQUE_ENABLE, 1).map(drop));

@@ -8,8 +8,8 @@ use common::{WAIT_NS, image, read_u8, read_u32};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
 use fingertip::store::SLOT_BYTES;
-use host_tests::encode;
-use host_tests::plant::{Setup, World};
+use sim::encode;
+use sim::plant::{Plant, Setup};
 use virtual_board::flash::{OTHER_SECTOR, SECTOR};
 use virtual_board::{Options, Rig};
 
@@ -35,7 +35,7 @@ fn filled(count: usize, first_sequence: u32) -> Vec<u8> {
 
 fn start(presets: Vec<(u64, Vec<u8>)>) -> Rig {
     let options = Options { presets, ..Options::default() };
-    let mut rig = Rig::new(&image(), World::new(&Setup::default()), &options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &options).expect("the image starts");
     rig.with(|stand| stand.bench.flash.word_ns = WORD_MAX_NS).expect("it runs");
     rig.run_ms(START_MS).expect("it runs");
     rig

@@ -7,7 +7,7 @@ mod common;
 use common::{image, write_param};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use virtual_board::measure::PinEdge;
 use virtual_board::{Fault, Options, Rig};
 
@@ -32,7 +32,7 @@ fn widths_ns(edges: &[PinEdge], pin: usize) -> Vec<[u64; 2]> {
 }
 
 fn running() -> Rig {
-    let mut rig = Rig::new(&image(), World::new(&Setup::default()), &Options::default()).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &Options::default()).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     rig
 }

@@ -1,6 +1,6 @@
 //! A pseudo-terminal, and a link to it that one process holds.
 
-use host_tests::{kept::Lock, say};
+use output::{kept::Lock, say};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::termios::tcgetattr;
 use serial2::SerialPort;

@@ -1,6 +1,6 @@
 //! A TCP port with one client at a time.
 
-use host_tests::say;
+use output::say;
 use rustix::fd::{AsFd, BorrowedFd};
 use std::io::{self, ErrorKind, Write as _};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};

@@ -1,7 +1,7 @@
 //! `budget`: what makes the force wrong, by fingers without one cause at a time.
 
 use clap::Parser;
-use host_tests::say;
+use output::say;
 use sim::native;
 use sim::population::budget::Budget;
 use std::process::ExitCode;

@@ -2,7 +2,7 @@
 //!
 //! The same scene and figures as on the flash image, without a microcontroller in between.
 
-use host_tests::say;
+use output::say;
 use sim::demo::{self, DemoError, Forces, Trace, figures::missed, pictures, table};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

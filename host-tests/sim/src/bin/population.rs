@@ -11,7 +11,7 @@ fn main() -> ExitCode {
         Board::Native => cli::answer(&args, &native::board),
         Board::Calibrated => cli::answer(&args, &native::calibrated::board),
         Board::Virtual => {
-            host_tests::say::aside(
+            output::say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
             );
             ExitCode::from(2)

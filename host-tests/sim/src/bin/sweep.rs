@@ -1,7 +1,7 @@
 //! `sweep`: many runs of a scene on the native board, over keys, seeds, cores and machines.
 
 use clap::{Parser, Subcommand};
-use host_tests::say;
+use output::say;
 use sim::cli::verdict;
 use sim::native;
 use sim::sweep::{Plan, Shard, Vary, merge, sweep};

@@ -1,10 +1,10 @@
 //! The figures of a run, each against its bound.
 
 use super::{Asked, DemoError, Run};
+use crate::optimal::minimum_time_s;
+use crate::setup::Setup;
 use fingertip::params::Params;
-use host_tests::optimal::minimum_time_s;
-use host_tests::plant::Setup;
-use host_tests::plot::Sample;
+use output::plot::Sample;
 use serde::Serialize;
 
 /// Figures of the true force.

@@ -1,8 +1,8 @@
 //! The demonstration's pictures.
 
 use super::{DemoError, Forces, Picture, Run};
-use host_tests::plant::Setup;
-use host_tests::plot::{self, Map, Panel};
+use crate::setup::Setup;
+use output::plot::{self, Map, Panel};
 use std::path::{Path, PathBuf};
 
 /// How much of a step is shown before and after its goal.

@@ -6,8 +6,8 @@ use crate::scene::{Scene, controller};
 use crate::watch::{Controller, Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::state::Fault;
-use host_tests::heatmap::Pressures;
-use host_tests::plot::Sample;
+use output::heatmap::Pressures;
+use output::plot::Sample;
 
 /// Holds of at least this are drawn, each force once.
 const DRAWN_N: f64 = 1.0;

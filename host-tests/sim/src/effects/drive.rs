@@ -21,6 +21,7 @@ mod winding_inductance;
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::{Cost, Truth};
+use serde::{Deserialize, Serialize};
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[
@@ -38,7 +39,7 @@ pub const EFFECTS: &[&Description] = &[
 ];
 
 /// What the winding is connected to, for a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Circuit {
     /// The source's voltage.
     pub source_v: f64,
@@ -146,6 +147,10 @@ pub trait Stages {
     /// See [`Play`].
     fn tip_mm(&mut self, flank_mm: f64, _surface_mm: f64) -> f64 {
         flank_mm
+    }
+    /// Travels of the pressing flank at which it meets an end, rear and front.
+    fn end_stops_mm(&self) -> Option<[f64; 2]> {
+        None
     }
     /// See [`Encoder`].
     fn count(&mut self, count: i32) -> i32 {

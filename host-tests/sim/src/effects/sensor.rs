@@ -14,15 +14,15 @@ mod noise;
 mod offset;
 mod row_sag;
 mod saturation;
-mod settling;
+pub(crate) mod settling;
 mod since;
 mod temperature_drift;
 
 use super::{Metered, Part};
 use crate::registry::Description;
+use crate::setup::Array;
 use crate::watch::Cost;
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::setup::Array;
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[
@@ -196,26 +196,31 @@ impl Readout {
 
     #[inline(never)]
     fn through(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        let array = &self.array;
-        let mut volts = [array.ground_v; COLUMNS];
-        if let Some(row) = self.siemens.get_mut(slot) {
-            let mut kpa = *kpa;
-            stages.pressure(slot, time_s, &mut kpa);
-            *row = core::array::from_fn(|column| {
-                let loaded = array.preload_siemens + array.siemens_per_kpa * kpa[column];
-                if loaded > 0.0 { loaded } else { 0.0 }
-            });
-            stages.conductance(slot, time_s, row);
-            let mut seen = *row;
-            stages.network(slot, &self.siemens, &mut seen);
-            for (volts, siemens) in volts.iter_mut().zip(seen) {
-                *volts += siemens * self.volts_per_siemens;
-            }
+        let mut volts = [self.array.ground_v; COLUMNS];
+        if slot < ROWS {
+            self.add_row(stages, slot, time_s, kpa, &mut volts);
         }
         stages.volts(slot, time_s, &mut volts);
         let mut codes = volts.map(|volts| volts * self.codes_per_volt);
         stages.codes(slot, time_s, &mut codes);
         // What becomes an integer is cut: rounded down, and 0 below it.
         codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
+    }
+
+    /// Adds what a driven row under these pressures gives to the columns' voltages.
+    #[inline(always)]
+    pub fn add_row(&mut self, stages: &mut impl Stages, row: usize, time_s: f64, kpa: &Row, volts: &mut Row) {
+        let (array, mut kpa) = (&self.array, *kpa);
+        stages.pressure(row, time_s, &mut kpa);
+        self.siemens[row] = core::array::from_fn(|column| {
+            let loaded = array.preload_siemens + array.siemens_per_kpa * kpa[column];
+            if loaded > 0.0 { loaded } else { 0.0 }
+        });
+        stages.conductance(row, time_s, &mut self.siemens[row]);
+        let mut seen = self.siemens[row];
+        stages.network(row, &self.siemens, &mut seen);
+        for (volts, siemens) in volts.iter_mut().zip(seen) {
+            *volts += siemens * self.volts_per_siemens;
+        }
     }
 }

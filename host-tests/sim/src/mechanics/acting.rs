@@ -1,8 +1,8 @@
 //! What acts on one finger's shaft through a step: the winding's current, friction, and the load at the tip.
 
 use crate::effects::drive::{Circuit, Friction, Stages};
-use host_tests::plant::drive::{Acting, Resistance, Source};
-use host_tests::plant::readout::decay;
+use crate::mechanics::decay::decay;
+use crate::mechanics::rotor::{Acting, Resistance, Source};
 
 /// The source without what an inductance adds.
 pub fn resistive(circuit: &Circuit, open: bool) -> Source {

@@ -5,8 +5,8 @@ use super::normal::Law;
 use super::pressures::{Between, Pressures};
 use super::shape;
 use crate::effects::contact::{Grip, Stages};
+use crate::setup::Setup;
 use fingertip::shipped::COLUMNS;
-use host_tests::plant::Setup;
 
 /// A contact and its effects.
 pub struct Contact<C> {

@@ -1,6 +1,6 @@
 //! The tip's elastic force against its indentation: a closed form on a plane, a table on any other surface.
 
-use host_tests::plant::drive::mean_square;
+use crate::mechanics::rotor::mean_square;
 
 /// Force and energy of an indentation. Beyond the table the force goes on in a straight line.
 #[derive(Clone, Debug, PartialEq)]

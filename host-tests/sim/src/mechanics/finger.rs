@@ -4,9 +4,10 @@ use super::acting::{Acts, resistive};
 use super::contact::Contact;
 use crate::effects::drive::{Circuit, Friction};
 use crate::effects::{contact, drive};
+use crate::mechanics::rotor::{Rotor, Shaft};
+use crate::{bridge::Bridge, setup::Setup};
 use core::f64::consts::TAU;
-use host_tests::plant::drive::{Rotor, Shaft};
-use host_tests::plant::{Bridge, Setup};
+use serde::{Deserialize, Serialize};
 
 /// Rounds of a step's solution at most, and the share of the speed at which they end.
 const ROUNDS: usize = 40;
@@ -29,6 +30,18 @@ pub struct Finger<D, C> {
     bridge: Bridge,
     circuit: Circuit,
     friction: Friction,
+    dt_s: f64,
+}
+
+/// What moves, with what holds through the last step: set up alike, a finger goes on from it to the bit.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Motion {
+    shafts: [Shaft; 2],
+    rad_per_s2: f64,
+    winding_a: f64,
+    tip_mm: f64,
+    bridge: Bridge,
+    circuit: Circuit,
     dt_s: f64,
 }
 
@@ -148,11 +161,37 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         if self.dt_s > 0.0 {
             self.rad_per_s2 = (self.shaft.speed_rad_per_s - self.before.speed_rad_per_s) / self.dt_s;
         }
+        if !self.drive.none() {
+            self.stop_at_ends();
+        }
         self.tip_mm = self.flank_mm();
         if !self.drive.none() {
             self.drive.heated(self.dt_s, &self.circuit, end.square_a2_s);
             self.tip_mm = self.drive.tip_mm(self.tip_mm, surface_mm);
         }
+    }
+
+    /// Holds it where it meets an end.
+    fn stop_at_ends(&mut self) {
+        let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
+        let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
+        if held_mm != self.flank_mm() {
+            self.shaft = Shaft { angle_rad: held_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
+        }
+    }
+
+    /// What moves.
+    pub fn motion(&self) -> Motion {
+        let Self { before, shaft, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s, .. } = *self;
+        Motion { shafts: [before, shaft], rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s }
+    }
+
+    /// Goes on from there.
+    pub fn resume(&mut self, motion: &Motion) {
+        let Motion { shafts, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s } = *motion;
+        [self.before, self.shaft] = shafts;
+        (self.rad_per_s2, self.winding_a, self.tip_mm, self.dt_s) = (rad_per_s2, winding_a, tip_mm, dt_s);
+        (self.bridge, self.circuit) = (bridge, circuit);
     }
 
     /// Puts it at rest at a travel, as if carried there.

@@ -8,9 +8,9 @@
 
 use super::shape;
 use crate::effects::contact::Stages;
+use crate::mechanics::cells::Cell;
+use crate::setup::Tip;
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::cells::Cell;
-use host_tests::plant::setup::Tip;
 
 /// A row's taxels.
 type Row = [f64; COLUMNS];

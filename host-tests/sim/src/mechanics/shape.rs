@@ -6,9 +6,9 @@
 
 use super::elastic::{Elastic, Table};
 use crate::effects::contact::Stages;
+use crate::mechanics::cells::Cell;
+use crate::setup::Tip;
 use core::f64::consts::TAU;
-use host_tests::plant::cells::Cell;
-use host_tests::plant::setup::Tip;
 
 /// Samples around, and from the apex to the tip's rim.
 const AROUND: usize = 64;

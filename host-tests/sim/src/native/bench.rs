@@ -1,23 +1,28 @@
-//! A finger on a bench: the scene around it is exchanged while its controller stays, as a user moves finger and plate
-//! between two presses.
+//! A finger on a bench, frame by frame: its command is somebody's to give, what its controller is given may be changed
+//! on the way, and the scene around it is exchanged while its controller stays, as a user moves finger and plate
+//! between two presses. The plant's finger ([`crate::plant`]) can also be broken and moved by hand.
 
-use super::{Begun, Board, SimError};
+use super::{Begun, Board, SimError, Unit};
+use crate::bridge::Bridge;
 use crate::effects::sensor::Stages as _;
 use crate::effects::set::Set;
-use crate::scene::Scene;
+use crate::mechanics::finger::Finger;
+use crate::plant::{Faults, Reference};
+use crate::scene::{Scene, read};
+use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::shipped::{COLUMNS, ROWS, TARE_FRAMES};
-use host_tests::plant::Bridge;
+use fingertip::frame::Sense;
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use images::record::Record;
 
-/// The first finger of a scene.
-pub struct Bench<E: Set> {
+/// The first finger of a scene, or the plant's.
+pub struct Bench<E: Set = Reference> {
     board: Board<E>,
+    sense: Sense,
 }
-
-/// The core of the array that is shipped.
-type Core = Pipeline<ROWS, COLUMNS>;
 
 impl<E: Set> Bench<E> {
     /// At rest, torque off, not tared.
@@ -25,7 +30,7 @@ impl<E: Set> Bench<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        Ok(Self { board: Board::new(scene, Begun::default())? })
+        Ok(Self { board: Board::new(scene, Begun::default())?, sense: Sense::default() })
     }
 
     /// Exchanges the world and the array's effects; the controller stays as it is.
@@ -40,30 +45,56 @@ impl<E: Set> Bench<E> {
         Ok(())
     }
 
+    fn unit(&self) -> &Unit<E> {
+        &self.board.units[0]
+    }
+
+    fn finger_mut(&mut self) -> &mut Finger<E::Drive, E::Contact> {
+        &mut self.board.world.fingers_mut()[0]
+    }
+
     /// What the host asks.
     pub fn command(&mut self) -> &mut Command {
         &mut self.board.units[0].command
     }
 
     /// The controller.
-    pub fn pipeline(&mut self) -> &mut Core {
+    pub fn pipeline(&mut self) -> &mut Pipeline {
         &mut self.board.units[0].pipeline
     }
 
-    /// One frame and its control step.
-    pub fn step(&mut self) -> Status {
-        self.board.scan();
-        let sense = self.board.world.sense(0, 0);
-        let unit = &mut self.board.units[0];
-        unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
-        let (_, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
-        unit.next = Bridge::of(status);
-        *status
+    /// What the controller reports.
+    pub fn status(&self) -> &Status {
+        self.unit().pipeline.status()
     }
 
-    /// What is true of the finger.
-    pub fn truth(&mut self) -> Truth {
-        self.board.world.truth(0, false)
+    /// The last frame scanned, what was sensed beside it, and what is asked.
+    pub fn record(&self) -> Record {
+        Record { frame: self.unit().frame, sense: self.sense, command: self.unit().command }
+    }
+
+    /// The last frame scanned.
+    pub fn frame(&self) -> &Frame {
+        &self.unit().frame
+    }
+
+    /// Scans one frame, row by row while the world moves on, and takes one control step.
+    pub fn step(&mut self) -> Status {
+        self.step_with(|_| {})
+    }
+
+    /// The same, where somebody changes what the controller is given.
+    pub fn step_with(&mut self, change: impl FnOnce(&mut Record)) -> Status {
+        self.board.scan();
+        self.sense = self.board.world.sense(0, 0);
+        let unit = &mut self.board.units[0];
+        unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
+        let mut record = self.record();
+        change(&mut record);
+        let unit = &mut self.board.units[0];
+        let (_, status) = unit.pipeline.step(&record.frame, &record.sense, &record.command);
+        unit.next = Bridge::of(status);
+        *status
     }
 
     /// Torque off, a tare, torque on; nothing may touch.
@@ -77,6 +108,26 @@ impl<E: Set> Bench<E> {
         self.command().torque = true;
     }
 
+    /// Virtual time.
+    pub fn time_s(&self) -> f64 {
+        self.board.time_s()
+    }
+
+    /// What is true of the finger.
+    pub fn truth(&mut self) -> Truth {
+        self.board.world.truth(0, false)
+    }
+
+    /// Puts the tip at rest at a travel, as if carried there.
+    pub fn place(&mut self, travel_mm: f64) {
+        self.finger_mut().place(travel_mm);
+    }
+
+    /// Puts the object where the tip meets it at this travel.
+    pub fn place_object(&mut self, distance_mm: f64) {
+        self.finger_mut().place_object(distance_mm);
+    }
+
     /// What each taxel makes of 100 kPa, as a share of it: its own gain, where no effect remembers what was before.
     pub fn sensitivities(&mut self) -> [[f64; COLUMNS]; ROWS] {
         let unit = &mut self.board.units[0];
@@ -85,5 +136,35 @@ impl<E: Set> Bench<E> {
             unit.sensor.pressure(row, 0.0, &mut kpa);
             kpa.map(|kpa| kpa / 100.0)
         })
+    }
+}
+
+impl Default for Bench {
+    /// The reference finger under a controller with the default parameters.
+    fn default() -> Self {
+        Self::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("the defaults are allowed"))
+    }
+}
+
+/// Whoever simulates the plant steps it once a slot.
+const SCENE: &str = "about = \"the plant\"\nduration_s = 1.0\n[world]\nstep_us = 10.0\n";
+
+impl Bench {
+    /// The plant's finger under a controller: at rest, torque off, not tared.
+    ///
+    /// # Panics
+    /// On a contact too stiff for steps of 10 us.
+    pub fn of(setup: &Setup, config: &Config) -> Self {
+        let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
+        let parts = core::iter::once(Reference::parts(setup));
+        let board = Board::of(&scene, Begun::default(), config, setup, parts);
+        Self { board: board.unwrap_or_else(|error| panic!("{error}")), sense: Sense::default() }
+    }
+
+    /// Breaks something or mends it.
+    pub fn harm(&mut self, change: impl FnOnce(&mut Faults)) {
+        let faults = &mut self.board.world.fingers_mut()[0].drive.faults;
+        change(faults);
+        self.board.units[0].sensor.faults = faults.array;
     }
 }

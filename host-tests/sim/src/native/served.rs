@@ -9,6 +9,7 @@ mod broken;
 mod object;
 
 use super::{Begun, Board, SimError};
+use crate::bridge::Bridge;
 use crate::effects::set::Set;
 use crate::scene::Scene;
 use crate::watch::Truth;
@@ -20,7 +21,6 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, Calibration, Capture, Config, Pipeline, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::settle;
-use host_tests::plant::Bridge;
 use object::Object;
 use std::collections::VecDeque;
 

@@ -8,7 +8,7 @@ use crate::part::Part;
 use crate::run::{Run, RunError};
 use crate::sweep::Shard;
 use clap::{Parser, Subcommand, ValueEnum};
-use host_tests::say;
+use output::say;
 use std::fs;
 use std::path::PathBuf;
 use std::process::ExitCode;

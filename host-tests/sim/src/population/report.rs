@@ -6,7 +6,7 @@ use crate::metrics::Hold;
 use crate::part::{cannot_write, check};
 use crate::run::{Outcome, RunError};
 use crate::sweep::first_missing;
-use host_tests::kept;
+use output::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;

@@ -5,7 +5,7 @@ use super::{Population, Report};
 use crate::part::cannot_write;
 use crate::run::RunError;
 use crate::scene::text::set;
-use host_tests::kept;
+use output::kept;
 use std::fs;
 use std::path::{Path, PathBuf};
 

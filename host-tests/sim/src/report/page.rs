@@ -6,8 +6,8 @@ use super::plots::{self, Plot};
 use super::{Report, Tracks, effects, pressures, strip};
 use crate::metrics::{Metric, Verdict, shown};
 use crate::run::{RunError, asked};
-use host_tests::plot::PlotError;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use output::plot::PlotError;
 
 /// Nothing but what is in the page, whatever is in it.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";

@@ -1,7 +1,7 @@
 //! A report's plots: what they show, and each as it is drawn where no script runs.
 
 use super::trace::{Kept, Track, Tracks};
-use host_tests::plot::{Curve, Curves, PlotError, curves};
+use output::plot::{Curve, Curves, PlotError, curves};
 use serde::Serialize;
 
 /// Width and height of a plot without a script: as wide as leaves its letters to be read on a phone.

@@ -2,8 +2,8 @@
 
 use super::trace::{Instant, Tracks};
 use crate::metrics::shown;
-use host_tests::heatmap::Pressures;
 use maud::{Markup, html};
+use output::heatmap::Pressures;
 
 /// How many are shown.
 const MAPS: usize = 10;

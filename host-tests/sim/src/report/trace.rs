@@ -6,7 +6,7 @@ use crate::metrics::newtons;
 use crate::watch::{Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
 use fingertip::units::Duty;
-use host_tests::heatmap::Pressures;
+use output::heatmap::Pressures;
 
 /// Stretches of time; of each the least, the largest and the mean value are kept.
 const STRETCHES: u64 = 900;

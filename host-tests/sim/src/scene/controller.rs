@@ -1,9 +1,9 @@
 //! What a scene sets its controller and its finger to.
 
 use super::Scene;
+use crate::setup::Array;
+use crate::setup::Setup;
 use fingertip::params::Params;
-use host_tests::plant::Setup;
-use host_tests::plant::setup::Array;
 
 /// The finger of a scene, as its tables say; everything that is an effect's to say is at its ideal value.
 pub fn setup(scene: &Scene) -> Setup {

@@ -10,7 +10,7 @@ use crate::part::{self, cannot_write};
 use crate::run::RunError;
 use crate::scene::Scene;
 use csv::ReaderBuilder;
-use host_tests::kept::Lock;
+use output::kept::Lock;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

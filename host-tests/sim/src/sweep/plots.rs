@@ -3,7 +3,7 @@
 use super::summary::{points, spread, values};
 use super::table::Table;
 use crate::report::around;
-use host_tests::plot::{Curve, Curves, PlotError, curves};
+use output::plot::{Curve, Curves, PlotError, curves};
 
 const PANEL_PX: (u32, u32) = (560, 340);
 /// Runs that are drawn each; of more, only the least, the median and the largest.

@@ -5,7 +5,7 @@ use super::{plots, summary};
 use crate::part::cannot_write;
 use crate::run::RunError;
 use csv::Writer;
-use host_tests::kept::Lock;
+use output::kept::Lock;
 use std::path::Path;
 
 /// All rows of a sweep or of a shard, in order.

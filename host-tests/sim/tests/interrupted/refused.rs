@@ -165,7 +165,7 @@ fn a_lock_of_a_dead_process_stands_in_nobodys_way() {
     assert!(!out.join("runs.csv.lock").exists() && !out.join("runs.csv.new").exists());
 
     // One that is alive is named, and what it does is left alone.
-    let lock = host_tests::kept::Lock::take(&out.join("runs.csv")).unwrap();
+    let lock = output::kept::Lock::take(&out.join("runs.csv")).unwrap();
     refused(&mut sweep(&out), &format!("is being written by process {}", std::process::id()));
     drop(lock);
     assert_eq!(told(&mut sweep(&out)).0, Some(1));

@@ -1,10 +1,10 @@
 //! What holds of every sensor effect, alone and together, over any input.
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use host_tests::plant::setup::Array;
 use sim::effects::sensor::{self, Readout, Row};
 use sim::registry;
 use sim::scene::{read, text};
+use sim::setup::Array;
 
 /// The readout with these effects.
 fn stages(tables: &str, seed: u64) -> sensor::Named {
@@ -98,18 +98,4 @@ fn an_effects_numbers_are_its_own() {
     let more = format!("{noise}[effects.gain_spread]\nrms_percent = 0\n[effects.burst]\namplitude_codes = 0\n");
     assert_eq!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(&more, 1), 100, 1));
     assert_ne!(scan(&mut stages(noise, 1), 100, 1), scan(&mut stages(noise, 2), 100, 1));
-}
-
-#[test]
-fn the_ideal_readout_is_the_plants() {
-    use host_tests::plant::{Setup, World};
-    let mut setup = Setup::default();
-    setup.array.row_ohm = 0.0;
-    let mut world = World::new(&setup);
-    world.place(6.0);
-    let mut readout = Readout::new(&setup.array);
-    for slot in 0..SLOTS {
-        let kpa = core::array::from_fn(|column| if slot < ROWS { world.pressure_kpa(slot, column) } else { 0.0 });
-        assert_eq!(readout.codes(&mut (), slot, 0.0, &kpa), world.slot_codes(slot));
-    }
 }

@@ -1,7 +1,7 @@
 //! A world moved by hand.
 
 pub use crate::common::{Last, scene};
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 use sim::effects::set::{Named, Set};
 use sim::mechanics::body::Surroundings;
 use sim::scene::controller;

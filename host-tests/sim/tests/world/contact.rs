@@ -2,7 +2,7 @@
 
 use crate::bench::{close, run, world};
 use core::f64::consts::PI;
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 
 /// Friction that lets nothing move: what is placed stays.
 const HELD: &str = "[effects.dry_friction]\ntorque_mnm = 20.0\n";

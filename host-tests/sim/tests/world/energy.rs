@@ -1,7 +1,7 @@
 //! No passive effect creates energy: a million random steps of each.
 
 use crate::bench::world;
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 use sim::effects::set::Named;
 use sim::world::World;
 

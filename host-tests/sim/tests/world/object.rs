@@ -2,7 +2,7 @@
 
 use crate::bench::{Last, close, run, scene, world};
 use fingertip::state::Mode;
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 use sim::watch::{Step, Watch};
 
 #[test]

@@ -1,7 +1,7 @@
 //! Between two steps: what a row feels and what the encoder reads a little before or behind the end of the last one.
 
 use crate::bench::{run, world};
-use host_tests::plant::Bridge;
+use sim::bridge::Bridge;
 use sim::effects::set::Named;
 use sim::world::World;
 

@@ -1,9 +1,9 @@
 //! Taxel means from the table against the fine integral.
 
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::cells::Cell;
-use host_tests::plant::setup::Tip;
+use sim::mechanics::cells::Cell;
 use sim::mechanics::pressures::Pressures;
+use sim::setup::Tip;
 
 const PITCH_MM: f64 = 1.5;
 

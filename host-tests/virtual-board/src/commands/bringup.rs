@@ -1,7 +1,7 @@
 //! `virtual-board bringup`.
 
 use ::bringup::judge::estimates;
-use host_tests::{kept, say};
+use output::{kept, say};
 use std::io;
 use std::path::PathBuf;
 use virtual_board::{Error, Options, bringup};

@@ -1,6 +1,6 @@
 //! `virtual-board demo`.
 
-use host_tests::{kept, say};
+use output::{kept, say};
 use sim::demo::{figures, pictures, table};
 use std::path::PathBuf;
 use virtual_board::demo::{self, DemoError, Plan};

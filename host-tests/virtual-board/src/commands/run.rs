@@ -1,6 +1,6 @@
 //! `virtual-board run`.
 
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 use std::path::PathBuf;
 use std::time::Instant;
 use virtual_board::{Error, Options, Rig};
@@ -22,7 +22,7 @@ pub struct Arguments {
 /// Runs the image and reports.
 pub fn run(arguments: &Arguments) -> Result<(), Error> {
     let begun = Instant::now();
-    let mut rig = Rig::new(&arguments.image, World::new(&Setup::default()), &Options::default())?;
+    let mut rig = Rig::new(&arguments.image, Plant::new(&Setup::default()), &Options::default())?;
     let started = begun.elapsed();
     rig.run_until_ns(arguments.ms * 1_000_000)?;
     let wall = begun.elapsed();

@@ -1,8 +1,8 @@
 //! `virtual-board serve`.
 
-use host_tests::plant::{Setup, World};
-use host_tests::say;
+use output::say;
 use serve::{Place, Port};
+use sim::plant::{Plant, Setup};
 use std::io::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -34,7 +34,7 @@ pub fn run(arguments: &Arguments) -> Result<(), Error> {
     let place = arguments.tcp.map_or_else(|| Place::Pty(arguments.pty.clone()), Place::Tcp);
     let mut setup = Setup::default();
     setup.wall.distance_mm = arguments.distance_mm;
-    let mut board = Board::warm(Rig::new(&arguments.image, World::new(&setup), &Options::confirmed())?)?;
+    let mut board = Board::warm(Rig::new(&arguments.image, Plant::new(&setup), &Options::confirmed())?)?;
     let mut port = Port::open(&place)?;
     let stop = port.stopper();
     ctrlc::set_handler(move || stop.stop()).map_err(|why| Error::Client(std::io::Error::other(why)))?;

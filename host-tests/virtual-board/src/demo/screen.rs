@@ -1,8 +1,8 @@
 //! What is seen while it runs: a live heat map where there is a terminal, a line for each phase elsewhere.
 
 use fingertip::pipeline::Status;
-use host_tests::{heatmap, say};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use output::{heatmap, say};
 use sim::demo::{Taxels, what};
 use sim::scene::Scene;
 use sim::watch::{Step, Watch};

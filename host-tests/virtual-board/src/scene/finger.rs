@@ -3,14 +3,14 @@
 use super::joint::Joint;
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use host_tests::plant::Bridge;
-use host_tests::plant::setup::Array;
 use sim::SimError;
+use sim::bridge::Bridge;
 use sim::effects::link;
 use sim::effects::sensor::{self, Readout};
 use sim::effects::set::{Named, Parts, Set};
 use sim::mechanics::body::Surroundings;
 use sim::scene::{Scene, controller};
+use sim::setup::Array;
 use sim::watch::{Cost, Truth};
 use sim::world::World;
 use std::collections::VecDeque;

@@ -3,8 +3,8 @@
 
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
-use host_tests::encode;
-use host_tests::plant::{Setup, World};
+use sim::encode;
+use sim::plant::{Plant, Setup};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use virtual_board::flash::SECTOR;
@@ -80,7 +80,7 @@ pub fn confirm_direction(rig: &mut Rig) {
 fn hold(options: &Options) -> Rig {
     let mut setup = Setup::default();
     setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), World::new(&setup), options).expect("the image starts");
+    let mut rig = Rig::new(&image(), Plant::new(&setup), options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     confirm_direction(&mut rig);
     write_u8(&mut rig, address::TARE, 1);

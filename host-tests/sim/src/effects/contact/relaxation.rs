@@ -3,8 +3,8 @@
 use super::Memory;
 use crate::effects::{Build, Part};
 use crate::key::Key;
+use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
-use host_tests::plant::readout::decay;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {

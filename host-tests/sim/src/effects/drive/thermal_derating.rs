@@ -3,9 +3,9 @@
 use super::{Circuit, Electric};
 use crate::effects::{Build, Part};
 use crate::key::Key;
+use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 use crate::watch::Truth;
-use host_tests::plant::readout::decay;
 
 /// Copper's temperature coefficient of resistance.
 const COPPER_PER_K: f64 = 0.0039;

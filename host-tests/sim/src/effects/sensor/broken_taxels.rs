@@ -4,8 +4,8 @@ use super::{Conductance, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
+use crate::setup::Array;
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::setup::Array;
 
 const TAXELS: Kind = Kind::Pairs { below: ROWS as i64 };
 

@@ -4,7 +4,7 @@ use super::{Codes, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
-use host_tests::plant::setup::Array;
+use crate::setup::Array;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {

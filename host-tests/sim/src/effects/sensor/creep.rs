@@ -4,9 +4,9 @@ use super::since::Since;
 use super::{Pressure, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
+use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::readout::decay;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {

@@ -3,8 +3,8 @@
 use super::{Row, Volts};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
+use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
-use host_tests::plant::readout::decay;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {
@@ -31,17 +31,24 @@ pub const EFFECT: Description = Description {
     ],
     zero: &[("tau_us", 0.0)],
     build: |build: &Build| {
-        let tau_s = build.values.number("tau_us") * 1e-6;
-        let left = decay(build.values.number("after_us") * 1e-6 / tau_s);
-        Part::Volts(Box::new(Settling { tau_s, left, before: None }))
+        let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.values.number(key) * 1e-6);
+        Part::Volts(Box::new(Settling::new(tau_s, after_s)))
     },
 };
 
-struct Settling {
+/// How far the columns have settled.
+pub struct Settling {
     tau_s: f64,
     /// What is left of a difference at the sample.
     left: f64,
     before: Option<Before>,
+}
+
+impl Settling {
+    /// Not scanned yet.
+    pub fn new(tau_s: f64, after_s: f64) -> Self {
+        Self { tau_s, left: decay(after_s / tau_s), before: None }
+    }
 }
 
 struct Before {

@@ -1,9 +1,9 @@
 //! What can be broken while a finger is served.
 
+use crate::bridge::Bridge;
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use host_tests::plant::Bridge;
 use std::str::FromStr;
 
 /// What breaks.

@@ -1,13 +1,15 @@
 //! Codes to contact: the plant's electrical model against what the core reads back.
 
+mod characteristic;
+
 use fingertip::contact::Contact;
 use fingertip::contact::from_sums;
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
-use host_tests::plant::{Setup, World};
+use sim::plant::{Plant, Setup};
 
 struct Bench {
-    world: World,
+    world: Plant,
     array: Array,
     config: Config,
     frame: Frame,
@@ -15,8 +17,12 @@ struct Bench {
 
 impl Bench {
     fn new(setup: &Setup) -> Self {
-        let config = Config::shipped(&Params::DEFAULT).unwrap();
-        let mut bench = Self { world: World::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
+        Self::with(setup, &Params::DEFAULT)
+    }
+
+    fn with(setup: &Setup, params: &Params) -> Self {
+        let config = Config::shipped(params).unwrap();
+        let mut bench = Self { world: Plant::new(setup), array: Array::new(), config, frame: Frame::EMPTY };
         bench.tare();
         bench
     }
@@ -177,7 +183,7 @@ fn the_force_that_is_seen_whole_leaves_the_converter_room() {
             ..Params::DEFAULT
         };
         let seen_n: f64 = Config::shipped(&params).unwrap().force_seen.0.to_num();
-        let mut world = World::new(&setup);
+        let mut world = Plant::new(&setup);
         let indentation_mm = setup.tip.indentation_mm(seen_n);
         world.place(setup.wall.distance_mm + indentation_mm);
         let mut frame = Frame::EMPTY;

@@ -4,9 +4,11 @@ mod cells;
 mod drive;
 mod electrics;
 mod optimal;
+mod same;
 
-use host_tests::plant::{Bridge, Setup, World};
 use proptest::test_runner::{Config, RngSeed};
+use sim::bridge::Bridge;
+use sim::plant::{Plant, Setup};
 
 /// The step that the tests vouch for.
 const STEP_S: f64 = 10e-6;
@@ -19,14 +21,14 @@ fn free() -> Setup {
 }
 
 /// The reference finger pressed in this far, at rest.
-fn pressed(d_mm: f64) -> World {
-    let mut world = World::new(&Setup::default());
+fn pressed(d_mm: f64) -> Plant {
+    let mut world = Plant::new(&Setup::default());
     world.place(world.setup().wall.distance_mm + d_mm);
     world
 }
 
 /// Holds the bridge for a time.
-fn run(world: &mut World, seconds: f64, bridge: Bridge) {
+fn run(world: &mut Plant, seconds: f64, bridge: Bridge) {
     for _ in 0..(seconds / STEP_S).round() as usize {
         world.advance(STEP_S, bridge);
     }

@@ -1,6 +1,6 @@
 //! Files that are there whole or not at all, written by one at a time.
 
-use host_tests::kept::{self, Lock, Whole};
+use output::kept::{self, Lock, Whole};
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

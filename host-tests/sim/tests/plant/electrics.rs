@@ -2,8 +2,8 @@
 
 use super::pressed;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
-use host_tests::plant::readout::decay;
-use host_tests::plant::{Row, Setup, Taxel, World};
+use sim::mechanics::decay::decay;
+use sim::plant::{Plant, Row, Setup, Taxel};
 
 const NONE: [bool; ROWS] = [false; ROWS];
 
@@ -19,20 +19,6 @@ fn the_boards_reference_figures() {
     assert!((array.preload_siemens * codes_ohm - 40.0).abs() < 1e-9);
     assert!((array.siemens_per_kpa * codes_ohm - 24.0).abs() < 1e-9);
     assert!((array.row_ohm / codes_ohm - 1.667e-6).abs() < 1e-9);
-}
-
-#[test]
-fn a_row_sags_by_its_sum() {
-    let mut world = pressed(2.0);
-    for row in 0..ROWS {
-        let ideal: [f64; COLUMNS] = std::array::from_fn(|column| 40.0 + 24.0 * world.pressure_kpa(row, column));
-        let sag = 1.0 / (1.0 + 30.0 / 1.8e7 * ideal.iter().sum::<f64>());
-        let volts = world.settled_volts(&only(row));
-        for column in 0..COLUMNS {
-            let codes = (volts[column] - 0.3) * 4096.0 / 3.3;
-            assert!((codes - ideal[column] * sag).abs() < 1e-9, "({row}, {column})");
-        }
-    }
 }
 
 #[test]
@@ -53,7 +39,7 @@ fn columns_settle_exponentially() {
     assert!(start - end > 0.1);
     for tau in [0.0_f64, 0.5, 1.0, 3.0, 9.0, 12.0] {
         let expected = end + (start - end) * (-tau).exp();
-        let volts = world.column_volts(&only(2), 5, tau * 0.2e-6, &only(4));
+        let volts = world.settling_volts(&only(2), tau * 0.2e-6, &only(4))[5];
         assert!((volts - expected).abs() < 1e-9, "{volts} V for {expected} V after {tau} tau");
     }
 }
@@ -92,7 +78,7 @@ fn a_frame_holds_every_slot() {
     assert_eq!(frame.sequence, 2);
     for slot in 0..SLOTS {
         for column in 0..COLUMNS {
-            assert_eq!(frame.code(slot, column), world.code(slot, column));
+            assert_eq!(frame.code(slot, column), world.slot_codes(slot)[column]);
         }
     }
     // 0.3 V of virtual ground is 372.36 codes; the preload of the undriven slot has settled away.
@@ -106,7 +92,10 @@ fn a_frame_holds_every_slot() {
 fn a_slot_sampled_at_its_edge_still_shows_the_slot_before() {
     let mut world = pressed(1.0);
     let settled: Vec<_> = (0..SLOTS).map(|slot| world.slot_codes(slot)).collect();
-    world.setup_mut().array.sample_after_s = 0.0;
+    let mut setup = Setup::default();
+    setup.array.sample_after_s = 0.0;
+    let mut world = Plant::new(&setup);
+    world.place(setup.wall.distance_mm + 1.0);
     for slot in 0..SLOTS {
         assert_eq!(world.slot_codes(slot), settled[(slot + SLOTS - 1) % SLOTS]);
     }
@@ -115,29 +104,29 @@ fn a_slot_sampled_at_its_edge_still_shows_the_slot_before() {
 #[test]
 fn defects_show_where_they_are() {
     let mut sound = pressed(1.0);
-    let code = |world: &mut World, row, column| f64::from(world.code(row, column));
+    let code = |world: &mut Plant, row, column| f64::from(world.slot_codes(row)[column]);
 
     let mut dead = pressed(1.0);
     dead.faults.array.taxels[4][5] = Taxel::Dead;
-    assert_eq!(dead.code(4, 5), 372);
-    assert_eq!(dead.code(5, 5), sound.code(5, 5));
+    assert_eq!(dead.slot_codes(4)[5], 372);
+    assert_eq!(dead.slot_codes(5)[5], sound.slot_codes(5)[5]);
 
     let mut shorted = pressed(1.0);
     shorted.faults.array.taxels[4][5] = Taxel::Shorted;
-    assert_eq!(shorted.code(4, 5), 4095);
+    assert_eq!(shorted.slot_codes(4)[5], 4095);
     // The row's switch carries 100 mS: R_on S = 3, so the others read a quarter.
     let share = (code(&mut shorted, 4, 4) - 372.4) / (code(&mut sound, 4, 4) - 372.4);
     assert!((0.24..0.26).contains(&share), "{share}");
 
     let mut low = pressed(1.0);
     low.faults.array.rows[4] = Row::StuckLow;
-    assert_eq!(low.code(4, 5), 372);
-    assert_eq!(low.code(5, 5), sound.code(5, 5));
+    assert_eq!(low.slot_codes(4)[5], 372);
+    assert_eq!(low.slot_codes(5)[5], sound.slot_codes(5)[5]);
 
     let mut high = pressed(1.0);
     high.faults.array.rows[4] = Row::StuckHigh;
-    assert_eq!(high.code(4, 5), sound.code(4, 5));
-    assert_eq!(high.code(ROWS, 5), sound.code(4, 5));
+    assert_eq!(high.slot_codes(4)[5], sound.slot_codes(4)[5]);
+    assert_eq!(high.slot_codes(ROWS)[5], sound.slot_codes(4)[5]);
     let both = code(&mut sound, 4, 5) + code(&mut sound, 5, 5) - 372.4;
     assert!((code(&mut high, 5, 5) - both).abs() < 2.0);
 

@@ -1,7 +1,7 @@
 //! The soft fingertip on a rigid plane: Park, Kim and Hirai, "Development of a Soft-fingertip and Its Modeling Based on
 //! Force Distribution", ICRA 2003.
 
-use super::setup::Tip;
+use crate::setup::Tip;
 use core::f64::consts::PI;
 
 /// The picture of the tip flattened by an indentation d: everything that does not depend on the place.

@@ -1,8 +1,9 @@
 //! The time-optimal bound against closed forms, and against the plant.
 
 use super::STEP_S;
-use host_tests::optimal::{Reason, minimum_time_s, profile};
-use host_tests::plant::{Bridge, Setup, World};
+use sim::bridge::Bridge;
+use sim::optimal::{Reason, minimum_time_s, profile};
+use sim::plant::{Plant, Setup};
 
 const NO_LIMIT: f64 = f64::INFINITY;
 
@@ -67,7 +68,7 @@ fn the_world_driven_so_arrives_at_rest() {
     let setup = Setup::default();
     for (from, to) in [(0.5, 1.6), (1.6, 2.5), (2.5, 1.1), (0.0, 3.0)] {
         let best = profile(&setup, from, to, 6.0, NO_LIMIT).unwrap();
-        let mut world = World::new(&setup);
+        let mut world = Plant::new(&setup);
         world.place(setup.wall.distance_mm + from);
         let sign = f64::signum(to - from);
         let whole = (best.switch_s / STEP_S).floor();

@@ -5,8 +5,8 @@
 //! into chords that end on the rim. Along a chord the pressure is smooth; across, it ends like (r_c - y)^1.5, which
 //! takes 5 points.
 
-use super::setup::{Setup, Tip};
 use super::tip::Flattened;
+use crate::setup::Setup;
 use fingertip::shipped::{COLUMNS, ROWS};
 
 /// Gauss-Legendre nodes and weights on -1..1, 3 points: 0 and sqrt(3/5); 5/9, 8/9, 5/9.
@@ -100,27 +100,4 @@ fn farthest(over: [f64; 2]) -> f64 {
 
 fn square(x: f64) -> f64 {
     x * x
-}
-
-/// The rows worked out for one indentation; they are forgotten when it or the setup changes.
-#[derive(Clone, Debug, Default)]
-pub struct Rows {
-    key: [u64; 6],
-    rows: [Option<[f64; COLUMNS]>; ROWS],
-}
-
-impl Rows {
-    /// The mean pressures of a row's taxels.
-    pub fn row_kpa(&mut self, setup: &Setup, indentation_mm: f64, row: usize) -> [f64; COLUMNS] {
-        let Tip { radius_mm, modulus_kpa } = setup.tip;
-        let (x, y, pitch) = (setup.wall.centre_x_mm, setup.wall.centre_y_mm, setup.array.pitch_mm);
-        let key = [indentation_mm.max(0.0), radius_mm, modulus_kpa, x, y, pitch].map(f64::to_bits);
-        if key != self.key {
-            *self = Self { key, ..Self::default() };
-        }
-        *self.rows[row].get_or_insert_with(|| {
-            let tip = setup.tip.flattened(indentation_mm);
-            core::array::from_fn(|column| Cell::of(setup, row, column).mean_kpa(&tip))
-        })
-    }
 }

@@ -3,13 +3,11 @@
 
 mod charts;
 mod curves;
-#[cfg(feature = "judges")]
 mod fronts;
 mod maps;
 
 pub use charts::{Panel, Sample, overview, steps};
 pub use curves::{Curve, Curves, curves};
-#[cfg(feature = "judges")]
 pub use fronts::{Dot, Front, front};
 pub use maps::{Map, maps};
 

@@ -2,10 +2,11 @@
 //!
 //! The drive gives the most that voltage and current limits allow, then brakes with the most, and switches once. For a
 //! shaft with friction against a load that depends on the place that is the time-optimal profile. The switch instant is
-//! found by bisection (shooting) on the plant's own equations of motion, [`crate::plant::drive`].
+//! found by bisection (shooting) on the plant's own equations of motion, [`crate::mechanics::dynamics`].
 
-use crate::plant::drive::{Dynamics, Shaft, Source};
-use crate::plant::setup::Setup;
+use crate::mechanics::dynamics::Dynamics;
+use crate::mechanics::rotor::{Shaft, Source};
+use crate::setup::Setup;
 
 /// Step of the shooting; its error is of second order.
 const STEP_S: f64 = 20e-6;

@@ -2,12 +2,12 @@
 
 use super::{free, pressed};
 use fingertip::shipped::{COLUMNS, ROWS};
-use host_tests::plant::cells::Cell;
-use host_tests::plant::setup::Tip;
-use host_tests::plant::{Setup, World};
 use proptest::prelude::*;
+use sim::mechanics::cells::Cell;
+use sim::plant::{Plant, Setup};
+use sim::setup::Tip;
 
-const ORACLE: &str = include_str!("../../oracle/park2003.csv");
+const ORACLE: &str = include_str!("../../../oracle/park2003.csv");
 
 #[test]
 fn pressure_force_and_radius_are_the_papers() {
@@ -86,22 +86,22 @@ fn the_picture_has_the_contacts_symmetry() {
 
 #[test]
 fn no_contact_no_pressure() {
-    let mut world = World::new(&free());
+    let mut world = Plant::new(&free());
     assert!((0..ROWS).all(|row| (0..COLUMNS).all(|column| world.pressure_kpa(row, column) == 0.0)));
 }
 
 #[test]
 fn rows_follow_the_indentation_the_wall_and_the_pitch() {
-    let mut world = pressed(1.0);
-    let before = world.pressure_kpa(3, 5);
-    world.place(world.travel_mm() + 0.1);
-    let deeper = world.pressure_kpa(3, 5);
-    assert!(deeper > before);
-    world.setup_mut().wall.centre_y_mm = -1.0;
-    let nearer = world.pressure_kpa(3, 5);
-    assert!(nearer > deeper);
-    world.setup_mut().array.pitch_mm = 3.0;
-    assert!(world.pressure_kpa(3, 5) < nearer);
+    let felt_kpa = |d_mm: f64, centre_y_mm, pitch_mm| {
+        let mut setup = Setup::default();
+        (setup.wall.centre_y_mm, setup.array.pitch_mm) = (centre_y_mm, pitch_mm);
+        let mut plant = Plant::new(&setup);
+        plant.place(setup.wall.distance_mm + d_mm);
+        plant.pressure_kpa(3, 5)
+    };
+    let nearer = felt_kpa(1.1, -1.0, 1.5);
+    assert!(felt_kpa(1.0, 0.0, 1.5) < felt_kpa(1.1, 0.0, 1.5) && felt_kpa(1.1, 0.0, 1.5) < nearer);
+    assert!(felt_kpa(1.1, -1.0, 3.0) < nearer);
 }
 
 proptest! {
@@ -117,12 +117,11 @@ fn relative_error_of_sum(d: f64, x: f64, y: f64) -> f64 {
     let mut setup = Setup::default();
     setup.wall.centre_x_mm = x;
     setup.wall.centre_y_mm = y;
-    let mut world = World::new(&setup);
-    world.place(setup.wall.distance_mm + d);
+    let tip = setup.tip.flattened(d);
     let mut sum_kpa = 0.0;
     for row in 0..ROWS {
-        sum_kpa += (0..COLUMNS).map(|column| world.pressure_kpa(row, column)).sum::<f64>();
+        sum_kpa += (0..COLUMNS).map(|column| Cell::of(&setup, row, column).mean_kpa(&tip)).sum::<f64>();
     }
     let felt_n = sum_kpa * 1e-3 * setup.array.pitch_mm * setup.array.pitch_mm;
-    felt_n / world.force_n() - 1.0
+    felt_n / setup.tip.force_n(d) - 1.0
 }

@@ -1,61 +1,39 @@
 //! An array whose characteristic is no line: codes to force, drift, bad taxels, and what is refused.
 
-use fingertip::contact::{Contact, from_sums};
+use super::Bench;
 use fingertip::params::Params;
 use fingertip::pressure::{GAIN_ONE, TARE_BITS};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES};
-use host_tests::plant::{Setup, World};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::setup::Setup;
 
 /// At the full range a code means so much more than at none.
 const GROWTH: f64 = 3.3;
 
-struct Bench {
-    world: World,
-    array: Array,
-    config: Config,
-    frame: Frame,
+/// An array of this growth, and a configuration of this one.
+fn curved(growth: f64, curve_permille: i32) -> Bench {
+    let mut setup = Setup::default();
+    setup.array.growth = growth;
+    // Such an array is steeper at small pressures.
+    setup.array.siemens_per_kpa *= 3.0;
+    Bench::with(&setup, &Params { curve_permille, codes_per_kpa_milli: 72_000, ..Params::DEFAULT })
 }
 
-impl Bench {
-    /// An array of this growth, and a configuration of this one.
-    fn new(growth: f64, curve_permille: i32) -> Self {
-        let mut setup = Setup::default();
-        setup.array.growth = growth;
-        // Such an array is steeper at small pressures.
-        setup.array.siemens_per_kpa *= 3.0;
-        let params = Params { curve_permille, codes_per_kpa_milli: 72_000, ..Params::DEFAULT };
-        let config = Config::shipped(&params).unwrap();
-        let mut bench = Self { world: World::new(&setup), array: Array::new(), config, frame: Frame::EMPTY };
-        for _ in 0..TARE_FRAMES {
-            bench.read();
-            bench.array.continue_tare();
-        }
-        bench
-    }
-
-    fn read(&mut self) -> Contact {
-        self.world.fill_frame(&mut self.frame);
-        from_sums(self.array.read(&self.frame, &self.config), &self.config)
-    }
-
-    /// Force as sensed and as it is, N.
-    fn press(&mut self, indentation_mm: f64) -> [f64; 2] {
-        self.world.place(self.world.setup().wall.distance_mm + indentation_mm);
-        [self.read().force.0.to_num(), self.world.force_n()]
-    }
+/// Force as sensed and as it is, N.
+fn press(bench: &mut Bench, indentation_mm: f64) -> [f64; 2] {
+    [bench.press(indentation_mm).force.0.to_num(), bench.world.force_n()]
 }
 
 #[test]
 fn the_force_of_a_saturating_array_is_read_by_its_curve() {
-    let mut bench = Bench::new(GROWTH, 3_300);
-    let mut line = Bench::new(GROWTH, 0);
+    let mut bench = curved(GROWTH, 3_300);
+    let mut line = curved(GROWTH, 0);
     let mut worst = 0.0_f64;
     for step in 2..=28 {
-        let [sensed, truth] = bench.press(f64::from(step) * 0.1);
+        let [sensed, truth] = press(&mut bench, f64::from(step) * 0.1);
         assert!((sensed - truth).abs() <= 0.003 * truth + 0.006, "{truth} N read as {sensed} N");
-        let [sensed, truth] = line.press(f64::from(step) * 0.1);
+        let [sensed, truth] = press(&mut line, f64::from(step) * 0.1);
         worst = worst.max(1.0 - sensed / truth);
     }
     assert!(worst > 0.3, "by a line it would be {worst} too small");
@@ -64,16 +42,16 @@ fn the_force_of_a_saturating_array_is_read_by_its_curve() {
 #[test]
 fn with_the_same_codes_a_curve_never_reads_less_than_the_line() {
     // What the guard goes by stays on the safe side.
-    let (mut curve, mut line) = (Bench::new(0.0, 1_000), Bench::new(0.0, 0));
+    let (mut curve, mut line) = (curved(0.0, 1_000), curved(0.0, 0));
     for step in 0..=28 {
-        let [[bent, _], [straight, _]] = [&mut curve, &mut line].map(|bench| bench.press(f64::from(step) * 0.1));
+        let [[bent, _], [straight, _]] = [&mut curve, &mut line].map(|bench| press(bench, f64::from(step) * 0.1));
         assert!(bent >= straight - 0.002, "{bent} {straight}");
     }
 }
 
 #[test]
 fn the_baseline_follows_drift_as_by_a_line() {
-    let (mut curve, mut line) = (Bench::new(GROWTH, 3_300), Bench::new(GROWTH, 0));
+    let (mut curve, mut line) = (curved(GROWTH, 3_300), curved(GROWTH, 0));
     for bench in [&mut curve, &mut line] {
         for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
             let code = bench.frame.code(row, column);
@@ -92,7 +70,7 @@ fn the_baseline_follows_drift_as_by_a_line() {
 
 #[test]
 fn bad_taxels_are_left_out_of_picture_sums_and_baseline() {
-    let mut bench = Bench::new(GROWTH, 3_300);
+    let mut bench = curved(GROWTH, 3_300);
     bench.press(2.0);
     bench.frame.set_code(4, 4, 0);
     bench.frame.set_code(5, 5, 4_095);

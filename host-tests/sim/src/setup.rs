@@ -85,6 +85,21 @@ impl Array {
     pub const CODES: f64 = 4096.0;
     /// K = R_f V_drive 4096 / V_ref of the reference finger, codes Ohm.
     const CODES_OHM: f64 = 1.8e7;
+
+    /// The conductance where one on the line would be so large: a parabola through it, solved.
+    pub fn loaded(&self, line: f64) -> f64 {
+        if self.growth == 0.0 {
+            return line;
+        }
+        // As a share of the converter's full range.
+        let range = self.reference_v / (self.feedback_ohm * self.drive_v);
+        2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
+    }
+
+    /// The code of a voltage: rounded down, as a successive-approximation converter does.
+    pub fn code(&self, volts: f64) -> u16 {
+        (volts / self.reference_v * Self::CODES).floor().clamp(0.0, Self::CODES - 1.0) as u16
+    }
 }
 
 impl Default for Array {

@@ -8,8 +8,8 @@ use fingertip::link::{Actions, Captured, Reply};
 use fingertip::shipped::{CLOCKS, Record, Server, Snapshot};
 
 use super::bus::Bus;
-use super::crash::{self, Boot};
 use super::capture;
+use super::crash::{self, Boot};
 use super::exchange::{CAPTURE, GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Picture, SAVE, SAVED};
 use super::guard::{self, Stopwatch};
 use super::health;

@@ -55,7 +55,12 @@ pub(super) fn add(digest: u32, duty: Duty, status: &Status) -> u32 {
     words.add(pack([refusal.map_or(0, |refusal| refusal as u8), points, 0, 0]));
     words.add(factor_ppm);
     words.add(sigma_ppm);
-    words.add(pack([identification.number(), identification.refusal(), commissioning.number(), commissioning.refusal()]));
+    words.add(pack([
+        identification.number(),
+        identification.refusal(),
+        commissioning.number(),
+        commissioning.refusal(),
+    ]));
     words.add(commissioning.progress().into());
     if identification.number() == 2 {
         let Modulus { modulus, sigma, contact, points } = identification.result();

@@ -51,7 +51,9 @@ impl core::fmt::Display for Refusal {
         match self {
             Self::NoCapture => f.write_str("no capture: it does not begin as one"),
             Self::Version(version) => write!(f, "a capture of layout {version}; this firmware's is layout {VERSION}"),
-            Self::Shape { rows, columns } => write!(f, "a capture of {rows} x {columns} taxels, which this is not built for"),
+            Self::Shape { rows, columns } => {
+                write!(f, "a capture of {rows} x {columns} taxels, which this is not built for")
+            }
             Self::Layout => write!(
                 f,
                 "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
@@ -168,7 +170,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLU
 }
 
 fn sense(bits: &mut Reader<'_>, last: &Sense) -> Option<Sense> {
-    let short = |bits: &mut Reader<'_>, last: u16, width| u16::try_from(i32::from(last).checked_add(bits.signed(width)?)?).ok();
+    let short =
+        |bits: &mut Reader<'_>, last: u16, width| u16::try_from(i32::from(last).checked_add(bits.signed(width)?)?).ok();
     Some(Sense {
         encoder: last.encoder.wrapping_add(bits.signed(width::ENCODER)?),
         supply_mv: short(bits, last.supply_mv, width::SUPPLY)?,

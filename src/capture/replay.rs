@@ -90,8 +90,8 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
             (Field::Digest, taken.digest.into(), digest::short(running).into()),
         ];
         let first = fields.into_iter().find(|(_, captured, replayed)| captured != replayed);
-        difference = difference
-            .or(first.map(|(field, captured, replayed)| Difference { frame, field, captured, replayed }));
+        difference =
+            difference.or(first.map(|(field, captured, replayed)| Difference { frame, field, captured, replayed }));
         each(&taken, status);
     }
     let running = digest::words(running, core::iter::once(head.ended as u32));

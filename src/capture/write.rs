@@ -53,9 +53,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
 
     /// Whether it should begin: it is armed, and the next step would take up a tare.
     pub fn is_due(&self, status: &Status, command: &Command) -> bool {
-        self.standing.state == State::Armed
-            && status.mode == Mode::Off
-            && command.tare_request != status.taken.tare
+        self.standing.state == State::Armed && status.mode == Mode::Off && command.tare_request != status.taken.tare
     }
 
     /// Begins, with a pipeline that is made anew; the next step is the first one kept. That takes as long as a frame.

@@ -193,7 +193,8 @@ fn a_frame_takes_what_its_noise_says() {
                 let normal: f64 = (0..12).map(|_| uniform()).sum();
                 frame.set_code(place / COLUMNS, place % COLUMNS, (372.3 + noise * normal).round() as u16);
             }
-            let sense = Sense { supply_mv: 6_000 + (8.0 * uniform()) as u16, answer: CoreCycles(5_000), ..Sense::default() };
+            let sense =
+                Sense { supply_mv: 6_000 + (8.0 * uniform()) as u16, answer: CoreCycles(5_000), ..Sense::default() };
             capture.record(&frame, &sense, &Command::default(), &Status::default());
         }
         let frames = capture.standing().frames;

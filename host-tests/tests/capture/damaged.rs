@@ -2,8 +2,8 @@
 
 use super::burst::Finger;
 use fingertip::capture::{Ended, Refusal, replay};
-use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
 use fingertip::scan::Clocks;
+use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
 
 const BYTES: usize = 1 << 10;
 

@@ -17,8 +17,8 @@ use crate::link::snapshot::hardware_error;
 use crate::store;
 
 use super::values::{
-    bump, permille, set_accept, set_calibrate, set_capture, set_commission, set_goal, set_recover, set_scale, set_torque,
-    set_watchdog, short, watchdog,
+    bump, permille, set_accept, set_calibrate, set_capture, set_commission, set_goal, set_recover, set_scale,
+    set_torque, set_watchdog, short, watchdog,
 };
 /// The defaults go by no shape.
 type Record = store::Record<3, 3>;

@@ -53,7 +53,9 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
             }
             LinearReadEvent::Record { data, opcode } => {
                 match mcap::parse_record(opcode, data).map_err(|why| damaged(&why))? {
-                    Record::Attachment { header, data, .. } if header.name == ATTACHED => bytes = Some(data.into_owned()),
+                    Record::Attachment { header, data, .. } if header.name == ATTACHED => {
+                        bytes = Some(data.into_owned())
+                    }
                     Record::Metadata(metadata) if metadata.name == ABOUT => about = Some(metadata.metadata),
                     Record::DataEnd(end) => ends.push(end.data_section_crc),
                     Record::Footer(footer) => ends.push(footer.summary_crc),
@@ -65,11 +67,18 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
     }
     match ends[..] {
         [data, summary] if data != 0 && summary != 0 => {}
-        [_, _] => return Err("the file has no check sums: another program wrote it anew. Take the one that it was made from".into()),
+        [_, _] => {
+            return Err(
+                "the file has no check sums: another program wrote it anew. Take the one that it was made from".into()
+            );
+        }
         _ => return Err(damaged(&"it has no end of its messages, or no footer")),
     }
     let (Some(bytes), Some(about)) = (bytes, about) else {
-        return Err("the file holds no capture: it is a recording of another kind (a scene's is replayed by its own tests)".into());
+        return Err(
+            "the file holds no capture: it is a recording of another kind (a scene's is replayed by its own tests)"
+                .into(),
+        );
     };
     Ok(Kept { bytes, about })
 }

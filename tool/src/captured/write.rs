@@ -28,7 +28,8 @@ type Captured<'a> = (&'a Taken<ROWS, COLUMNS>, &'a Status);
 /// It is no capture of this version, or it cannot be written.
 pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
     let mut shown = Vec::new();
-    let replayed = through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
+    let replayed =
+        through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
     let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
     let out = options.create(to).map_err(|why| why.to_string())?;
     put(out, bytes, about, &replayed.head, &shown).map_err(|why| why.to_string())

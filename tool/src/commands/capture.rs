@@ -101,7 +101,8 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     captured::write(part.file().map_err(|why| file(&why))?, &bytes, &about).map_err(|why| file(&why))?;
     part.place().map_err(|why| file(&why))?;
     let ended = table::meaning(address::CAPTURE_ENDED, replayed.head.ended as i64);
-    let (frames, seconds) = (replayed.head.frames, f64::from(replayed.head.frames) * f64::from(replayed.head.frame_ns) * 1e-9);
+    let (frames, seconds) =
+        (replayed.head.frames, f64::from(replayed.head.frames) * f64::from(replayed.head.frame_ns) * 1e-9);
     let difference = replayed.difference.map(|difference| difference.to_string());
     if json {
         say_json(&json!({
@@ -115,7 +116,10 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     // The file is what shows it, so it is kept.
     match difference {
         None => Ok(()),
-        Some(at) => Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?").into()),
+        Some(at) => {
+            Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?")
+                .into())
+        }
     }
 }
 

@@ -50,7 +50,8 @@ fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         files.push(path.into());
         return Ok(());
     }
-    let mut inside: Vec<PathBuf> = fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
+    let mut inside: Vec<PathBuf> =
+        fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
     inside.sort();
     for path in inside {
         if path.is_dir() || path.extension().is_some_and(|ending| ending == "mcap") {

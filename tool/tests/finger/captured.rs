@@ -17,7 +17,11 @@ fn a_capture_is_taken_and_replays() {
     let finger = Served::begin("wall");
     let file = finger.file("press.mcap");
     let taken = finger.json(&["capture", "--press", "0.5", "--out", &file, "--board", "a served one", "--contribute"]);
-    assert_eq!((taken["replays"].as_bool(), taken["ended"].as_str()), (Some(true), Some("its memory is full")), "{taken}");
+    assert_eq!(
+        (taken["replays"].as_bool(), taken["ended"].as_str()),
+        (Some(true), Some("its memory is full")),
+        "{taken}"
+    );
     let frames = taken["frames"].as_u64().expect("a number");
     assert!(frames > 600 && taken["bytes"].as_u64() <= Some(44 << 10), "{taken}");
     let kept = captured::open(file.as_ref()).expect("a capture");
@@ -92,6 +96,7 @@ fn a_file_that_is_not_as_it_was_written_is_refused() {
     let why = finger.refused(&["replay", &finger.file("nowhere")]);
     assert!(why.contains("cannot read"), "{why}");
     fs::remove_file(&file).expect("it is there");
-    let why = finger.refused(&["replay", std::path::Path::new(&file).parent().expect("a folder").to_str().expect("text")]);
+    let why =
+        finger.refused(&["replay", std::path::Path::new(&file).parent().expect("a folder").to_str().expect("text")]);
     assert!(why.contains("no capture there"), "{why}");
 }

@@ -1,4 +1,4 @@
-//! What can be broken while it runs, beside the defects that the world itself has (`World::faults`).
+//! What can be broken while it runs, beside the defects that the world itself has (`Plant::faults`).
 
 use crate::board::FingerBoard;
 use crate::error::Error;

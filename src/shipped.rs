@@ -74,7 +74,7 @@ pub type Server = crate::link::Server<ROWS, COLUMNS>;
 
 /// Every register of the control table, in the order of the addresses.
 pub const REGISTERS: &[table::Register] = &ALL;
-const ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>();
+static ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>();
 
 /// Where each register begins.
 pub mod address {

@@ -79,7 +79,8 @@ pub type Snapshot<'a> = crate::link::Snapshot<'a, ROWS, COLUMNS>;
 pub type Server = crate::link::Server<ROWS, COLUMNS>;
 
 /// Every register of the control table, in the order of the addresses.
-pub const REGISTERS: &[table::Register] = &table::registers::<ROWS, COLUMNS>();
+pub const REGISTERS: &[table::Register] = &ALL;
+static ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>();
 
 /// Where each register begins.
 pub mod address {

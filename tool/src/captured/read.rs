@@ -69,7 +69,7 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
         [data, summary] if data != 0 && summary != 0 => {}
         [_, _] => {
             return Err(
-                "the file has no check sums: another program wrote it anew. Take the one that it was made from".into()
+                "the file has no check sums: another program wrote it anew. Take the one that it was made from".into(),
             );
         }
         _ => return Err(damaged(&"it has no end of its messages, or no footer")),

@@ -62,7 +62,7 @@ fn a_scan_that_the_hardware_cannot_time() {
     );
     assert_eq!(refused(&params).to_string(), "sample_cycles of 16: [3, 15, 28, 56, 84, 112, 144, 480] are allowed");
     let error = ScanTiming::new(400_000, 15, [10, 10], &CLOCKS).unwrap_err();
-    assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68320 ticks: 65535 are allowed");
+    assert_eq!(error.to_string(), "settle_ns and sample_cycles make a slot of 68328 ticks: 65535 are allowed");
 }
 
 #[test]

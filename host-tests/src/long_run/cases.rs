@@ -1,10 +1,12 @@
-//! The machines: observer, drive, speed loop, baseline, tare, relaxation.
+//! The machines: observer, drive, speed loop, baseline, tare, relaxation, winding.
 
 use super::{Machine, Outcome};
 use fingertip::config::gains::PACES;
+use fingertip::config::heat::FRAMES;
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::observer::Observer;
+use fingertip::control::winding::Winding;
 use fingertip::frame::SATURATED;
 use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
@@ -32,7 +34,7 @@ const DISTURBANCE_SWING: i64 = 1_024;
 pub fn all(whole: bool) -> Vec<Outcome> {
     let mut runs: Vec<Run> = Vec::new();
     for (scan, settle_ns, sample_cycles) in SCANS {
-        let config = Config::shipped(&Params { settle_ns, sample_cycles, ..Params::DEFAULT }).expect("allowed");
+        let config = Config::shipped(&Params { settle_ns, sample_cycles, ..cool() }).expect("allowed");
         // The default scan is the one to take every step of.
         let whole = whole && scan == "default";
         queue(&mut runs, observers(scan, &config), whole);
@@ -42,7 +44,14 @@ pub fn all(whole: bool) -> Vec<Outcome> {
     queue(&mut runs, baselines(), false);
     queue(&mut runs, tares(), false);
     queue(&mut runs, relaxations(whole), whole);
+    queue(&mut runs, windings(whole), whole);
     in_parallel(runs)
+}
+
+/// A motor that stays cool, for what has the winding beside what is looked at: it is a machine of its own below. While
+/// it holds the current back, the loop's current and its own state repeat together after longer than can be waited for.
+pub fn cool() -> Params {
+    Params { winding_k_per_w: 0, housing_k_per_w: 0, ..Params::DEFAULT }
 }
 
 type Run = Box<dyn FnOnce() -> Outcome + Send>;
@@ -258,6 +267,29 @@ fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
                 }
             }),
             outputs: vec![],
+        }
+    };
+    inputs.map(machine).into()
+}
+
+/// The usual lags, or the longest, without current, at the limit, and in turns.
+fn windings(longest: bool) -> Vec<Machine<Winding>> {
+    let [winding_time_ms, housing_time_ms] = if longest { [600_000, 10_000_000] } else { [5_000, 400_000] };
+    let params = Params { winding_time_ms, housing_time_ms, ..Params::DEFAULT };
+    let inputs = [("none", [0; 2]), ("the limit", [1; 2]), ("extremes in turns", [0, i32::MAX])];
+    let machine = |(input, pair): (&str, [i32; 2])| {
+        let config = Config::shipped(&params).expect("allowed");
+        let currents = if pair == [1; 2] { [config.current_limit; 2] } else { pair };
+        Machine {
+            name: format!("winding over {} s, {input}", housing_time_ms / 1_000),
+            start: Winding::new(),
+            inputs: u64::from(FRAMES),
+            step: Box::new(move |winding: &mut Winding| {
+                for net in currents.into_iter().cycle().take(FRAMES as usize) {
+                    winding.observe(net, &config);
+                }
+            }),
+            outputs: vec![("share", |winding| winding.share().into(), 0)],
         }
     };
     inputs.map(machine).into()

@@ -1,16 +1,16 @@
 //! The whole pipeline under frames, senses and commands that do not change.
 
+use super::cases::cool;
 use super::{Cycle, Outcome};
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 
-/// The baseline visits a row of ten a frame, and a refinement of the fit takes eleven frames: the pipeline can repeat
-/// itself no sooner than after this many steps.
-const PERIOD: u64 = 110;
+/// The baseline visits a row of ten a frame, a refinement of the fit takes eleven frames, and a step of the winding's
+/// model 256: the pipeline can repeat itself no sooner than after this many steps.
+const PERIOD: u64 = 14_080;
 
 /// The frame of a tip that presses, or not, in the middle of the array.
 fn frame(codes: u16) -> Frame {
@@ -29,7 +29,7 @@ fn frame(codes: u16) -> Frame {
 /// # Panics
 /// Something still changes after `most` steps.
 pub fn hold(name: &str, torque: bool, goal_mn: i32, codes: u16, most: u64) -> (Outcome, Status) {
-    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).expect("the defaults are allowed"));
+    let mut pipeline = Pipeline::new(&Config::shipped(&cool()).expect("the defaults are allowed"));
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let mut command = Command { tare_request: 1, ..Command::default() };
     let mut shown = frame(0);

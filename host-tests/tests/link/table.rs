@@ -56,8 +56,8 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
         (address::RAW_CODES, u16::MAX, StatusError::Length),
         (u16::MAX, 1, StatusError::Access),
         (u16::MAX, 2, StatusError::Access),
-        (address::FRICTION_BACK_SIGMA + 2, 1, StatusError::Access),
-        (address::FRICTION_BACK_SIGMA + 1, 2, StatusError::Access),
+        (address::CAPTURE_DATA + 248, 1, StatusError::Access),
+        (address::CAPTURE_DATA + 247, 2, StatusError::Access),
     ] {
         assert_eq!(bench.read(address, length), Err(error as u8), "{length} at {address}");
     }

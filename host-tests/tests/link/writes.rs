@@ -115,6 +115,7 @@ fn every_value_in_range_is_taken_or_stopped_by_a_limit() {
                         "COMMISSION",
                         "COMMISSION_ACCEPT",
                         "CALIBRATE",
+                        "CAPTURE",
                         "SCALE",
                     ]
                     .contains(&register.name.trim_start_matches("MIRROR_")) =>

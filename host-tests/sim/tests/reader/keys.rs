@@ -16,6 +16,7 @@ const PLAIN: &[&str] = &[
     "max",
     "fingers",
     "share",
+    "chip_share",
     "left",
     "still",
     "slipping",

@@ -210,9 +210,17 @@ TIME_CONSTANT_SIGMA = Register("time_constant_sigma", 4250, 2, 1, False, 1, Fals
 INERTIA_SIGMA = Register("inertia_sigma", 4252, 2, 1, False, 1, False, 0, 65535)
 FRICTION_FORWARD_SIGMA = Register("friction_forward_sigma", 4254, 2, 1, False, 1, False, 0, 65535)
 FRICTION_BACK_SIGMA = Register("friction_back_sigma", 4256, 2, 1, False, 1, False, 0, 65535)
+CAPTURE = Register("capture", 4260, 1, 1, False, 1, False, 0, 1)
+CAPTURE_STATE = Register("capture_state", 4261, 1, 1, False, 1, False, 0, 3)
+CAPTURE_ENDED = Register("capture_ended", 4262, 1, 1, False, 1, False, 0, 5)
+CAPTURE_COUNT = Register("capture_count", 4263, 1, 1, False, 1, False, 0, 255)
+CAPTURE_FRAMES = Register("capture_frames", 4264, 4, 1, False, 1, False, 0, 4294967295)
+CAPTURE_BYTES = Register("capture_bytes", 4268, 4, 1, False, 1, False, 0, 4294967295)
+CAPTURE_OFFSET = Register("capture_offset", 4272, 4, 1, False, 1, False, 0, 4294967295)
 PRESENT_WINDING_MC = Register("present_winding_mc", 4400, 4, 1, True, 1, False, -40000, 8500000)
 CHIP_MC = Register("chip_mc", 4404, 4, 1, True, 1, False, -273150, 1000000)
 PRESENT_DRIFT_MN = Register("present_drift_mn", 4408, 4, 1, True, 1, False, -150000, 150000)
+CAPTURE_DATA = Register("capture_data", 4512, 1, 248, False, 1, False, 0, 255)
 
 ALL = (
     MODEL_NUMBER,
@@ -405,7 +413,15 @@ ALL = (
     INERTIA_SIGMA,
     FRICTION_FORWARD_SIGMA,
     FRICTION_BACK_SIGMA,
+    CAPTURE,
+    CAPTURE_STATE,
+    CAPTURE_ENDED,
+    CAPTURE_COUNT,
+    CAPTURE_FRAMES,
+    CAPTURE_BYTES,
+    CAPTURE_OFFSET,
     PRESENT_WINDING_MC,
     CHIP_MC,
     PRESENT_DRIFT_MN,
+    CAPTURE_DATA,
 )

@@ -164,17 +164,18 @@ impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
         let square = (weight * model.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
         let x = (model.by_square * dx) >> PLACE_BITS;
-        let drop = Bits::<ROWS, COLUMNS>::TAXEL;
-        self.height_height += (height * model.by_height) >> drop;
-        self.height_square += (height * model.by_square) >> drop;
-        self.height_x += (height * x) >> drop;
-        self.square_square += (square * model.by_square) >> drop;
-        self.square_x += (square * x) >> drop;
-        self.x_x += (weighted_x * x) >> drop;
-        self.height += (height * residual) >> drop;
-        self.square += (square * residual) >> drop;
-        self.x += (weighted_x * residual) >> drop;
-        self.misfit.inside += (residual * residual) >> drop;
+        // Of a row's slopes more than the bound of `Bits` wraps: one of some million drawn arrays and poses had that.
+        let add = |sum: &mut i32, product: i32| *sum = sum.wrapping_add(product >> Bits::<ROWS, COLUMNS>::TAXEL);
+        add(&mut self.height_height, height * model.by_height);
+        add(&mut self.height_square, height * model.by_square);
+        add(&mut self.height_x, height * x);
+        add(&mut self.square_square, square * model.by_square);
+        add(&mut self.square_x, square * x);
+        add(&mut self.x_x, weighted_x * x);
+        add(&mut self.height, height * residual);
+        add(&mut self.square, square * residual);
+        add(&mut self.x, weighted_x * residual);
+        add(&mut self.misfit.inside, residual * residual);
     }
 }
 

@@ -147,10 +147,19 @@ fn unfit(clocked: bool) -> Option<Fault> {
     (!options::brown_out_resets()).then_some(Fault::BrownOutLevel)
 }
 
-/// Puts the core in its place. A function of its own, because a configuration is large and its stack is soon free
-/// again.
-#[inline(never)]
+/// Makes the core. Its parts are functions of their own, because a configuration and a pipeline that are being made are
+/// large, and their stack is soon free again.
 fn make_pipeline(params: &Params) -> Result<&'static mut Pipeline, ConfigError> {
-    let config = Config::shipped(params)?;
-    Ok(PIPELINE.init_with(|| Pipeline::new(&config)))
+    let made = make_config(params);
+    made.as_ref().map(put_in_place).map_err(|cause| *cause)
+}
+
+#[inline(never)]
+fn make_config(params: &Params) -> Result<Config, ConfigError> {
+    Config::shipped(params)
+}
+
+#[inline(never)]
+fn put_in_place(config: &Config) -> &'static mut Pipeline {
+    PIPELINE.init_with(|| Pipeline::new(config))
 }

@@ -1,6 +1,6 @@
 //! A pipeline as it is after a start, in place.
 
-use super::{Budget, Calibrator, Fit, Goal, Guard, Monitor, Pipeline, Press, Run, Scale, SpeedLoop, Status, Taken};
+use super::{Budget, Fit, Goal, Guard, Monitor, Pipeline, Press, Run, Scale, SpeedLoop, Status, Taken};
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Makes all anew but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests with
@@ -16,14 +16,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.press = Press::new();
         self.commission = Run::new();
         self.scale = Scale::new();
-        renew_calibrator(&mut self.calibrator);
+        self.calibrator.renew();
         self.status = Status { taken, missed_frames, ..Status::default() };
         self.tared = false;
     }
-}
-
-/// By itself, because it is large.
-#[inline(never)]
-fn renew_calibrator<const ROWS: usize, const COLUMNS: usize>(calibrator: &mut Calibrator<ROWS, COLUMNS>) {
-    *calibrator = Calibrator::new();
 }

@@ -203,15 +203,15 @@ mod tests {
         }
     }
 
-    /// What the shipped board makes of it: a PWM of 25 to 50 kHz in step with whatever scan is asked for.
+    /// What the shipped board makes of it: a PWM of 20 to 40 kHz in step with whatever scan is asked for.
     #[test]
     fn a_frame_is_a_whole_number_of_its_parts() {
         let clocks = Clocks { slot_step: 12, ..CLOCKS };
         for settle_ns in (0..340_000).step_by(37) {
             let Ok(timing) = ScanTiming::new(settle_ns, 15, [10, 10], &clocks) else { continue };
-            let part = timing.whole_part(ScanTicks(6_720)).0;
+            let part = timing.whole_part(ScanTicks(8_400)).0;
             assert_eq!(timing.frame().0 % part, 0);
-            assert!((3_360..=6_720).contains(&part), "{part} ticks of {:?}", timing.frame());
+            assert!((4_200..=8_400).contains(&part), "{part} ticks of {:?}", timing.frame());
         }
         let timing = timing(1_000, 15, [10, 10]).unwrap();
         assert_eq!(timing.whole_part(ScanTicks(0)), ScanTicks(1));

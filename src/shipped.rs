@@ -22,7 +22,7 @@ pub const BANK_COLUMNS: usize = Shape::<ROWS, COLUMNS>::BANK_COLUMNS;
 pub const TARE_FRAMES: u32 = Array::TARE_FRAMES;
 
 /// The STM32F446's clocks: core and TIM8 at 168 MHz, converters at 21 MHz with 12 bits (RM0390, 13). Slots
-/// of whole dozens of ticks let the bridge's PWM of 25 to 50 kHz keep step with the frames.
+/// of whole dozens of ticks let the bridge's PWM of 20 to 40 kHz keep step with the frames.
 pub const CLOCKS: Clocks = Clocks {
     timer_hz: 168_000_000,
     core_hz: 168_000_000,

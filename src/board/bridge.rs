@@ -18,8 +18,8 @@ use fingertip::units::{Duty, ScanTicks};
 
 use super::{guard, pins};
 
-/// The longest period, 168 MHz / 6720 = 25 kHz. TIM1 and the scan's TIM8 count the same clock.
-const LONGEST: ScanTicks = ScanTicks(6_720);
+/// The longest period, 168 MHz / 8400 = 20 kHz. TIM1 and the scan's TIM8 count the same clock.
+const LONGEST: ScanTicks = ScanTicks(8_400);
 /// The driver wants 1 ms from nSLEEP to its first output; nFAULT means nothing before.
 const WAKE_TICKS: u32 = guard::HZ / 1_000;
 const TIM1_FUNCTION: u8 = 1;

@@ -49,7 +49,7 @@ fn set_and_save(rig: &mut Rig, pitch_um: u32) {
     rig.run_ms(10).expect("it runs");
     let saved = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::SAVE_PARAMETERS, 1).map(drop));
     saved.expect("the client runs").expect("the image obeys");
-    // 78 words of 100 us.
+    // 98 words of 100 us.
     rig.run_ms(12).expect("it runs");
 }
 
@@ -80,7 +80,7 @@ fn a_save_with_the_longest_times_is_no_fault_and_no_reset() {
     assert_eq!(rig.resets().expect("it runs"), vec![]);
     // A word that is blank anyway is not programmed.
     let (words, erases) = words_and_erases(&mut rig);
-    assert!((156..=160).contains(&words), "{words} words");
+    assert!((192..=196).contains(&words), "{words} words");
     assert_eq!(erases, 0);
     // The scan goes on: torque can be enabled after a tare.
     let before = rig.scan_counts().expect("it runs").frames;

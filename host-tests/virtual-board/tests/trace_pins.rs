@@ -88,7 +88,7 @@ fn the_bridge_keeps_step_with_the_scan() {
             })
             .expect("it runs");
         assert!(
-            frame.is_multiple_of(period) && (3_360..=6_720).contains(&period),
+            frame.is_multiple_of(period) && (4_200..=8_400).contains(&period),
             "{period} ticks in a frame of {frame}"
         );
     }

@@ -49,7 +49,8 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
-    /// A pipeline in the mode off.
+    /// A pipeline in the mode off. Inlined, so that it lies on the stack once while it is made, not twice.
+    #[inline(always)]
     pub fn new(config: &Shaped<ROWS, COLUMNS>) -> Self {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         Self {

@@ -78,7 +78,7 @@ impl Sheet {
     }
 
     /// The same downwards, to ground.
-    fn to_ground(&mut self, x: i32, y: i32, symbol: &str, value: &str) -> Drawn {
+    fn grounded(&mut self, x: i32, y: i32, symbol: &str, value: &str) -> Drawn {
         self.path(x, y + 40, 0, GROUND);
         self.part(x, y, true, symbol, value)
     }
@@ -124,7 +124,7 @@ impl Sheet {
         self.title(20, 40, "Row switch, ten times: U1 to U10");
         self.net(90, 130, true, "ROW0")?;
         self.part(90, 130, false, RESISTOR, "47 Ohm")?;
-        self.to_ground(140, 130, RESISTOR, "10 kOhm")?;
+        self.grounded(140, 130, RESISTOR, "10 kOhm")?;
         self.path(130, 130, 0, "M0 0h90");
         self.block([220, 80, 110, 100], "U1 SN74LVC1G3157")?;
         self.text(226, 134, "start", "S");
@@ -153,7 +153,7 @@ impl Sheet {
         self.text(210, 472, "start", "U11A OPA4354");
         self.part(290, 420, false, RESISTOR, "47 Ohm")?;
         self.path(330, 420, 0, "M0 0h30");
-        self.to_ground(345, 420, CAPACITOR, "330 pF")?;
+        self.grounded(345, 420, CAPACITOR, "330 pF")?;
         self.net(360, 420, false, "COL0")
     }
 
@@ -163,8 +163,8 @@ impl Sheet {
         self.path(90, 600, 0, "M0 0h10");
         self.part(100, 600, true, RESISTOR, "10 kOhm")?;
         self.path(100, 640, 0, "M0 0h150");
-        self.to_ground(100, 640, RESISTOR, "1 kOhm")?;
-        self.to_ground(180, 640, CAPACITOR, "1 uF")?;
+        self.grounded(100, 640, RESISTOR, "1 kOhm")?;
+        self.grounded(180, 640, CAPACITOR, "1 uF")?;
         self.path(250, 600, 0, AMPLIFIER);
         self.path(250, 600, 0, "M0 0h-20v-35h100v55h-20h30");
         self.text(256, 604, "start", "-");
@@ -186,20 +186,20 @@ impl Sheet {
             if net == "NFAULT" {
                 self.path(930, y, 0, "M0 0h20m40 0h60");
                 self.part(950, y, false, RESISTOR, "1 kOhm")?;
-                self.to_ground(940, y, CAPACITOR, "1 nF")?;
+                self.grounded(940, y, CAPACITOR, "1 nF")?;
                 self.part(1_010, y, true, RESISTOR, "")?;
                 self.known("10 kOhm to 3V3")?;
                 self.text(1_018, y + 24, "start", "10k");
                 self.text(1_010, y + 54, "middle", "3V3");
             } else {
                 self.path(930, y, 0, "M0 0h120");
-                self.to_ground(970, y, RESISTOR, "10 kOhm")?;
+                self.grounded(970, y, RESISTOR, "10 kOhm")?;
             }
         }
         self.net(1_310, 100, false, "VM")?;
         self.path(1_180, 100, 0, "M0 0h130");
-        self.to_ground(1_205, 100, CAPACITOR, "100 nF")?;
-        self.to_ground(1_275, 100, CAPACITOR, "100 uF")?;
+        self.grounded(1_205, 100, CAPACITOR, "100 nF")?;
+        self.grounded(1_275, 100, CAPACITOR, "100 uF")?;
         self.text(1_174, 104, "end", "VM");
         for (y, pin) in [(170, "OUT1"), (200, "OUT2")] {
             self.text(1_174, y + 4, "end", pin);
@@ -209,7 +209,7 @@ impl Sheet {
         self.text(1_220, 190, "middle", "M");
         self.text(1_174, 229, "end", "IPROPI");
         self.path(1_180, 225, 0, "M0 0h90");
-        self.to_ground(1_270, 225, RESISTOR, "1.3 kOhm")?;
+        self.grounded(1_270, 225, RESISTOR, "1.3 kOhm")?;
         for (y, pin) in [(255, "VREF"), (280, "PMODE")] {
             self.text(1_174, y + 4, "end", pin);
             self.net(1_180, y, false, "3V3")?;
@@ -231,8 +231,8 @@ impl Sheet {
         self.path(980, 540, 0, "M0 0h10");
         self.part(990, 540, true, RESISTOR, "100 kOhm")?;
         self.path(990, 580, 0, "M0 0h140");
-        self.to_ground(990, 580, RESISTOR, "10 kOhm")?;
-        self.to_ground(1_090, 580, CAPACITOR, "100 nF")?;
+        self.grounded(990, 580, RESISTOR, "10 kOhm")?;
+        self.grounded(1_090, 580, CAPACITOR, "100 nF")?;
         self.net(1_130, 580, false, "VSUP")
     }
 
@@ -247,7 +247,7 @@ impl Sheet {
         self.text(1_056, 824, "start", "/RE");
         self.path(1_050, 790, 0, "M0 0h-20v30h20m-20-30h-90");
         self.net(940, 790, true, "TE")?;
-        self.to_ground(945, 790, RESISTOR, "10 kOhm")?;
+        self.grounded(945, 790, RESISTOR, "10 kOhm")?;
         for (y, pin) in [(750, "A"), (790, "B")] {
             self.text(1_134, y + 4, "end", pin);
             self.path(1_140, y, 0, "M0 0h60");

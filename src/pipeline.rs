@@ -5,6 +5,7 @@ mod modes;
 mod renew;
 mod report;
 mod requests;
+mod words;
 
 pub use report::{Bridge, Status, Taken, Taring};
 

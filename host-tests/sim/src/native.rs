@@ -29,6 +29,7 @@ use core::ops::Range;
 use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
+use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::Celsius;
 use std::time::Instant;
@@ -296,6 +297,12 @@ impl<E: Set> Board<E> {
         }
     }
 
+    /// What a finger's control step learns beside the frame.
+    fn sense(&mut self, finger: usize, silent_ms: u16) -> Sense {
+        let chip = self.units[finger].sensor.chip_c(self.time_s()).map(celsius);
+        Sense { chip, ..self.world.sense(finger, silent_ms) }
+    }
+
     fn control(&mut self, finger: usize, watch: &mut dyn Watch) {
         let time_s = self.time_s();
         let unit = &mut self.units[finger];
@@ -306,8 +313,8 @@ impl<E: Set> Board<E> {
             unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
             silent_ms = unit.host.silent_ms(time_s);
         }
-        let mut sense = self.world.sense(finger, silent_ms);
-        sense.chip = unit.sensor.chip_c(time_s).map(celsius);
+        let sense = self.sense(finger, silent_ms);
+        let unit = &mut self.units[finger];
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = Bridge::of(status);
         if unit.command.torque {

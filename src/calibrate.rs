@@ -112,7 +112,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Default for Calibrator<ROWS, COLUM
 
 impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
     /// Nothing asked for.
-    #[inline(always)]
     pub const fn new() -> Self {
         Self {
             press: Press::new(),
@@ -136,40 +135,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
         }
     }
 
-    /// The same in place: made anew it would take as much of the stack.
+    /// The same in place. What a press is worked out with is begun by each press, so it may stay.
     pub fn renew(&mut self) {
-        // Taken apart field by field, so that a field cannot be forgotten.
-        let Self {
-            press,
-            phase,
-            standing,
-            readings,
-            travel,
-            centre,
-            pose,
-            equations,
-            system,
-            zero,
-            line,
-            scatter,
-            expected,
-            totals,
-            sums,
-            fresh,
-            cleared,
-            proposal,
-        } = self;
-        *press = Press::new();
-        *phase = Phase::Idle;
-        *standing = Standing { state: State::None, progress: 0, presses: 0, reached: 0, proposals: 0 };
-        (0..ROWS).for_each(|row| readings.clear(row));
-        *travel = [None; STEPS];
-        (*centre, *pose) = ([0; 2], Pose { touch: 0, axis: [0; 2], tilt: [0; 2], roundness: 0 });
-        (*equations, *system, *zero, *line) = (Equations::NONE, System::NONE, None, None);
-        (*scatter, *expected, *totals) = (0, [0; STEPS], Totals::NONE);
-        sums.as_flattened_mut().fill(Sums::NONE);
-        (*fresh, *cleared) = (true, 0);
-        *proposal = Proposal::NONE;
+        self.phase = Phase::Idle;
+        self.forget();
+        self.standing = Standing::default();
     }
 
     /// How it stands.

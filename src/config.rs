@@ -5,12 +5,14 @@
 //! `docs/control.md`.
 
 pub mod bounds;
+mod codes;
 pub mod curve;
 mod error;
 pub mod gains;
 pub(crate) mod geometry;
 pub mod heat;
 pub mod motions;
+mod numbers;
 mod shaped;
 pub mod warm;
 
@@ -18,17 +20,20 @@ pub use error::ConfigError;
 pub use geometry::Geometry;
 pub use shaped::Shaped;
 
-use crate::frame::SATURATED;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use bounds::{Bounds, Drives};
+use codes::{codes_at_full_range, force_seen, sag_max};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
 use heat::Heat;
 use motions::{Driven, Motions};
+pub use numbers::newtons;
+pub(crate) use numbers::{exp2, millimetres, narrow, speed};
+use numbers::{thousandths, wide};
 use warm::Warm;
 
 /// The band of the way at rest: this, for the array's noise, mm,
@@ -40,11 +45,6 @@ const CALM_MAX: i32 = 2 << 24;
 /// Time constants of the quickest profile without a way to go before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 4.0;
 
-/// Share of the converter's range up to saturation that a peak may use,
-const SEEN: f32 = 0.95;
-/// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not
-/// as more than this.
-const LEVEL_MAX: i32 = 1_024;
 /// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
 pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
 /// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
@@ -268,34 +268,6 @@ impl Config {
     }
 }
 
-/// The largest [`Params::row_sag_ppb_per_code`] that leaves a row of so many columns, all at the converter's top, a sag
-/// of 0.32: what the boost's series and 32 bits hold. Up to ten columns that is more than the parameter's own range.
-const fn sag_max(columns: usize) -> i32 {
-    (320_000_000 / (4_095 * columns)) as i32
-}
-
-/// The codes for a kPa at the full range, thousandths: fewer where the characteristic is not a line. Rounded, at most by
-/// 5e-4 of them.
-fn codes_at_full_range(p: &Params) -> Result<i32, ConfigError> {
-    let whole = 1_000 + p.curve_permille;
-    let codes = (p.codes_per_kpa_milli.unsigned_abs() * 1_000 + whole.unsigned_abs() / 2) / whole.unsigned_abs().max(1);
-    if codes < 1_000 {
-        let (name, value) = ("codes_per_kpa_milli", p.codes_per_kpa_milli);
-        return Err(ConfigError::Param(ParamError { name, value, min: whole, max: 200_000 }));
-    }
-    Ok(codes as i32)
-}
-
-/// See [`Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.
-fn force_seen(p: &Params, codes_milli: i32, tip: &Tip) -> Newtons {
-    let codes = SEEN * f32::from(SATURATED) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
-    let grown = p.curve_permille as f32 * 1e-3;
-    // See `Curve`: what so many codes carry, in those of the full range.
-    let codes = codes * (1.0 + grown * codes / 4_096.0) / (1.0 + grown);
-    let peak_kpa = codes / (codes_milli as f32 * 1e-3);
-    tip.force(tip.indentation_from_peak(Kilopascals::from_bits(narrow(peak_kpa * exp2(16)))))
-}
-
 fn tip(p: &Params) -> Result<Tip, ConfigError> {
     let modulus = Kilopascals(I16F16::from_bits(thousandths(p.modulus_pa, 16)));
     Tip::new(millimetres(p.tip_radius_um), modulus).map_err(|error| {
@@ -307,45 +279,9 @@ fn tip(p: &Params) -> Result<Tip, ConfigError> {
     })
 }
 
-/// 2^n, exactly.
-pub(crate) const fn exp2(n: u32) -> f32 {
-    (1u64 << n) as f32
-}
-
-/// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
-// Kept apart, as the next: a dozen copies would fill a sixtieth of the flash.
-#[inline(never)]
-fn wide(value: f32) -> i64 {
-    value.clamp(-4e18, 4e18) as i64
-}
-
-/// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
-pub(crate) fn narrow(value: f32) -> i32 {
-    wide(value).min(i64::from(i32::MAX)) as i32
-}
-
 /// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a
 /// quarter and twice of that.
 fn brake(motor: i32) -> [i32; 3] {
     let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
     [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]
-}
-
-/// `value / 1000` in units of 2^-bits, rounded.
-#[inline(never)]
-const fn thousandths(value: i32, bits: u32) -> i32 {
-    ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
-}
-
-pub(crate) fn millimetres(um: i32) -> Millimetres {
-    Millimetres(I8F24::from_bits(thousandths(um, 24)))
-}
-
-/// A force in N from mN, rounded.
-pub fn newtons(mn: i32) -> Newtons {
-    Newtons(I16F16::from_bits(thousandths(mn, 16)))
-}
-
-pub(crate) fn speed(um_per_s: i32) -> MillimetresPerSecond {
-    MillimetresPerSecond(I16F16::from_bits(thousandths(um_per_s, 16)))
 }

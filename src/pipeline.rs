@@ -1,10 +1,11 @@
 //! One frame's way from codes to duty.
 
+mod between;
 pub mod budget;
 mod modes;
-mod renew;
 mod report;
 mod requests;
+mod words;
 
 pub use report::{Bridge, Status, Taken, Taring};
 
@@ -19,7 +20,7 @@ use crate::control::goal::Goal;
 use crate::control::observer::Observer;
 use crate::frame::{Frame, Sense, Shape};
 use crate::identify::{Press, PressView, Refusal};
-use crate::pressure::{Array, Calibration};
+use crate::pressure::Array;
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::state::{Fault, Limits, Mode};
@@ -69,46 +70,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             status: Status::default(),
             tared: false,
         }
-    }
-
-    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins
-    /// anew.
-    pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
-        self.config = config.clone();
-        self.interrupt_commission();
-        // What was measured belonged to the parameters before.
-        if !matches!(self.status.commissioning, commission::Commissioning::Refused(_)) {
-            self.commission = Run::new();
-            self.status.commissioning = self.commission.outcome();
-        }
-        self.forget();
-        self.leave();
-    }
-
-    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one
-    /// under way begins anew.
-    pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
-        self.array.calibrate(calibration);
-        self.forget();
-        self.tared = false;
-        self.leave();
-    }
-
-    /// Stops for a reason that the firmware saw (frame guard, broken parameters, crash); latched like any fault.
-    pub fn stop(&mut self, fault: Fault) {
-        self.status.mode = Mode::Fault;
-        self.status.fault.get_or_insert(fault);
-        if self.press.running() {
-            self.press.refuse(Refusal::Interrupted);
-            self.status.identification = self.press.outcome();
-        }
-        self.interrupt_commission();
-        self.calibrator.interrupt();
-        self.status.calibration = self.calibrator.standing();
-        if self.status.tare == Taring::Running {
-            self.status.tare = Taring::Refused;
-        }
-        self.status.duty = self.motion.coast();
     }
 
     /// What the last step reported.
@@ -285,19 +246,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.drift = self.goal.warmth.force(command.goal, &self.config);
         self.status.winding = self.motion.winding.temperature(&self.config);
         (duty, &self.status)
-    }
-
-    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array
-    /// seems broken, and tells whether. A taxel that fails just after it was read is seen a frame later; without this
-    /// look the motor would be driven until that frame's end. Whether it is a fault is for the step to say.
-    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
-        let broken = self.watched()
-            && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
-        if broken {
-            self.motion.drive.cut();
-            self.status.duty = Duty::ZERO;
-        }
-        broken
     }
 
     /// Ends motions that measure the drive, for the reason that another mode begins.

@@ -5,7 +5,7 @@ use std::{env, error::Error, fs, path::PathBuf};
 const MEMORY: &str = "../../memory.x";
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("cargo:rerun-if-changed=build.rs");
+    println!("cargo:rerun-if-changed=../images/build.rs");
     println!("cargo:rerun-if-changed={MEMORY}");
     if env::var("CARGO_CFG_TARGET_OS")? != "none" {
         return Ok(());
@@ -15,5 +15,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rustc-link-search={}", out.display());
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    // The image that checks a board logs as the firmware does.
+    if env::var_os("CARGO_FEATURE_IMAGE").is_some() {
+        println!("cargo:rustc-env=DEFMT_LOG=info");
+        println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
+    }
     Ok(())
 }

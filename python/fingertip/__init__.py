@@ -15,7 +15,9 @@ Times are the controller's own; registers and their units are in `fingertip.regi
 from . import registers
 from .bus import Bus, FingertipError, NoAnswer, Refused
 from .calibration import ArrayCalibration, Gain, Scale
-from .finger import Drive, Fault, Fingertip, Mode, Restarted, State
+from .drive import Drive
+from .finger import Fingertip
+from .state import Fault, Mode, Restarted, State
 
 __all__ = [
     "ArrayCalibration",

@@ -1,12 +1,12 @@
 """What one does with a fingertip."""
 
 import time
-from dataclasses import dataclass
-from enum import IntEnum
-from typing import Any, Dict, Iterator, List, Mapping, Optional, Tuple, Type
+from typing import Any, Dict, Iterator, Mapping, Optional, Tuple, Type
 
 from . import registers as reg
 from .bus import Bus, FingertipError, NoAnswer, Refused, numbers
+from .drive import JOG, MEASURE, Drive, carry_out, measured
+from .state import Fault, Mode, Restarted, State
 
 _MODEL = 21574  # the letters FT
 _TARING, _TARED = 1, 2
@@ -19,74 +19,6 @@ _PARAMETERS = [
     if register.stored and register.numbers == 1 and register.address >= reg.TIP_RADIUS_UM.address
 ]
 _PATIENCE_S = 10.0
-_COMMISSION_S = 60.0
-_JOG, _MEASURE = 1, 2
-_NO_TASK, _RUNNING, _REFUSED = 0, 1, 4
-_DONE = {_JOG: 2, _MEASURE: 3}
-_REASONS = {
-    1: "a stop, torque, a fault, a tare or new parameters ended it",
-    2: "tare first, with torque off; nothing may touch the tip",
-    3: "jog first, and confirm the direction",
-    4: "the encoder did not count at 5 % of duty: is the motor connected, and free to move?",
-    5: "the encoder counts against the motor: swap the motor's leads or the encoder's channels",
-    6: "the encoder does not follow the motor: is one of its channels open?",
-    7: "the tip touched something: leave it 2 mm of air",
-    8: "the motor felt a force that the array did not: leave the finger 2 mm to both sides",
-    9: "the guard or a limit held the voltage back: are slew, current and speed limits wide enough?",
-    10: "the tip did not come to rest: does something move it?",
-    11: "the strokes do not agree: does friction or a spring change along the way?",
-    12: "a result is outside of its parameter's range: check gear, encoder and resistance",
-}
-
-
-class Mode(IntEnum):
-    """What the controller is doing."""
-
-    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY, COMMISSION = range(8)
-
-
-class Fault(IntEnum):
-    """Why the motor was stopped."""
-
-    NONE, LOST_FRAMES, ARRAY_BROKEN, ROW_STUCK, ARRAY_FROZEN, ENCODER_FROZEN, OVER_FORCE, BUS_SILENT = range(8)
-    BROKEN_PARAMETERS, SUPPLY_LOW, SUPPLY_HIGH, BRIDGE, MISSED_DEADLINE, CRASH, RUNAWAY, REVERSED, UNSEEN = range(8, 17)
-    NO_CLOCK, BROWN_OUT_LEVEL = 17, 18
-
-
-class Restarted(FingertipError):
-    """The controller started anew in between: torque is off, it is not tared, and its time begins again."""
-
-
-@dataclass(frozen=True)
-class State:
-    """The state of the loop, all of it from one frame."""
-
-    time_s: float  # by the controller's clock, from the first state that this object read
-    frame: int
-    force_n: float
-    goal_n: float
-    centre_x_mm: float
-    centre_y_mm: float
-    indentation_mm: float
-    travel_mm: float
-    speed_mm_per_s: float
-    duty: float  # share of the supply, -1 to 1
-    mode: Mode
-    fault: Fault
-    limits: int  # a bit each
-    pressures_kpa: List[List[float]]  # row by row; none where they were not read
-
-
-@dataclass(frozen=True)
-class Drive:
-    """A drive as measured; `sigma` has the standard uncertainties, as shares, by the names of the other fields."""
-
-    torque_constant_unm_per_a: int
-    time_constant_us: int
-    inertia_ug_m2: int  # where the parameter resistance_mohm is true, as the friction
-    friction_forward_unm: int
-    friction_back_unm: int
-    sigma: Dict[str, float]
 
 
 class Fingertip(Bus):
@@ -193,7 +125,7 @@ class Fingertip(Bus):
 
     def jog(self) -> None:
         """Moves the tip a little, towards the object first: proves that motor and encoder go the same way."""
-        self._commission(_JOG)
+        carry_out(self, JOG)
 
     def confirm_direction(self) -> None:
         """Says that somebody saw the jog go towards the object first: torque is refused before."""
@@ -201,50 +133,14 @@ class Fingertip(Bus):
 
     def measure_drive(self) -> Drive:
         """Measures the drive by motions of 1 mm to both sides in the air. The parameters stay until it is accepted."""
-        self._commission(_MEASURE)
-        rows = {
-            "torque_constant_unm_per_a": (reg.MEASURED_TORQUE_CONSTANT, reg.TORQUE_CONSTANT_SIGMA),
-            "time_constant_us": (reg.MEASURED_TIME_CONSTANT, reg.TIME_CONSTANT_SIGMA),
-            "inertia_ug_m2": (reg.MEASURED_INERTIA, reg.INERTIA_SIGMA),
-            "friction_forward_unm": (reg.MEASURED_FRICTION_FORWARD, reg.FRICTION_FORWARD_SIGMA),
-            "friction_back_unm": (reg.MEASURED_FRICTION_BACK, reg.FRICTION_BACK_SIGMA),
-        }
-        values = {name: self.read(value) for name, (value, _) in rows.items()}
-        return Drive(sigma={name: self.read(sigma) * 1e-3 for name, (_, sigma) in rows.items()}, **values)
+        carry_out(self, MEASURE)
+        return measured(self)
 
     def accept_drive(self, save: bool = False) -> None:
         """Takes what was measured into the parameters."""
         self.write(reg.COMMISSION_ACCEPT, 2)
         if save:
             self.save()
-
-    def _commission(self, task: int) -> None:
-        if self.read(reg.COMMISSION_STATE) == _RUNNING:
-            raise FingertipError("the tip is moving for a jog or a measurement: wait until it ends")
-        self.write(reg.COMMISSION, task)
-        begun, frame_s = self.read(reg.FRAME_COUNTER), 1e-9 * self.read(reg.FRAME_PERIOD_NS)
-        try:
-            state, frames = _RUNNING, 0
-            # By the controller's own time: a simulated one may be slower than a real one.
-            while state == _RUNNING and frames * frame_s < _COMMISSION_S:
-                time.sleep(0.02)
-                state = self.read(reg.COMMISSION_STATE)
-                frames = (self.read(reg.FRAME_COUNTER) - begun) % 2**32
-                if frames >= 2**31:
-                    # Frames count back.
-                    state = _NO_TASK
-        except BaseException:
-            self.write(reg.COMMISSION, 0)
-            raise
-        if state == _RUNNING:
-            self.write(reg.COMMISSION, 0)
-            raise FingertipError("it did not end in a minute: stopped")
-        if state == _REFUSED:
-            refusal = self.read(reg.COMMISSION_REFUSAL)
-            raise FingertipError(f"refused: {_REASONS.get(refusal, refusal)}")
-        if state != _DONE[task]:
-            # A controller that started anew knows of no task.
-            raise Restarted("it came to no end: the controller started anew, or its parameters were set")
 
     def press(self, newtons: float, silence_s: Optional[float] = None) -> None:
         """Asks for a force: the tip approaches, touches and holds it. Returns at once.

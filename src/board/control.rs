@@ -3,21 +3,20 @@
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
 
 mod elapsed;
+mod pauses;
 
 use elapsed::{BusClock, FrameClock};
 use fingertip::capture::Ended;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::pipeline::Bridge as Wanted;
-use fingertip::shipped::{Calibration, Config, Frame, Pipeline};
+use fingertip::shipped::{Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
 use super::bridge::{self, Bridge};
 use super::capture::Keeper;
 use super::encoder::Encoder;
-use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED, STANDING, Standing};
+use super::exchange::{HEARD, Heard, PICTURE, Report, STANDING, Standing};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::health;
@@ -118,18 +117,6 @@ impl State {
         let Command { torque, clear_request, .. } = HEARD.get().command;
         if self.lost && clear_request != self.clear_seen && !torque {
             self.clear_seen = clear_request;
-            self.restart_scan();
-        }
-    }
-
-    /// Begins a capture where it is due. The pipeline is made anew, which may take most of a frame: the scan starts anew.
-    fn capture(&mut self) {
-        self.keeper.take_asked();
-        if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
-            self.parts.bridge.apply(Wanted::Open);
-            self.parts.scan.stop();
-            guard::rest();
-            self.keeper.begin(self.parts.pipeline);
             self.restart_scan();
         }
     }
@@ -263,57 +250,4 @@ impl State {
             }
         });
     }
-
-    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and
-    /// the scan starts anew.
-    fn configure(&mut self) {
-        let Some(params) = PARAMS.take(|params| *params) else { return };
-        self.keeper.end(Ended::Configured);
-        self.parts.bridge.apply(Wanted::Open);
-        self.parts.scan.stop();
-        guard::rest();
-        self.parts.watchdogs.allow_long();
-        if !set_config(self.parts.pipeline, &params) {
-            self.stop(Fault::BrokenParameters);
-        }
-        self.restart_scan();
-    }
-
-    /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
-    fn calibrate(&mut self) {
-        if let Some(gains) = GAINS.take(|gains| *gains) {
-            self.keeper.end(Ended::Configured);
-            self.parts.bridge.apply(Wanted::Open);
-            self.parts.scan.stop();
-            guard::rest();
-            self.parts.pipeline.calibrate(&Calibration::of(&gains));
-            self.restart_scan();
-        }
-    }
-
-    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so
-    /// the scan is stopped and starts anew, and the bridge stays as it is.
-    #[inline(never)]
-    fn save(&mut self) {
-        let Some(record) = SAVE.take(|record| *record) else { return };
-        if !matches!(self.parts.pipeline.status().mode, Mode::Off | Mode::Fault) {
-            return SAVED.signal(Err(NotSaved::Busy));
-        }
-        self.parts.scan.stop();
-        guard::rest();
-        let Control { store, watchdogs, .. } = &mut self.parts;
-        watchdogs.allow_long();
-        let saved = store.save(&record, || watchdogs.pet());
-        self.restart_scan();
-        SAVED.signal(saved.map_err(NotSaved::Failed));
-    }
-}
-
-/// A function of its own, because a configuration is large and takes stack only here.
-#[inline(never)]
-fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
-    Config::shipped(params).is_ok_and(|config| {
-        pipeline.configure(&config);
-        true
-    })
 }

@@ -57,16 +57,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
 
     /// What the digest of the steps goes on from: all that is known before the first one.
     pub(super) fn seed(&self) -> u32 {
-        let Taken { tare, clear, identify, calibrate, forget, shown, commission } = self.taken;
-        let taken = [[tare, clear, identify, calibrate], [forget, shown, commission, 0]].map(u32::from_le_bytes);
-        let first = [self.missed_frames, taken[0], taken[1], self.frame_ns];
+        let [taken, more_taken] = self.taken.words();
+        let first = [self.missed_frames, taken, more_taken, self.frame_ns];
         let params = self.params.to_array().map(i32::cast_unsigned);
         let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
         digest::words(LAYOUT, first.into_iter().chain(params).chain(gains))
     }
 
     pub(super) fn write(&self, bytes: &mut [u8]) {
-        let Taken { tare, clear, identify, calibrate, forget, shown, commission } = self.taken;
         let mut rest = bytes;
         let mut put = |word: [u8; 4]| {
             if let Some((place, after)) = core::mem::take(&mut rest).split_first_chunk_mut() {
@@ -79,8 +77,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
             put(word.to_le_bytes());
         }
-        put([tare, clear, identify, calibrate]);
-        put([forget, shown, commission, 0]);
+        self.taken.words().into_iter().for_each(|word| put(word.to_le_bytes()));
         put(self.frame_ns.to_le_bytes());
         self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));
         (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
@@ -121,12 +118,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
         let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
         let missed_frames = u32::from_le_bytes(next()?);
-        let [tare, clear, identify, calibrate] = next()?;
-        let [forget, shown, commission, none] = next()?;
-        if zero != 0 || none != 0 {
-            return Err(Refusal::Damaged);
-        }
-        let taken = Taken { tare, clear, identify, calibrate, forget, shown, commission };
+        let taken = Taken::from_words([next()?, next()?].map(u32::from_le_bytes)).filter(|_| zero == 0);
+        let taken = taken.ok_or(Refusal::Damaged)?;
         let frame_ns = u32::from_le_bytes(next()?);
         let mut values = [0; Params::COUNT];
         for value in &mut values {

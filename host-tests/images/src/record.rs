@@ -3,13 +3,10 @@
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
 use crc::{CRC_64_XZ, Crc, Table};
-use fingertip::calibrate::{Standing, scale};
 use fingertip::command::Command;
-use fingertip::contact::Contact;
 use fingertip::contact::FitLevel;
 use fingertip::frame::Sense;
-use fingertip::identify::Modulus;
-use fingertip::pipeline::{Status, Taken};
+use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 
@@ -125,69 +122,7 @@ impl Digest {
 
     /// Adds what a step returned.
     pub fn add(&mut self, duty: Duty, status: &Status) {
-        // Taken apart field by field, so that a field cannot be forgotten.
-        let Status {
-            sequence,
-            missed_frames,
-            mode,
-            fault,
-            limits,
-            fit_level,
-            contact,
-            creep,
-            chip,
-            drift,
-            winding,
-            travel,
-            speed,
-            duty: applied,
-            identification,
-            calibration,
-            scale,
-            tare,
-            taken,
-            // No recording asks for one.
-            commissioning: _,
-        } = *status;
-        let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } =
-            contact;
-        for word in [sequence, missed_frames, peak_pa] {
-            self.0.update(&word.to_le_bytes());
-        }
-        for length in [indentation, centre_x, centre_y, radius, travel] {
-            self.0.update(&length.to_bits().to_le_bytes());
-        }
-        self.0.update(&force.to_bits().to_le_bytes());
-        self.0.update(&creep.to_bits().to_le_bytes());
-        self.0.update(&chip.map_or(UNMEASURED, Celsius::to_bits).to_le_bytes());
-        self.0.update(&drift.to_bits().to_le_bytes());
-        self.0.update(&winding.to_bits().to_le_bytes());
-        self.0.update(&speed.to_bits().to_le_bytes());
-        let Modulus { modulus, sigma, contact, points } = identification.result();
-        for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
-            self.0.update(&bits.to_le_bytes());
-        }
-        let Taken { tare: tares, clear: clears, identify: identifies, commission: _, .. } = taken;
-        let Taken { calibrate: calibrates, forget: forgets, shown, .. } = taken;
-        let Standing { state, progress, presses, reached, proposals } = calibration;
-        self.0.update(&[state.number(), state.refusal(), progress, presses, proposals, calibrates, forgets]);
-        self.0.update(&reached.to_le_bytes());
-        let scale::Standing { refusal, points, factor_ppm, sigma_ppm } = scale;
-        self.0.update(&[refusal.map_or(0, |refusal| refusal as u8), points, shown]);
-        self.0.update(&factor_ppm.to_le_bytes());
-        self.0.update(&sigma_ppm.to_le_bytes());
-        self.0.update(&[identification.number(), identification.refusal(), tare as u8, tares, clears, identifies]);
-        self.0.update(&limits.0.to_le_bytes());
-        self.0.update(&duty.0.to_le_bytes());
-        self.0.update(&applied.0.to_le_bytes());
-        self.0.update(&[
-            fit_level as u8,
-            mode as u8,
-            fault.map_or(0, |fault| fault as u8),
-            confidence,
-            doubt,
-            bad_taxels,
-        ]);
+        status.words(duty, |word| self.0.update(&word.to_le_bytes()));
     }
 
     /// The digest of what was added.
@@ -205,7 +140,7 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fingertip::identify::{Identification, Refusal};
+    use fingertip::identify::{Identification, Modulus, Refusal};
     use fingertip::pipeline::Taring;
     use fingertip::state::{Fault, Limits, Mode};
     use fingertip::units::{Millimetres, MillimetresPerSecond};

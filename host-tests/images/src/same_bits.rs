@@ -5,6 +5,7 @@
 //! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what
 //! is costly to make, [`made::MADE`], every 1024th.
 
+mod answers;
 mod frames;
 pub mod machines;
 pub mod made;

@@ -3,6 +3,35 @@
 //! An effect acts at one stage and knows no other effect. A stage holds the named ones in the order of the registry, so
 //! an effect that is not named has no state and is never called.
 
+/// A family's named effects: a list for each stage, filled from the parts of that name.
+macro_rules! named {
+    ($($part:ident $list:ident),*) => {
+        /// The named effects.
+        #[derive(Default)]
+        pub struct Named {
+            any: bool,
+            $($list: Vec<Metered<dyn $part>>),*
+        }
+
+        impl Named {
+            /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
+            pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
+                match part {
+                    $(Part::$part(part) => self.$list.push(Metered::new(name, part)),)*
+                    other => return Some(other),
+                }
+                self.any = true;
+                None
+            }
+
+            /// What each has cost so far.
+            pub fn costs(&self) -> impl Iterator<Item = Cost> {
+                core::iter::empty()$(.chain(self.$list.iter().map(Metered::cost)))*
+            }
+        }
+    };
+}
+
 pub mod contact;
 pub mod drive;
 pub mod link;

@@ -7,17 +7,16 @@ pub mod bench;
 pub mod calibrated;
 mod clock;
 mod digest;
+mod scan;
 pub mod served;
 
 use crate::bridge::Bridge;
-use crate::effects::link::Stages as _;
 use crate::effects::sensor::{Readout, Stages as _};
 use crate::effects::set::{Named, Parts, Set};
 use crate::host::Host;
 use crate::host::grip::Reading;
 use crate::ledger;
 use crate::mechanics::body::Surroundings;
-use crate::mechanics::contact::Place;
 use crate::run::RunError;
 use crate::scene::Scene;
 use crate::scene::controller;
@@ -25,17 +24,14 @@ use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
 pub use clock::Clock;
-use core::ops::Range;
 use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
-use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::frame::Sense;
+use fingertip::shipped::{Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::Celsius;
+pub use scan::DUTY_DELAY_SLOTS;
 use std::time::Instant;
-
-/// Slots between the end of a frame and the duty that came of it: what the step takes on the microcontroller, rounded
-/// up.
-pub const DUTY_DELAY_SLOTS: usize = 3;
 
 /// Why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -242,58 +238,10 @@ impl<E: Set> Board<E> {
         }
     }
 
-    /// Scans one frame of each finger while the world moves on.
-    fn scan(&mut self) {
-        let time_s = self.time_s();
-        let second_s = self.units[0].link.second_s(time_s);
-        let slot_s = self.slot_s * second_s;
-        for slot in [0..DUTY_DELAY_SLOTS, DUTY_DELAY_SLOTS..SLOTS] {
-            if slot.start == DUTY_DELAY_SLOTS {
-                for (bridge, unit) in self.bridges.iter_mut().zip(&self.units) {
-                    *bridge = unit.next;
-                }
-            }
-            self.slots(slot, slot_s);
-        }
-    }
-
-    /// Moves the world through slots under the same duty, and samples each at its end.
-    fn slots(&mut self, slots: Range<usize>, slot_s: f64) {
-        let at_once = (self.longest_s / slot_s).max(1.0) as usize;
-        let parts = (slot_s / self.longest_s).ceil().max(1.0);
-        let mut from = slots.start;
-        while from < slots.end {
-            let count = if parts > 1.0 { 1 } else { at_once.min(slots.end - from) };
-            let (begun_s, part_s) = (self.time_s(), slot_s * count as f64 / parts);
-            for part in 0..parts as usize {
-                self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
-            }
-            self.sample(from..from + count, slot_s);
-            from += count;
-        }
-    }
-
-    /// Samples slots that the world's last step went through, each at its end.
-    fn sample(&mut self, slots: Range<usize>, slot_s: f64) {
-        let begun = self.clock;
-        for (finger, unit) in self.units.iter_mut().enumerate() {
-            let mut places = [Place::NOWHERE; ROWS];
-            for (slot, place) in places.iter_mut().enumerate().take(slots.end).skip(slots.start) {
-                let gone = slot + 1 - slots.start;
-                let since_s = if gone == slots.len() { f64::INFINITY } else { slot_s * gone as f64 };
-                *place = self.world.place(finger, since_s);
-            }
-            self.clock = begun;
-            for slot in slots.clone() {
-                self.clock.go_on(slot_s);
-                let kpa = places.get(slot).map_or([0.0; COLUMNS], |place| self.world.placed_kpa(finger, place, slot));
-                let time_s = self.clock.since(self.start);
-                let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
-                for (column, code) in codes.into_iter().enumerate() {
-                    unit.frame.set_code(slot, column, code);
-                }
-            }
-        }
+    /// What a finger's control step learns beside the frame.
+    fn sense(&mut self, finger: usize, silent_ms: u16) -> Sense {
+        let chip = self.units[finger].sensor.chip_c(self.time_s()).map(celsius);
+        Sense { chip, ..self.world.sense(finger, silent_ms) }
     }
 
     fn control(&mut self, finger: usize, watch: &mut dyn Watch) {
@@ -306,8 +254,8 @@ impl<E: Set> Board<E> {
             unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
             silent_ms = unit.host.silent_ms(time_s);
         }
-        let mut sense = self.world.sense(finger, silent_ms);
-        sense.chip = unit.sensor.chip_c(time_s).map(celsius);
+        let sense = self.sense(finger, silent_ms);
+        let unit = &mut self.units[finger];
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = Bridge::of(status);
         if unit.command.torque {

@@ -3,6 +3,7 @@
 mod bench;
 mod client;
 mod document;
+mod gains;
 mod indirect;
 mod instructions;
 mod mirrors;

@@ -38,6 +38,7 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use fingertip::link::snapshot::CrashCause;
 use fingertip::params::Params;
+use fingertip::pipeline::Taken;
 use fingertip::shipped::{Config, Pipeline};
 use stages::{Kept, Stage};
 use static_cell::{ConstStaticCell, StaticCell};
@@ -136,7 +137,7 @@ fn main() -> ! {
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
     scan.stop();
-    renew(pipeline, config);
+    pipeline.renew(Taken::default(), 0);
     report::number("loop_bits", bench.digest(pipeline));
     kernels::run(config, bench, pipeline);
     report::end();
@@ -149,15 +150,10 @@ fn make_config() -> &'static Config {
     CONFIG.init(config)
 }
 
-/// These two are functions of their own, because a pipeline that is being made takes most of the stack only here.
+/// A function of its own, because a pipeline that is being made takes most of the stack only here.
 #[inline(never)]
 fn make_pipeline(config: &Config) -> &'static mut Pipeline {
     PIPELINE.init_with(|| Pipeline::new(config))
-}
-
-#[inline(never)]
-fn renew(pipeline: &mut Pipeline, config: &Config) {
-    *pipeline = Pipeline::new(config);
 }
 
 fn count_cycles() {

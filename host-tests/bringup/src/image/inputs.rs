@@ -2,7 +2,8 @@
 //! finger, made anew each time that they are asked for.
 
 use bringup::script::{Bench, RECORDS};
-use fingertip::shipped::{Config, Pipeline};
+use fingertip::pipeline::Taken;
+use fingertip::shipped::Pipeline;
 use images::record::Record;
 
 use crate::host::fail;
@@ -13,15 +14,14 @@ static BYTES: &[u8] = include_bytes!("../inputs.bin");
 /// Where the next byte is.
 pub struct Inputs<'a> {
     place: usize,
-    config: &'static Config,
     bench: &'a mut Bench,
     pipeline: &'a mut Pipeline,
 }
 
 impl<'a> Inputs<'a> {
     /// From the start. Takes what makes the records.
-    pub fn new(config: &'static Config, bench: &'a mut Bench, pipeline: &'a mut Pipeline) -> Self {
-        Self { place: 0, config, bench, pipeline }
+    pub fn new(bench: &'a mut Bench, pipeline: &'a mut Pipeline) -> Self {
+        Self { place: 0, bench, pipeline }
     }
 
     /// The next bytes.
@@ -56,7 +56,7 @@ impl<'a> Inputs<'a> {
     pub fn seek(&mut self, place: usize) {
         if place >= BYTES.len() {
             self.bench.restart();
-            *self.pipeline = Pipeline::new(self.config);
+            self.pipeline.renew(Taken::default(), 0);
         }
         self.place = place;
     }

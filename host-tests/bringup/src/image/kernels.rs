@@ -3,41 +3,16 @@
 
 #[path = "call.rs"]
 mod call;
-#[path = "../../../images/src/study/control.rs"]
-mod control;
-#[path = "../../../images/src/study/fit.rs"]
-mod fit;
-#[path = "../../../images/src/study/force.rs"]
-mod force;
-#[path = "../../../images/src/study/formats.rs"]
-mod formats;
-#[path = "../../../images/src/study/frame.rs"]
-mod frame;
 #[path = "inputs.rs"]
 mod inputs;
-#[path = "../../../images/src/study/number.rs"]
-mod number;
-#[path = "../../../images/src/study/packed.rs"]
-mod packed;
-#[path = "../../../images/src/study/pressure.rs"]
-mod pressure;
-#[path = "../../../images/src/study/rings.rs"]
-mod rings;
-#[path = "../../../images/src/study/root.rs"]
-mod root;
-#[path = "../../../images/src/study/scalar.rs"]
-mod scalar;
-#[path = "../../../images/src/study/sparse.rs"]
-mod sparse;
-#[path = "../../../images/src/study/step.rs"]
-mod step;
+#[path = "../../../images/src/study/kernels.rs"]
+mod study;
 
 use bringup::script::Bench;
 use core::cell::RefCell;
 use cortex_m::interrupt::{Mutex, free};
 use fingertip::shipped::{Config, Pipeline};
 use inputs::Inputs;
-use scalar::Tools;
 
 use crate::report;
 
@@ -54,36 +29,10 @@ struct Passed {
     most: u32,
 }
 
-/// Only returns.
-#[unsafe(naked)]
-extern "C" fn nothing(_: &mut ()) {
-    core::arch::naked_asm!("bx lr")
-}
-
 /// Runs all of them.
-pub fn run(config: &'static Config, bench: &mut Bench, pipeline: &mut Pipeline) {
+pub fn run(config: &Config, bench: &mut Bench, pipeline: &mut Pipeline) {
     report::say(format_args!("kernels: a minute or less"));
-    begin("nothing: an empty call");
-    for _ in 0..256 {
-        call::pass_on(0, nothing, &mut ());
-    }
-    let tools = Tools::new(config);
-    let mut inputs = Inputs::new(config, bench, pipeline);
-    let region = &mut 1;
-    for (kernel, variants) in [
-        ("root", root::VARIANTS),
-        ("force", force::FORCE),
-        ("indentation", force::INDENTATION),
-        ("pressure", pressure::VARIANTS),
-        ("rings", rings::VARIANTS),
-    ] {
-        scalar::run(kernel, variants, region, &tools, &mut inputs);
-    }
-    frame::run(region, config, &mut inputs);
-    fit::run("fit-clean", region, &mut inputs);
-    fit::run("fit-noise", region, &mut inputs);
-    control::run(region, &mut inputs);
-    step::run(region, config, &mut inputs);
+    study::run(config, &mut Inputs::new(bench, pipeline));
     begin("");
 }
 

@@ -6,12 +6,14 @@
 #![no_std]
 #![no_main]
 
+#[path = "../study/call.rs"]
+mod call;
 mod host;
+#[path = "../timing/press.rs"]
+mod press;
 
-use core::arch::asm;
-use core::hint::black_box;
+use call::pass_on;
 use cortex_m_semihosting::debug;
-use fingertip::calibrate::parts::{Equations, Line, Pose, Readings, STEPS, Series, Sums, add_part};
 use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
@@ -20,12 +22,13 @@ use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::params::Params;
-use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, Proposal, ROWS};
+use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
 use images::record::{MAGIC, Record};
 use images::single::{self, Refined};
+use press::Press;
 use static_cell::StaticCell;
 
 /// Too large for the stack.
@@ -96,64 +99,11 @@ const KERNELS: [(&str, Kernel, When); 26] = [
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
     ("contact, over the edge, full", read_full, Edge),
-    ("calibration, a frame's readings", gather, Always),
-    ("calibration, a taxel for the pose", find_pose, Always),
-    ("calibration, a ninth of a taxel's expectation", expect, Always),
-    ("calibration, a taxel's gain", propose, Always),
+    ("calibration, a frame's readings", press::gather, Always),
+    ("calibration, a taxel for the pose", press::find_pose, Always),
+    ("calibration, a ninth of a taxel's expectation", press::expect, Always),
+    ("calibration, a taxel's gain", press::propose, Always),
 ];
-
-/// What a press left, as it is evaluated.
-struct Press {
-    readings: Readings<ROWS, COLUMNS>,
-    travel: [Option<i64>; STEPS],
-    reading: Series,
-    expected: Series,
-    pose: Pose,
-    equations: Equations,
-    proposal: Proposal,
-}
-
-impl Press {
-    /// A taxel a third of the radius off the axis, in Q30.
-    const PLACE: [i64; 2] = [1 << 28, 1 << 28];
-    const PITCH: i64 = (1 << 30) * 15 / 100;
-    const STEP: i64 = 12_500_000;
-
-    fn new() -> Self {
-        let mut travel = [None; STEPS];
-        let mut reading = [0; STEPS];
-        for (step, (x, u)) in (1..).zip(travel.iter_mut().zip(&mut reading)) {
-            (*x, *u) = (Some(step * Self::STEP), (step * Self::STEP - (1 << 26)).max(0));
-        }
-        let (readings, proposal) = (Readings::NONE, Proposal::NONE);
-        let (pose, equations) = (Pose::default(), Equations::NONE);
-        Self { readings, travel, reading, expected: [0; STEPS], pose, equations, proposal }
-    }
-}
-
-extern "C" fn gather(bench: &mut Bench) {
-    bench.press.readings.take(1 << 24, 3 << 24, &bench.picture);
-}
-
-extern "C" fn find_pose(bench: &mut Bench) {
-    let Press { pose, travel, reading, equations, .. } = &mut *bench.press;
-    let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) else { return };
-    if let Some(line) = Line::of(&zero, travel, reading) {
-        equations.take(&zero, &line);
-    }
-}
-
-extern "C" fn expect(bench: &mut Bench) {
-    let Press { pose, travel, expected, .. } = &mut *bench.press;
-    *expected = [0; STEPS];
-    add_part(expected, pose, Press::PLACE, Press::PITCH, 1, travel, Press::STEP);
-}
-
-extern "C" fn propose(bench: &mut Bench) {
-    let Press { travel, reading, expected, proposal, .. } = &mut *bench.press;
-    let sums = Sums::of(reading, expected, travel);
-    proposal.set(44, &sums, 16_384, bench.config);
-}
 
 extern "C" fn nothing(_: &mut Bench) {}
 
@@ -284,7 +234,7 @@ fn main() -> ! {
 
 /// The step first: the others work on what it left.
 fn measure_frame(bench: &mut Bench) {
-    measure(STEP, step, bench);
+    pass_on(STEP as u32, step, bench);
     let status = *bench.pipeline.status();
     let touches = status.contact.force >= bench.config.contact_on;
     let drives = matches!(status.mode, Mode::Approach | Mode::Force | Mode::Release);
@@ -308,29 +258,8 @@ fn measure_frame(bench: &mut Bench) {
             Driving => drives,
         };
         if now {
-            measure(number, *kernel, bench);
+            pass_on(number as u32, *kernel, bench);
         }
-    }
-}
-
-/// Runs a kernel between the markers.
-fn measure(number: usize, kernel: Kernel, bench: &mut Bench) {
-    // The compiler must neither know the kernel nor move it.
-    let kernel = black_box(kernel);
-    // SAFETY: a call by the calling convention, with every register that it may change named; the markers do nothing.
-    unsafe {
-        asm!(
-            ".inst.w 0xf3af8040",
-            "mov r0, {bench}",
-            "blx {kernel}",
-            ".inst.w 0xf3af8041",
-            bench = in(reg) &raw mut *bench,
-            kernel = in(reg) kernel,
-            inout("r0") number => _,
-            out("r1") _, out("r2") _, out("r3") _, out("r12") _, out("lr") _,
-            out("s0") _, out("s1") _, out("s2") _, out("s3") _, out("s4") _, out("s5") _, out("s6") _, out("s7") _,
-            out("s8") _, out("s9") _, out("s10") _, out("s11") _, out("s12") _, out("s13") _, out("s14") _, out("s15") _,
-        );
     }
 }
 

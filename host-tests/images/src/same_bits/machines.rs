@@ -1,6 +1,7 @@
 //! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer,
 //! profile and drive, the least squares of the modulus.
 
+use super::answers::{add_contact, add_modulus, add_picture, add_reference};
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
@@ -14,9 +15,9 @@ use fingertip::control::observer::Observer;
 use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
-use fingertip::identify::{DepthFit, Modulus, Refusal, TravelFit};
+use fingertip::identify::{DepthFit, TravelFit};
 use fingertip::model::{Relaxation, RelaxationState, Tip};
-use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame, Picture};
+use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Row, Total};
@@ -269,46 +270,7 @@ fn towards(machines: &Machines, sample: &Sample) -> Reference {
     )
 }
 
-fn add_reference(mix: &mut Mix, reference: Reference) {
-    mix.add(reference.speed.to_bits());
-    mix.add(reference.acceleration.to_bits());
-}
-
 /// Both halves of each word.
 fn halves(pairs: [u32; COLUMNS / 2]) -> [u16; COLUMNS] {
     core::array::from_fn(|column| (pairs[column / 2] >> (16 * (column % 2))) as u16)
-}
-
-fn add_picture(mix: &mut Mix, picture: &Picture) {
-    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
-        picture;
-    taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
-    bad.iter().for_each(|row| mix.add(*row));
-    [undriven_max, peak_codes].into_iter().for_each(|number| mix.add(*number));
-    mix.add(*bad_count);
-    mix.add(*bad_again);
-}
-
-fn add_contact(mix: &mut Mix, contact: &Contact) {
-    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = *contact;
-    mix.add(force.to_bits());
-    for length in [indentation, centre_x, centre_y, radius] {
-        mix.add(length.to_bits());
-    }
-    mix.add(peak_pa);
-    mix.add(confidence);
-    mix.add(doubt);
-    mix.add(bad_taxels);
-}
-
-fn add_modulus(mix: &mut Mix, result: Result<Modulus, Refusal>) {
-    match result {
-        Ok(Modulus { modulus, sigma, contact, points }) => {
-            mix.add(modulus.to_bits());
-            mix.add(sigma.to_bits());
-            mix.add(contact.to_bits());
-            mix.add(points);
-        }
-        Err(refusal) => mix.add(refusal as u8),
-    }
 }

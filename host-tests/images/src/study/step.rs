@@ -10,6 +10,7 @@ use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::frame::Sense;
+use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
@@ -113,7 +114,7 @@ extern "C" fn guard(bench: &mut Bench) {
 
 impl<'a> Bench<'a> {
     fn new(fit_level: FitLevel, config: &'a Config, pipeline: &'a mut Pipeline) -> Self {
-        renew(pipeline, config);
+        pipeline.renew(Taken::default(), 0);
         Self {
             config,
             fit_level,
@@ -137,12 +138,6 @@ impl<'a> Bench<'a> {
 #[inline(never)]
 fn begin(config: &Config) -> &'static mut Pipeline {
     PIPELINE.init_with(|| Pipeline::new(config))
-}
-
-/// The same.
-#[inline(never)]
-fn renew(pipeline: &mut Pipeline, config: &Config) {
-    *pipeline = Pipeline::new(config);
 }
 
 fn record(inputs: &mut Inputs) -> Record {

@@ -165,42 +165,7 @@ impl Stages for () {
     }
 }
 
-/// The named effects.
-#[derive(Default)]
-pub struct Named {
-    any: bool,
-    shape: Vec<Metered<dyn Shape>>,
-    memory: Vec<Metered<dyn Memory>>,
-    series: Vec<Metered<dyn Series>>,
-    strength: Vec<Metered<dyn Strength>>,
-    tangent: Vec<Metered<dyn Tangent>>,
-    body: Vec<Metered<dyn Body>>,
-}
-
-impl Named {
-    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
-    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
-        match part {
-            Part::Shape(part) => self.shape.push(Metered::new(name, part)),
-            Part::Memory(part) => self.memory.push(Metered::new(name, part)),
-            Part::Series(part) => self.series.push(Metered::new(name, part)),
-            Part::Strength(part) => self.strength.push(Metered::new(name, part)),
-            Part::Tangent(part) => self.tangent.push(Metered::new(name, part)),
-            Part::Body(part) => self.body.push(Metered::new(name, part)),
-            other => return Some(other),
-        }
-        self.any = true;
-        None
-    }
-
-    /// What each has cost so far.
-    pub fn costs(&self) -> impl Iterator<Item = Cost> {
-        let (shape, memory) = (self.shape.iter().map(Metered::cost), self.memory.iter().map(Metered::cost));
-        let (series, strength) = (self.series.iter().map(Metered::cost), self.strength.iter().map(Metered::cost));
-        let (tangent, body) = (self.tangent.iter().map(Metered::cost), self.body.iter().map(Metered::cost));
-        shape.chain(memory).chain(series).chain(strength).chain(tangent).chain(body)
-    }
-}
+named!(Shape shape, Memory memory, Series series, Strength strength, Tangent tangent, Body body);
 
 impl Stages for Named {
     fn none(&self) -> bool {

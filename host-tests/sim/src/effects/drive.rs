@@ -166,42 +166,7 @@ impl Stages for () {
     }
 }
 
-/// The named effects.
-#[derive(Default)]
-pub struct Named {
-    any: bool,
-    inertia: Vec<Metered<dyn Inertia>>,
-    electric: Vec<Metered<dyn Electric>>,
-    resist: Vec<Metered<dyn Resist>>,
-    potential: Vec<Metered<dyn Potential>>,
-    play: Vec<Metered<dyn Play>>,
-    encoder: Vec<Metered<dyn Encoder>>,
-}
-
-impl Named {
-    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
-    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
-        match part {
-            Part::Inertia(part) => self.inertia.push(Metered::new(name, part)),
-            Part::Electric(part) => self.electric.push(Metered::new(name, part)),
-            Part::Resist(part) => self.resist.push(Metered::new(name, part)),
-            Part::Potential(part) => self.potential.push(Metered::new(name, part)),
-            Part::Play(part) => self.play.push(Metered::new(name, part)),
-            Part::Encoder(part) => self.encoder.push(Metered::new(name, part)),
-            other => return Some(other),
-        }
-        self.any = true;
-        None
-    }
-
-    /// What each has cost so far.
-    pub fn costs(&self) -> impl Iterator<Item = Cost> {
-        let (inertia, electric) = (self.inertia.iter().map(Metered::cost), self.electric.iter().map(Metered::cost));
-        let (resist, potential) = (self.resist.iter().map(Metered::cost), self.potential.iter().map(Metered::cost));
-        let (play, encoder) = (self.play.iter().map(Metered::cost), self.encoder.iter().map(Metered::cost));
-        inertia.chain(electric).chain(resist).chain(potential).chain(play).chain(encoder)
-    }
-}
+named!(Inertia inertia, Electric electric, Resist resist, Potential potential, Play play, Encoder encoder);
 
 impl Stages for Named {
     fn none(&self) -> bool {

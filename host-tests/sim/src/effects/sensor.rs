@@ -104,42 +104,7 @@ impl Stages for () {
     }
 }
 
-/// The named effects.
-#[derive(Default)]
-pub struct Named {
-    any: bool,
-    pressure: Vec<Metered<dyn Pressure>>,
-    conductance: Vec<Metered<dyn Conductance>>,
-    network: Vec<Metered<dyn Network>>,
-    volts: Vec<Metered<dyn Volts>>,
-    codes: Vec<Metered<dyn Codes>>,
-}
-
-impl Named {
-    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
-    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
-        match part {
-            Part::Pressure(part) => self.pressure.push(Metered::new(name, part)),
-            Part::Conductance(part) => self.conductance.push(Metered::new(name, part)),
-            Part::Network(part) => self.network.push(Metered::new(name, part)),
-            Part::Volts(part) => self.volts.push(Metered::new(name, part)),
-            Part::Codes(part) => self.codes.push(Metered::new(name, part)),
-            other => return Some(other),
-        }
-        self.any = true;
-        None
-    }
-
-    /// What each has cost so far.
-    pub fn costs(&self) -> impl Iterator<Item = Cost> {
-        let pressure = self.pressure.iter().map(Metered::cost);
-        let conductance = self.conductance.iter().map(Metered::cost);
-        let network = self.network.iter().map(Metered::cost);
-        let volts = self.volts.iter().map(Metered::cost);
-        let codes = self.codes.iter().map(Metered::cost);
-        pressure.chain(conductance).chain(network).chain(volts).chain(codes)
-    }
-}
+named!(Pressure pressure, Conductance conductance, Network network, Volts volts, Codes codes);
 
 impl Stages for Named {
     fn none(&self) -> bool {

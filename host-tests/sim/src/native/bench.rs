@@ -86,7 +86,7 @@ impl<E: Set> Bench<E> {
     /// The same, where somebody changes what the controller is given.
     pub fn step_with(&mut self, change: impl FnOnce(&mut Record)) -> Status {
         self.board.scan();
-        self.sense = self.board.world.sense(0, 0);
+        self.sense = self.board.sense(0, 0);
         let unit = &mut self.board.units[0];
         unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
         let mut record = self.record();

@@ -1,9 +1,7 @@
 //! What a run was, in one number.
 
 use fingertip::command::Command;
-use fingertip::contact::Contact;
 use fingertip::frame::Sense;
-use fingertip::identify::Modulus;
 use fingertip::pipeline::Status;
 use fingertip::shipped::Frame;
 use fingertip::units::Duty;
@@ -13,9 +11,8 @@ use twox_hash::xxhash3_128::Hasher;
 /// bit. It finds runs that happen to differ, and keeps nobody from making two that do not seem to.
 pub struct Digest(Hasher);
 
-/// Words of what a step takes beside the codes, and of what it gives.
+/// Words of what a step takes beside the codes.
 const TAKEN: usize = 13;
-const GIVEN: usize = 29;
 
 impl Digest {
     /// Of nothing.
@@ -28,7 +25,8 @@ impl Digest {
         self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
         self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
         self.0.write(taken(frame.sequence, sense, command).map(u32::to_le_bytes).as_flattened());
-        self.0.write(given(duty, status).map(u32::to_le_bytes).as_flattened());
+        // Of the temperature only what it does, which is in the rest.
+        Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
     }
 
     /// In hexadecimal.
@@ -57,67 +55,6 @@ fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
         tare_request.into(),
         clear_request.into(),
         identify_request.into(),
-    ]
-}
-
-fn given(duty: Duty, status: &Status) -> [u32; GIVEN] {
-    let Status {
-        sequence,
-        missed_frames,
-        mode,
-        fault,
-        limits,
-        fit_level,
-        contact,
-        // What it does is in the duty.
-        creep: _,
-        winding: _,
-        chip: _,
-        drift: _,
-        travel,
-        speed,
-        duty: applied,
-        identification,
-        // What it does is in the mode and the duty.
-        commissioning: _,
-        // No scene asks for it.
-        calibration: _,
-        scale: _,
-        tare,
-        taken,
-    } = *status;
-    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = contact;
-    let Modulus { modulus, sigma, contact, points } = identification.result();
-    [
-        sequence,
-        missed_frames,
-        mode as u32,
-        fault.map_or(0, |fault| fault as u32),
-        limits.0.into(),
-        fit_level as u32,
-        force.to_bits() as u32,
-        indentation.to_bits() as u32,
-        centre_x.to_bits() as u32,
-        centre_y.to_bits() as u32,
-        radius.to_bits() as u32,
-        peak_pa,
-        u32::from(confidence),
-        u32::from(doubt),
-        u32::from(bad_taxels),
-        travel.to_bits() as u32,
-        speed.to_bits() as u32,
-        modulus.to_bits() as u32,
-        sigma.to_bits() as u32,
-        contact.to_bits() as u32,
-        points.into(),
-        u32::from(identification.number()),
-        u32::from(identification.refusal()),
-        tare as u32,
-        taken.tare.into(),
-        taken.clear.into(),
-        taken.identify.into(),
-        duty.0 as u32,
-        applied.0 as u32,
     ]
 }
 

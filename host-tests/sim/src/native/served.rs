@@ -106,14 +106,14 @@ impl<E: Set> Bus<E> {
         for (finger, device) in self.devices.iter_mut().enumerate() {
             let board = &mut self.board;
             if device.reboot_s.is_some_and(|at_s| at_s <= now_s) {
-                let encoder = board.world.sense(finger, 0).encoder;
+                let encoder = board.sense(finger, 0).encoder;
                 *device = Device { encoder_start: encoder, broken: device.broken.take(), ..device.rebooted(now_s) };
                 board.units[finger].pipeline = device.pipeline();
                 board.units[finger].frame.sequence = 0;
             }
+            let mut sense = board.sense(finger, device.silent_ms(now_s));
             let unit = &mut board.units[finger];
             unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
-            let mut sense = board.world.sense(finger, device.silent_ms(now_s));
             sense.encoder = sense.encoder.wrapping_sub(device.encoder_start);
             let params = &unit.pipeline.config().params;
             let scanned =

@@ -232,7 +232,7 @@ impl Config {
             contact_off: newtons(p.contact_off_mn),
             touch_line: narrow(0.5e-3 * p.contact_on_mn as f32 / newtons_per_sum),
             creep_share_q32: (creep / (1.0 + creep) * exp2(32)) as u32,
-            creep_leak_q32: (frame_s * (1.0 + creep) / (p.creep_time_ms as f32 * 1e-3) * exp2(32)) as u32,
+            creep_leak_q32: (frame_s * (1.0 + creep) / (p.creep_time_ms as f32 * 1e-3) * exp2(32)).min(exp2(26)) as u32,
             frame_s_q39: narrow(frame_s * exp2(39)),
             mm_per_count_q40,
             count: Millimetres(I8F24::from_bits(narrow(mm_per_count * exp2(24)))),

@@ -148,7 +148,7 @@ params! {
     /// By how much the reading of a held force grows in the end, permille of it: the array's creep. 0 takes none off.
     creep_permille = 0 in 0..=300;
     /// Time constant of the creep.
-    creep_time_ms = 10_000 in 500..=600_000;
+    creep_time_ms = 10_000 in 50..=600_000;
     /// Whether somebody saw that positive duty moves the tip towards the object, and the jog that the encoder then counts
     /// up: 1 yes, 0 no. Without it the bus refuses torque. See `docs/commissioning.md`.
     direction_confirmed = 0 in 0..=1;

@@ -226,7 +226,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
 
         self.calibrator.work(&self.array, &self.config);
-        self.scale.observe(mode, &contact, &self.config);
+        self.scale.observe(mode, self.goal.creep.less(contact.force), &self.config);
         if command.shown_request != self.status.taken.shown {
             self.status.taken.shown = command.shown_request;
             self.scale.take(command.shown_mn, &contact);

@@ -8,6 +8,7 @@ use crate::config::Config;
 use crate::contact::Contact;
 use crate::root::floor_sqrt;
 use crate::state::Mode;
+use crate::units::Newtons;
 
 /// Points at most.
 const POINTS: usize = 8;
@@ -103,10 +104,10 @@ impl Scale {
         *self = Self { held_ns: self.held_ns, mean: self.mean, ..Self::new() };
     }
 
-    /// Follows the force that is held.
+    /// Follows the force that is held: the reading without its creep, which is taken off beside the scale.
     #[inline(always)]
-    pub fn observe(&mut self, mode: Mode, contact: &Contact, config: &Config) {
-        let force = i64::from(contact.force.to_bits()) << 16;
+    pub fn observe(&mut self, mode: Mode, force: Newtons, config: &Config) {
+        let force = i64::from(force.to_bits()) << 16;
         if mode != Mode::Force {
             (self.held_ns, self.mean) = (0, force);
             return;
@@ -137,7 +138,7 @@ impl Scale {
         if self.held_ns < HELD_NS {
             return Some(Refusal::NotHeld);
         }
-        if contact.doubt > 0 || contact.bad_taxels > 0 {
+        if contact.doubt > 0 {
             return Some(Refusal::OffArray);
         }
         if shown_mn < LEAST_MN {

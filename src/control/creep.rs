@@ -30,6 +30,12 @@ impl Creep {
         self.state = self.state.saturating_add(way * i64::from(config.creep_leak_q32));
     }
 
+    /// A reading without what of it is creep.
+    #[inline(always)]
+    pub fn less(&self, reading: Newtons) -> Newtons {
+        Newtons(reading.0.saturating_sub(self.force().0))
+    }
+
     /// What of the reading is creep.
     #[inline(always)]
     pub fn force(&self) -> Newtons {

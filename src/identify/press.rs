@@ -47,8 +47,8 @@ pub struct Press {
     still_ns: u32,
     /// It goes on where the array's edge or a bad taxel ends a measurement of the modulus, and gives none.
     deep: bool,
-    /// Taxels that were bad at the touch.
-    bad_at_touch: u16,
+    /// The most taxels that were bad before the touch: of one on the brink of being dead, noise makes a bad one now and then.
+    bad_before: u16,
     /// The way from the touch in this frame, where it counts.
     sampled: Option<Millimetres>,
 }
@@ -86,7 +86,7 @@ impl Press {
             moved_to: Millimetres::ZERO,
             still_ns: 0,
             deep: false,
-            bad_at_touch: 0,
+            bad_before: 0,
             sampled: None,
         }
     }
@@ -146,8 +146,10 @@ impl Press {
             return;
         }
         self.sampled = None;
-        let bad_before = if self.deep && self.phase != Phase::Squeeze { u16::MAX } else { self.bad_at_touch };
-        if view.picture.bad_count > bad_before {
+        if self.deep && self.phase != Phase::Squeeze {
+            self.bad_before = self.bad_before.max(view.picture.bad_count);
+        }
+        if view.picture.bad_count > self.bad_before {
             return self.finish(Refusal::BadTaxels);
         }
         if self.stalled(view, config) {
@@ -198,7 +200,6 @@ impl Press {
         self.fit = TravelFit::new(travel, depth_goal(config), config.force_fault);
         self.step = Step::at(0);
         self.phase = Phase::Squeeze;
-        self.bad_at_touch = view.picture.bad_count;
     }
 
     fn squeeze<const ROWS: usize, const COLUMNS: usize>(

@@ -4,7 +4,8 @@ use super::conduct::Conduct;
 use super::response::Response;
 use super::slips::Slips;
 use crate::watch::{Controller, Step};
-use fingertip::state::{Fault, Limits};
+use fingertip::pipeline::Status;
+use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, Newtons};
 
 /// Errors of the centre count from this force on: below it there is next to nothing to see.
@@ -15,6 +16,12 @@ const APPROACH_S: f64 = 0.01;
 const STEP_N: f64 = 0.02;
 /// An object that fell this far below its highest place was dropped.
 pub(super) const DROPPED_MM: f64 = 5.0;
+
+/// What the controller takes the force for: the reading, and while a force is held less what of it is creep and warmth.
+fn sensed_n(status: &Status) -> f64 {
+    let beside_n = if status.mode == Mode::Force { newtons(status.creep) + newtons(status.drift) } else { 0.0 };
+    newtons(status.contact.force) - beside_n
+}
 
 /// A sum of squares over time.
 #[derive(Clone, Copy, Debug, Default)]
@@ -209,7 +216,7 @@ impl Finger {
 
     fn sensing(&mut self, step: &Step, dt_s: f64) {
         let (contact, truth) = (&step.status.contact, step.truth);
-        self.force_error_n.add(newtons(contact.force) - truth.force_n, dt_s);
+        self.force_error_n.add(sensed_n(step.status) - truth.force_n, dt_s);
         if truth.force_n > SEEN_N {
             let off = |sensed: Millimetres, true_mm: f64| sensed.0.to_num::<f64>() - true_mm;
             let [x, y] = [off(contact.centre_x, truth.centre_mm[0]), off(contact.centre_y, truth.centre_mm[1])];

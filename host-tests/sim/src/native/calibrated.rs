@@ -1,6 +1,6 @@
 //! A finger that is calibrated first, by the device's own procedures, as a user does it: the modulus by a press, gains by
 //! three presses at three places of a plate that stands askew by up to 2 degrees, and a kitchen scale with steps of 5 mN
-//! at two holds. All of the finger's effects are there meanwhile.
+//! at three holds, each higher than the one before. All of the finger's effects are there meanwhile.
 
 use super::bench::Bench;
 use super::simulate_calibrated;
@@ -21,7 +21,7 @@ use fingertip::state::Mode;
 const PLATES: [([f64; 2], [f64; 2]); 3] =
     [([0.3, -0.2], [1.0, -1.5]), ([-1.5, 1.0], [2.0, 0.5]), ([1.4, 1.2], [-1.0, 1.0])];
 /// What is held on the scale.
-const HOLDS_N: [f64; 2] = [1.5, 4.0];
+const HOLDS_N: [f64; 3] = [1.0, 2.5, 4.0];
 /// Frames of a hold, the last of which the scale shows.
 const HOLD_FRAMES: usize = 7_000;
 const SHOWN_FRAMES: usize = 2_000;

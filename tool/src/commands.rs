@@ -22,6 +22,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+/// What a tare came to that was no tare.
+const TOUCHED: &str = "something seemed to touch the tip while it was tared: forces read too low by that. \
+                       Free the tip and tare again";
+
 /// Says a line. Who closed the output wanted no more of it.
 pub fn say(text: impl std::fmt::Display) {
     let _ = writeln!(io::stdout(), "{text}");

@@ -119,7 +119,8 @@ impl Winding {
             let target = (mean * u64::from(part.gain)).min(MOST).cast_signed();
             let way = (target - *lag) >> 12;
             let leak = if way > 0 { part.rise_q31 } else { part.fall_q31 };
-            *lag = (*lag + ((way * i64::from(leak)) >> 19)).max(0);
+            // A lag that is left out holds no heat of before.
+            *lag = if part.gain == 0 { 0 } else { (*lag + ((way * i64::from(leak)) >> 19)).max(0) };
         }
         self.allow(heat);
     }

@@ -16,7 +16,8 @@
 //! | 12 | frames, bits of all frames, digest after the last one, check sum of the bits, missed frames before the first one |
 //! | 32 | numbers of the requests taken up before, as in [`Taken`](crate::pipeline::Taken); 0 |
 //! | 40 | from frame to frame, ns |
-//! | 44 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
+//! | 44 | what is known of the motor's winding, as [`Winding`](crate::control::winding::Winding) tells it |
+//! | 72 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
 //! | then | the frames, without a gap |
 //!
 //! Of a frame only what changed is written: numbers as bits of their difference to the frame before, codes with a
@@ -38,7 +39,7 @@ use crate::command::Command;
 use crate::frame::{Frame, Sense};
 
 /// The version of the layout.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// What a capture is doing. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -91,6 +91,22 @@ fn without_resistances_it_is_as_warm_as_its_surroundings_and_takes_nothing_away(
     assert!((degrees(&winding, &config) - 40.0).abs() < 1e-3);
 }
 
+/// Who leaves the model out by new parameters has not to wait until its heat is gone.
+#[test]
+fn what_is_left_out_later_holds_no_heat_of_before() {
+    let mut winding = Winding::new();
+    let warm = config(Params::DEFAULT);
+    (0..10_000).for_each(|_| winding.observe(driven(&warm, 0.3), &warm));
+    assert!(degrees(&winding, &warm) > 80.0);
+    let hot = config(Params { winding_max_c: 85, ambient_c: 60, ..Params::DEFAULT });
+    (0..256).for_each(|_| winding.observe(0, &hot));
+    assert_eq!(winding.share(), 0);
+    let left_out = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..hot.params });
+    (0..256).for_each(|_| winding.observe(0, &left_out));
+    assert_eq!(winding.share(), 256);
+    assert!((degrees(&winding, &left_out) - 60.0).abs() < 1e-3);
+}
+
 #[test]
 fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
     let config = config(Params::DEFAULT);

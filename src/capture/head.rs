@@ -2,6 +2,7 @@
 
 use super::read::Refusal;
 use super::{Ended, VERSION, digest};
+use crate::control::winding;
 use crate::params::Params;
 use crate::pipeline::Taken;
 use crate::pressure::Gains;
@@ -23,6 +24,8 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     pub missed_frames: u32,
     /// Requests taken up before.
     pub taken: Taken,
+    /// What is known of the motor's winding, as [`Winding`](winding::Winding) tells it.
+    pub winding: [u32; winding::WORDS],
     /// From frame to frame.
     pub frame_ns: u32,
     /// The parameters in force.
@@ -33,7 +36,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 
 const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
 /// Bytes before the parameters.
-const FIXED: usize = 44;
+const FIXED: usize = 44 + 4 * winding::WORDS;
 
 /// A number for the names and the order of the parameters (FNV-1a of 32 bits).
 const LAYOUT: u32 = {
@@ -61,7 +64,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         let first = [self.missed_frames, taken, more_taken, self.frame_ns];
         let params = self.params.to_array().map(i32::cast_unsigned);
         let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
-        digest::words(LAYOUT, first.into_iter().chain(params).chain(gains))
+        digest::words(LAYOUT, first.into_iter().chain(self.winding).chain(params).chain(gains))
     }
 
     pub(super) fn write(&self, bytes: &mut [u8]) {
@@ -79,6 +82,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         }
         self.taken.words().into_iter().for_each(|word| put(word.to_le_bytes()));
         put(self.frame_ns.to_le_bytes());
+        self.winding.iter().for_each(|word| put(word.to_le_bytes()));
         self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));
         (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
     }
@@ -121,6 +125,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         let taken = Taken::from_words([next()?, next()?].map(u32::from_le_bytes)).filter(|_| zero == 0);
         let taken = taken.ok_or(Refusal::Damaged)?;
         let frame_ns = u32::from_le_bytes(next()?);
+        let mut winding = [0; winding::WORDS];
+        for word in &mut winding {
+            *word = u32::from_le_bytes(next()?);
+        }
         let mut values = [0; Params::COUNT];
         for value in &mut values {
             *value = i32::from_le_bytes(next()?);
@@ -132,6 +140,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
             }
         }
         let params = Params::from_array(&values);
-        Ok(Self { ended, frames, bits, digest, check, missed_frames, taken, frame_ns, params, gains })
+        Ok(Self { ended, frames, bits, digest, check, missed_frames, taken, winding, frame_ns, params, gains })
     }
 }

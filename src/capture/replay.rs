@@ -2,6 +2,7 @@
 
 use super::{Frames, Head, Refusal, Taken, digest};
 use crate::config::Shaped;
+use crate::control::winding::Winding;
 use crate::pipeline::{Pipeline, Status};
 use crate::pressure::Calibration;
 use crate::scan::Clocks;
@@ -77,7 +78,8 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     }
     let mut pipeline = Pipeline::new(&config);
     pipeline.calibrate(&Calibration::of(&head.gains));
-    pipeline.renew(head.taken, head.missed_frames);
+    let winding = Winding::of_words(&head.winding, &config).ok_or(Refusal::Damaged)?;
+    pipeline.renew(head.taken, head.missed_frames, winding);
     let (mut difference, mut running) = (None, head.seed());
     for (frame, taken) in (0..).zip(frames) {
         let taken = taken?;

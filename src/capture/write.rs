@@ -77,12 +77,14 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
             check: 0,
             missed_frames,
             taken,
+            winding: pipeline.winding().words(),
             frame_ns: config.timing.frame_ns,
             params: config.params,
             gains,
         };
         head.write(&mut self.bytes);
-        pipeline.renew(taken, missed_frames);
+        let winding = *pipeline.winding();
+        pipeline.renew(taken, missed_frames, winding);
         self.place = Place::START;
         self.last = Last { digest: head.seed(), ..Last::NONE };
         let count = self.standing.count.wrapping_add(1);

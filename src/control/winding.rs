@@ -21,8 +21,12 @@ use fixed::types::I16F16;
 
 /// All of the current, Q8.
 pub const WHOLE: i32 = 1 << 8;
+/// Words of all that a winding knows.
+pub const WORDS: usize = 7;
 /// What a lag holds at most, K in Q30: 4,096 K.
 const MOST: u64 = 1 << 42;
+/// In the last of [`Winding::words`]: the lags have their start.
+const STARTED: u32 = 1 << 31;
 
 /// The winding's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +68,31 @@ impl Winding {
         self.share
     }
 
+    /// All that it knows, so that a pipeline that is made anew goes on with it.
+    pub fn words(&self) -> [u32; WORDS] {
+        let [winding, housing] = self.lags.map(i64::cast_unsigned);
+        let halves = |value: u64| [value as u32, (value >> 32) as u32];
+        let ([a, b], [c, d], [e, f]) = (halves(self.squares), halves(winding), halves(housing));
+        [a, b, c, d, e, f, self.frames | if self.started { STARTED } else { 0 }]
+    }
+
+    /// The inverse; none where no winding tells these.
+    pub fn of_words(words: &[u32; WORDS], config: &Config) -> Option<Self> {
+        let [a, b, c, d, e, f, last] = *words;
+        let [squares, winding, housing] =
+            [[a, b], [c, d], [e, f]].map(|[low, high]| u64::from(high) << 32 | u64::from(low));
+        let (frames, started) = (last & !STARTED, last & STARTED != 0);
+        if frames >= FRAMES || squares > u64::from(frames) << 54 || winding > MOST || housing > MOST {
+            return None;
+        }
+        let lags = [winding, housing].map(u64::cast_signed);
+        let mut known = Self { squares, frames, lags, started, share: WHOLE };
+        if started {
+            known.allow(&config.heat);
+        }
+        Some(known)
+    }
+
     /// How warm it is, rounded up.
     pub fn temperature(&self, config: &Config) -> Celsius {
         let above = self.above() >> 14;
@@ -90,8 +119,14 @@ impl Winding {
             let target = (mean * u64::from(part.gain)).min(MOST).cast_signed();
             let way = (target - *lag) >> 12;
             let leak = if way > 0 { part.rise_q31 } else { part.fall_q31 };
-            *lag = (*lag + ((way * i64::from(leak)) >> 19)).max(0);
+            // A lag that is left out holds no heat of before.
+            *lag = if part.gain == 0 { 0 } else { (*lag + ((way * i64::from(leak)) >> 19)).max(0) };
         }
+        self.allow(heat);
+    }
+
+    #[inline(always)]
+    fn allow(&mut self, heat: &Heat) {
         let left = (heat.room_q30 - self.above()).max(0);
         // Q8 of the allowance.
         self.share = (left >> (30 + ALLOWANCE_BITS - 8)).min(WHOLE.into()) as i32;

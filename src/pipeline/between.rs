@@ -3,6 +3,7 @@
 use super::{Budget, Fit, Goal, Guard, Monitor, Pipeline, Press, Run, Scale, SpeedLoop, Status, Taken, Taring};
 use crate::commission;
 use crate::config::Shaped;
+use crate::control::winding::Winding;
 use crate::frame::Frame;
 use crate::identify::Refusal;
 use crate::pressure::Calibration;
@@ -64,12 +65,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     /// Makes all anew but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests with
-    /// these numbers count as taken up, and so many frames as missed before.
-    pub fn renew(&mut self, taken: Taken, missed_frames: u32) {
+    /// these numbers count as taken up, and so many frames as missed before. The motor stays as warm as it is told.
+    pub fn renew(&mut self, taken: Taken, missed_frames: u32, winding: Winding) {
         self.array.renew();
         self.budget = Budget::new();
         self.fit = Fit::default();
         self.motion = SpeedLoop::new();
+        self.motion.winding = winding;
         self.monitor = Monitor::default();
         self.guard = Guard::default();
         self.goal = Goal::default();
@@ -79,5 +81,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.calibrator.renew();
         self.status = Status { taken, missed_frames, ..Status::default() };
         self.tared = false;
+    }
+
+    /// How warm the motor's winding is, and all that this follows from.
+    pub fn winding(&self) -> &Winding {
+        &self.motion.winding
     }
 }

@@ -22,9 +22,32 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Says a line. Who closed the output wanted no more of it.
+/// Something of the output was lost, and nobody wanted that.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// What a tare came to that was no tare.
+const TOUCHED: &str = "something seemed to touch the tip while it was tared: forces read too low by that. \
+                       Free the tip and tare again";
+
+/// Says a line. What becomes of it [`said`] tells.
 pub fn say(text: impl std::fmt::Display) {
-    let _ = writeln!(io::stdout(), "{text}");
+    note(writeln!(io::stdout(), "{text}"));
+}
+
+/// Who closed the output wanted no more of it; what else is in its way, as a full disk, is told in the end.
+fn note(written: io::Result<()>) {
+    if written.is_err_and(|why| why.kind() != io::ErrorKind::BrokenPipe) {
+        LOST.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Whether all that was said is written.
+///
+/// # Errors
+/// It is not, though nobody closed the output.
+pub fn said() -> Result<(), Error> {
+    note(io::stdout().flush());
+    if LOST.load(Ordering::Relaxed) { Err("the output cannot be written: is the disk full?".into()) } else { Ok(()) }
 }
 
 /// Says a line beside the results.

@@ -82,10 +82,7 @@ enum Command {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = run(&cli);
-    // Who closed the output wanted no more of it.
-    let _ = io::stdout().flush();
-    match result {
+    match run(&cli).and_then(|()| fingertip_cli::commands::said()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             let _ = writeln!(io::stderr(), "fingertip: {why}");

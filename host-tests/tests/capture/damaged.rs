@@ -44,7 +44,7 @@ fn others_are_told_apart() {
         verdict(&bytes)
     };
     assert_eq!(changed(0, b'X'), Err(Refusal::NoCapture));
-    assert_eq!(changed(3, 2), Err(Refusal::Version(2)));
+    assert_eq!(changed(3, 1), Err(Refusal::Version(1)));
     assert_eq!(changed(4, 8), Err(Refusal::Shape { rows: 8, columns: 10 }));
     assert_eq!(changed(6, Ended::No as u8), Err(Refusal::Unfinished));
     assert_eq!(changed(8, 0), Err(Refusal::Layout));

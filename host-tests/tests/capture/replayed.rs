@@ -70,6 +70,26 @@ fn what_the_finger_did_before_does_not_matter() {
     assert_eq!(finger.capture.standing().count, 2);
 }
 
+/// What holds the current back must not forget because somebody wants a record.
+#[test]
+fn the_motor_stays_as_warm_as_it_is() {
+    let mut finger = Finger::<BYTES>::new();
+    finger.native.tare();
+    *finger.native.command() = Command { torque: true, goal: newtons(6_000), ..*finger.native.command() };
+    (0..5_000).for_each(|_| finger.frame());
+    *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
+    (0..200).for_each(|_| finger.frame());
+    let before: f64 = finger.native.status().winding.0.to_num();
+    assert!(before > 88.5, "{before} C: it is warmer than after a reset");
+    finger.press();
+    let mut coldest = f64::MAX;
+    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
+        coldest = coldest.min(status.winding.0.to_num());
+    });
+    assert_eq!(replayed.expect("a capture").difference, None);
+    assert!(coldest > before - 0.1, "{coldest} C after {before} C");
+}
+
 #[test]
 fn a_fault_is_in_it_and_what_comes_after() {
     let mut finger = Finger::<BYTES>::new();
@@ -102,7 +122,7 @@ fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
     let mut bytes = finger.capture.data().to_vec();
     // A creep's share more, though its effect comes late.
     let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
-    bytes[44 + 4 * place] ^= 1;
+    bytes[72 + 4 * place] ^= 1;
     let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, _| {}).expect("a capture");
     assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((0, Field::Digest)));
     let told = replayed.difference.map(|difference| difference.to_string()).unwrap_or_default();

@@ -8,7 +8,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{Attachment, WriteOptions, Writer};
+use mcap::{Attachment, McapError, WriteOptions, Writer};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -31,8 +31,13 @@ pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), S
     let replayed =
         through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
     let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
-    let out = options.create(to).map_err(|why| why.to_string())?;
-    put(out, bytes, about, &replayed.head, &shown).map_err(|why| why.to_string())
+    let out = options.create(to).map_err(|why| in_words(&why))?;
+    put(out, bytes, about, &replayed.head, &shown).map_err(|why| in_words(&why))
+}
+
+/// The system's reason where it has one: a full disk is told as such.
+fn in_words(why: &McapError) -> String {
+    if let McapError::Io(why) = why { why.to_string() } else { why.to_string() }
 }
 
 fn put(

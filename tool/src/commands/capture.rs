@@ -1,11 +1,12 @@
 //! `fingertip capture`.
 
-use super::{Interrupt, aside, no_fault, say, say_json, stopped, wait_for};
+use super::{Interrupt, TOUCHED, aside, no_fault, say, say_json, stopped, wait_for};
 use crate::captured::{self, About};
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::State;
 use fingertip::shipped::address;
+use fingertip::state::Limits;
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -17,6 +18,7 @@ const WATCHDOG_UNIT_MS: i64 = 20;
 const LOOK: Duration = Duration::from_millis(5);
 /// `CAPTURE_STATE`.
 const ARMED: i64 = State::Armed as i64;
+const RECORDING: i64 = State::Recording as i64;
 const DONE: i64 = State::Done as i64;
 /// What contributed captures are under.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
@@ -94,7 +96,8 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let count = kept?;
     let bytes = fetch(client, count, &say_on)?;
-    let replayed = captured::through_the_core(&bytes, |_, _| {})
+    let mut touched = false;
+    let replayed = captured::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
         .map_err(|why| format!("what the board kept is of no use here: {why}"))?;
     let about = about(args, client)?;
     let file = |why: &dyn std::fmt::Display| Error::file("write", &args.out, why);
@@ -107,7 +110,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if json {
         say_json(&json!({
             "file": args.out, "frames": frames, "seconds": seconds, "bytes": bytes.len(), "ended": ended,
-            "replays": difference.is_none(), "difference": difference,
+            "replays": difference.is_none(), "difference": difference, "touched": touched,
         }));
     } else {
         let replays = difference.as_ref().map_or("replays here to the bit".to_owned(), |at| format!("here it {at}"));
@@ -115,6 +118,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     // The file is what shows it, so it is kept.
     match difference {
+        None if touched => Err(TOUCHED.into()),
         None => Ok(()),
         Some(at) => {
             Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?")
@@ -155,6 +159,14 @@ fn keep(
         }
         if count == before && state != ARMED {
             return Err("the capture is gone: the controller started anew, or another host called it off".into());
+        }
+        // Zeros that hide a touch would let it press harder than it was asked to.
+        if goal_mn.is_some() && state == RECORDING {
+            let limits = client.again(|client| client.number(address::LIMITS))?;
+            if Limits(limits as u16).has(Limits::TARED_TOUCHING) {
+                client.again(|client| client.set(address::CAPTURE, 0))?;
+                return Err(TOUCHED.into());
+            }
         }
         let enough = args.frames.is_some_and(|wanted| frames >= i64::from(wanted));
         let late = Instant::now() >= until;

@@ -84,7 +84,13 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             let values = values.iter().map(|text| assignment(text)).collect::<Result<Vec<_>, _>>()?;
             change(&values, *save, client, json)
         }
-        Command::Save => save(client, json),
+        Command::Save => {
+            save(client, json)?;
+            if json {
+                say_json(&json!({ "saved": true }));
+            }
+            Ok(())
+        }
         Command::Backup { file, force } => {
             let kept = file::Kept { values: read_all(client)?, gains: Some(gains::read(client)?) };
             file::write(file, *force, client, &kept)?;

@@ -1,6 +1,6 @@
 //! `fingertip tare`.
 
-use super::{no_fault, say, say_json, wait_for};
+use super::{TOUCHED, no_fault, say, say_json, wait_for};
 use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::Limits;
@@ -52,9 +52,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }
     if touched {
-        return Err("something seemed to touch the tip while it was tared: forces read too low by that. \
-             Free the tip and tare again"
-            .into());
+        return Err(TOUCHED.into());
     }
     Ok(())
 }

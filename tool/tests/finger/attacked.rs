@@ -195,4 +195,13 @@ fn a_full_disk_is_told_and_a_closed_pipe_is_no_error() {
     let output = finger.writing_to(&["record", "--seconds", "1000000", "-"], full);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(1) && said.contains("cannot write -: No space left"), "{said}");
+    for arguments in [&["info"][..], &["info", "--json"], &["params", "get"], &["completions", "bash"]] {
+        let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let output = finger.writing_to(arguments, full);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(1) && said.contains("the output cannot be written"), "{said}");
+        let (reader, writer) = std::io::pipe().expect("a pipe");
+        drop(reader);
+        assert_eq!(finger.writing_to(arguments, writer).status.code(), Some(0), "{arguments:?}");
+    }
 }

@@ -35,10 +35,31 @@ fn a_capture_is_taken_and_replays() {
     assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
     // It let go.
     assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
+    let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+    let why = captured::write(full, &kept.bytes, &kept.about).expect_err("it is full");
+    assert!(why.contains("No space left"), "{why}");
     // A tare alone, ended early.
     let file = finger.file("tare.mcap");
     let told = finger.done(&["capture", "--frames", "30", "--out", &file]);
     assert!(told.contains("ended: asked to; replays here to the bit"), "{told}");
+}
+
+#[test]
+fn a_press_from_a_tip_that_touches_is_told_and_ends() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    // Torque goes off while it presses: the tip rests on the wall.
+    let mut bus = client(&finger);
+    bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    bus.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
+    while bus.number(address::PRESENT_FORCE_MN).expect("it answers") < 900 {}
+    bus.set(address::TORQUE_ENABLE, 0).expect("it obeys");
+    drop(bus);
+    let file = finger.file("touching.mcap");
+    let why = finger.refused(&["capture", "--press", "1", "--out", &file]);
+    assert!(why.contains("something seemed to touch"), "{why}");
+    assert!(fs::metadata(&file).is_err(), "nothing was written");
+    assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
 }
 
 #[test]

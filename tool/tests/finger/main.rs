@@ -133,6 +133,7 @@ fn parameters_are_set_all_or_none_and_saved() {
     finger.done(&["params", "set", "modulus_pa=300000", "fit_level=3", "--save"]);
     assert_eq!(get(&["modulus_pa", "fit_level"]), serde_json::json!({ "modulus_pa": 300_000, "fit_level": 3 }));
     assert_eq!(finger.json(&["info"])["saved_state"], 0);
+    assert_eq!(finger.json(&["params", "save"]), serde_json::json!({ "saved": true }));
 
     // What is wrong with one leaves the others as they were.
     for (values, why) in [

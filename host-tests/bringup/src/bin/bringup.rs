@@ -36,6 +36,7 @@ use board::{clocks, crash, guard, health, options, stack, trace};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
+use fingertip::control::winding::Winding;
 use fingertip::link::snapshot::CrashCause;
 use fingertip::params::Params;
 use fingertip::pipeline::Taken;
@@ -137,7 +138,7 @@ fn main() -> ! {
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
     scan.stop();
-    pipeline.renew(Taken::default(), 0);
+    pipeline.renew(Taken::default(), 0, Winding::new());
     report::number("loop_bits", bench.digest(pipeline));
     kernels::run(config, bench, pipeline);
     report::end();

@@ -2,6 +2,7 @@
 //! finger, made anew each time that they are asked for.
 
 use bringup::script::{Bench, RECORDS};
+use fingertip::control::winding::Winding;
 use fingertip::pipeline::Taken;
 use fingertip::shipped::Pipeline;
 use images::record::Record;
@@ -56,7 +57,7 @@ impl<'a> Inputs<'a> {
     pub fn seek(&mut self, place: usize) {
         if place >= BYTES.len() {
             self.bench.restart();
-            self.pipeline.renew(Taken::default(), 0);
+            self.pipeline.renew(Taken::default(), 0, Winding::new());
         }
         self.place = place;
     }

@@ -9,6 +9,7 @@ use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
+use fingertip::control::winding::Winding;
 use fingertip::frame::Sense;
 use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
@@ -114,7 +115,7 @@ extern "C" fn guard(bench: &mut Bench) {
 
 impl<'a> Bench<'a> {
     fn new(fit_level: FitLevel, config: &'a Config, pipeline: &'a mut Pipeline) -> Self {
-        pipeline.renew(Taken::default(), 0);
+        pipeline.renew(Taken::default(), 0, Winding::new());
         Self {
             config,
             fit_level,

@@ -40,7 +40,7 @@ use drive::Drive;
 use observer::Observer;
 use pace::Pace;
 use profile::Reference;
-use winding::Winding;
+use winding::{SHARE_BITS, Winding};
 
 /// The state of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -118,6 +118,8 @@ impl SpeedLoop {
         let way = if self.pace.calm() { Millimetres(way.0 - way.0.max(-slack.0).min(slack.0)) } else { way };
         let brake = self.brake(way, config);
         let reference = Reference::towards(way, self.observer.speed, brake, self.pace.gains(config));
+        // A motor that may be driven with less brakes with less, also where it meets something.
+        let limit = MillimetresPerSecond::from_bits(product(limit.to_bits(), self.winding.share(), SHARE_BITS));
         let limited = reference.limited(limit);
         (limited, limited != reference)
     }
@@ -129,13 +131,14 @@ impl SpeedLoop {
         Duty::ZERO
     }
 
-    /// The deceleration that the motor can surely give to a motion in the direction of `way`.
+    /// The deceleration that the motor can surely give to a motion in the direction of `way`, with the current that its
+    /// winding leaves.
     ///
     /// The contact force brakes a tip that presses in and drives one that lets go: the disturbance says how much.
     #[inline(always)]
     pub fn brake(&self, way: Millimetres, config: &Config) -> MillimetresPerSecond2 {
         let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
-        let [least, usual, most] = config.brake;
+        let [least, usual, most] = config.brake.map(|brake| product(brake, self.winding.share(), SHARE_BITS));
         let pressing = way >= Millimetres::ZERO;
         let whole = if pressing { usual.saturating_sub(disturbance) } else { usual.saturating_add(disturbance) };
         MillimetresPerSecond2::from_bits(whole.max(least).min(most))

@@ -1,13 +1,16 @@
 //! The winding's temperature as the controller has it: bounded, never lower than that of the builds it covers, and what
 //! it does to the current.
 
+use fingertip::config::newtons;
 use fingertip::control::SpeedLoop;
 use fingertip::control::winding::Winding;
 use fingertip::params::Params;
 use fingertip::shipped::Config;
-use fingertip::state::Limits;
+use fingertip::state::{Limits, Mode};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 /// Only a winding's own lag, of a small motor: what is judged needs no more.
 const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..Params::DEFAULT };
@@ -214,5 +217,32 @@ proptest! {
             prop_assert!(low <= high + 1e-3, "{low} {high}");
             prop_assert!((0..=256).contains(&less.share()) && more.share() <= less.share() + 1);
         }
+    }
+}
+
+/// Where the current is held back the tip cannot be braked as usual, so it must not be driven as usual either. As if it
+/// could: 5.2 N for a goal of 3 N, and the contact was lost on the way to less.
+#[test]
+fn a_motor_that_may_hardly_be_driven_presses_no_harder_and_lets_go_no_farther() {
+    let hot = Params { winding_max_c: 85, ambient_c: 60, winding_time_ms: 2_000, ..Params::DEFAULT };
+    for (k_per_w, goals_n) in [([500, 500], [3.0, 0.3]), ([200, 0], [6.0, 1.0]), ([200, 0], [6.0, 0.2])] {
+        let [winding_k_per_w, housing_k_per_w] = k_per_w;
+        let mut board = Bench::of(&Setup::default(), &config(Params { winding_k_per_w, housing_k_per_w, ..hot }));
+        board.tare();
+        let [mut held_back, mut peak_n, mut least_n] = [0.0_f64, 0.0, f64::MAX];
+        let [first_n, then_n] = goals_n;
+        for goal_n in goals_n {
+            board.command().goal = newtons((goal_n * 1e3) as i32);
+            for _ in 0..60_000 {
+                held_back += f64::from(u8::from(board.step().limits.has(Limits::WINDING)));
+                let force_n = board.truth().force_n;
+                peak_n = peak_n.max(force_n);
+                least_n = if goal_n == then_n { least_n.min(force_n) } else { least_n };
+            }
+        }
+        let (mode, ends_n) = (board.status().mode, board.truth().force_n);
+        assert!(held_back > 100.0 && mode == Mode::Force, "{goals_n:?}: {held_back} frames, {mode:?}");
+        assert!((0.3 * first_n..1.03 * first_n).contains(&peak_n), "{goals_n:?}: up to {peak_n} N");
+        assert!(least_n > 0.97 * then_n && (ends_n / then_n - 1.0).abs() < 0.02, "{goals_n:?}: {least_n}, {ends_n} N");
     }
 }

@@ -19,8 +19,10 @@ use crate::config::heat::{ALLOWANCE_BITS, FRAMES, Heat};
 use crate::units::Celsius;
 use fixed::types::I16F16;
 
-/// All of the current, Q8.
-pub const WHOLE: i32 = 1 << 8;
+/// Fractional bits of a share of the current.
+pub const SHARE_BITS: u32 = 8;
+/// All of the current.
+pub const WHOLE: i32 = 1 << SHARE_BITS;
 /// Words of all that a winding knows.
 pub const WORDS: usize = 7;
 /// What a lag holds at most, K in Q30: 4,096 K.

@@ -44,7 +44,8 @@ pub fn run(args: &Args, json: bool) -> Result<(), Error> {
     }
 }
 
-/// What ends with `.mcap`, in the order of the names; a file that is named counts whatever its name.
+/// Files that end with `.mcap`, in the order of the names; a file that is named counts whatever its name. A link to a
+/// folder is not followed: it may lead back.
 fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     if !fs::metadata(path)?.is_dir() {
         files.push(path.into());
@@ -54,7 +55,8 @@ fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         fs::read_dir(path)?.map(|entry| Ok(entry?.path())).collect::<std::io::Result<_>>()?;
     inside.sort();
     for path in inside {
-        if path.is_dir() || path.extension().is_some_and(|ending| ending == "mcap") {
+        let folder = fs::symlink_metadata(&path)?.is_dir();
+        if folder || path.is_file() && path.extension().is_some_and(|ending| ending == "mcap") {
             find(&path, files)?;
         }
     }

@@ -177,7 +177,8 @@ pub const KERNELS: &[Kernel] = &[
     Kernel {
         name: "step",
         title: "The step and its parts",
-        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default fit level, 2, and at the others; its parts over the first 3,000.",
+        text: "`Pipeline::step` over the recorded stimulus of 10,000 frames, faults included, at the default fit level, 2, and at the others; its parts over the first 3,000. What corrects for a real sensor is off in the step and costs it a \
+            comparison; switched on, *by a curve* takes the place of *Array::read*, *with creep* that of *goal and profile*, and *warmth* is added. The *winding* is in the step.",
         error: "",
         other: None,
         measure: Measure::Cost,

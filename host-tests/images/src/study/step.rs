@@ -2,29 +2,34 @@
 
 use super::call::pass_on;
 use super::inputs::Inputs;
-use crate::host::say;
+use crate::host::{fail, say};
 use fingertip::command::Command;
 use fingertip::contact::Contact;
 use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
 use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
+use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::frame::Sense;
+use fingertip::params::Params;
 use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
-use fingertip::units::Duty;
+use fingertip::units::{Celsius, Duty, Newtons};
 use images::record::Record;
 use static_cell::StaticCell;
 
 /// Too large for the stack.
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
+static CORRECTED: StaticCell<Config> = StaticCell::new();
 
 /// What the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
+    /// With a characteristic that is no line, creep, and a gain that drifts with temperature.
+    corrected: &'a Config,
     fit_level: FitLevel,
     record: Record,
     pipeline: &'a mut Pipeline,
@@ -35,6 +40,9 @@ struct Bench<'a> {
     motion: SpeedLoop,
     goal: Goal,
     guard: Guard,
+    winding: Winding,
+    warmth: Warmth,
+    drift: Newtons,
     reference: Reference,
     limits: Limits,
     wanted: i32,
@@ -58,7 +66,7 @@ const OBSERVER: usize = 2;
 const PART_RECORDS: i32 = 3_000;
 
 /// The part, and whether it runs only while the loop drives the motor.
-const PARTS: [(&str, Kernel, bool); 8] = [
+const PARTS: [(&str, Kernel, bool); 12] = [
     ("**Array::read**", read, false),
     ("**contact::from_sums**", sums, false),
     ("**observer**", observe, true),
@@ -67,6 +75,10 @@ const PARTS: [(&str, Kernel, bool); 8] = [
     ("**limits alone, Drive::apply**", apply, true),
     ("**duty from the voltage**", duty, true),
     ("**guard**", guard, true),
+    ("**Array::read, by a curve**", curved_read, false),
+    ("**goal and profile, with creep**", creeping, true),
+    ("**warmth, with a coefficient**", warmth, false),
+    ("**winding**", winding, false),
 ];
 
 extern "C" fn step(bench: &mut Bench) {
@@ -76,6 +88,24 @@ extern "C" fn step(bench: &mut Bench) {
 
 extern "C" fn read(bench: &mut Bench) {
     bench.array.read(&bench.record.frame, bench.config);
+}
+
+extern "C" fn curved_read(bench: &mut Bench) {
+    bench.array.read(&bench.record.frame, bench.corrected);
+}
+
+extern "C" fn creeping(bench: &mut Bench) {
+    let Bench { corrected, record, contact, motion, goal, limits, .. } = bench;
+    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, corrected, limits);
+}
+
+extern "C" fn warmth(bench: &mut Bench) {
+    bench.warmth.observe(Some(Celsius::from_bits(30 << 16)), bench.corrected);
+    bench.drift = bench.warmth.force(bench.record.command.goal, bench.corrected);
+}
+
+extern "C" fn winding(bench: &mut Bench) {
+    bench.winding.observe(bench.motion.drive.acceleration(), bench.config);
 }
 
 extern "C" fn sums(bench: &mut Bench) {
@@ -114,10 +144,11 @@ extern "C" fn guard(bench: &mut Bench) {
 }
 
 impl<'a> Bench<'a> {
-    fn new(fit_level: FitLevel, config: &'a Config, pipeline: &'a mut Pipeline) -> Self {
+    fn new(fit_level: FitLevel, [config, corrected]: [&'a Config; 2], pipeline: &'a mut Pipeline) -> Self {
         pipeline.renew(Taken::default(), 0, Winding::new());
         Self {
             config,
+            corrected,
             fit_level,
             record: Record::from_bytes(&[0; Record::BYTES]),
             pipeline,
@@ -128,6 +159,9 @@ impl<'a> Bench<'a> {
             motion: SpeedLoop::new(),
             goal: Goal::default(),
             guard: Guard::start(0, config),
+            winding: Winding::new(),
+            warmth: Warmth::default(),
+            drift: Newtons::ZERO,
             reference: Reference::default(),
             limits: Limits::default(),
             wanted: 0,
@@ -137,8 +171,10 @@ impl<'a> Bench<'a> {
 
 /// A function of its own, because a pipeline is large and takes stack only here.
 #[inline(never)]
-fn begin(config: &Config) -> &'static mut Pipeline {
-    PIPELINE.init_with(|| Pipeline::new(config))
+fn begin(config: &Config) -> (&'static mut Pipeline, &'static Config) {
+    let params = Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..Params::DEFAULT };
+    let Ok(corrected) = Config::shipped(&params) else { fail("a curve is refused") };
+    (PIPELINE.init_with(|| Pipeline::new(config)), CORRECTED.init(corrected))
 }
 
 fn record(inputs: &mut Inputs) -> Record {
@@ -152,11 +188,12 @@ fn record(inputs: &mut Inputs) -> Record {
 pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     let [count] = inputs.words();
     let start = inputs.place();
-    let pipeline = begin(config);
+    let (pipeline, corrected) = begin(config);
+    let configs = [config, corrected];
     for (name, fit_level) in STEPS {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(fit_level, config, pipeline);
+        let mut bench = Bench::new(fit_level, configs, pipeline);
         for _ in 0..count {
             bench.record = record(inputs);
             pass_on(*region, step, &mut bench);
@@ -166,7 +203,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
     for (part, (name, kernel, driving)) in PARTS.into_iter().enumerate() {
         say(format_args!("region {region} step: {name}"));
         inputs.seek(start);
-        let mut bench = Bench::new(FitLevel::default(), config, pipeline);
+        let mut bench = Bench::new(FitLevel::default(), configs, pipeline);
         for n in 0..count.min(PART_RECORDS) {
             bench.record = record(inputs);
             step(&mut bench);

@@ -8,12 +8,14 @@ use crate::bench::{Bench, STEP_NS};
 use crate::board::FingerBoard;
 use crate::error::Error;
 use crate::flash::SECTOR;
-use crate::front_end::{REFERENCE_V, ScanCounts, Shared};
+use crate::front_end::{ScanCounts, Shared};
 use crate::image::Firmware;
+use crate::inside;
 use crate::link::Listening;
 use crate::scene::finger::Finger;
 use crate::stand::{Hall, Stand};
 use crate::surroundings::Surroundings;
+use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
 use rigless::emulator::{self, Start};
@@ -38,6 +40,8 @@ pub struct Options {
     /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
     /// the factory does.
     pub brown_out_bits: u8,
+    /// What the factory kept of the reference and of the sensor.
+    pub factory: Factory,
 }
 
 impl Options {
@@ -55,13 +59,10 @@ impl Default for Options {
             instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
             presets: Vec::new(),
             brown_out_bits: 0,
+            factory: inside::factory(),
         }
     }
 }
-
-/// What the factory measured of the internal reference, and at which supply.
-const CALIBRATION: u64 = 0x1fff_7a2a;
-const CALIBRATED_AT_V: f64 = 3.3;
 
 type Job = Box<dyn FnOnce(&mut Stand<'_>) + Send>;
 
@@ -315,8 +316,9 @@ fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
-    let calibration = (REFERENCE_V / CALIBRATED_AT_V * 4096.0) as u16;
-    images.push(read(Path::new("factory"), calibration.to_le_bytes().to_vec(), Some(CALIBRATION))?);
+    let Factory { reference, sensor: [cold, hot] } = options.factory;
+    let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
+    images.push(read(Path::new("factory"), factory, Some(inside::FACTORY_AT))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }

@@ -33,7 +33,7 @@ mod stages;
 use board::analogue::Analogue;
 use board::bridge::Bridge;
 use board::scan::Scan;
-use board::{clocks, crash, guard, health, options, pins, stack, trace};
+use board::{clocks, crash, guard, options, pins, stack, trace};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;

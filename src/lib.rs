@@ -30,6 +30,8 @@ pub mod frame;
 
 pub mod scan;
 
+pub mod chip;
+
 pub mod config;
 
 pub mod state;

@@ -4,15 +4,15 @@
 
 mod board;
 
+use board::analogue::Analogue;
 use board::bridge::Bridge;
 use board::control::{self, Control};
 use board::encoder::Encoder;
 use board::flash::Store;
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
-use board::supply::Supply;
 use board::watchdog::Watchdogs;
-use board::{bus, clocks, crash, guard, link_task, options, stack, trace, watch};
+use board::{bus, clocks, crash, guard, link_task, options, pins, stack, trace, watch};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -71,35 +71,11 @@ async fn main(spawner: Spawner) {
 
     trace::start(p.PB10, p.PB13, p.PB14, p.PB15);
     guard::start(p.TIM5);
-    let rows = [
-        p.PB0.into(),
-        p.PB1.into(),
-        p.PB2.into(),
-        p.PB3.into(),
-        p.PB4.into(),
-        p.PB5.into(),
-        p.PB6.into(),
-        p.PB7.into(),
-        p.PB8.into(),
-        p.PB9.into(),
-    ];
-    let columns = [
-        p.PA1.into(),
-        p.PA4.into(),
-        p.PA6.into(),
-        p.PA7.into(),
-        p.PC5.into(),
-        p.PC0.into(),
-        p.PC1.into(),
-        p.PC2.into(),
-        p.PC3.into(),
-        p.PC4.into(),
-    ];
     let control = Control {
-        scan: Scan::new(p.TIM8, p.ADC1, p.ADC2, p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2, rows, columns),
+        scan: Scan::new(p.TIM8, (p.ADC3, p.ADC2), (p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2), pins::of_scan!(p)),
         bridge,
         encoder: Encoder::new(p.TIM3, p.PC6, p.PC7),
-        supply: Supply::new(p.ADC3, p.PA0),
+        analogue: Analogue::new(p.ADC1, p.PA0),
         watchdogs: Watchdogs::new(p.IWDG, p.WWDG),
         store,
         pipeline,

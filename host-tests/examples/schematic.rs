@@ -24,7 +24,7 @@ const RIGHT: [&str; 9] = ["IN1", "IN2", "NSLEEP", "NFAULT", "ENCA", "ENCB", "TX"
 
 struct Sheet {
     page: String,
-    /// The image's source, which takes the pins.
+    /// The image's sources that take the pins.
     image: String,
     /// Pin and connector of each net that begins at the microcontroller.
     pins: BTreeMap<String, String>,
@@ -102,8 +102,8 @@ impl Sheet {
                 let y = 85 + 36 * place as i32;
                 let pin = self.pins.get(*net).ok_or_else(|| format!("the netlist has no row {net}"))?.clone();
                 let name = pin.split(' ').next();
-                if !self.image.split("p.").any(|rest| rest.split(|sign: char| !sign.is_alphanumeric()).next() == name) {
-                    return Err(format!("src/main.rs does not take {pin} for {net}").into());
+                if !self.image.split(|sign: char| !sign.is_alphanumeric()).any(|word| Some(word) == name) {
+                    return Err(format!("src/main.rs and src/board/pins.rs do not take {pin} for {net}").into());
                 }
                 self.net(x, y, left, net)?;
                 self.text(if left { x + 8 } else { x - 8 }, y + 4, if left { "start" } else { "end" }, &pin);
@@ -271,7 +271,7 @@ impl Sheet {
 
 fn main() -> Drawn {
     let read = |file: &str| std::fs::read_to_string(Path::new(env!("FINGERTIP_ROOT")).join(file));
-    let mut sheet = Sheet::new(read("docs/board.md")?, read("src/main.rs")?);
+    let mut sheet = Sheet::new(read("docs/board.md")?, read("src/main.rs")? + &read("src/board/pins.rs")?);
     sheet.controller()?;
     sheet.row()?;
     sheet.column()?;

@@ -13,6 +13,7 @@ use fingertip::shipped::{Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
+use super::analogue::Analogue;
 use super::bridge::{self, Bridge};
 use super::capture::Keeper;
 use super::encoder::Encoder;
@@ -21,7 +22,6 @@ use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::health;
 use super::scan::{Completed, Scan, WAKE};
-use super::supply::Supply;
 use super::trace;
 use super::watchdog::Watchdogs;
 
@@ -36,8 +36,8 @@ pub struct Control {
     pub bridge: Bridge,
     /// The motor's encoder.
     pub encoder: Encoder,
-    /// The bridge's supply.
-    pub supply: Supply,
+    /// The bridge's supply, and the microcontroller's temperature.
+    pub analogue: Analogue,
     /// Fed here and nowhere else.
     pub watchdogs: Watchdogs,
     /// The parameters in flash.
@@ -160,11 +160,10 @@ impl State {
         let Heard { command, packets } = HEARD.get();
         let sense = Sense {
             encoder: parts.encoder.read(),
-            supply_mv: parts.supply.read_mv(),
+            supply_mv: parts.analogue.read_mv(),
             bus_silent_ms: self.bus.silent_ms(packets),
             bridge_fault: parts.bridge.fault(),
-            // The sensor shares its converter with the scan.
-            chip: None,
+            chip: parts.analogue.chip(),
             // Before the first frame nothing is known: not 0, which would let any fit level in.
             answer: self.report.loop_time.cycles().max(CoreCycles(1)),
         };

@@ -74,7 +74,7 @@ pub fn note_interval(late: Stopwatch) {
     }
 }
 
-/// The analogue supply, as measured at the start.
+/// The analogue supply; 0 where it is not known.
 pub fn set_analogue_mv(millivolts: u16) {
     ANALOGUE_MV.store(millivolts, Ordering::Relaxed);
 }

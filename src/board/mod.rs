@@ -2,6 +2,7 @@
 
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 
+pub mod analogue;
 pub mod bridge;
 pub mod bus;
 pub mod capture;
@@ -18,10 +19,8 @@ pub mod link_task;
 pub mod log;
 pub mod options;
 pub mod pins;
-pub mod reference;
 pub mod scan;
 pub mod stack;
-pub mod supply;
 pub mod trace;
 pub mod watch;
 pub mod watchdog;

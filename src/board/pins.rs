@@ -2,10 +2,28 @@
 
 use embassy_stm32::Peri;
 use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, OutputType, Pin, Pull, Speed};
+use fingertip::shipped::{COLUMNS, ROWS};
+
+/// Pins of a scan: rows and columns.
+pub type OfScan = ([Peri<'static, AnyPin>; ROWS], [Peri<'static, AnyPin>; COLUMNS]);
+
+/// Takes the pins of the scan, rows 0 to 9 and columns 0 to 9, from the peripherals.
+macro_rules! of_scan {
+    ($p:ident) => {
+        (
+            $crate::board::pins::taken!($p PB0 PB1 PB2 PB3 PB4 PB5 PB6 PB7 PB8 PB9),
+            $crate::board::pins::taken!($p PA1 PC0 PC1 PC2 PC3 PA4 PA6 PA7 PC4 PC5),
+        )
+    };
+}
+macro_rules! taken {
+    ($p:ident $($pin:ident)*) => { [$($p.$pin.into()),*] };
+}
+pub(crate) use {of_scan, taken};
 
 /// Rows 0 to 9, none driven. The scan moves them through the port's set/reset register, two at once: with slow edges
 /// (100 ns at most, DS10693), which disturb the columns less and are a small part of the settle time.
-pub fn rows(pins: [Peri<'static, AnyPin>; 10]) {
+pub fn rows(pins: [Peri<'static, AnyPin>; ROWS]) {
     for pin in pins {
         low_output(pin, Speed::Low);
     }

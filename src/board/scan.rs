@@ -8,10 +8,9 @@ mod machine;
 
 use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering, fence};
 
-use embassy_stm32::gpio::AnyPin;
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::InterruptExt;
-use embassy_stm32::peripherals::{ADC1, ADC2, DMA2_CH0, DMA2_CH1, DMA2_CH2, TIM8};
+use embassy_stm32::peripherals::{ADC2, ADC3, DMA2_CH0, DMA2_CH1, DMA2_CH2, TIM8};
 use embassy_stm32::{Peri, pac, rcc};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -20,14 +19,14 @@ use fingertip::scan::ScanTiming;
 use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
 
 use super::health::{self, Broken};
-use super::{converter, guard, pins, reference, trace};
+use super::{converter, guard, pins, trace};
 use machine::*;
 
 /// Wakes the control task: a frame is complete or half complete, or the guard tripped.
 pub static WAKE: Signal<CriticalSectionRawMutex, ()> = Signal::new();
 
-/// Columns 0 to 4 on ADC1 and 5 to 9 on ADC2.
-const CHANNELS: [[u8; BANK_COLUMNS]; BANKS] = [[1, 4, 6, 7, 15], [10, 11, 12, 13, 14]];
+/// Columns 0 to 4 on ADC3 and 5 to 9 on ADC2: the inputs of the pins that [`pins::of_scan`] takes.
+const CHANNELS: [[u8; BANK_COLUMNS]; BANKS] = [[1, 10, 11, 12, 13], [4, 6, 7, 14, 15]];
 
 /// Two frames of one bank, as the DMA writes them.
 type Buffer = [[[AtomicU16; BANK_COLUMNS]; SLOTS]; 2];
@@ -68,24 +67,17 @@ pub struct Scan(());
 
 impl Scan {
     /// Takes the hardware; nothing moves yet.
-    #[expect(clippy::too_many_arguments, reason = "each is a piece of hardware that nothing else may touch")]
     pub fn new(
         _timer: Peri<'static, TIM8>,
-        _adc1: Peri<'static, ADC1>,
-        _adc2: Peri<'static, ADC2>,
-        _stream_a: Peri<'static, DMA2_CH0>,
-        _stream_rows: Peri<'static, DMA2_CH1>,
-        _stream_b: Peri<'static, DMA2_CH2>,
-        rows: [Peri<'static, AnyPin>; ROWS],
-        columns: [Peri<'static, AnyPin>; BANKS * BANK_COLUMNS],
+        _converters: (Peri<'static, ADC3>, Peri<'static, ADC2>),
+        _streams: (Peri<'static, DMA2_CH0>, Peri<'static, DMA2_CH1>, Peri<'static, DMA2_CH2>),
+        (rows, columns): pins::OfScan,
     ) -> Self {
         pins::rows(rows);
         pins::analog(columns);
         rcc::enable_and_reset::<TIM8>();
-        rcc::enable_and_reset::<ADC1>();
+        rcc::enable_and_reset::<ADC3>();
         rcc::enable_and_reset::<ADC2>();
-        converter::set_clock();
-        reference::measure();
         Self(())
     }
 
@@ -97,15 +89,17 @@ impl Scan {
     /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         stop();
-        // First, while no converter listens: a compare that is set below the counter is a trigger.
+        // Not before: the register is the first converter's, whose clock is on by now.
+        converter::set_clock();
+        // First of the scan, while no converter listens: a compare that is set below the counter is a trigger.
         set_timer(timing);
         let time = converter::sample_time(timing.sample_cycles);
-        for (adc, channels) in [pac::ADC1, pac::ADC2].into_iter().zip(CHANNELS) {
+        for (adc, channels) in SCANNING.into_iter().zip(CHANNELS) {
             start_converter(adc, || converter::set_sequence(adc, channels, time));
         }
         // The next frame fills the first half: its number must be even.
         SEQUENCE.store(SEQUENCE.load(Ordering::Relaxed) | 1, Ordering::Release);
-        start_stream(STREAM_A, CHANNEL_ADC1, pac::ADC1.dr().as_ptr() as u32, &raw const BUFFERS[0] as u32);
+        start_stream(STREAM_A, CHANNEL_ADC3, pac::ADC3.dr().as_ptr() as u32, &raw const BUFFERS[0] as u32);
         start_stream(STREAM_B, CHANNEL_ADC2, pac::ADC2.dr().as_ptr() as u32, &raw const BUFFERS[1] as u32);
         start_rows();
         // SAFETY: the handlers below touch only atomics and flags of their own streams, and their priority is set.

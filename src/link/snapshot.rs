@@ -79,7 +79,7 @@ fn saturate(value: i32) -> u16 {
 pub struct Health {
     /// The option bytes as the last reset loaded them, in the microcontroller's own order.
     pub option_bytes: u32,
-    /// The analogue supply at the start; 0 where it is not known.
+    /// The analogue supply; 0 where it is not known.
     pub analogue_mv: u16,
     /// The deepest that the stack has been.
     pub stack_bytes: u16,

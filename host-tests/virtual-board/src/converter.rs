@@ -3,16 +3,17 @@
 //!
 //! A sequence with DMA is one event, at its last conversion: the inputs are sampled at each rank's own instant, and the
 //! words wait together for [`crate::streams`]. Nothing that the image can see depends on the words in between, and 110
-//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: injected
-//! group, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits; asking for one is told
-//! to the run.
+//! conversions a frame cost 22 events. In a scene they cost one, see [`crate::front_end::Scan`]. Not modelled: an injected
+//! group with a trigger of its own, continuous and discontinuous mode, analogue watchdog, resolutions other than 12 bits;
+//! asking for one is told to the run.
 
 use crate::front_end::{Shared, Slot};
+use crate::injected::{self, Injected};
 use crate::scan_timer::COMPARE_1;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
-use rigless::soc::stm32f427::generated::ADC2;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sqr1, sqr2, sqr3, sr};
+use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
 use rigless::soc::{FieldSpec, Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
@@ -67,15 +68,32 @@ pub struct Converter {
     status: u64,
     running: Option<Running>,
     rank: usize,
+    injected: Injected,
     interrupt: Level,
+    /// Whether reference and sensor are on, by the register that the converters share.
+    pub inside_on: bool,
 }
 
-store!(Converter { values: [clock_hz, status, running, rank, interrupt], parts: [], built: [nth, front_end] });
+store!(Converter {
+    values: [clock_hz, status, running, rank, injected, interrupt],
+    parts: [],
+    built: [nth, front_end, inside_on]
+});
 
 impl Converter {
     /// Out of reset, its inputs on a front end.
     pub fn new(nth: usize, front_end: Shared, clock_hz: u64) -> Self {
-        Self { nth, front_end, clock_hz, status: 0, running: None, rank: 0, interrupt: Level::Low }
+        Self {
+            nth,
+            front_end,
+            clock_hz,
+            status: 0,
+            running: None,
+            rank: 0,
+            injected: Injected::default(),
+            interrupt: Level::Low,
+            inside_on: false,
+        }
     }
 
     fn length(registers: &RegisterFile) -> usize {
@@ -107,7 +125,7 @@ impl Converter {
             self.finish(running, registers, context);
         }
         let mut front_end = self.front_end.lock();
-        front_end.counts.triggers += u64::from(self.nth == 0);
+        front_end.counts.triggers += u64::from(self.nth == 1);
         let slot = front_end.scan.as_ref().map(|scan| scan.slot);
         drop(front_end);
         self.triggered(slot, registers, context);
@@ -117,6 +135,9 @@ impl Converter {
         let control = registers.get(Register::Cr2);
         if !cr2::ADON.is_set(control) || self.running.is_some() || sr::OVR.is_set(self.status) || self.clock_hz == 0 {
             return;
+        }
+        if self.injected.runs(context.now().0) {
+            context.tell("CR2", "a regular sequence that waits for the injected group is not modelled");
         }
         let by_dma = cr2::DMA.is_set(control);
         // What a scene's last slot left is being fetched at this very instant.
@@ -156,7 +177,7 @@ impl Converter {
         if !by_dma {
             front_end.waiting[self.nth].clear();
         }
-        front_end.convert(self.nth, running.slot, samples.iter().copied().take(running.ranks));
+        front_end.convert(self.nth, self.inside_on, running.slot, samples.iter().copied().take(running.ranks));
         if let Some(word) = front_end.waiting[self.nth].front() {
             registers.set(Register::Dr, u64::from(*word));
         }
@@ -164,6 +185,9 @@ impl Converter {
             front_end.sequence_done(context.now().0, running.slot);
         }
         drop(front_end);
+        if complete && cr1::JAUTO.is_set(registers.get(Register::Cr1)) {
+            self.inject(self.after(running.begun_ns, cycles), registers, context);
+        }
         if complete || cr2::EOCS.is_set(control) {
             self.status = sr::EOC.set(self.status, 1);
         }
@@ -174,6 +198,20 @@ impl Converter {
         if !complete && running.slot.is_none() {
             self.begin(None, registers, context);
         }
+    }
+
+    /// The injected group begins, behind a regular sequence.
+    fn inject(&mut self, begun_ns: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        self.status = self.injected.show(context.now().0, self.status, registers);
+        let front_end = self.front_end.lock();
+        let mut cycles = 0;
+        let mut words = Vec::new();
+        for input in injected::inputs(registers) {
+            cycles += Self::sampling_cycles(registers, input);
+            words.push(front_end.word(self.nth, input, self.inside_on, self.after(begun_ns, cycles)));
+            cycles += CONVERSION_CYCLES;
+        }
+        self.injected = Injected::new(words, self.after(begun_ns, cycles));
     }
 
     fn refresh(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
@@ -207,7 +245,7 @@ impl Converter {
         }
         registers.set(Register::Cr2, cr2::SWSTART.set(value, 0));
         if !cr2::ADON.is_set(value) {
-            (self.running, self.rank) = (None, 0);
+            (self.running, self.rank, self.injected) = (None, 0, Injected::default());
             self.front_end.lock().waiting[self.nth].clear();
         } else if cr2::SWSTART.is_set(value) {
             self.begin(None, registers, context);
@@ -223,8 +261,8 @@ impl Device for Converter {
     }
 
     /// The part's description sends requests to the first converter only, so this one hands the trigger on: as a write
-    /// to the second's data register, which is read-only and means nothing else there. In a scene [`crate::streams`]
-    /// triggers both so.
+    /// to the others' data registers, which are read-only and mean nothing else there. In a scene [`crate::streams`]
+    /// triggers both of the scan so.
     fn on_request(&mut self, change: RequestChange, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         if change.instance == ROW_PORT.0 && change.request < ROW_PORT.1 {
             self.front_end.lock().drive_row(change.request, change.level == Level::High, context.now().0);
@@ -239,7 +277,9 @@ impl Device for Converter {
             drop(front_end);
             self.triggered(None, registers, context);
             if self.nth == 0 {
-                context.write_to(ADC2.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
+                for other in [ADC2, ADC3] {
+                    context.write_to(other.base + u64::from(Register::Dr.spec().offset), Width::W32, 0, 0);
+                }
             }
         }
     }
@@ -250,14 +290,18 @@ impl Device for Converter {
         registers: &mut RegisterFile,
         context: &mut DeviceContext<'_>,
     ) -> Option<u64> {
+        self.status = self.injected.show(context.now().0, self.status, registers);
         let taken = match register {
             Register::Dr => self.front_end.lock().waiting[self.nth].pop_front().is_some(),
             // Words that the streams fetched were read, too.
             Register::Sr => {
                 cr2::DMA.is_set(registers.get(Register::Cr2)) && self.front_end.lock().waiting[self.nth].is_empty()
             }
-            _ => return None,
+            _ => false,
         };
+        if register == Register::Sr {
+            registers.set(Register::Sr, self.status);
+        }
         if taken {
             let value = registers.get(register);
             self.status = sr::EOC.set(self.status, 0);
@@ -275,8 +319,12 @@ impl Device for Converter {
             Register::Dr => return self.triggered(None, registers, context),
             Register::Cr1 => {
                 let control = registers.get(Register::Cr1);
-                if cr1::RES.get(control) != 0 || cr1::DISCEN.is_set(control) || cr1::AWDEN.is_set(control) {
-                    context.tell("CR1", "resolutions but 12 bits, discontinuous mode and watchdog are not modelled");
+                if cr1::RES.get(control) != 0
+                    || cr1::JEOCIE.is_set(control)
+                    || cr1::DISCEN.is_set(control)
+                    || cr1::AWDEN.is_set(control)
+                {
+                    context.tell("CR1", "resolutions but 12 bits, the injected group's interrupt, discontinuous mode and watchdog are not modelled");
                 }
             }
             _ => {}

@@ -1,5 +1,6 @@
 //! The converters' inputs: rows in, column voltages out.
 
+use crate::inside;
 use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
@@ -11,13 +12,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Rows of the array, as a port's lowest bits.
 const ROWS: usize = 10;
-/// Converter inputs of columns 0 to 4, by converter.
-const COLUMN_INPUTS: [[usize; 5]; 2] = [[1, 4, 6, 7, 15], [10, 11, 12, 13, 14]];
-/// The third converter's input behind the supply's divider.
+/// The first column of each converter, and the inputs that five of them are at.
+const COLUMN_INPUTS: [Option<(usize, [usize; 5])>; 3] =
+    [None, Some((5, [4, 6, 7, 14, 15])), Some((0, [1, 10, 11, 12, 13]))];
+/// The input behind the supply's divider, of whichever converter.
 const SUPPLY_INPUT: usize = 0;
-/// The internal reference's input, the first converter's, and its voltage.
-const REFERENCE_INPUT: (usize, usize) = (0, 17);
-pub const REFERENCE_V: f64 = 1.21;
 /// The supply's divider.
 const SUPPLY_RATIO: f64 = 11.0;
 /// Codes of the converter.
@@ -68,12 +67,12 @@ impl Scan {
 /// What the columns settle to under the drive of that place and under the one before it.
 type Settled = Option<(usize, [f64; COLUMNS], [f64; COLUMNS])>;
 
-/// The DAC's first channel, on the pin of column 1: codes, newest first, and since when. Its buffer is off; it is quick.
+/// The DAC's first channel, on the pin of column 5: codes, newest first, and since when. Its buffer is off; it is quick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Dac([(u16, u64); 3]);
 
 /// The column on its pin, and its registers: control, and the code to the right.
-const DAC_COLUMN: usize = 1;
+const DAC_COLUMN: usize = 5;
 const DAC_CR: u64 = 0;
 const DAC_DHR12R1: u64 = 8;
 
@@ -221,19 +220,19 @@ impl FrontEnd {
     pub fn convert(
         &mut self,
         converter: usize,
+        inside_on: bool,
         slot: Option<Slot>,
         samples: impl ExactSizeIterator<Item = (usize, u64)>,
     ) {
-        if converter < COLUMN_INPUTS.len() {
+        if COLUMN_INPUTS[converter].is_some() {
             self.counts.conversions += samples.len() as u64;
         }
-        let reference_v = self.world.reference_v();
-        let word = |volts: f64| (volts / reference_v * CODES).floor().clamp(0.0, CODES - 1.0) as u16;
         let mut settled = None;
         for (input, at_ns) in samples {
-            let word = match COLUMN_INPUTS.get(converter).map(|inputs| inputs.iter().position(|of| *of == input)) {
-                Some(Some(place)) => {
-                    let column = converter * COLUMN_INPUTS[0].len() + place;
+            let column = COLUMN_INPUTS[converter]
+                .and_then(|(first, inputs)| Some(first + inputs.iter().position(|of| *of == input)?));
+            let word = match column {
+                Some(column) => {
                     if let (DAC_COLUMN, Some(Dac(codes))) = (column, &self.dac) {
                         let held = codes.iter().find(|(_, since_ns)| *since_ns <= at_ns);
                         self.waiting[converter].push_back(held.map_or(0, |(code, _)| *code));
@@ -242,19 +241,29 @@ impl FrontEnd {
                     let newest = self.drives.iter().position(|drive| drive.since_ns <= at_ns).unwrap_or(0);
                     match &mut self.world {
                         Surroundings::Plant(world) => {
-                            word(column_volts(world, &self.drives, newest, column, at_ns, &mut settled))
+                            let volts = column_volts(world, &self.drives, newest, column, at_ns, &mut settled);
+                            self.code(volts)
                         }
                         Surroundings::Scene(finger) => {
                             slot.map_or(0, |slot| finger.code(column, slot.rows, slot.begun_ns))
                         }
                     }
                 }
-                _ if (converter, input) == REFERENCE_INPUT => word(REFERENCE_V),
-                None if input == SUPPLY_INPUT => word(self.world.supply_v() / SUPPLY_RATIO),
-                _ => 0,
+                None => self.word(converter, input, inside_on, at_ns),
             };
             self.waiting[converter].push_back(word);
         }
+    }
+
+    /// An input that is no column's: the supply, and what is inside the microcontroller where that is on.
+    pub fn word(&self, converter: usize, input: usize, inside_on: bool, at_ns: u64) -> u16 {
+        let inside = inside::volts(converter, input, self.world.chip_c(at_ns)).filter(|_| inside_on);
+        let supply = (input == SUPPLY_INPUT).then(|| self.world.supply_v() / SUPPLY_RATIO);
+        self.code(inside.or(supply).unwrap_or(0.0))
+    }
+
+    fn code(&self, volts: f64) -> u16 {
+        (volts / self.world.reference_v() * CODES).floor().clamp(0.0, CODES - 1.0) as u16
     }
 
     /// A scanning converter's sequence is complete: with no row driven after one was, so is the frame.

@@ -21,6 +21,8 @@ pub mod flash;
 pub mod front_end;
 pub mod gaps;
 pub mod image;
+mod injected;
+pub mod inside;
 pub mod link;
 pub mod log;
 #[cfg(feature = "log")]

@@ -16,6 +16,7 @@ use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::Stm32f427;
+use rigless::soc::stm32f427::generated::c_adc::{self, ccr};
 use rigless::soc::stm32f427::generated::rcc::{Register, apb1enr, csr};
 use rigless::soc::stm32f427::peripherals::gpio::Pin;
 use rigless::soc::stm32f427::peripherals::tim::Channel;
@@ -71,14 +72,15 @@ pub struct Part {
     layout: Bus,
     laying_out: bool,
     wiring: Vec<Model>,
-    /// TIM1 on the bus.
+    /// TIM1 on the bus, and what the converters share.
     pwm_slot: usize,
+    common_slot: usize,
 }
 
 store!(Part {
     values: [inputs],
     parts: [chip, converters, pwm_timer, scan_timer, streams, window_watchdog],
-    built: [front_end, layout, laying_out, wiring, pwm_slot],
+    built: [front_end, layout, laying_out, wiring, pwm_slot, common_slot],
 });
 
 impl Part {
@@ -93,6 +95,7 @@ impl Part {
             wiring[chip.bus().slot(name)?] = Model::Converter(nth);
         }
         let pwm_slot = chip.bus().slot("TIM1")?;
+        let common_slot = chip.bus().slot("C_ADC")?;
         wiring[pwm_slot] = Model::PwmTimer;
         wiring[chip.bus().slot("TIM8")?] = Model::ScanTimer;
         wiring[chip.bus().slot("DMA2")?] = Model::Streams;
@@ -114,6 +117,7 @@ impl Part {
             laying_out: false,
             wiring,
             pwm_slot,
+            common_slot,
         };
         part.drive_inputs(VirtualNanos(0));
         Ok(part)
@@ -226,7 +230,11 @@ impl Mcu for Part {
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
         let own: Option<&mut dyn ErasedDevice> = match self.wiring.get(slot) {
-            Some(Model::Converter(nth)) => Some(&mut self.converters[*nth]),
+            Some(Model::Converter(nth)) => {
+                let common = self.chip.bus().slots()[self.common_slot].registers().get(c_adc::Register::Ccr);
+                self.converters[*nth].inside_on = ccr::TSVREFE.is_set(common) && !ccr::VBATE.is_set(common);
+                Some(&mut self.converters[*nth])
+            }
             Some(Model::PwmTimer) => Some(&mut self.pwm_timer),
             Some(Model::ScanTimer) => Some(&mut self.scan_timer),
             Some(Model::Streams) => Some(&mut self.streams),

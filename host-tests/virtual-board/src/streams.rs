@@ -12,7 +12,7 @@ use registers::*;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::dma2::{Register, s0cr};
-use rigless::soc::stm32f427::generated::{ADC1, ADC2};
+use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::{CONVERTERS, adc, tim};
 use rigless::soc::{Layout, Width};
 use serde::{Deserialize, Serialize};
@@ -101,7 +101,7 @@ impl Streams {
         let mut front_end = self.front_end.lock();
         front_end.begin_slot(word, [(state.items - state.left) as usize, state.items as usize]);
         let Some(scan) = &front_end.scan else { return false };
-        for converter in [ADC1, ADC2] {
+        for converter in [ADC3, ADC2] {
             context.write_to(converter.base + DATA_REGISTER, Width::W32, 0, stream as u64);
         }
         if !scan.due_ns.is_empty() && state.running {

@@ -1,6 +1,7 @@
 //! What lies around the board: the plant of `host-tests`, or one finger in the world of a scene.
 
 use crate::bench::STEP_NS;
+use crate::inside::ROOM_C;
 use crate::scene::finger::Finger;
 use serde::{Deserialize, Serialize};
 use sim::bridge::Bridge;
@@ -63,6 +64,14 @@ impl Surroundings {
         match self {
             Self::Plant(world) => world.supply_v(),
             Self::Scene(finger) => finger.supply_v(),
+        }
+    }
+
+    /// The microcontroller's temperature.
+    pub fn chip_c(&self, at_ns: u64) -> f64 {
+        match self {
+            Self::Plant(_) => ROOM_C,
+            Self::Scene(finger) => finger.chip_c(at_ns),
         }
     }
 

@@ -20,9 +20,11 @@ pub const TRIGGER_TIM8_CC1: u8 = 13;
 pub const STREAM_A: usize = 0;
 pub const STREAM_ROWS: usize = 1;
 pub const STREAM_B: usize = 2;
-pub const CHANNEL_ADC1: u8 = 0;
+pub const CHANNEL_ADC3: u8 = 2;
 pub const CHANNEL_TIM8_UP: u8 = 7;
 pub const CHANNEL_ADC2: u8 = 1;
+/// The converters of bank A and bank B.
+pub const SCANNING: [Adc; 2] = [pac::ADC3, pac::ADC2];
 
 pub const HALF_LEN: u16 = (SLOTS * BANK_COLUMNS) as u16;
 pub const BUFFER_LEN: u16 = 2 * HALF_LEN;
@@ -48,7 +50,7 @@ const ALL_PINS: u32 = ((1 << ROWS) - 1) | (1 << trace::FRAME);
 pub fn stop() {
     pac::TIM8.cr1().write(|w| w.set_cen(false));
     pac::TIM8.dier().write(|_| ());
-    for adc in [pac::ADC1, pac::ADC2] {
+    for adc in SCANNING {
         adc.cr2().write(|_| ());
         adc.sr().write(|_| ());
     }
@@ -184,7 +186,7 @@ pub fn bank_a_completed(half: usize) -> bool {
 
 /// A converter that was not read in time stops asking for DMA.
 pub fn overrun() -> bool {
-    [pac::ADC1, pac::ADC2].into_iter().any(|adc| adc.sr().read().ovr())
+    SCANNING.into_iter().any(|adc| adc.sr().read().ovr())
 }
 
 /// Whether a transfer failed on the memory's bus, and whether a stream failed, since the last time.

@@ -30,9 +30,10 @@ mod rows;
 #[path = "../image/stages.rs"]
 mod stages;
 
+use board::analogue::Analogue;
 use board::bridge::Bridge;
 use board::scan::Scan;
-use board::{clocks, crash, guard, health, options, stack, trace};
+use board::{clocks, crash, guard, options, pins, stack, trace};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
@@ -103,33 +104,9 @@ fn main() -> ! {
     loopback::run();
     flash_times::run(p.FLASH);
     converters::noise();
+    converters::means(Analogue::new(p.ADC1, p.PA0));
 
-    let rows = [
-        p.PB0.into(),
-        p.PB1.into(),
-        p.PB2.into(),
-        p.PB3.into(),
-        p.PB4.into(),
-        p.PB5.into(),
-        p.PB6.into(),
-        p.PB7.into(),
-        p.PB8.into(),
-        p.PB9.into(),
-    ];
-    let columns = [
-        p.PA1.into(),
-        p.PA4.into(),
-        p.PA6.into(),
-        p.PA7.into(),
-        p.PC5.into(),
-        p.PC0.into(),
-        p.PC1.into(),
-        p.PC2.into(),
-        p.PC3.into(),
-        p.PC4.into(),
-    ];
-    let mut scan = Scan::new(p.TIM8, p.ADC1, p.ADC2, p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2, rows, columns);
-    report::figure("analogue_mv", f32::from(health::health().analogue_mv));
+    let mut scan = Scan::new(p.TIM8, (p.ADC3, p.ADC2), (p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2), pins::of_scan!(p));
     scan.start(config.timing);
     rows::run(kept.frames);
     converters::sample_instant(&mut scan, config.timing);

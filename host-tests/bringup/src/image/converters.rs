@@ -1,21 +1,23 @@
-//! The converters: their noise by the internal reference, and when a sample ends by a step of the DAC, which is on the
-//! pin of column 1.
+//! The converters: their noise by the internal reference, what the first one tells of the microcontroller, and when a
+//! sample ends by a step of the DAC, which is on the pin of column 5.
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac;
 use embassy_stm32::peripherals::ADC1;
 use embassy_stm32::rcc;
+use fingertip::chip::FRAMES;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{Frame, ROWS};
 
-use crate::board::{converter, scan};
+use crate::board::analogue::Analogue;
+use crate::board::{converter, health, scan};
 use crate::{CYCLES_PER_US, passed, report};
 
 /// The reference's input.
 const REFERENCE: u8 = 17;
 const SAMPLES: u32 = 4_096;
-/// The column on the DAC's pin, PA4: the second that the first converter takes.
-const COLUMN: usize = 1;
+/// The column on the DAC's pin, PA4: the first that its converter takes.
+const COLUMN: usize = 5;
 /// The slot in which it steps.
 const SLOT: usize = 2;
 /// The step, and what a sample that saw it is above.
@@ -41,6 +43,18 @@ pub fn noise() {
     pac::FLASH.acr().modify(|w| w.set_prften(true));
     pac::ADC1.cr2().write(|_| ());
     pac::ADC123_COMMON.ccr().modify(|w| w.set_tsvrefe(false));
+}
+
+/// The analogue supply and the microcontroller's temperature, as in as many frames as a mean takes.
+pub fn means(mut analogue: Analogue) {
+    for _ in 0..=FRAMES {
+        cortex_m::asm::delay(100 * CYCLES_PER_US);
+        analogue.read_mv();
+    }
+    report::figure("analogue_mv", f32::from(health::health().analogue_mv));
+    if let Some(chip) = analogue.chip() {
+        report::figure("chip_c", chip.0.to_num());
+    }
 }
 
 /// The standard deviation of the codes; none where the converter does not answer.

@@ -2,8 +2,9 @@
 
 use crate::error::Error;
 use crate::flash::SECTOR;
-use crate::front_end::REFERENCE_V;
 use crate::image::Firmware;
+use crate::inside;
+use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::Record;
 use rigless::image::Image;
@@ -21,6 +22,8 @@ pub struct Options {
     /// Bits 3:2 of the option bytes: 0 is the brown-out level 3, as `cargo xtask flash` leaves them, and 3 is off, as
     /// the factory does.
     pub brown_out_bits: u8,
+    /// What the factory kept of the reference and of the sensor.
+    pub factory: Factory,
 }
 
 impl Options {
@@ -38,13 +41,10 @@ impl Default for Options {
             instructions_per_second: NonZeroU64::new(125_000_000).expect("the core runs"),
             presets: Vec::new(),
             brown_out_bits: 0,
+            factory: inside::factory(),
         }
     }
 }
-
-/// What the factory measured of the internal reference, and at which supply.
-const CALIBRATION: u64 = 0x1fff_7a2a;
-const CALIBRATED_AT_V: f64 = 3.3;
 
 /// The image, the factory's calibration, and the presets.
 pub(super) fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, Error> {
@@ -52,8 +52,9 @@ pub(super) fn images(image: &Firmware, options: &Options) -> Result<Vec<Image>, 
         Image::new(path, bytes, at).map_err(|why| Error::NotAnImage { path: path.into(), why: why.to_string() })
     };
     let mut images = vec![read(image.path(), image.elf().to_vec(), None)?];
-    let calibration = (REFERENCE_V / CALIBRATED_AT_V * 4096.0) as u16;
-    images.push(read(Path::new("factory"), calibration.to_le_bytes().to_vec(), Some(CALIBRATION))?);
+    let Factory { reference, sensor: [cold, hot] } = options.factory;
+    let factory = [reference, cold, hot].map(u16::to_le_bytes).concat();
+    images.push(read(Path::new("factory"), factory, Some(inside::FACTORY_AT))?);
     for (address, bytes) in &options.presets {
         images.push(read(Path::new("preset"), bytes.clone(), Some(*address))?);
     }

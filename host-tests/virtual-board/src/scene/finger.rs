@@ -1,12 +1,13 @@
 //! The board's end of a scene: the world behind the pins, and what only it knows, frame by frame.
 
 use super::joint::Joint;
+use crate::inside::ROOM_C;
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use sim::SimError;
 use sim::bridge::Bridge;
 use sim::effects::link;
-use sim::effects::sensor::{self, Readout};
+use sim::effects::sensor::{self, Readout, Stages as _};
 use sim::effects::set::{Named, Parts, Set};
 use sim::mechanics::body::Surroundings;
 use sim::scene::{Scene, controller};
@@ -153,6 +154,11 @@ impl Finger {
     /// The supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.joint.supply_v()
+    }
+
+    /// The microcontroller's temperature, a room's where the scene does not tell.
+    pub fn chip_c(&self, at_ns: u64) -> f64 {
+        self.sensor.chip_c(self.clock.time_s(at_ns)).unwrap_or(ROOM_C)
     }
 
     /// What the encoder has counted by an instant of the board.

@@ -197,7 +197,7 @@ macro_rules! state {
             /// The option bytes as the last reset loaded them: FLASH_OPTCR of the microcontroller.
             484 OPTION_BYTES: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
                 |view, _| view.snapshot.health.option_bytes;
-            /// The analogue supply at the start, by the internal reference; 0 where it is not known.
+            /// The analogue supply, by the internal reference, over 256 frames; 0 where it is not known.
             488 ANALOGUE_SUPPLY_MV: U16 ReadOnly, "mV" * 1, 0 to 0xFFFF,
                 |view, _| u32::from(view.snapshot.health.analogue_mv);
             /// The deepest that the stack has been since reset, looked up each second.

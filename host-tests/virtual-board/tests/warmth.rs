@@ -1,0 +1,136 @@
+//! The microcontroller's temperature and the analogue supply as the board measures them while it runs, and what of a
+//! held force the temperature term takes away.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+mod common;
+
+use common::{image, read_u16, read_u32, write_goal, write_param, write_u8};
+use fingertip::chip::Factory;
+use fingertip::params::Params;
+use fingertip::shipped::{Record, address};
+use sim::encode;
+use sim::plant::{Plant, Setup};
+use sim::run::run;
+use virtual_board::flash::SECTOR;
+use virtual_board::scene::finger::{Clock, Finger};
+use virtual_board::scene::simulate;
+use virtual_board::{Options, Rig, inside};
+
+const GAIN_PPM_PER_K: i32 = 3_600;
+const ZERO_PA_PER_K: i32 = 10;
+const START_MS: u64 = 60;
+const UNMEASURED_MC: i32 = -273_150;
+
+fn chip_mc(rig: &mut Rig) -> i32 {
+    read_u32(rig, address::CHIP_MC) as i32
+}
+
+fn drift_mn(rig: &mut Rig) -> i32 {
+    read_u32(rig, address::PRESENT_DRIFT_MN) as i32
+}
+
+fn options(factory: Factory) -> Options {
+    let params = Params {
+        direction_confirmed: 1,
+        array_gain_ppm_per_k: GAIN_PPM_PER_K,
+        array_zero_pa_per_k: ZERO_PA_PER_K,
+        ..Params::DEFAULT
+    };
+    let presets = vec![(SECTOR.start, encode(&Record { params, ..Record::DEFAULT }, 0))];
+    Options { presets, factory, ..Options::default() }
+}
+
+/// A finger that holds 1 N while its array and its microcontroller warm by 20 K, an hour in the hot in seconds.
+fn warming(factory: Factory) -> Rig {
+    let keys = ["effects.temperature_drift.time_constant_s=1.0".into(), "object.distance_mm=0.5".into()];
+    let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
+    let clock = Clock::new(START_MS * 1_000_000);
+    let finger = Finger::all(&scene, clock, -0.001).expect("the world is simulated").remove(0);
+    let mut rig = Rig::new(&image(), finger, &options(factory)).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    write_u8(&mut rig, address::TARE, 1);
+    rig.run_until_ns(START_MS * 1_000_000).expect("it runs");
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    write_goal(&mut rig, 1_000);
+    rig
+}
+
+#[test]
+fn the_bus_tells_the_chip_s_temperature_and_the_drift() {
+    let mut rig = warming(inside::factory());
+    let mut worst_c: f64 = 0.0;
+    for _ in 0..15 {
+        rig.run_ms(100).expect("it runs");
+        let now_ns = rig.now_ns();
+        let true_c = rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs");
+        let told_c = f64::from(chip_mc(&mut rig)) * 1e-3;
+        worst_c = worst_c.max((told_c - true_c).abs());
+        assert!((told_c - true_c).abs() < 1.0, "{told_c} C of {true_c} C");
+    }
+    let (told_c, drift) = (f64::from(chip_mc(&mut rig)) * 1e-3, drift_mn(&mut rig));
+    // 1 N of 3600 ppm/K, and 225 mm^2 of 10 Pa/K, since 25 C.
+    let expected_mn = (told_c - 25.0) * (3.6 + 2.25);
+    println!("within {worst_c:.2} C; at {told_c:.2} C {drift} mN, {expected_mn:.1} mN by the coefficients");
+    assert!(told_c > 39.0, "it has warmed: {told_c} C");
+    // The term goes after a reading by a tenth of a second.
+    assert!((f64::from(drift) - expected_mn).abs() < 6.0, "{drift} mN of {expected_mn:.1} mN");
+    assert_eq!(read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), 3_300);
+    rig.check_gaps().expect("nothing is missing");
+}
+
+#[test]
+fn without_the_factory_s_codes_there_is_no_temperature_and_no_term() {
+    let sound = inside::factory();
+    let cases = [
+        (Factory { reference: 0xffff, sensor: [0xffff; 2] }, 0),
+        (Factory { sensor: [sound.sensor[0]; 2], ..sound }, 3_300),
+    ];
+    for (factory, supply_mv) in cases {
+        let mut rig = warming(factory);
+        rig.run_ms(200).expect("it runs");
+        assert_eq!((chip_mc(&mut rig), drift_mn(&mut rig)), (UNMEASURED_MC, 0), "{factory:?}");
+        assert_eq!(read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV), supply_mv, "{factory:?}");
+        assert!(read_u32(&mut rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
+    }
+}
+
+#[test]
+fn a_low_analogue_supply_is_told_and_makes_no_warmth() {
+    let mut setup = Setup::default();
+    setup.array.reference_v = 3.1;
+    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::default()).expect("the image starts");
+    rig.run_until_ns(40_000_000).expect("it runs");
+    let mv = read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV);
+    assert!((3_095..=3_105).contains(&mv), "{mv} mV");
+    let chip = chip_mc(&mut rig);
+    assert!((chip - 25_000).abs() < 500, "{chip} mC");
+    // The scan starts anew; the mean goes on.
+    write_param(&mut rig, "settle_ns", 2_500);
+    rig.run_ms(60).expect("it runs");
+    assert!((chip_mc(&mut rig) - 25_000).abs() < 500);
+}
+
+/// The largest error of 3 N held through an hour in the hot, mN.
+fn error_mn(share: i32) -> f64 {
+    let keys = [
+        format!("controller.array_gain_ppm_per_k={}", GAIN_PPM_PER_K * share),
+        format!("controller.array_zero_pa_per_k={}", ZERO_PA_PER_K * share),
+        "duration_s=3.2".into(),
+        "effects.temperature_drift.time_constant_s=0.8".into(),
+    ];
+    let scene = sim::cli::load("hot_hour", &keys, None).unwrap_or_else(|error| panic!("{error}"));
+    let outcome = run(&scene, &|scene, watch| Ok(simulate(&image(), scene, watch)?), &mut []).expect("it runs");
+    assert_eq!(outcome.measured.get("faults_count"), Some(0.0));
+    outcome.measured.get("steady_error_max_mn").expect("it is held")
+}
+
+#[test]
+fn the_term_takes_most_of_an_hour_in_the_hot_away() {
+    let [without, with] = std::thread::scope(|scope| {
+        [0, 1].map(|share| scope.spawn(move || error_mn(share))).map(|run| run.join().expect("no panic"))
+    });
+    println!("without the term {without:.1} mN, with it {with:.1} mN");
+    assert!((225.0..250.0).contains(&without), "{without} mN");
+    assert!(with < 40.0, "{with} mN");
+}

@@ -1,0 +1,85 @@
+//! The first converter, which the scan leaves alone: the bridge's supply, and behind each conversion of it, as the
+//! injected group, the internal reference and the microcontroller's temperature.
+//!
+//! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5.
+
+use embassy_stm32::pac::adc::vals::Eocs;
+use embassy_stm32::peripherals::{ADC1, PA0};
+use embassy_stm32::{Peri, pac, rcc};
+use fingertip::chip::{Chip, Factory};
+use fingertip::units::Celsius;
+
+use super::{converter, health, pins};
+
+/// Full scale: 3.3 V behind the divider by 11.
+const FULL_SCALE_MV: u32 = 3_300 * 11;
+const SUPPLY: u8 = 0;
+const REFERENCE: u8 = 17;
+const SENSOR: u8 = 18;
+/// The factory's codes of the reference, and of the sensor at 30 and 110 degrees Celsius (DS10693).
+const FACTORY: [*const u16; 3] = [0x1FFF_7A2A as _, 0x1FFF_7A2C as _, 0x1FFF_7A2E as _];
+
+/// The converter, and what its codes tell of the microcontroller.
+pub struct Analogue {
+    chip: Chip,
+}
+
+impl Analogue {
+    /// Powers the converter up and starts it. Comes after [`super::scan::Scan::new`]: one reset is all converters'.
+    pub fn new(_adc: Peri<'static, ADC1>, pin: Peri<'static, PA0>) -> Self {
+        pins::analog([pin.into()]);
+        rcc::enable_and_reset::<ADC1>();
+        converter::set_clock();
+        // The battery's divider, on the sensor's input too, stays off.
+        pac::ADC123_COMMON.ccr().modify(|w| w.set_tsvrefe(true));
+        converter::set_sequence(pac::ADC1, [SUPPLY], converter::sample_time(84));
+        // Reference and sensor want 10 us (DS10693): 480 cycles are 23.
+        pac::ADC1.smpr1().write(|w| {
+            for channel in [REFERENCE, SENSOR] {
+                w.set_smp(usize::from(channel) - 10, converter::sample_time(480));
+            }
+        });
+        // Of two, the third and the fourth place are taken (RM0390, ADC_JSQR).
+        pac::ADC1.jsqr().write(|w| {
+            w.set_jl(1);
+            w.set_jsq(2, REFERENCE);
+            w.set_jsq(3, SENSOR);
+        });
+        pac::ADC1.cr1().write(|w| {
+            w.set_scan(true);
+            w.set_jauto(true);
+        });
+        pac::ADC1.cr2().write(|w| {
+            w.set_adon(true);
+            w.set_eocs(Eocs::EACH_CONVERSION);
+        });
+        // Both wake within 10 us (DS10693), the converter within 3.
+        cortex_m::asm::delay(10 * 168);
+        start();
+        // SAFETY: aligned, in the microcontroller's system memory, and always readable.
+        let [reference, cold, hot] = FACTORY.map(|code| unsafe { code.read_volatile() });
+        Self { chip: Chip::new(Factory { reference, sensor: [cold, hot] }) }
+    }
+
+    /// The supply's last conversion in mV, and starts the next. A converter that does not answer reads as no supply,
+    /// which stops the motor.
+    pub fn read_mv(&mut self) -> u16 {
+        let done = pac::ADC1.sr().read().eoc();
+        let code = u32::from(pac::ADC1.dr().read().data());
+        let [reference, sensor] = [0, 1].map(|place| pac::ADC1.jdr(place).read().jdata());
+        start();
+        if self.chip.observe(reference, sensor) {
+            health::set_analogue_mv(self.chip.analogue_mv());
+        }
+        if done { ((code * FULL_SCALE_MV) >> 12) as u16 } else { 0 }
+    }
+
+    /// The microcontroller's temperature; none before its first mean, or where the factory left no codes.
+    pub fn chip(&self) -> Option<Celsius> {
+        self.chip.temperature()
+    }
+}
+
+fn start() {
+    pac::ADC1.cr2().modify(|w| w.set_swstart(true));
+}

@@ -1,0 +1,169 @@
+//! The microcontroller's own temperature and its analogue supply, by its sensor and its internal reference.
+//!
+//! The sensor's voltage is a line through two codes that the factory read at 3.3 V. What a code means now the reference
+//! tells, whose code at 3.3 V the factory read too: both are measured by the same converter, so that the supply drops
+//! out of their ratio. Means over [`FRAMES`] frames are taken, as a code is 0.3 K.
+
+use crate::units::Celsius;
+use fixed::types::I16F16;
+
+/// Frames of a mean: 26 ms.
+pub const FRAMES: u32 = 256;
+
+/// The analogue supply of the factory's codes.
+const FACTORY_MV: u32 = 3_300;
+/// The sensor's temperatures at them, degrees Celsius.
+const FACTORY_C: [i32; 2] = [30, 110];
+/// A code of a converter.
+const CODE: u16 = 0xfff;
+/// Codes of a reference of 1.0 to 1.4 V at 3.3 V: 1.18 to 1.24 V by its sheet.
+const REFERENCE_CODES: core::ops::RangeInclusive<u16> = 1_241..=1_737;
+/// Codes between the sensor's two temperatures: 1.3 to 5.2 mV/K; 2.5 mV/K by its sheet.
+const SENSOR_CODES: core::ops::RangeInclusive<i32> = 128..=512;
+/// Analogue supplies that are believed, mV.
+const BELIEVED_MV: core::ops::RangeInclusive<u16> = 1_600..=4_000;
+/// Temperatures that are believed, degrees Celsius in Q16: -60 to 160.
+const BELIEVED_C: core::ops::RangeInclusive<i64> = -60 << 16..=160 << 16;
+/// Fractional bits of a mean code.
+const MEAN_BITS: u32 = 4;
+
+/// What the factory read at 3.3 V and keeps in the microcontroller, codes of 12 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Factory {
+    /// The internal reference.
+    pub reference: u16,
+    /// The sensor at 30 degrees Celsius and at 110.
+    pub sensor: [u16; 2],
+}
+
+/// The mean over the last [`FRAMES`] frames, and the sums of the next.
+#[derive(Clone, Copy, Debug)]
+pub struct Chip {
+    /// The reference's code at 3.3 V; 0 where nothing sensible was kept.
+    reference: u32,
+    /// The sensor's code at 30 degrees Celsius, and Kelvin for a code in Q16.
+    line: Option<(i32, i32)>,
+    frames: u32,
+    reference_sum: u32,
+    sensor_sum: u32,
+    analogue_mv: u16,
+    temperature: Option<Celsius>,
+}
+
+impl Chip {
+    /// Nothing is known before the first mean. Of codes that make no sense, as blank memory's, nothing ever is.
+    pub fn new(factory: Factory) -> Self {
+        let [cold, hot] = factory.sensor.map(i32::from);
+        let sound = SENSOR_CODES.contains(&(hot - cold)) && hot <= i32::from(CODE);
+        let kelvin_q16 = ((FACTORY_C[1] - FACTORY_C[0]) << 16).checked_div(hot - cold).filter(|_| sound);
+        Self {
+            reference: if REFERENCE_CODES.contains(&factory.reference) { factory.reference.into() } else { 0 },
+            line: kelvin_q16.map(|kelvin_q16| (cold, kelvin_q16)),
+            frames: 0,
+            reference_sum: 0,
+            sensor_sum: 0,
+            analogue_mv: 0,
+            temperature: None,
+        }
+    }
+
+    /// The analogue supply in mV; 0 where it is not known.
+    pub fn analogue_mv(&self) -> u16 {
+        self.analogue_mv
+    }
+
+    /// The microcontroller's temperature; none where it is not known.
+    pub fn temperature(&self) -> Option<Celsius> {
+        self.temperature
+    }
+
+    /// Takes a frame's codes; tells whether there is a new mean.
+    #[inline(always)]
+    pub fn observe(&mut self, reference: u16, sensor: u16) -> bool {
+        self.reference_sum = self.reference_sum.wrapping_add((reference & CODE).into());
+        self.sensor_sum = self.sensor_sum.wrapping_add((sensor & CODE).into());
+        self.frames += 1;
+        let complete = self.frames >= FRAMES;
+        if complete {
+            self.renew();
+        }
+        complete
+    }
+
+    #[inline(never)]
+    fn renew(&mut self) {
+        // 4095 x 3300 x 256 and 4095 x 4095 x 256 are just within 32 bits.
+        let full = self.reference.wrapping_mul(FACTORY_MV).wrapping_mul(FRAMES);
+        let supply_mv = full.checked_div(self.reference_sum).and_then(|mv| u16::try_from(mv).ok());
+        self.analogue_mv = supply_mv.filter(|mv| BELIEVED_MV.contains(mv)).unwrap_or(0);
+        // The sensor's mean code, were the supply 3.3 V.
+        let code = self.sensor_sum.wrapping_mul(self.reference).checked_div(self.reference_sum >> MEAN_BITS);
+        self.temperature = match (code, self.line) {
+            (Some(code), Some((cold, kelvin_q16))) if self.analogue_mv != 0 => {
+                let warmer = i64::from(code) - i64::from(cold << MEAN_BITS);
+                let at_q16 = i64::from(FACTORY_C[0] << 16) + ((warmer * i64::from(kelvin_q16)) >> MEAN_BITS);
+                BELIEVED_C.contains(&at_q16).then(|| Celsius(I16F16::from_bits(at_q16 as i32)))
+            }
+            _ => None,
+        };
+        (self.frames, self.reference_sum, self.sensor_sum) = (0, 0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FACTORY: Factory = Factory { reference: 1_502, sensor: [954, 1_202] };
+
+    /// What is told of codes that stand still.
+    fn told(factory: Factory, reference: u16, sensor: u16) -> (u16, Option<f64>) {
+        let mut chip = Chip::new(factory);
+        for frame in 1..=FRAMES {
+            assert_eq!((chip.analogue_mv(), chip.temperature()), (0, None), "before the first mean");
+            assert_eq!(chip.observe(reference, sensor), frame == FRAMES);
+        }
+        (chip.analogue_mv(), chip.temperature().map(|chip| chip.0.to_num()))
+    }
+
+    #[test]
+    fn the_factory_s_codes_are_its_temperatures_at_any_supply() {
+        for (code, celsius) in [(954, 30.0), (1_202, 110.0), (1_078, 70.0)] {
+            for supply_mv in [1_800, 3_000, 3_300, 3_600] {
+                let at = |code: u32| ((code * 3_300 + supply_mv / 2) / supply_mv) as u16;
+                let (mv, chip) = told(FACTORY, at(1_502), at(code));
+                assert!(u32::from(mv).abs_diff(supply_mv) <= 2, "{mv} mV of {supply_mv}");
+                let chip = chip.expect("it is measured");
+                assert!((chip - celsius).abs() < 0.35, "{chip} C at {supply_mv} mV, {celsius} C");
+            }
+        }
+    }
+
+    #[test]
+    fn a_mean_is_finer_than_a_code() {
+        let mut chip = Chip::new(FACTORY);
+        for frame in 0..FRAMES {
+            chip.observe(1_502, if frame % 4 == 0 { 955 } else { 954 });
+        }
+        let found: f64 = chip.temperature().expect("it is measured").0.to_num();
+        assert!((found - (30.0 + 0.25 * 80.0 / 248.0)).abs() < 0.03, "{found} C");
+    }
+
+    #[test]
+    fn of_a_blank_memory_nothing_is_known() {
+        for sensor in [[0xffff; 2], [0; 2], [954; 2], [1_202, 954], [954, 0xffff], [954, 1_000], [0, 1_202]] {
+            assert_eq!(told(Factory { sensor, ..FACTORY }, 1_502, 960), (3_300, None), "{sensor:?}");
+        }
+        for reference in [0, 0xffff, 0xfff, 1_000] {
+            assert_eq!(told(Factory { reference, ..FACTORY }, 1_502, 960), (0, None), "{reference}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_is_not_believed() {
+        assert_eq!(told(FACTORY, 0, 960), (0, None), "no reference");
+        assert_eq!(told(FACTORY, 0xfff, 960), (0, None), "1.2 V");
+        assert_eq!(told(FACTORY, 1_502, 0), (3_300, None), "a sensor that is off");
+        assert_eq!(told(FACTORY, 1_502, 0xfff), (3_300, None), "one at its rail");
+    }
+}

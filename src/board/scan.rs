@@ -16,7 +16,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use fingertip::frame::BANKS;
 use fingertip::scan::ScanTiming;
-use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, ROWS, SLOTS};
+use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, SLOTS};
 
 use super::health::{self, Broken};
 use super::{converter, guard, pins, trace};

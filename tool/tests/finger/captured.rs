@@ -119,7 +119,9 @@ fn a_file_that_is_not_as_it_was_written_is_refused() {
     fs::remove_file(&file).expect("it is there");
     let folder = std::path::Path::new(&file).parent().expect("a folder");
     // Links that lead back are not followed.
-    ["one", "two"].map(|link| std::os::unix::fs::symlink(folder, folder.join(link)).expect("a link"));
+    for link in ["one", "two"] {
+        std::os::unix::fs::symlink(folder, folder.join(link)).expect("a link");
+    }
     let why = finger.refused(&["replay", folder.to_str().expect("text")]);
     assert!(why.contains("no capture there"), "{why}");
 }

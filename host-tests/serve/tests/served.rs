@@ -293,7 +293,15 @@ fn behind_a_terminal_it_serves_on_while_somebody_types() {
         script.0.stdout.as_mut().expect("it was asked for").read_exact(&mut byte).expect("a terminal");
         shown.push(byte[0]);
     }
-    let number: i32 = std::fs::read_to_string(&number).expect("it was written").trim().parse().expect("a number");
+    // The shell may not have come as far as the finger.
+    let written = loop {
+        match std::fs::read_to_string(&number) {
+            Ok(line) if line.ends_with('\n') => break line,
+            _ => std::thread::yield_now(),
+        }
+    };
+    std::fs::remove_file(&number).expect("it is there");
+    let number: i32 = written.trim().parse().expect("a number");
     let mut port = SerialPort::open(&path, 1_000_000).expect("it is there");
     port.set_read_timeout(std::time::Duration::from_secs(1)).expect("a time-out");
     for _ in 0..200 {

@@ -41,6 +41,20 @@ pub enum Mode {
     Commission = 7,
 }
 
+impl Mode {
+    /// All of them; the first has the number 0.
+    pub const ALL: [Self; 8] = [
+        Self::Off,
+        Self::Tare,
+        Self::Approach,
+        Self::Force,
+        Self::Release,
+        Self::Fault,
+        Self::Identify,
+        Self::Commission,
+    ];
+}
+
 /// Why the motor was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -84,6 +98,30 @@ pub enum Fault {
     /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have another
     /// brown-out level than 3. Stands until they are programmed.
     BrownOutLevel = 18,
+}
+
+impl Fault {
+    /// All of them; the first has the number 1.
+    pub const ALL: [Self; 18] = [
+        Self::LostFrames,
+        Self::ArrayBroken,
+        Self::RowStuck,
+        Self::ArrayFrozen,
+        Self::EncoderFrozen,
+        Self::OverForce,
+        Self::BusSilent,
+        Self::BrokenParameters,
+        Self::SupplyLow,
+        Self::SupplyHigh,
+        Self::Bridge,
+        Self::MissedDeadline,
+        Self::Crash,
+        Self::Runaway,
+        Self::Reversed,
+        Self::Unseen,
+        Self::NoClock,
+        Self::BrownOutLevel,
+    ];
 }
 
 /// What holds the loop back just now: a set of flags, stable by bit.

@@ -63,6 +63,7 @@ fn every_fault_has_a_bit() {
         (Fault::NoClock, 7),
         (Fault::BrownOutLevel, 7),
     ];
+    assert_eq!(faults.map(|(fault, _)| fault), Fault::ALL);
     for (fault, bit) in faults {
         bench.set_fault(Some(fault));
         assert_eq!(bench.number(address::FAULT, 1), fault as u32);

@@ -67,7 +67,12 @@ fn reads_of_no_or_too_many_bytes_are_refused() {
 #[test]
 fn the_last_fault_and_the_last_limit_are_in_the_table() {
     let largest = |address| REGISTERS.iter().find(|register| register.address == address).expect("a register").max;
-    assert_eq!(largest(address::FAULT), Fault::BrownOutLevel as i64);
+    assert_eq!(largest(address::FAULT), Fault::ALL.len() as i64);
+    assert_eq!(largest(address::PRESENT_MODE), Mode::ALL.len() as i64 - 1);
+    for number in 0..18 {
+        assert_eq!(Fault::ALL[number] as usize, number + 1);
+        assert!(Mode::ALL.get(number).is_none_or(|mode| *mode as usize == number));
+    }
     assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::WINDING) - 1);
 }
 

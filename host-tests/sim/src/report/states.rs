@@ -32,6 +32,8 @@ const NAMES: [(u32, &str, &[&str]); 3] = [
             "runaway",
             "reversed",
             "unseen",
+            "no clock",
+            "brown-out level",
         ],
     ),
     (
@@ -118,7 +120,8 @@ fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
 }
 
 // A new mode or fault must not run into the next one's bits.
-const _: () = assert!((Mode::Commission as u32) < FAULTS && FAULTS + (Fault::Unseen as u32) < LIMITS);
+const _: () = assert!(Mode::ALL.len() as u32 <= FAULTS && FAULTS + (Fault::ALL.len() as u32) < LIMITS);
+const _: () = assert!(NAMES[0].2.len() == Mode::ALL.len() && NAMES[1].2.len() == 1 + Fault::ALL.len());
 const _: () = assert!(Limits::WINDING == 1 << 13);
 
 #[cfg(test)]

@@ -100,31 +100,9 @@ fn scaled(thousandths: i32, one: i64) -> i32 {
 }
 
 fn mode(number: u8) -> Mode {
-    [Mode::Off, Mode::Tare, Mode::Approach, Mode::Force, Mode::Release, Mode::Fault, Mode::Identify, Mode::Commission]
-        .into_iter()
-        .find(|mode| *mode as u8 == number)
-        .unwrap_or(Mode::Fault)
+    Mode::ALL.into_iter().find(|mode| *mode as u8 == number).unwrap_or(Mode::Fault)
 }
 
 fn fault(number: u8) -> Option<Fault> {
-    [
-        Fault::LostFrames,
-        Fault::ArrayBroken,
-        Fault::RowStuck,
-        Fault::ArrayFrozen,
-        Fault::EncoderFrozen,
-        Fault::OverForce,
-        Fault::BusSilent,
-        Fault::BrokenParameters,
-        Fault::SupplyLow,
-        Fault::SupplyHigh,
-        Fault::Bridge,
-        Fault::MissedDeadline,
-        Fault::Crash,
-        Fault::Runaway,
-        Fault::Reversed,
-        Fault::Unseen,
-    ]
-    .into_iter()
-    .find(|fault| *fault as u8 == number)
+    Fault::ALL.into_iter().find(|fault| *fault as u8 == number)
 }

@@ -294,8 +294,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// No contact, or none that the model can say anything of.
-    fn lose(&mut self) {
+    /// No contact, none that the model can say anything of, or another model.
+    pub(crate) fn lose(&mut self) {
         self.forget();
         (self.begun, self.confidence, self.doubt) = (false, 255, 0);
     }

@@ -57,16 +57,17 @@ struct Row<const ROWS: usize, const COLUMNS: usize> {
 
 /// Bits dropped from sums over the taxels, so that they fit 32 bits.
 ///
-/// A slope is at most 1.5, at the rim, and the squares of a row's slopes average 2 at most, in Q26. What all rows add
-/// up to has another bit to spare. A row loses four bits at least, so that its shifted place, up to two radii, fits
-/// too.
+/// A slope is at most 1.5: inside it is at most 1.31 where the indentation is the guess's, and half more where it
+/// follows the force away from it; under the rim it stops there. So the squares of a row's slopes average 9/4 at most,
+/// in Q26. What all rows add up to has another bit to spare. A row loses four bits at least, so that its shifted place,
+/// up to two radii, fits too.
 pub struct Bits<const ROWS: usize, const COLUMNS: usize>;
 
 impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
-    /// From a taxel's part of its row: none up to 15 columns, 2 of 32.
+    /// From a taxel's part of its row: none up to 14 columns, 2 of 32.
     const TAXEL: u32 = {
         let mut drop = 0;
-        while (COLUMNS as u64) << 27 >> drop >= 1 << 31 {
+        while (COLUMNS as u64 * 9) << 24 >> drop >= 1 << 31 {
             drop += 1;
         }
         drop
@@ -74,7 +75,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
     /// From a row's sums: 4 of 10 x 10, 5 of 16 x 16 and 16 x 32.
     const ROW: u32 = {
         let mut drop = 4;
-        while ((ROWS * COLUMNS) as u64) << 28 >> (Self::TAXEL + drop) >= 1 << 31 {
+        while ((ROWS * COLUMNS) as u64 * 9) << 25 >> (Self::TAXEL + drop) >= 1 << 31 {
             drop += 1;
         }
         drop
@@ -164,8 +165,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
         let square = (weight * model.by_square) >> SLOPE_BITS;
         let weighted_x = (square * dx) >> PLACE_BITS;
         let x = (model.by_square * dx) >> PLACE_BITS;
-        // Of a row's slopes more than the bound of `Bits` wraps: one of some million drawn arrays and poses had that.
-        let add = |sum: &mut i32, product: i32| *sum = sum.wrapping_add(product >> Bits::<ROWS, COLUMNS>::TAXEL);
+        let add = |sum: &mut i32, product: i32| *sum += product >> Bits::<ROWS, COLUMNS>::TAXEL;
         add(&mut self.height_height, height * model.by_height);
         add(&mut self.height_square, height * model.by_square);
         add(&mut self.height_x, height * x);

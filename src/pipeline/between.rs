@@ -12,9 +12,10 @@ use crate::units::Duty;
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins
-    /// anew.
+    /// anew, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
+        self.fit.lose();
         self.interrupt_commission();
         // What was measured belonged to the parameters before.
         if !matches!(self.status.commissioning, commission::Commissioning::Refused(_)) {
@@ -29,6 +30,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// under way begins anew.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
+        self.fit.lose();
         self.forget();
         self.tared = false;
         self.leave();

@@ -3,4 +3,5 @@
 
 mod closed_loop;
 mod finger;
+mod slopes;
 mod worst;

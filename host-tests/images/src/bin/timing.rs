@@ -26,6 +26,7 @@ use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
+use images::CORRECTED;
 use images::record::{MAGIC, Record};
 use images::single::{self, Refined};
 use press::Press;
@@ -196,8 +197,7 @@ fn main() -> ! {
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
     let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
-    let params = Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..Params::DEFAULT };
-    let Ok(curved) = Config::shipped(&params) else { fail("a curve is refused") };
+    let Ok(curved) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };
     let mut bench = Bench {
         config: &config,
         curved: &curved,

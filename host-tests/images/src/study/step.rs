@@ -12,18 +12,18 @@ use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
 use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
 use fingertip::units::{Celsius, Duty, Newtons};
+use images::CORRECTED;
 use images::record::Record;
 use static_cell::StaticCell;
 
 /// Too large for the stack.
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
-static CORRECTED: StaticCell<Config> = StaticCell::new();
+static CORRECTED_CONFIG: StaticCell<Config> = StaticCell::new();
 
 /// What the parts read and write.
 struct Bench<'a> {
@@ -172,9 +172,8 @@ impl<'a> Bench<'a> {
 /// A function of its own, because a pipeline is large and takes stack only here.
 #[inline(never)]
 fn begin(config: &Config) -> (&'static mut Pipeline, &'static Config) {
-    let params = Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..Params::DEFAULT };
-    let Ok(corrected) = Config::shipped(&params) else { fail("a curve is refused") };
-    (PIPELINE.init_with(|| Pipeline::new(config)), CORRECTED.init(corrected))
+    let Ok(corrected) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };
+    (PIPELINE.init_with(|| Pipeline::new(config)), CORRECTED_CONFIG.init(corrected))
 }
 
 fn record(inputs: &mut Inputs) -> Record {

@@ -44,6 +44,8 @@ pub struct Chip {
     /// The sensor's code at 30 degrees Celsius, and Kelvin for a code in Q16.
     line: Option<(i32, i32)>,
     frames: u32,
+    /// Whether codes came in each of them.
+    whole: bool,
     reference_sum: u32,
     sensor_sum: u32,
     analogue_mv: u16,
@@ -60,6 +62,7 @@ impl Chip {
             reference: if REFERENCE_CODES.contains(&factory.reference) { factory.reference.into() } else { 0 },
             line: kelvin_q16.map(|kelvin_q16| (cold, kelvin_q16)),
             frames: 0,
+            whole: true,
             reference_sum: 0,
             sensor_sum: 0,
             analogue_mv: 0,
@@ -77,11 +80,17 @@ impl Chip {
         self.temperature
     }
 
-    /// Takes a frame's codes; tells whether there is a new mean.
+    /// Takes a frame's codes of the reference and the sensor, none where the converter did not give new ones; tells
+    /// whether a mean is over. One that lacks a frame tells nothing.
     #[inline(always)]
-    pub fn observe(&mut self, reference: u16, sensor: u16) -> bool {
-        self.reference_sum = self.reference_sum.wrapping_add((reference & CODE).into());
-        self.sensor_sum = self.sensor_sum.wrapping_add((sensor & CODE).into());
+    pub fn observe(&mut self, codes: Option<[u16; 2]>) -> bool {
+        match codes.map(|codes| codes.map(|code| u32::from(code & CODE))) {
+            Some([reference, sensor]) => {
+                self.reference_sum = self.reference_sum.wrapping_add(reference);
+                self.sensor_sum = self.sensor_sum.wrapping_add(sensor);
+            }
+            None => self.whole = false,
+        }
         self.frames += 1;
         let complete = self.frames >= FRAMES;
         if complete {
@@ -93,7 +102,8 @@ impl Chip {
     #[inline(never)]
     fn renew(&mut self) {
         // 4095 x 3300 x 256 and 4095 x 4095 x 256 are just within 32 bits.
-        let full = self.reference.wrapping_mul(FACTORY_MV).wrapping_mul(FRAMES);
+        let reference = if self.whole { self.reference } else { 0 };
+        let full = reference.wrapping_mul(FACTORY_MV).wrapping_mul(FRAMES);
         let supply_mv = full.checked_div(self.reference_sum).and_then(|mv| u16::try_from(mv).ok());
         self.analogue_mv = supply_mv.filter(|mv| BELIEVED_MV.contains(mv)).unwrap_or(0);
         // The sensor's mean code, were the supply 3.3 V.
@@ -106,7 +116,7 @@ impl Chip {
             }
             _ => None,
         };
-        (self.frames, self.reference_sum, self.sensor_sum) = (0, 0, 0);
+        (self.frames, self.whole, self.reference_sum, self.sensor_sum) = (0, true, 0, 0);
     }
 }
 
@@ -121,7 +131,7 @@ mod tests {
         let mut chip = Chip::new(factory);
         for frame in 1..=FRAMES {
             assert_eq!((chip.analogue_mv(), chip.temperature()), (0, None), "before the first mean");
-            assert_eq!(chip.observe(reference, sensor), frame == FRAMES);
+            assert_eq!(chip.observe(Some([reference, sensor])), frame == FRAMES);
         }
         (chip.analogue_mv(), chip.temperature().map(|chip| chip.0.to_num()))
     }
@@ -143,7 +153,7 @@ mod tests {
     fn a_mean_is_finer_than_a_code() {
         let mut chip = Chip::new(FACTORY);
         for frame in 0..FRAMES {
-            chip.observe(1_502, if frame % 4 == 0 { 955 } else { 954 });
+            chip.observe(Some([1_502, if frame % 4 == 0 { 955 } else { 954 }]));
         }
         let found: f64 = chip.temperature().expect("it is measured").0.to_num();
         assert!((found - (30.0 + 0.25 * 80.0 / 248.0)).abs() < 0.03, "{found} C");
@@ -151,12 +161,28 @@ mod tests {
 
     #[test]
     fn of_a_blank_memory_nothing_is_known() {
-        for sensor in [[0xffff; 2], [0; 2], [954; 2], [1_202, 954], [954, 0xffff], [954, 1_000], [0, 1_202]] {
+        for sensor in
+            [[0xffff; 2], [0; 2], [954; 2], [1_202, 954], [954, 0xffff], [3_900, 4_200], [954, 1_000], [0, 1_202]]
+        {
             assert_eq!(told(Factory { sensor, ..FACTORY }, 1_502, 960), (3_300, None), "{sensor:?}");
         }
         for reference in [0, 0xffff, 0xfff, 1_000] {
             assert_eq!(told(Factory { reference, ..FACTORY }, 1_502, 960), (0, None), "{reference}");
         }
+    }
+
+    #[test]
+    fn what_was_measured_is_not_told_when_codes_stay_away() {
+        let mut chip = Chip::new(FACTORY);
+        let mut told = |codes: &dyn Fn(u32) -> Option<[u16; 2]>| {
+            (0..FRAMES).for_each(|frame| _ = chip.observe(codes(frame)));
+            (chip.analogue_mv(), chip.temperature().is_some())
+        };
+        let sound = Some([1_502, 960]);
+        assert_eq!(told(&|_| sound), (3_300, true));
+        assert_eq!(told(&|frame| sound.filter(|_| frame != 100)), (0, false), "one frame's are missing");
+        assert_eq!(told(&|_| sound), (3_300, true));
+        assert_eq!(told(&|_| None), (0, false));
     }
 
     #[test]

@@ -24,7 +24,7 @@ use crate::pressure::Array;
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::state::{Fault, Limits, Mode};
-use crate::units::Duty;
+use crate::units::{Duty, Newtons};
 use budget::Budget;
 
 /// The loop's state between frames. The example at the crate's top closes a loop with it.
@@ -226,7 +226,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
 
         self.calibrator.work(&self.array, &self.config);
-        self.scale.observe(mode, self.goal.creep.less(contact.force), &self.config);
+        self.status.drift = self.goal.warmth.force(command.goal, &self.config);
+        let held = self.goal.creep.less(contact.force).0.saturating_sub(self.status.drift.0);
+        self.scale.observe(mode, Newtons(held), &self.config);
         if command.shown_request != self.status.taken.shown {
             self.status.taken.shown = command.shown_request;
             self.scale.take(command.shown_mn, &contact);
@@ -243,7 +245,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.duty = duty;
         self.status.creep = self.goal.creep.force();
         self.status.chip = sense.chip;
-        self.status.drift = self.goal.warmth.force(command.goal, &self.config);
         self.status.winding = self.motion.winding.temperature(&self.config);
         (duty, &self.status)
     }

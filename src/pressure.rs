@@ -23,6 +23,7 @@ pub use picture::Picture;
 
 use crate::config::Config;
 use crate::frame::{Frame, Shape};
+use crate::units::Newtons;
 use lanes::{BOOST_BITS, Codes, GAIN_BITS, Row};
 use row::Sound;
 use touched::Touched;
@@ -55,6 +56,8 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     baseline_line: Option<[i32; COLUMNS]>,
     /// Rounds of the baseline over all rows since a contact.
     clear_rounds: i32,
+    /// The largest force since the baseline was last learnt after a contact.
+    held: Newtons,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Default for Array<ROWS, COLUMNS> {
@@ -79,6 +82,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             baseline_row: 0,
             baseline_line: None,
             clear_rounds: 0,
+            held: Newtons::ZERO,
         }
     }
 

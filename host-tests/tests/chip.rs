@@ -7,7 +7,7 @@ use proptest::prelude::*;
 fn told(factory: Factory, codes: &[(u16, u16)], frames: u32) -> (u16, Option<f64>) {
     let mut chip = Chip::new(factory);
     for (_, (reference, sensor)) in (0..frames).zip(codes.iter().cycle()) {
-        chip.observe(*reference, *sensor);
+        chip.observe(Some([*reference, *sensor]));
     }
     (chip.analogue_mv(), chip.temperature().map(|chip| chip.0.to_num()))
 }

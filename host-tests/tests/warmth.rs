@@ -1,12 +1,17 @@
 //! The array's drift with the microcontroller's temperature: what is made of it, its bounds, and that it is off at 0.
 
+use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::control::warmth::Warmth;
 use fingertip::params::Params;
-use fingertip::shipped::Config;
+use fingertip::shipped::{Config, TARE_FRAMES};
+use fingertip::state::Mode;
 use fingertip::units::{Celsius, Newtons};
+use images::record::Record;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
 
 fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
     Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..Params::DEFAULT }).unwrap()
@@ -21,7 +26,7 @@ fn warmed(from: i32, to: i32, config: &Config) -> Warmth {
     let mut warmth = Warmth::default();
     // What it was before the tare is forgotten.
     (0..30_000).for_each(|frame| warmth.observe(celsius(if frame == 0 { from + 7 } else { from }), config));
-    warmth.zero();
+    warmth.zero(1 << 16);
     (0..30_000).for_each(|_| warmth.observe(celsius(to), config));
     warmth
 }
@@ -38,14 +43,85 @@ fn gain_goes_by_the_calibration_and_zero_by_the_tare() {
 }
 
 #[test]
-fn at_coefficients_of_zero_and_without_a_reading_there_is_none() {
+fn at_coefficients_of_zero_and_before_a_reading_there_is_none() {
     let off = config(0, 0);
     assert_eq!(warmed(0, 100, &off), Warmth::default());
     let on = config(3_600, 10);
-    let mut warmth = warmed(25, 45, &on);
-    assert!(warmth.force(newtons(3_000), &on) > newtons(200));
+    let mut warmth = Warmth::default();
     warmth.observe(None, &on);
     assert_eq!(warmth.force(newtons(3_000), &on), Newtons::ZERO);
+    let mut warmth = warmed(25, 45, &on);
+    warmth.observe(celsius(45), &off);
+    assert_eq!(warmth.force(newtons(3_000), &on), Newtons::ZERO);
+}
+
+#[test]
+fn a_reading_that_stays_away_and_comes_back_moves_nothing() {
+    let config = config(3_600, 10);
+    let mut warmth = warmed(25, 45, &config);
+    let before = warmth.force(newtons(3_000), &config);
+    assert!(before > newtons(200));
+    for chip in [None, celsius(45), None, None, celsius(45)] {
+        warmth.observe(chip, &config);
+        assert_eq!(warmth.force(newtons(3_000), &config), before);
+    }
+}
+
+#[test]
+fn the_zero_s_temperature_moves_as_the_baseline_does() {
+    let config = config(0, 10);
+    let mut warmth = warmed(45, 25, &config);
+    let at = |warmth: &Warmth| warmth.force(newtons(3_000), &config).0.to_num::<f64>();
+    assert!((at(&warmth) + 0.045).abs() < 1e-3);
+    // Nothing of the baseline, a hundredth, a half, all of it.
+    for (share, left) in [(0, 1.0), (655, 0.99), (1 << 15, 0.495), (1 << 16, 0.0)] {
+        warmth.zero(share);
+        assert!((at(&warmth) + 0.045 * left).abs() < 1e-4, "{share}: {}", at(&warmth));
+    }
+}
+
+/// Contact lost for a frame, after the array has cooled since its tare: the baseline has learnt next to nothing of that.
+#[test]
+fn a_frame_without_contact_does_not_forget_the_drift() {
+    let mut board: Bench = Bench::of(&Setup::default(), &config(0, 10));
+    *board.command() = Command { tare_request: 1, ..Command::default() };
+    (0..TARE_FRAMES + 2).for_each(|_| _ = board.step_with(|record| record.sense.chip = celsius(45)));
+    let quiet = *board.frame();
+    (board.command().torque, board.command().goal) = (true, newtons(1_000));
+    let mut cool = |frames: u32, lost: bool| {
+        let step = |record: &mut Record| {
+            record.sense.chip = celsius(25);
+            if lost {
+                record.frame.codes = quiet.codes;
+            }
+        };
+        (0..frames).map(|_| board.step_with(step)).last().unwrap()
+    };
+    let held = cool(30_000, false);
+    assert_eq!(held.mode, Mode::Force);
+    let after = cool(40, true);
+    assert_ne!(after.mode, Mode::Force);
+    let [before, after]: [f64; 2] = [held, after].map(|status| status.drift.0.to_num());
+    assert!((before + 0.045).abs() < 6e-3 && (after - before).abs() < 0.02 * 0.045, "{before} {after}");
+}
+
+#[test]
+fn what_a_scale_shows_counts_beside_the_reading_less_its_drift() {
+    let mut board: Bench = Bench::of(&Setup::default(), &config(3_600, 10));
+    let mut run = |command: Command, frames: u32| {
+        *board.command() = command;
+        (0..frames).map(|_| board.step_with(|record| record.sense.chip = celsius(45))).last().unwrap()
+    };
+    let tare = Command { tare_request: 1, ..Command::default() };
+    run(tare, TARE_FRAMES + 2);
+    let hold = Command { torque: true, goal: newtons(3_000), ..tare };
+    let held = run(hold, 30_000);
+    assert_eq!(held.mode, Mode::Force);
+    let [reading, drift]: [f64; 2] = [held.contact.force, held.drift].map(|force| force.0.to_num());
+    assert!((drift - 0.216).abs() < 2e-3 && (reading - 3.216).abs() < 0.01, "{reading} {drift}");
+    // The array only seems to feel the drift: the scale shows what is held.
+    let factor_ppm = run(Command { shown_request: 1, shown_mn: 3_000, ..hold }, 2).scale.factor_ppm;
+    assert!(factor_ppm.abs_diff(1_000_000) < 3_000, "{factor_ppm}");
 }
 
 #[test]
@@ -78,7 +154,7 @@ proptest! {
                 warmth.observe(chip.map(Celsius::from_bits), &config);
             }
             if zeroes {
-                warmth.zero();
+                warmth.zero(1 << 16);
             }
             let found = warmth.force(Newtons::from_bits(held), &config).to_bits();
             prop_assert!(i64::from(found).abs() <= i64::from(held.max(0)) / 2);

@@ -1,9 +1,9 @@
 //! The first converter, which the scan leaves alone: the bridge's supply, and behind each conversion of it, as the
 //! injected group, the internal reference and the microcontroller's temperature.
 //!
-//! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5.
+//! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5; where
+//! a frame is shorter than that, it is started in every other.
 
-use embassy_stm32::pac::adc::vals::Eocs;
 use embassy_stm32::peripherals::{ADC1, PA0};
 use embassy_stm32::{Peri, pac, rcc};
 use fingertip::chip::{Chip, Factory};
@@ -14,7 +14,7 @@ use super::{converter, health, pins};
 /// Full scale: 3.3 V behind the divider by 11.
 const FULL_SCALE_MV: u32 = 3_300 * 11;
 const SUPPLY: u8 = 0;
-const REFERENCE: u8 = 17;
+pub const REFERENCE: u8 = 17;
 const SENSOR: u8 = 18;
 /// The factory's codes of the reference, and of the sensor at 30 and 110 degrees Celsius (DS10693).
 const FACTORY: [*const u16; 3] = [0x1FFF_7A2A as _, 0x1FFF_7A2C as _, 0x1FFF_7A2E as _];
@@ -22,6 +22,10 @@ const FACTORY: [*const u16; 3] = [0x1FFF_7A2A as _, 0x1FFF_7A2C as _, 0x1FFF_7A2
 /// The converter, and what its codes tell of the microcontroller.
 pub struct Analogue {
     chip: Chip,
+    /// The supply's last conversion.
+    supply_mv: u16,
+    /// Whether the last frame found the converter still at work.
+    waited: bool,
 }
 
 impl Analogue {
@@ -49,29 +53,31 @@ impl Analogue {
             w.set_scan(true);
             w.set_jauto(true);
         });
-        pac::ADC1.cr2().write(|w| {
-            w.set_adon(true);
-            w.set_eocs(Eocs::EACH_CONVERSION);
-        });
+        pac::ADC1.cr2().write(|w| w.set_adon(true));
         // Both wake within 10 us (DS10693), the converter within 3.
         cortex_m::asm::delay(10 * 168);
         start();
         // SAFETY: aligned, in the microcontroller's system memory, and always readable.
         let [reference, cold, hot] = FACTORY.map(|code| unsafe { code.read_volatile() });
-        Self { chip: Chip::new(Factory { reference, sensor: [cold, hot] }) }
+        Self { chip: Chip::new(Factory { reference, sensor: [cold, hot] }), supply_mv: 0, waited: false }
     }
 
-    /// The supply's last conversion in mV, and starts the next. A converter that does not answer reads as no supply,
-    /// which stops the motor.
+    /// The supply's last conversion in mV, and starts the next. A converter that is not done within two frames reads as
+    /// no supply, which stops the motor.
     pub fn read_mv(&mut self) -> u16 {
-        let done = pac::ADC1.sr().read().eoc();
+        let status = pac::ADC1.sr().read();
+        self.waited = !status.jeoc() && !self.waited;
+        if self.waited {
+            return self.supply_mv;
+        }
         let code = u32::from(pac::ADC1.dr().read().data());
-        let [reference, sensor] = [0, 1].map(|place| pac::ADC1.jdr(place).read().jdata());
+        let codes = status.jeoc().then(|| [0, 1].map(|place| pac::ADC1.jdr(place).read().jdata()));
+        self.supply_mv = if status.eoc() { ((code * FULL_SCALE_MV) >> 12) as u16 } else { 0 };
         start();
-        if self.chip.observe(reference, sensor) {
+        if self.chip.observe(codes) {
             health::set_analogue_mv(self.chip.analogue_mv());
         }
-        if done { ((code * FULL_SCALE_MV) >> 12) as u16 } else { 0 }
+        self.supply_mv
     }
 
     /// The microcontroller's temperature; none before its first mean, or where the factory left no codes.
@@ -80,6 +86,8 @@ impl Analogue {
     }
 }
 
+/// What is done counts no more.
 fn start() {
+    pac::ADC1.sr().write_value(pac::adc::regs::Sr(0));
     pac::ADC1.cr2().modify(|w| w.set_swstart(true));
 }

@@ -104,7 +104,7 @@ impl Scale {
         *self = Self { held_ns: self.held_ns, mean: self.mean, ..Self::new() };
     }
 
-    /// Follows the force that is held: the reading without its creep, which is taken off beside the scale.
+    /// Follows the force that is held: the reading without its creep and its drift, which are taken off beside the scale.
     #[inline(always)]
     pub fn observe(&mut self, mode: Mode, force: Newtons, config: &Config) {
         let force = i64::from(force.to_bits()) << 16;

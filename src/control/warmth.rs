@@ -33,13 +33,13 @@ pub struct Warmth {
 }
 
 impl Warmth {
-    /// Takes a frame's reading of the microcontroller's temperature. Where it stays away, nothing is known of drift.
+    /// Takes a frame's reading of the microcontroller's temperature. Where one stays away, the last counts on.
     #[inline(always)]
     pub fn observe(&mut self, chip: Option<Celsius>, config: &Config) {
-        let Some(chip) = chip.filter(|_| config.warm.on()) else {
+        if !config.warm.on() {
             self.chip = None;
-            return;
-        };
+        }
+        let Some(chip) = chip.filter(|_| config.warm.on()) else { return };
         let chip = chip.to_bits().max(LEAST).min(MOST);
         match &mut self.chip {
             Some(state) => *state += ((i64::from(chip) << 16) - *state) >> SLOW,
@@ -50,9 +50,10 @@ impl Warmth {
         }
     }
 
-    /// The zero is learnt at this temperature.
-    pub fn zero(&mut self) {
-        self.zero = self.chip.map_or(0, |chip| (chip >> 16) as i32);
+    /// So much of the zero, Q16 from 0 to 1, is learnt at this temperature.
+    pub fn zero(&mut self, share: i32) {
+        let way = self.chip.map_or(0, |chip| (chip >> 16) - i64::from(self.zero));
+        self.zero += ((way * i64::from(share)) >> 16) as i32;
     }
 
     /// What a held force reads more than it is, between half of it and half of it less.

@@ -33,7 +33,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             Mode::Fault => Mode::Off,
             Mode::Tare => {
                 self.tared = sound && self.array.continue_tare();
-                self.goal.warmth.zero();
+                self.goal.warmth.zero(1 << 16);
                 if self.tared {
                     self.array.judge_tare(&self.config);
                 }
@@ -46,7 +46,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 Mode::Off
             }
             Mode::Off | Mode::Commission => Mode::Off,
-            Mode::Identify if self.press.running() || self.calibrator.running() => Mode::Identify,
+            Mode::Identify if self.press.running() || self.calibrator.running() => {
+                self.array.touched(contact.force);
+                Mode::Identify
+            }
             Mode::Approach | Mode::Force | Mode::Release if asked.identify => {
                 self.press.start(&self.motion);
                 Mode::Identify
@@ -60,7 +63,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 Mode::Force
             }
             Mode::Force if wanted == Mode::Approach && contact.force >= self.config.contact_off => {
-                self.array.touched();
+                self.array.touched(contact.force);
                 Mode::Force
             }
             Mode::Approach | Mode::Force | Mode::Release | Mode::Identify => {
@@ -94,11 +97,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// Lets the baseline follow drift where nothing is touched.
     fn follow_drift(&mut self, contact: &Contact, sound: bool) {
-        let clear = self.goal.clear(self.motion.observer.travel, &self.config);
-        let untouched = sound && (clear || contact.force < self.config.contact_off);
-        if self.tared && self.config.params.baseline_follows != 0 && untouched {
-            self.array.follow_drift(clear);
-            self.goal.warmth.zero();
+        let light = contact.force < self.config.contact_off;
+        let clear = self.goal.clear(self.motion.observer.travel, &self.config)
+            && (light || self.array.may_be_left(contact.force));
+        if self.tared && self.config.params.baseline_follows != 0 && sound && (light || clear) {
+            let share = self.array.follow_drift(clear);
+            self.goal.warmth.zero(share);
         }
     }
 }

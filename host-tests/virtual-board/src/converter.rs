@@ -9,6 +9,7 @@
 
 use crate::front_end::{Shared, Slot};
 use crate::injected::{self, Injected};
+use crate::inside;
 use crate::scan_timer::COMPARE_1;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
@@ -207,7 +208,11 @@ impl Converter {
         let mut cycles = 0;
         let mut words = Vec::new();
         for input in injected::inputs(registers) {
-            cycles += Self::sampling_cycles(registers, input);
+            let sampling = Self::sampling_cycles(registers, input);
+            if input >= inside::REFERENCE_INPUT && sampling * 1_000_000_000 < inside::SAMPLING_NS * self.clock_hz {
+                context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
+            }
+            cycles += sampling;
             words.push(front_end.word(self.nth, input, self.inside_on, self.after(begun_ns, cycles)));
             cycles += CONVERSION_CYCLES;
         }

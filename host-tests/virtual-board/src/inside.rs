@@ -7,6 +7,8 @@ use fingertip::chip::Factory;
 pub const CONVERTER: usize = 0;
 pub const REFERENCE_INPUT: usize = 17;
 pub const SENSOR_INPUT: usize = 18;
+/// Both want to be sampled for so long (DS10693).
+pub const SAMPLING_NS: u64 = 10_000;
 /// Where the factory keeps its codes: the reference's, and the sensor's at 30 and 110 degrees Celsius.
 pub const FACTORY_AT: u64 = 0x1fff_7a2a;
 /// What is around a board of which nothing else is said.

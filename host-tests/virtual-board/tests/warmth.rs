@@ -9,6 +9,8 @@ use common::{image, read_u16, read_u32, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
+use rigless::emulator::{Access, AccessKind};
+use rigless::soc::Width;
 use sim::encode;
 use sim::plant::{Plant, Setup};
 use sim::run::run;
@@ -21,6 +23,20 @@ const GAIN_PPM_PER_K: i32 = 3_600;
 const ZERO_PA_PER_K: i32 = 10;
 const START_MS: u64 = 60;
 const UNMEASURED_MC: i32 = -273_150;
+
+/// The first converter's CR1, bits of it, and SMPR1.
+const ADC1_CR1: u64 = 0x4001_2004;
+const SCAN: u64 = 1 << 8;
+const INJECTED_FOLLOWS: u64 = 1 << 10;
+const ADC1_SMPR1: u64 = 0x4001_200c;
+
+fn set(rig: &mut Rig, register: u64, bits: u64) {
+    rig.with(move |stand| {
+        let access = Access::new(AccessKind::Write, register, Width::W32, bits);
+        stand.session.access(access.at(stand.stop.instruction_count, stand.stop.at), stand.host);
+    })
+    .expect("it runs");
+}
 
 fn chip_mc(rig: &mut Rig) -> i32 {
     read_u32(rig, address::CHIP_MC) as i32
@@ -105,9 +121,60 @@ fn a_low_analogue_supply_is_told_and_makes_no_warmth() {
     assert!((3_095..=3_105).contains(&mv), "{mv} mV");
     let chip = chip_mc(&mut rig);
     assert!((chip - 25_000).abs() < 500, "{chip} mC");
-    // The scan starts anew; the mean goes on.
+}
+
+#[test]
+fn the_means_go_on_where_the_scan_starts_anew() {
+    let mut rig = warming(inside::factory());
+    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    rig.run_ms(40).expect("it runs");
+    let before = chip_mc(&mut rig);
     write_param(&mut rig, "settle_ns", 2_500);
-    rig.run_ms(60).expect("it runs");
+    rig.run_ms(400).expect("it runs");
+    let now_ns = rig.now_ns();
+    let true_mc = 1e3 * rig.finger(move |finger| finger.chip_c(now_ns)).expect("it runs");
+    let told = chip_mc(&mut rig);
+    assert!(
+        told > before + 2_000 && (f64::from(told) - true_mc).abs() < 1_000.0,
+        "{told} after {before}, {true_mc} mC"
+    );
+}
+
+#[test]
+fn codes_that_stay_away_are_no_temperature_and_the_finger_holds_on() {
+    let mut rig = warming(inside::factory());
+    rig.run_ms(200).expect("it runs");
+    assert!(chip_mc(&mut rig) > 25_000);
+    // No injected group behind the supply.
+    set(&mut rig, ADC1_CR1, SCAN);
+    rig.run_ms(80).expect("it runs");
+    assert_eq!((chip_mc(&mut rig), read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV)), (UNMEASURED_MC, 0));
+    assert!((5_900..=6_100).contains(&read_u16(&mut rig, address::SUPPLY_MV)), "the supply is read");
+    assert!(read_u32(&mut rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
+    set(&mut rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
+    rig.run_ms(80).expect("it runs");
+    assert!(chip_mc(&mut rig) > 25_000);
+    // The emulated converter tells where they are sampled too shortly.
+    rig.check_gaps().expect("nothing is missing");
+    set(&mut rig, ADC1_SMPR1, 0);
+    rig.run_ms(1).expect("it runs");
+    rig.check_gaps().expect_err("3 cycles are too few");
+}
+
+#[test]
+fn frames_shorter_than_the_three_conversions_find_the_supply_too() {
+    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &Options::default()).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    write_u8(&mut rig, address::FIT_LEVEL, 0);
+    write_param(&mut rig, "sample_cycles", 3);
+    write_param(&mut rig, "settle_ns", 500);
+    rig.run_ms(80).expect("it runs");
+    for _ in 0..200 {
+        rig.run_ms(1).expect("it runs");
+        let mv = read_u16(&mut rig, address::SUPPLY_MV);
+        assert!((5_900..=6_100).contains(&mv), "{mv} mV");
+    }
+    rig.check_gaps().expect("nothing starts before what is under way ends");
     assert!((chip_mc(&mut rig) - 25_000).abs() < 500);
 }
 

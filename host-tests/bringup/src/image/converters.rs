@@ -9,12 +9,10 @@ use fingertip::chip::FRAMES;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{Frame, ROWS};
 
-use crate::board::analogue::Analogue;
+use crate::board::analogue::{Analogue, REFERENCE};
 use crate::board::{converter, health, scan};
 use crate::{CYCLES_PER_US, passed, report};
 
-/// The reference's input.
-const REFERENCE: u8 = 17;
 const SAMPLES: u32 = 4_096;
 /// The column on the DAC's pin, PA4: the first that its converter takes.
 const COLUMN: usize = 5;

@@ -223,7 +223,7 @@ pub const STEPS: [Step; 22] = [
     ("Warmth::force", |m, s, mix| {
         m.warmth.observe((s.share_q32 & 15 != 0).then_some(Celsius::from_bits(s.words[0])), &m.config);
         if s.share_q32 & 0xf0 == 0 {
-            m.warmth.zero();
+            m.warmth.zero(s.share_q32 as i32 & 0x1_ffff);
         }
         mix.add(m.warmth.force(s.force, &m.config).to_bits());
     }),

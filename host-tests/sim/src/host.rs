@@ -95,11 +95,6 @@ impl Host {
         }
     }
 
-    /// Whether it reads the controller.
-    pub fn reads(&self) -> bool {
-        self.reader.is_some()
-    }
-
     /// The next packet that arrives by a time: when, and its goal. Times never fall.
     pub fn arrival(&mut self, time_s: f64, stages: &mut impl Stages) -> Option<(f64, f64)> {
         self.judge(time_s, stages);

@@ -1,9 +1,8 @@
-//! The bus from the host's side: bytes at their time, a byte stream, and whole transactions.
+//! The bus from the host's side: bytes at their time, and whole transactions.
 
 use crate::error::Error;
 use crate::rig::{Order, Rig};
 use crate::wire::TimedByte;
-use std::io::{Read, Write};
 use std::sync::mpsc;
 
 /// How far the run goes between two looks at what the image sent.
@@ -43,11 +42,6 @@ impl Rig {
         self.order(Order::Listen(Listening { wait_ns, quiet_since_ns, reply: Vec::new(), answer }))?;
         self.await_reached()?;
         self.answer(&answered)
-    }
-
-    /// The bus as a byte stream; reading runs the board.
-    pub fn stream(&mut self, wait_ns: u64) -> Stream<'_> {
-        Stream { rig: self, wait_ns }
     }
 }
 
@@ -95,45 +89,4 @@ pub fn packet_length(bytes: &[u8]) -> Option<usize> {
     }
     let length = bytes.get(5..7)?;
     Some(7 + usize::from(u16::from_le_bytes([length[0], length[1]])))
-}
-
-/// The bus as a byte stream. A read with nothing there runs the board until something comes, or times out in virtual
-/// time.
-#[derive(Debug)]
-pub struct Stream<'a> {
-    rig: &'a mut Rig,
-    wait_ns: u64,
-}
-
-impl Read for Stream<'_> {
-    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
-        let end_ns = self.rig.now_ns() + self.wait_ns;
-        loop {
-            let wanted = buffer.len();
-            let taken = self.rig.with(move |stand| {
-                let received = &mut stand.bench.received;
-                received.drain(..wanted.min(received.len())).map(|timed| timed.byte).collect::<Vec<_>>()
-            });
-            let taken = taken.map_err(std::io::Error::other)?;
-            buffer[..taken.len()].copy_from_slice(&taken);
-            if !taken.is_empty() || wanted == 0 {
-                return Ok(taken.len());
-            }
-            if self.rig.now_ns() >= end_ns {
-                return Err(std::io::ErrorKind::TimedOut.into());
-            }
-            self.rig.run_until_ns(self.rig.now_ns() + LOOK_NS).map_err(std::io::Error::other)?;
-        }
-    }
-}
-
-impl Write for Stream<'_> {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.rig.send(bytes).map_err(std::io::Error::other)?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        Ok(())
-    }
 }

@@ -2,16 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Width of the latency histogram's bins.
-pub const BIN_NS: u64 = 1_000;
-/// The histogram's bins; the last takes all above.
-pub const BINS: usize = 128;
-
 /// From the last conversion of a frame to the new duty.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Latency {
-    /// Frames by latency, in bins of [`BIN_NS`].
-    pub histogram: Vec<u64>,
+    /// Frames that were answered by a duty.
+    pub frames: u64,
     /// The longest.
     pub max_ns: u64,
     /// The shortest.
@@ -21,7 +16,7 @@ pub struct Latency {
 
 impl Default for Latency {
     fn default() -> Self {
-        Self { histogram: vec![0; BINS], max_ns: 0, min_ns: u64::MAX, open: None }
+        Self { frames: 0, max_ns: 0, min_ns: u64::MAX, open: None }
     }
 }
 
@@ -43,13 +38,8 @@ impl Latency {
             let latency_ns = at_ns - end_ns;
             self.max_ns = self.max_ns.max(latency_ns);
             self.min_ns = self.min_ns.min(latency_ns);
-            self.histogram[((latency_ns / BIN_NS) as usize).min(BINS - 1)] += 1;
+            self.frames += 1;
         }
-    }
-
-    /// Frames that were answered by a duty.
-    pub fn frames(&self) -> u64 {
-        self.histogram.iter().sum()
     }
 }
 

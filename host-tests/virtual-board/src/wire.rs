@@ -20,7 +20,6 @@ pub struct TimedByte {
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct Wire {
     outgoing: VecDeque<(u64, u8)>,
-    handed_over: u64,
     incoming: Vec<TimedByte>,
     single: bool,
 }
@@ -47,11 +46,6 @@ impl Wire {
         self.outgoing.len()
     }
 
-    /// Bytes that have gone to the port since the run began.
-    pub fn handed_over(&self) -> u64 {
-        self.handed_over
-    }
-
     /// Takes what the image has sent since the last time.
     pub fn take_received(&mut self) -> Vec<TimedByte> {
         std::mem::take(&mut self.incoming)
@@ -69,7 +63,6 @@ impl Peer for Wire {
 
     fn transmit(&mut self, now: VirtualNanos) -> Option<u16> {
         let (_, byte) = self.outgoing.pop_front_if(|(from_ns, _)| *from_ns <= now.0)?;
-        self.handed_over += 1;
         Some(u16::from(byte))
     }
 }

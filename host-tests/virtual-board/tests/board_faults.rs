@@ -11,7 +11,6 @@ use rigless::mcu::Operate;
 use rigless::soc::Width;
 use sim::plant::{Plant, Setup};
 use std::sync::Mutex;
-use virtual_board::flash::SECTOR;
 use virtual_board::{Fault, Options, Rig};
 
 /// A board that has run for 20 ms.
@@ -29,19 +28,6 @@ fn with_one_running(test: impl FnOnce(&mut Rig)) {
 
 fn frames(rig: &mut Rig) -> u64 {
     rig.scan_counts().expect("it runs").frames
-}
-
-#[test]
-fn converters_stall_and_go_on() {
-    with_one_running(|rig| {
-        rig.inject(Fault::ConvertersStall).expect("it runs");
-        let before = frames(rig);
-        rig.run_ms(2).expect("it runs");
-        assert!(frames(rig) <= before + 1, "a frame under way may end");
-        rig.mend(Fault::ConvertersStall).expect("it runs");
-        rig.run_ms(2).expect("it runs");
-        assert!(frames(rig) > before + 15);
-    });
 }
 
 /// At several instants of a frame, driven or not, and while the scan starts.
@@ -83,6 +69,8 @@ fn hangs(rig: &mut Rig) {
     // A crash, by a hang, after a watchdog's reset.
     let causes = [address::FAULT, address::CRASH_CAUSE, address::RESET_CAUSE].map(|place| read_u8(rig, place));
     assert_eq!(causes, [13, 3, 5]);
+    assert_eq!(read_u8(rig, address::TORQUE_ENABLE), 0);
+    assert!(!rig.bridge_edges().expect("it runs").last().is_some_and(|edge| edge.on));
 }
 
 #[test]
@@ -177,15 +165,6 @@ fn alert(rig: &mut Rig) -> Option<bool> {
 }
 
 #[test]
-fn a_bus_error_is_a_hard_fault_that_resets() {
-    let mut rig = running(&Options::default());
-    // The next access to TIM5, the frame guard.
-    rig.inject(Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 }).expect("it runs");
-    rig.run_ms(20).expect("it runs");
-    assert_eq!(rig.resets().expect("it runs").first().map(|reset| reset.cause.clone()).as_deref(), Some("software"));
-}
-
-#[test]
 fn what_is_stored_survives_a_snapshot_and_a_reboot() {
     let file = scratch("flash.snapshot");
     let mut rig = running(&Options::default());
@@ -224,15 +203,4 @@ fn the_timer_counts_every_edge_of_the_encoder_also_when_it_turns_impossibly_fast
             assert_eq!(counted, turned, "at {travel_mm} mm");
         }
     });
-}
-
-#[test]
-fn a_damaged_sector_can_be_preset() {
-    let damaged = Options { presets: vec![(SECTOR.start, vec![0x55; 64])], ..Options::default() };
-    let logs = |rig: &mut Rig| {
-        let lines = rig.log().expect("it runs");
-        lines.iter().any(|line| line.level.as_deref() != Some("info") && line.text.contains("record"))
-    };
-    assert!(logs(&mut running(&damaged)));
-    with_one_running(|rig| assert!(!logs(rig)));
 }

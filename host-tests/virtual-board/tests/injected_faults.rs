@@ -194,21 +194,6 @@ fn the_bus_falls_silent() {
 }
 
 #[test]
-fn a_starved_watchdog_resets_to_off_and_leaves_a_record() {
-    let mut rig = holding();
-    rig.inject(Fault::CoreHangs).expect("it runs");
-    let off_us = until_off_us(&mut rig, 60);
-    println!("core hangs: bridge off after {off_us:.1} us");
-    assert!(off_us <= 23_000.0, "{off_us} us");
-    rig.run_ms(20).expect("it runs");
-    assert_eq!(read_u8(&mut rig, address::FAULT), Number::Crash as u8);
-    assert_eq!(read_u8(&mut rig, address::RESET_CAUSE), 5, "watchdog");
-    assert_eq!(read_u8(&mut rig, address::CRASH_CAUSE), 3, "hang");
-    assert_eq!(read_u8(&mut rig, address::TORQUE_ENABLE), 0);
-    assert!(!rig.bridge_edges().expect("it runs").last().expect("it was on").on);
-}
-
-#[test]
 fn a_panic_or_a_hard_fault_resets_to_off_and_leaves_a_record() {
     // TIM5 is the frame guard, which control reads in every frame.
     let bus_error = Fault::BusError { from: 0x4000_0c00, to: 0x4000_1000 };
@@ -237,6 +222,11 @@ fn damaged_parameters_are_a_fault_that_the_bus_tells() {
     let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &options).expect("the image starts");
     rig.run_until_ns(20_000_000).expect("it runs");
     assert_eq!(read_u8(&mut rig, address::FAULT), Number::BrokenParameters as u8);
+    let told = |rig: &mut Rig| {
+        let lines = rig.log().expect("it runs");
+        lines.iter().any(|line| line.level.as_deref() != Some("info") && line.text.contains("record"))
+    };
+    assert!(told(&mut rig) && !told(&mut holding()));
     let refused = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::TORQUE_ENABLE, 1).map(drop));
     assert!(refused.expect("the client runs").is_err(), "torque stays off in a fault");
     assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), 5);

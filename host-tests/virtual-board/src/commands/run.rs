@@ -38,9 +38,9 @@ pub fn run(arguments: &Arguments) -> Result<(), Error> {
     let scan = rig.scan_counts()?;
     println!("scan         {} frames, {} conversions, {} triggers", scan.frames, scan.conversions, scan.triggers);
     let latency = rig.latency()?;
-    if latency.frames() > 0 {
+    if latency.frames > 0 {
         let (least, most) = (latency.min_ns as f64 * 1e-3, latency.max_ns as f64 * 1e-3);
-        println!("latency      {least:.3} to {most:.3} us from conversion to duty, {} duties", latency.frames());
+        println!("latency      {least:.3} to {most:.3} us from conversion to duty, {} duties", latency.frames);
     }
     if let Some(stack) = rig.stack_use()? {
         println!("stack        {} of {} bytes used", stack.used, stack.size);

@@ -29,7 +29,7 @@ impl Counts {
     /// # Errors
     /// The emulator stopped.
     pub fn of(rig: &mut Rig) -> Result<Self, Error> {
-        let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames());
+        let (at_ns, duties) = (rig.now_ns(), rig.latency()?.frames);
         Ok(Self { at_ns, scans: rig.scan_counts()?, instructions: rig.instructions()?, duties })
     }
 }

@@ -11,44 +11,22 @@ use crate::front_end::{Shared, Slot};
 use crate::injected::{self, Injected};
 use crate::inside;
 use crate::scan_timer::COMPARE_1;
+use crate::sequence::{self, CONVERSION_CYCLES};
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
-use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sqr1, sqr2, sqr3, sr};
+use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sr};
 use rigless::soc::stm32f427::generated::{ADC2, ADC3};
 use rigless::soc::stm32f427::peripherals::adc::DMA_REQUEST;
-use rigless::soc::{FieldSpec, Layout, Width};
+use rigless::soc::{Layout, Width};
 use rigless::time::{EventId, VirtualNanos};
 use serde::{Deserialize, Serialize};
 
-/// `SMPx`, RM0090 13.13.4, in converter cycles.
-const SAMPLING_CYCLES: [u64; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
-/// Cycles of a 12-bit conversion after sampling, 13.7.
-const CONVERSION_CYCLES: u64 = 12;
 /// `EXTSEL` of TIM8_CC1, 13.13.3.
 const TIM8_CC1: u64 = 13;
 /// The interrupt line of the converters, table 70.
 const GLOBAL: usize = 0;
 /// The row drives' port, and how many of its pins are rows.
 const ROW_PORT: (&str, usize) = ("GPIOB", 10);
-
-const SEQUENCE: [(Register, &FieldSpec); 16] = [
-    (Register::Sqr3, sqr3::SQ1),
-    (Register::Sqr3, sqr3::SQ2),
-    (Register::Sqr3, sqr3::SQ3),
-    (Register::Sqr3, sqr3::SQ4),
-    (Register::Sqr3, sqr3::SQ5),
-    (Register::Sqr3, sqr3::SQ6),
-    (Register::Sqr2, sqr2::SQ7),
-    (Register::Sqr2, sqr2::SQ8),
-    (Register::Sqr2, sqr2::SQ9),
-    (Register::Sqr2, sqr2::SQ10),
-    (Register::Sqr2, sqr2::SQ11),
-    (Register::Sqr2, sqr2::SQ12),
-    (Register::Sqr1, sqr1::SQ13),
-    (Register::Sqr1, sqr1::SQ14),
-    (Register::Sqr1, sqr1::SQ15),
-    (Register::Sqr1, sqr1::SQ16),
-];
 
 /// Conversions under way, all of them over at the event.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -97,24 +75,6 @@ impl Converter {
         }
     }
 
-    fn length(registers: &RegisterFile) -> usize {
-        if cr1::SCAN.is_set(registers.get(Register::Cr1)) {
-            sqr1::L.get(registers.get(Register::Sqr1)) as usize + 1
-        } else {
-            1
-        }
-    }
-
-    fn input(registers: &RegisterFile, rank: usize) -> usize {
-        let (register, field) = SEQUENCE[rank % SEQUENCE.len()];
-        field.get(registers.get(register)) as usize
-    }
-
-    fn sampling_cycles(registers: &RegisterFile, input: usize) -> u64 {
-        let (register, place) = if input < 10 { (Register::Smpr2, input) } else { (Register::Smpr1, input - 10) };
-        SAMPLING_CYCLES[(registers.get(register) >> (3 * place) & 0b111) as usize]
-    }
-
     fn after(&self, begun_ns: u64, cycles: u64) -> u64 {
         begun_ns + (cycles * 1_000_000_000).div_ceil(self.clock_hz)
     }
@@ -146,13 +106,13 @@ impl Converter {
             self.status = sr::OVR.set(self.status, 1);
             return;
         }
-        let length = Self::length(registers);
+        let length = sequence::length(registers);
         if self.rank >= length {
             self.rank = 0;
         }
         let ranks = if by_dma { length - self.rank } else { 1 };
         let cycles: u64 = (self.rank..self.rank + ranks)
-            .map(|rank| Self::sampling_cycles(registers, Self::input(registers, rank)) + CONVERSION_CYCLES)
+            .map(|rank| sequence::sampling_cycles(registers, sequence::input(registers, rank)) + CONVERSION_CYCLES)
             .sum();
         let begun_ns = slot.map_or(context.now().0, |slot| slot.begun_ns);
         let done = VirtualNanos(self.after(begun_ns, cycles));
@@ -163,15 +123,15 @@ impl Converter {
 
     fn finish(&mut self, running: Running, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let mut cycles = 0;
-        let mut samples = [(0, 0); SEQUENCE.len()];
+        let mut samples = [(0, 0); sequence::RANKS];
         for (place, sample) in samples.iter_mut().enumerate().take(running.ranks) {
-            let input = Self::input(registers, self.rank + place);
-            cycles += Self::sampling_cycles(registers, input);
+            let input = sequence::input(registers, self.rank + place);
+            cycles += sequence::sampling_cycles(registers, input);
             *sample = (input, self.after(running.begun_ns, cycles));
             cycles += CONVERSION_CYCLES;
         }
         self.rank += running.ranks;
-        let complete = self.rank >= Self::length(registers);
+        let complete = self.rank >= sequence::length(registers);
         let control = registers.get(Register::Cr2);
         let by_dma = cr2::DMA.is_set(control);
         let mut front_end = self.front_end.lock();
@@ -208,7 +168,7 @@ impl Converter {
         let mut cycles = 0;
         let mut words = Vec::new();
         for input in injected::inputs(registers) {
-            let sampling = Self::sampling_cycles(registers, input);
+            let sampling = sequence::sampling_cycles(registers, input);
             if input >= inside::REFERENCE_INPUT && sampling * 1_000_000_000 < inside::SAMPLING_NS * self.clock_hz {
                 context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");
             }

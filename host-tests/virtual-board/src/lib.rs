@@ -36,6 +36,7 @@ pub mod rig;
 pub mod scan_timer;
 pub mod scan_updates;
 pub mod scene;
+mod sequence;
 pub mod serve;
 pub mod stack;
 pub mod stand;

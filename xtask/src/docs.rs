@@ -11,16 +11,16 @@ use crate::{
 use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
-/// Files that programs write: path, and the package and its example that print their text.
-const GENERATED: [(&str, (&str, &str)); 8] = [
-    ("docs/control-table.md", ("host-tests", "control-table")),
-    ("docs/scenes.md", ("sim", "scenes-page")),
-    ("docs/budget.md", ("sim", "budget-page")),
-    ("docs/pictures/imports.svg", ("host-tests", "imports")),
-    ("docs/pictures/schematic.svg", ("host-tests", "schematic")),
-    ("examples/dynamixel/fingertip.model", ("host-tests", "model-file")),
-    ("examples/dynamixel/fingertip_direct.model", ("host-tests", "model-file-direct")),
-    ("python/fingertip/registers.py", ("host-tests", "python-package")),
+/// Files that programs write: path, and the example that prints their text.
+const GENERATED: [(&str, &str); 8] = [
+    ("docs/control-table.md", "control-table"),
+    ("docs/scenes.md", "scenes-page"),
+    ("docs/budget.md", "budget-page"),
+    ("docs/pictures/imports.svg", "imports"),
+    ("docs/pictures/schematic.svg", "schematic"),
+    ("examples/dynamixel/fingertip.model", "model-file"),
+    ("examples/dynamixel/fingertip_direct.model", "model-file-direct"),
+    ("python/fingertip/registers.py", "python-package"),
 ];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
@@ -28,7 +28,7 @@ const FIGURES: &str = "docs/demo.json";
 pub const PICTURES: &str = "docs/pictures";
 /// The paper's figures among the pictures.
 const PAPER: [&str; 3] = ["docs/pictures/figure-7.svg", "docs/pictures/figure-10.svg", "docs/pictures/figure-11.svg"];
-const README: (&str, (&str, &str)) = ("README.md", ("host-tests", "readme"));
+const README: (&str, &str) = ("README.md", "readme");
 
 /// Flags of `cargo xtask docs`.
 #[derive(clap::Args)]
@@ -80,9 +80,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// The text that a program prints.
-fn print((package, example): (&str, &str), argument: Option<&Path>) -> Result<String> {
+fn print(example: &str, argument: Option<&Path>) -> Result<String> {
     let mut command = console::cargo("run");
-    command.args(["--quiet", "--package", package, "--example", example, "--"]).args(argument);
+    command.args(["--quiet", "--example", example, "--"]).args(argument);
     console::output(&mut command)
 }
 

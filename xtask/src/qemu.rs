@@ -39,8 +39,9 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 /// The image does not build, or a test fails.
 pub fn test(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
+    // Of all packages, like `cargo test`: so nothing is compiled anew with other features.
     let mut command = console::cargo("test");
-    command.args(["--package", "host-tests", "--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
+    command.args(["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
     host::test(&mut command, console)
 }
 

@@ -8,6 +8,7 @@ use crate::{
     toolchain::{self, Choice},
 };
 use anyhow::{Context, Result};
+use std::process::Command;
 
 /// Flags of `cargo xtask test`.
 #[derive(clap::Args)]
@@ -37,7 +38,7 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;
-        let mut command = host::cargo("test", "virtual-board");
+        let mut command = on_a_board(&["--lib", "--test", "board"]);
         let checking = bringup::build(toolchain::ensure(choice, console)?, console)?;
         command.env("FINGERTIP_IMAGE", &image()?.elf).env("FINGERTIP_PYTHON", &python);
         command.env("FINGERTIP_BRINGUP", &checking.elf);
@@ -45,17 +46,23 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("Python package on a served finger", |console| {
         let python = python::ensure(console)?;
-        let mut command = host::cargo("test", "serve");
-        command.args(["--test", "python"]).env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
+        let mut command = on_a_board(&["--test", "python"]);
+        command.env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
         host::test(&mut command, console)
     });
-    stages.stage("stream to Foxglove", |console| {
-        let mut command = host::cargo("test", "fingertip-cli");
-        host::test(command.args(["--features", "foxglove", "--test", "stream"]), console)
-    });
+    stages.stage("stream to Foxglove", |console| host::test(&mut on_a_board(&["--test", "stream"]), console));
     stages.stage("reports in a browser", |console| {
         let program = browser::ensure(console)?;
-        host::test(host::cargo("test", "browser").env("FINGERTIP_CHROMIUM", &program), console)
+        host::test(on_a_board(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")
+}
+
+/// Tests of the packages that stand around an image or a served finger. All of them are selected each time, so that they
+/// agree on the features of what they share, and it is compiled once.
+fn on_a_board(targets: &[&str]) -> Command {
+    let mut command = host::cargo("test", "virtual-board");
+    command.args(["--package", "serve", "--package", "browser", "--package", "fingertip-cli"]);
+    command.args(["--features", "fingertip-cli/foxglove"]).args(targets);
+    command
 }

@@ -99,7 +99,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     let plugin = plugin(console)?;
     let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
     let mut command = console::cargo("test");
-    command.args(["--package", "m4-timing", "--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
+    command.args(["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
 
@@ -111,7 +111,7 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
     let recording = folder()?.join("recording.bin");
     let mut command = console::cargo("run");
-    command.args(["--quiet", "--package", "host-tests", "--example", "recording", "--"]);
+    command.args(["--quiet", "--example", "recording", "--"]);
     console.run(command.arg(&recording))?;
     measure(&image, Some(&recording), console)
 }

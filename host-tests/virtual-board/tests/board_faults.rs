@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
+use crate::common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
 use fingertip::shipped::{REGISTERS, address};
 use rigless::emulator::{Access, AccessKind};
 use rigless::mcu::Operate;

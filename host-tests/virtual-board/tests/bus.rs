@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use crate::common::{WAIT_NS, holding, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
 use fingertip::link::crc;

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
 use fingertip::shipped::address;
 use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_param, write_u8};
+use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_param, write_u8};
 use fingertip::capture::{Ended, Replayed, replay};
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;

@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding};
+use crate::common::{WAIT_NS, holding};
 use fingertip::shipped::address;
 use std::time::Duration;
 

@@ -1,8 +1,6 @@
 //! The drive of the emulated board, commissioned over the bus as its owner would.
 
-mod common;
-
-use common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_u8};
+use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_u8};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Mode;

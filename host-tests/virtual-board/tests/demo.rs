@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{image, scratch};
+use crate::common::{image, scratch};
 use sim::demo::{figures::missed, pictures, table};
 use virtual_board::demo::{self, Plan};
 

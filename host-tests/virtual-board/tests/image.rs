@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
+use crate::common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
 use sim::plant::{Plant, Setup};

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding, holding_on_a_bus, image, read_u8, write_goal, write_u8};
+use crate::common::{WAIT_NS, holding, holding_on_a_bus, image, read_u8, write_goal, write_u8};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Fault as Number;

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::image;
+use crate::common::image;
 use sim::run::run;
 use sim::scene::library;
 use std::sync::Mutex;

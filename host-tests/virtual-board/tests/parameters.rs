@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, image, read_u8, read_u32};
+use crate::common::{WAIT_NS, image, read_u8, read_u32};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
 use fingertip::store::SLOT_BYTES;

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{WAIT_NS, holding_on_a_bus, read_u8, write_u8};
+use crate::common::{WAIT_NS, holding_on_a_bus, read_u8, write_u8};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::packet::StatusError;
 use fingertip::link::table::{Access, Kind, Register};

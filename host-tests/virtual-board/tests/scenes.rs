@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{image, scratch};
+use crate::common::{image, scratch};
 use sim::agreement::{Agreement, BEYOND_MM, BEYOND_N, Path};
 use sim::metrics;
 use sim::scene::{Scene, read};

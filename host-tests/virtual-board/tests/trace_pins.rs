@@ -2,9 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{image, write_param};
+use crate::common::{image, write_param};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use sim::plant::{Plant, Setup};

@@ -3,9 +3,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-mod common;
-
-use common::{image, read_u16, read_u32, write_goal, write_param, write_u8};
+use crate::common::{image, read_u16, read_u32, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};

@@ -1,5 +1,4 @@
 //! What the tests of the flash image share.
-#![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};

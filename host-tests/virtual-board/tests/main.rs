@@ -1,0 +1,36 @@
+//! The tests of the flash image on the emulated board, as one program: it is linked once, both cores have work until the
+//! end, and a board that holds 1 N is started once. One file of them: `cargo test ... --test board warmth::`.
+
+mod board_faults;
+mod bringup;
+mod bus;
+mod calibrated;
+mod capture;
+mod client;
+mod clients;
+mod commission;
+mod common;
+mod demo;
+mod fit_level;
+mod image;
+mod injected_faults;
+mod library;
+mod parameters;
+mod refused_writes;
+mod scenes;
+mod serve;
+mod trace_pins;
+mod warmth;
+
+/// A file that is not in the list above would never be compiled.
+#[test]
+fn every_file_is_taken() {
+    let folder = std::path::Path::new(env!("FINGERTIP_ROOT")).join("host-tests/virtual-board/tests");
+    for entry in folder.read_dir().expect("the sources are there") {
+        let path = entry.expect("an entry").path();
+        if let Some(name) = path.file_stem().filter(|name| path.extension() == Some("rs".as_ref()) && *name != "main") {
+            let line = format!("mod {};", name.display());
+            assert!(include_str!("main.rs").lines().any(|other| other == line), "{line}");
+        }
+    }
+}

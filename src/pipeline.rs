@@ -123,6 +123,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         // one's.
         let sound = monitor::array_sound(picture, &self.config);
         let fits = sound && !matches!(self.status.mode, Mode::Identify | Mode::Commission);
+        if matches!(self.status.mode, Mode::Identify | Mode::Commission) {
+            self.fit.lose();
+        }
         let contact = if fits {
             self.fit.read(picture, &self.config)
         } else if sound || !watched {
@@ -194,6 +197,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if mode != Mode::Identify {
             self.calibrator.interrupt();
         }
+        if mode == Mode::Identify {
+            self.goal.measures();
+        }
         let reference = match mode {
             Mode::Off | Mode::Tare | Mode::Fault | Mode::Commission => None,
             Mode::Approach | Mode::Force | Mode::Release => {
@@ -228,7 +234,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.calibrator.work(&self.array, &self.config);
         self.status.drift = self.goal.warmth.force(command.goal, &self.config);
         let held = self.goal.creep.less(contact.force).0.saturating_sub(self.status.drift.0);
-        self.scale.observe(mode, Newtons(held), &self.config);
+        self.scale.observe(mode, command.goal, Newtons(held), &self.config);
         if command.shown_request != self.status.taken.shown {
             self.status.taken.shown = command.shown_request;
             self.scale.take(command.shown_mn, &contact);

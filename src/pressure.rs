@@ -205,7 +205,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             (row.gains, row.moments) = (*gains, *moments);
         }
         self.mask = *mask;
-        (self.picture.bad, self.picture.bad_count) = (*mask, 0);
+        (self.picture.bad, self.picture.bad_count, self.picture.bad_again) = (*mask, 0, 0);
         self.touched = Touched::NONE;
         self.start_tare();
     }

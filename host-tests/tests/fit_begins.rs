@@ -5,7 +5,7 @@ use fingertip::contact::{CONFIDENCE_LEAST, FitLevel};
 use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
+use fingertip::shipped::{Config, Fit, Frame, Picture, Pipeline, TARE_FRAMES};
 use sim::plant::{Plant, Setup};
 
 /// The fit of one geometry says nothing of another.
@@ -38,6 +38,31 @@ fn other_parameters_begin_the_fit_anew() {
                 pipelines.each_mut().map(|pipeline| pipeline.step(&frame, &sense, &command).1.contact);
             if count >= TARE_FRAMES + 237 {
                 assert_eq!(before, fresh, "{pitch_um} um, {tip_radius_um} um, frame {count}");
+            }
+        }
+    }
+}
+
+/// A fit that is handed another geometry in the middle of a refinement takes it as a new one, by itself: its sums would
+/// overflow.
+#[test]
+fn a_fit_that_is_handed_another_geometry_begins_anew() {
+    let config = |pitch_um: i32, tip_radius_um: i32| {
+        Config::shipped(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT }).unwrap()
+    };
+    let mut rng = fastrand::Rng::with_seed(7);
+    let mut picture = Picture::EMPTY;
+    let (mut fit, last) = (Fit::default(), config(4_000, 4_000));
+    for (pitch_um, tip_radius_um) in [(500, 16_000), (1_500, 10_000), (500, 4_000)] {
+        let first = config(pitch_um, tip_radius_um);
+        for change in 1..200 {
+            picture.taxels.as_flattened_mut().fill_with(|| rng.i32(0..60_000));
+            picture.peak = *picture.taxels.as_flattened().iter().max().unwrap();
+            picture.sum = picture.taxels.as_flattened().iter().sum();
+            (0..=change % 37).for_each(|_| drop(fit.read(&picture, &first)));
+            let mut fresh = Fit::default();
+            for _ in 0..20 {
+                assert_eq!(fit.read(&picture, &last), fresh.read(&picture, &last), "{pitch_um} um, change {change}");
             }
         }
     }

@@ -13,9 +13,9 @@ const POINTS: usize = 8;
 fn held(scale: &mut Scale, read_n: f64, shown_mn: i32) -> Option<Refusal> {
     let config = Config::shipped(&Params::DEFAULT).unwrap();
     let contact = Contact { force: Newtons::from_bits((read_n * 65_536.0) as i32), ..Contact::default() };
-    scale.observe(Mode::Approach, contact.force, &config);
+    scale.observe(Mode::Approach, contact.force, contact.force, &config);
     for _ in 0..8_000 {
-        scale.observe(Mode::Force, contact.force, &config);
+        scale.observe(Mode::Force, contact.force, contact.force, &config);
     }
     scale.take(shown_mn, &contact);
     scale.standing().refusal

@@ -79,6 +79,8 @@ pub struct Scale {
     points: [[i32; 2]; POINTS],
     standing: Standing,
     held_ns: u32,
+    /// Which force that is.
+    goal: Newtons,
     /// A mean of the force, Q16 of its bits.
     mean: i64,
 }
@@ -90,6 +92,7 @@ impl Scale {
             points: [[0; 2]; POINTS],
             standing: Standing { refusal: None, points: 0, factor_ppm: 0, sigma_ppm: 0 },
             held_ns: 0,
+            goal: Newtons::ZERO,
             mean: 0,
         }
     }
@@ -101,14 +104,14 @@ impl Scale {
 
     /// Forgets all numbers.
     pub fn forget(&mut self) {
-        *self = Self { held_ns: self.held_ns, mean: self.mean, ..Self::new() };
+        *self = Self { held_ns: self.held_ns, goal: self.goal, mean: self.mean, ..Self::new() };
     }
 
     /// Follows the force that is held: the reading without its creep and its drift, which are taken off beside the scale.
     #[inline(always)]
-    pub fn observe(&mut self, mode: Mode, force: Newtons, config: &Config) {
+    pub fn observe(&mut self, mode: Mode, goal: Newtons, force: Newtons, config: &Config) {
         let force = i64::from(force.to_bits()) << 16;
-        if mode != Mode::Force {
+        if mode != Mode::Force || core::mem::replace(&mut self.goal, goal) != goal {
             (self.held_ns, self.mean) = (0, force);
             return;
         }

@@ -81,6 +81,8 @@ pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     /// How far the indentation follows the sum's force: d over twice that force.
     follows: i32,
     equations: Equations<ROWS, COLUMNS>,
+    /// Of the array that all this was found on, in tip radii.
+    pitch: i32,
     confidence: u8,
     /// See [`Contact::doubt`], Q8.
     doubt: u32,
@@ -117,6 +119,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             forces: 0,
             follows: 0,
             equations: Equations::NONE,
+            pitch: 0,
             confidence: 255,
             doubt: 0,
             astray: 0,
@@ -146,6 +149,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     pub fn read(&mut self, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
         let force = picture.force(config);
         self.at_work = false;
+        // The sums' bound holds for one table of nodes, which is the pitch's.
+        if self.pitch != config.geometry.pitch {
+            self.lose();
+            self.pitch = config.geometry.pitch;
+        }
         if self.fit_level.rows(ROWS) == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);

@@ -51,6 +51,11 @@ impl Goal {
         *self = Self { warmth: self.warmth, ..Self::default() };
     }
 
+    /// A press that measures goes its own way: what it touches is another surface.
+    pub fn measures(&mut self) {
+        (self.mode, self.lost) = (Mode::Identify, false);
+    }
+
     /// The speed to follow in a mode that drives the bridge.
     ///
     /// Approach and force follow the same curve, d_goal - d; an approach is only slower. So contact changes nothing but
@@ -66,6 +71,10 @@ impl Goal {
         limits: &mut Limits,
     ) -> Reference {
         let travel = motion.observer.travel;
+        // Nothing is pressed that deep: it was lost indeed.
+        self.lost &= self
+            .surface
+            .is_some_and(|surface| travel.0.saturating_sub(surface.0) <= config.tip.indentation(config.force_fault).0);
         self.enter(mode, contact, travel, config);
         self.creep.observe(mode == Mode::Force, contact.force, config);
         let (way, quick, slack) = if mode == Mode::Release {
@@ -97,12 +106,17 @@ impl Goal {
             return;
         }
         let before = core::mem::replace(&mut self.mode, mode);
-        if mode == Mode::Force || before == Mode::Off && contact.force >= config.contact_on {
+        if mode == Mode::Force || matches!(before, Mode::Off | Mode::Identify) && contact.force >= config.contact_on {
             let deep = if contact.doubt > 0 { contact.indentation.max(self.felt) } else { contact.indentation };
             let surface = Millimetres(travel.0.saturating_sub(deep.0));
             // A contact that was lost only to the array is where it was.
             let kept = self.surface.filter(|_| self.lost && contact.doubt > 0);
             self.surface = Some(kept.map_or(surface, |before| before.min(surface)));
+        }
+        // What is held may have come along, towards the finger.
+        if before == Mode::Force && mode == Mode::Release && contact.force >= config.contact_on {
+            let now = Millimetres(travel.0.saturating_sub(contact.indentation.0));
+            self.surface = self.surface.map(|surface| surface.min(now));
         }
         self.lost = before == Mode::Force && mode == Mode::Approach;
         if mode == Mode::Release {
@@ -141,7 +155,7 @@ impl Goal {
         }
         let mut sensed = contact.indentation.0.saturating_add(since_scan(motion.observer.speed, config));
         if contact.doubt > 0
-            && let Some(surface) = self.surface
+            && let Some(surface) = self.surface.filter(|_| self.mode == Mode::Force || self.lost)
         {
             let deeper = motion.observer.travel.0.saturating_sub(surface.0).saturating_sub(sensed).max(I8F24::ZERO);
             if contact.doubt > u8::MAX / 2 {

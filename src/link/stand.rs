@@ -86,6 +86,11 @@ impl Stand {
         }
     }
 
+    /// Whether what was measured is about to be forgotten.
+    pub fn forgets(&self, command: &Command) -> bool {
+        command.forget_request != self.taken.forget
+    }
+
     /// Whether the motor moves to be measured, or is about to.
     pub fn commissioning(&self, command: &Command) -> bool {
         let waits = command.commission_request != self.taken.commission;

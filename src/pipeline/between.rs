@@ -15,6 +15,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// anew, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
+        self.array.forget_line();
         self.fit.lose();
         self.interrupt_commission();
         // What was measured belonged to the parameters before.

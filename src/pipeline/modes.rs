@@ -98,11 +98,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Lets the baseline follow drift where nothing is touched.
     fn follow_drift(&mut self, contact: &Contact, sound: bool) {
         let light = contact.force < self.config.contact_off;
-        let clear = self.goal.clear(self.motion.observer.travel, &self.config)
-            && (light || self.array.may_be_left(contact.force));
+        let stands_clear = self.goal.clear(self.motion.observer.travel, &self.config);
+        let clear = stands_clear && (light || self.array.may_be_left(contact.force));
         if self.tared && self.config.params.baseline_follows != 0 && sound && (light || clear) {
             let share = self.array.follow_drift(clear);
             self.goal.warmth.zero(share);
+        } else if stands_clear {
+            self.array.pass();
         }
     }
 }

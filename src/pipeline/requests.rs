@@ -66,7 +66,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.status.identification = self.press.outcome();
         }
         self.status.commissioning = self.commission.outcome();
-        if asked.calibrate {
+        // A press before that is being worked out has its answer first.
+        if asked.calibrate && !self.calibrator.busy() {
             self.status.taken.calibrate = command.calibrate_request;
             self.calibrator.refuse(Unfit::NotReady);
             self.status.calibration = self.calibrator.standing();
@@ -96,7 +97,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         // The one waits for the other, and for what a press before left to be worked out.
         let waits = about_to_drive || self.tared && (mode == Mode::Identify || self.calibrator.busy());
-        if asked.calibrate && (self.calibrator.running() || !command.torque || !waits) {
+        let works = self.calibrator.busy() && !self.calibrator.running();
+        if asked.calibrate && (self.calibrator.running() || !works && (!command.torque || !waits)) {
             self.status.taken.calibrate = command.calibrate_request;
             if !self.calibrator.running() {
                 self.calibrator.refuse(Unfit::NotReady);

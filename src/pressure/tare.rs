@@ -31,6 +31,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
         self.baseline_line = None;
+        self.held = Newtons::ZERO;
+    }
+
+    /// Another characteristic may count from now on.
+    pub fn forget_line(&mut self) {
+        self.baseline_line = None;
     }
 
     /// Takes the picture last read into the tare's running means; true when the tare is complete.
@@ -71,6 +77,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
         }
         weight
+    }
+
+    /// A frame of a clear tip that is not learnt from: what comes later is another touch.
+    pub fn pass(&mut self) {
+        self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
+        if self.baseline_row == 0 {
+            self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
+        }
     }
 
     /// Something is touched with this force: the baseline that it leaves is learnt anew.

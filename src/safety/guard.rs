@@ -69,6 +69,8 @@ pub struct Guard {
     /// Where a touch began, less its indentation.
     surface: Option<i32>,
     touching: bool,
+    /// Whether this touch has its surface.
+    placed: bool,
     presses: bool,
     /// Mean force, Q16 N.
     force: i32,
@@ -194,15 +196,21 @@ impl Guard {
     fn touch(&mut self, pressing: bool, depth: Millimetres, config: &Config) {
         if self.force < config.contact_off.to_bits() {
             self.touching = false;
-        } else if !self.touching && self.force >= config.contact_on.to_bits() {
+        } else if self.force >= config.contact_on.to_bits() {
             self.touching = true;
-            if pressing {
-                let surface = self.travel.saturating_sub(depth.to_bits());
+            let surface = self.travel.saturating_sub(depth.to_bits());
+            let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
+            let back = back.max(config.bounds.back.to_bits().saturating_neg());
+            if pressing && !self.placed {
+                self.placed = true;
                 self.surface = Some(surface);
-                let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
-                self.floor = back.max(config.bounds.back.to_bits().saturating_neg());
+                self.floor = back;
+            } else if pressing {
+                // What is held may come along, towards the finger.
+                self.floor = self.floor.min(back);
             }
         }
+        self.placed &= self.touching && pressing;
     }
 
     /// What the motor feels where the array shows nothing.

@@ -82,6 +82,7 @@ impl Bench {
             clear_request: clear,
             identify_request: identify,
             commission_request: commission,
+            forget_request: forget,
             torque,
             ..
         } = self.server.command();
@@ -91,7 +92,7 @@ impl Bench {
         if tare != self.status.taken.tare {
             self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
         }
-        self.status.taken = Taken { tare, clear, identify, commission, ..self.status.taken };
+        self.status.taken = Taken { tare, clear, identify, commission, forget, ..self.status.taken };
     }
 
     /// What the bus sends in return, packet by packet.

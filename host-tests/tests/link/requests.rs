@@ -185,6 +185,7 @@ fn a_calibration_is_asked_for_and_accepted_where_that_can_be() {
     assert_eq!((bench.server.settings().record.params, bench.number(address::SAVED_STATE, 1)), (params, 1));
     let actions = bench.server.take_actions();
     assert!(actions.calibrate && !actions.configure);
+    bench.take_up();
     // A quarter more force for each code: fewer codes for a kPa, and a tip that is harder by that.
     assert_eq!(bench.write(address::SCALE, &[3]), Ok(()));
     let after = bench.server.settings().record.params;
@@ -197,6 +198,7 @@ fn a_calibration_is_asked_for_and_accepted_where_that_can_be() {
 fn a_factor_that_leads_out_of_range_changes_nothing() {
     let mut bench = Bench::new();
     bench.write_parameter("modulus_pa", 1_900_000);
+    bench.take_up();
     bench.status.scale = scale::Standing { points: 1, factor_ppm: 1_100_000, sigma_ppm: 900, refusal: None };
     let before = *bench.server.settings();
     assert_eq!(bench.write(address::SCALE, &[3]), Err(4));

@@ -116,8 +116,15 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
 
     fn commit(&mut self, mut staged: Staged<ROWS, COLUMNS>) {
         let (before, after) = (&self.settings.record, &staged.settings.record);
-        staged.actions.configure |= before.params != after.params;
-        staged.actions.calibrate |= before.gains != after.gains;
+        let params = before.params != after.params;
+        staged.actions.configure |= params;
+        let gains = before.gains != after.gains;
+        staged.actions.calibrate |= gains;
+        // What was measured with those before is void from now on, not only once the loop has the others.
+        if params || gains {
+            let forget = &mut staged.settings.command.forget_request;
+            *forget = forget.wrapping_add(1);
+        }
         staged.actions.baud |= before.baud_code != after.baud_code;
         if before != after {
             staged.settings.saved = Saved::Changed;

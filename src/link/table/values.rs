@@ -101,7 +101,9 @@ pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
     if staged.stand.hindrance(&staged.settings.record.params, staged.actions) != Hindrance::None {
         return Err(StatusError::Result);
     }
-    set_watchdog(staged, 0)?;
+    if staged.settings.watchdog_tripped {
+        set_watchdog(staged, 0)?;
+    }
     set_torque(staged, 0)?;
     bump(&mut staged.settings.command.clear_request, 1);
     Ok(())
@@ -117,7 +119,7 @@ pub(super) fn set_calibrate<const ROWS: usize, const COLUMNS: usize>(
         1 => bump(&mut command.calibrate_request, 1),
         2 => bump(&mut command.forget_request, 1),
         3 if command.torque => return Err(StatusError::Access),
-        3 if !staged.stand.proposed => return Err(StatusError::Result),
+        3 if !staged.stand.proposed || staged.stand.forgets(command) => return Err(StatusError::Result),
         3 => staged.accept = true,
         _ => {}
     }
@@ -133,7 +135,7 @@ pub(super) fn set_scale<const ROWS: usize, const COLUMNS: usize>(
     match value {
         2 => bump(&mut staged.settings.command.forget_request, 1),
         3 if staged.settings.command.torque => return Err(StatusError::Access),
-        3 if factor_ppm == 0 => return Err(StatusError::Result),
+        3 if factor_ppm == 0 || staged.stand.forgets(&staged.settings.command) => return Err(StatusError::Result),
         3 => {
             let params = &mut staged.settings.record.params;
             let by = |value: i32, over: i64, under: i64| {

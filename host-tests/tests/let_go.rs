@@ -1,0 +1,184 @@
+//! A goal of 0 lets go, whatever went before.
+
+use fingertip::config::newtons;
+use fingertip::params::Params;
+use fingertip::shipped::Config;
+use fingertip::state::Mode;
+use sim::effects::set::{Named, Set};
+use sim::native::bench::Bench;
+use sim::scene::read;
+use sim::setup::Setup;
+
+fn run<E: Set>(board: &mut Bench<E>, seconds: f64) {
+    let until = board.time_s() + seconds;
+    while board.time_s() < until {
+        board.step();
+    }
+}
+
+fn bench() -> Bench {
+    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    board.tare();
+    board
+}
+
+/// An ordinary finger: noise, friction, hysteresis, creep, uneven gains.
+fn ordinary(seed: u64) -> Bench<Named> {
+    let text = format!(
+        "about = \"a finger\"\nseed = {seed}\nduration_s = 1.0\n[object]\ndistance_mm = 5.0\ncentre_x_mm = 1.0\n\
+        [effects.noise]\nrms_codes = 1.5\n[effects.dry_friction]\ntorque_mnm = 0.15\n[effects.hysteresis]\nwidth_percent = 4\n\
+        [effects.creep]\nrate_percent_per_decade = 2\n[effects.gain_spread]\nrms_percent = 6\n\
+        [[script]]\nat_s = 0.0\ngoal_n = 0.0\n"
+    );
+    let mut board = Bench::new(&read("t.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"))).unwrap();
+    board.tare();
+    board
+}
+
+fn told<E: Set>(board: &mut Bench<E>) -> String {
+    let (truth, status) = (board.truth(), *board.status());
+    format!(
+        "{:?} {:?}, true {:.3} N, read {:.3} N, at {:.3} mm, limits {:014b}",
+        status.mode,
+        status.fault,
+        truth.force_n,
+        status.contact.force.0.to_num::<f64>(),
+        truth.travel_mm,
+        status.limits.0
+    )
+}
+
+/// 5 mm/s, frame by frame.
+fn carry<E: Set>(board: &mut Bench<E>, from: f64, to: f64) {
+    let frames = ((to - from).abs() / 5.0 / 1e-4).ceil() as u32;
+    for frame in 1..=frames {
+        board.place_object(from + (to - from) * f64::from(frame) / f64::from(frames));
+        board.step();
+    }
+}
+
+fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) -> Option<String> {
+    board.command().goal = newtons(goal_mn);
+    run(board, 0.7);
+    carry(board, 5.0, 5.0 - moved_mm);
+    run(board, 0.3);
+    let held = board.truth().force_n;
+    board.command().goal = newtons(0);
+    run(board, 2.0);
+    let kept = board.truth().force_n > 0.0;
+    kept.then(|| format!("goal {goal_mn} mN, {moved_mm} mm: held {held:.3} N, then let go: {}", told(board)))
+}
+
+/// Another finger pushes the object towards this one while both hold it: the loop goes along and holds the force, the
+/// surface stays where it was first touched. Nothing lets go of it then.
+#[test]
+fn an_object_that_came_along_while_it_was_held_is_let_go() {
+    let mut failed = Vec::new();
+    for goal_mn in [300, 1_000, 3_000] {
+        for moved_mm in [1.0, 1.5, 2.0, 2.5] {
+            failed.extend(moved_while_held(&mut bench(), goal_mn, moved_mm));
+        }
+    }
+    for seed in 0..6 {
+        for goal_mn in [1_000, 3_000] {
+            failed.extend(
+                moved_while_held(&mut ordinary(seed), goal_mn, 2.5).map(|text| format!("ordinary {seed}: {text}")),
+            );
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+fn goal_0_during_a_press<E: Set>(board: &mut Bench<E>, gains: bool) -> Option<String> {
+    board.command().goal = newtons(1_000);
+    board.step();
+    let command = board.command();
+    if gains {
+        command.calibrate_request += 1
+    } else {
+        command.identify_request += 1
+    }
+    run(board, 0.05);
+    board.command().goal = newtons(0);
+    run(board, 6.0);
+    let kept = board.truth().force_n > 0.0;
+    kept.then(|| format!("gains {gains}: {}", told(board)))
+}
+
+/// A press asked for during the first approach; the host takes the goal back while it presses.
+#[test]
+fn a_press_that_measures_is_let_go() {
+    let mut failed = Vec::new();
+    for gains in [false, true] {
+        failed.extend(goal_0_during_a_press(&mut bench(), gains));
+        for seed in 0..4 {
+            failed.extend(
+                goal_0_during_a_press(&mut ordinary(seed), gains).map(|text| format!("ordinary {seed}: {text}")),
+            );
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// As `docs/commissioning.md` has it: tare, torque, goal 0, a press. The tip rests at the clearance behind what the press
+/// touched, not where the guard cuts the motor off.
+#[test]
+fn a_press_from_a_released_tip_ends_at_the_clearance() {
+    let mut failed = Vec::new();
+    for gains in [false, true] {
+        let mut board = bench();
+        board.step();
+        let command = board.command();
+        if gains {
+            command.calibrate_request += 1
+        } else {
+            command.identify_request += 1
+        }
+        run(&mut board, 3.0);
+        let behind_mm = 5.0 - board.truth().travel_mm;
+        if !(0.75..1.25).contains(&behind_mm) {
+            failed.push(format!("gains {gains}: {behind_mm:.3} mm behind, {}", told(&mut board)));
+        }
+    }
+    // What the press touches is nearer than what was touched before.
+    let mut board = bench();
+    board.place_object(10.0);
+    board.command().goal = newtons(1_000);
+    run(&mut board, 1.0);
+    board.command().goal = newtons(0);
+    run(&mut board, 0.7);
+    carry(&mut board, 10.0, 7.5);
+    board.command().identify_request += 1;
+    run(&mut board, 6.0);
+    if board.truth().force_n > 0.0 {
+        failed.push(format!("nearer: {}", told(&mut board)));
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// The object comes to a released tip, is held, and is let go again.
+#[test]
+fn what_came_to_a_released_tip_is_held_and_let_go() {
+    let mut failed = Vec::new();
+    for (to_mm, goal_mn) in [(3.0, 1_000), (2.5, 1_000), (2.0, 1_000), (1.5, 200), (0.8, 200)] {
+        let mut board = bench();
+        board.command().goal = newtons(1_000);
+        run(&mut board, 0.7);
+        board.command().goal = newtons(0);
+        run(&mut board, 0.7);
+        carry(&mut board, 5.0, to_mm);
+        run(&mut board, 0.3);
+        board.command().goal = newtons(goal_mn);
+        run(&mut board, 1.0);
+        let held = board.truth().force_n;
+        if (held - f64::from(goal_mn) * 1e-3).abs() > 0.05 || board.status().mode != Mode::Force {
+            failed.push(format!("to {to_mm} mm, goal {goal_mn} mN: {}", told(&mut board)));
+        }
+        board.command().goal = newtons(0);
+        run(&mut board, 2.0);
+        if board.truth().force_n > 0.0 {
+            failed.push(format!("to {to_mm} mm, let go of {goal_mn} mN: {}", told(&mut board)));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}

@@ -3,7 +3,7 @@
 use crate::effects::random::waiting_s;
 use crate::effects::sensor::{Codes, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 
@@ -19,21 +19,9 @@ pub const EFFECT: Description = Description {
     state: "begin and end of bursts, the random numbers' (8 bytes)",
     reference: "the bursts of IEC 61000-4-4 as a conversion sees them: repeated, short, of any sign",
     keys: &[
-        Key {
-            name: "rate_per_s",
-            about: "Bursts in a second, on average.",
-            kind: Kind::Number { min: 0.0, max: 10_000.0, default: Some(10.0) },
-        },
-        Key {
-            name: "length_us",
-            about: "How long each lasts.",
-            kind: Kind::Number { min: 1.0, max: 1e6, default: Some(300.0) },
-        },
-        Key {
-            name: "amplitude_codes",
-            about: "The largest deviation, in codes of the 12-bit converter.",
-            kind: Kind::Number { min: 0.0, max: 4096.0, default: Some(100.0) },
-        },
+        Key::number("rate_per_s", "Bursts in a second, on average.", 0.0, 10_000.0, 10.0),
+        Key::number("length_us", "How long each lasts.", 1.0, 1e6, 300.0),
+        Key::number("amplitude_codes", "The largest deviation, in codes of the 12-bit converter.", 0.0, 4096.0, 100.0),
     ],
     zero: &[("amplitude_codes", 0.0)],
     build: |build: &Build| {

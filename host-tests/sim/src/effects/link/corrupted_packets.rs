@@ -2,7 +2,7 @@
 
 use super::Packets;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 use fingertip::link::crc;
@@ -19,11 +19,7 @@ pub const EFFECT: Description = Description {
     ],
     state: "the random numbers' (8 bytes)",
     reference: "DYNAMIXEL Protocol 2.0, CRC-16/BUYPASS; a binary symmetric channel",
-    keys: &[Key {
-        name: "bit_error_ppm",
-        about: "Probability for each bit.",
-        kind: Kind::Number { min: 0.0, max: 1e6, default: Some(100.0) },
-    }],
+    keys: &[Key::number("bit_error_ppm", "Probability for each bit.", 0.0, 1e6, 100.0)],
     zero: &[("bit_error_ppm", 0.0)],
     build: |build: &Build| {
         let flips = build.values.number("bit_error_ppm") * 1e-6;

@@ -18,11 +18,7 @@ pub const EFFECT: Description = Description {
     state: "the random numbers' (8 bytes)",
     reference: "wake-up latency of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
     keys: &[
-        Key {
-            name: "delay_ms",
-            about: "The largest delay (uniform) or its deviation (normal).",
-            kind: Kind::Number { min: 0.0, max: 1000.0, default: Some(2.0) },
-        },
+        Key::number("delay_ms", "The largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0),
         Key {
             name: "distribution",
             about: "How the delays are spread.",

@@ -2,7 +2,7 @@
 
 use super::Packets;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 
@@ -14,11 +14,7 @@ pub const EFFECT: Description = Description {
     equations: &["each packet is lost with the probability lost_percent / 100, whatever became of the others"],
     state: "the random numbers' (8 bytes)",
     reference: "a Bernoulli channel",
-    keys: &[Key {
-        name: "lost_percent",
-        about: "Share of the packets that is lost.",
-        kind: Kind::Number { min: 0.0, max: 100.0, default: Some(1.0) },
-    }],
+    keys: &[Key::number("lost_percent", "Share of the packets that is lost.", 0.0, 100.0, 1.0)],
     zero: &[("lost_percent", 0.0)],
     build: |build: &Build| {
         let lost = build.values.number("lost_percent") / 100.0;

@@ -21,11 +21,7 @@ pub const EFFECT: Description = Description {
         Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
         Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },
         Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: TAXELS },
-        Key {
-            name: "at_s",
-            about: "When they break; -10 is before the tare.",
-            kind: Kind::Number { min: -10.0, max: 1e6, default: Some(-10.0) },
-        },
+        Key::number("at_s", "When they break; -10 is before the tare.", -10.0, 1e6, -10.0),
     ],
     zero: &[],
     build: |build: &Build| {

@@ -2,7 +2,7 @@
 
 use super::{Codes, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use crate::setup::Array;
 
@@ -18,12 +18,14 @@ pub const EFFECT: Description = Description {
     state: "none",
     reference: "Tekscan I-Scan, the paper's kind of sensor: 8 bits; STM32F446 data sheet: INL 2 to 3 codes of 12 bits",
     keys: &[
-        Key { name: "bits", about: "Resolution.", kind: Kind::Whole { min: 1, max: 12, default: Some(8) } },
-        Key {
-            name: "inl_codes",
-            about: "Largest deviation from the straight line, in the middle, in codes of the 12-bit converter.",
-            kind: Kind::Number { min: -50.0, max: 50.0, default: Some(0.0) },
-        },
+        Key::whole("bits", "Resolution.", 1, 12, 8),
+        Key::number(
+            "inl_codes",
+            "Largest deviation from the straight line, in the middle, in codes of the 12-bit converter.",
+            -50.0,
+            50.0,
+            0.0,
+        ),
     ],
     zero: &[("bits", 12.0), ("inl_codes", 0.0)],
     build: |build: &Build| {

@@ -3,7 +3,7 @@
 use super::{Codes, Row};
 use crate::effects::random::normal_within_3;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 use fingertip::shipped::SLOTS;
@@ -16,11 +16,7 @@ pub const EFFECT: Description = Description {
     equations: &["code' = code + rms_codes g, g of each taxel normal, drawn once, within 3 deviations"],
     state: "none; 110 levels drawn at the start",
     reference: "docs/board.md: the preload's spread and the amplifiers' offsets",
-    keys: &[Key {
-        name: "rms_codes",
-        about: "Deviation of the levels, in codes of the 12-bit converter.",
-        kind: Kind::Number { min: 0.0, max: 200.0, default: Some(5.0) },
-    }],
+    keys: &[Key::number("rms_codes", "Deviation of the levels, in codes of the 12-bit converter.", 0.0, 200.0, 5.0)],
     zero: &[("rms_codes", 0.0)],
     build: |build: &Build| {
         let mut rng = Rng::with_seed(build.seed);

@@ -2,7 +2,7 @@
 
 use super::{Row, Volts};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use crate::setup::Array;
 
@@ -14,11 +14,7 @@ pub const EFFECT: Description = Description {
     equations: &["v' = min(v, V_ref - headroom_mv)"],
     state: "none",
     reference: "output swing to the rail in data sheets of amplifiers, 5 to 200 mV",
-    keys: &[Key {
-        name: "headroom_mv",
-        about: "How far below the reference of 3.3 V they end.",
-        kind: Kind::Number { min: 0.0, max: 3000.0, default: Some(50.0) },
-    }],
+    keys: &[Key::number("headroom_mv", "How far below the reference of 3.3 V they end.", 0.0, 3000.0, 50.0)],
     zero: &[("headroom_mv", 0.0)],
     build: |build: &Build| {
         let rail_v = Array::default().reference_v - build.values.number("headroom_mv") * 1e-3;

@@ -2,7 +2,7 @@
 
 use super::{Row, Volts};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 
@@ -18,16 +18,8 @@ pub const EFFECT: Description = Description {
     state: "voltage of each column at the last edge, and what it settles to (20 numbers)",
     reference: "docs/plant.md, readout: 0.2 us; half a bit of 12 takes 9.0 tau",
     keys: &[
-        Key {
-            name: "tau_us",
-            about: "Time constant.",
-            kind: Kind::Number { min: 0.0, max: 100.0, default: Some(0.2) },
-        },
-        Key {
-            name: "after_us",
-            about: "From the edge to the sample.",
-            kind: Kind::Number { min: 0.1, max: 1000.0, default: Some(2.4) },
-        },
+        Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2),
+        Key::number("after_us", "From the edge to the sample.", 0.1, 1000.0, 2.4),
     ],
     zero: &[("tau_us", 0.0)],
     build: |build: &Build| {

@@ -1,6 +1,5 @@
 //! The controller's clock is not the world's.
 
-use super::Clock;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -16,16 +15,7 @@ pub const EFFECT: Description = Description {
     keys: &[Key::number("fast_ppm", "How much it runs fast; below 0, slow.", -50_000.0, 50_000.0, 50.0)],
     zero: &[("fast_ppm", 0.0)],
     build: |build: &Build| {
-        Part::Clock(Box::new(ClockTolerance { second_s: 1.0 / (1.0 + build.values.number("fast_ppm") * 1e-6) }))
+        let second_s = 1.0 / (1.0 + build.values.number("fast_ppm") * 1e-6);
+        Part::Clock(Box::new(move |_| second_s))
     },
 };
-
-struct ClockTolerance {
-    second_s: f64,
-}
-
-impl Clock for ClockTolerance {
-    fn second_s(&mut self, _time_s: f64) -> f64 {
-        self.second_s
-    }
-}

@@ -1,6 +1,5 @@
 //! Packets that never arrive.
 
-use super::Packets;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -18,17 +17,7 @@ pub const EFFECT: Description = Description {
     zero: &[("lost_percent", 0.0)],
     build: |build: &Build| {
         let lost = build.values.number("lost_percent") / 100.0;
-        Part::Packets(Box::new(LostPackets { lost, rng: Rng::with_seed(build.seed) }))
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Packets(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s)))
     },
 };
-
-struct LostPackets {
-    lost: f64,
-    rng: Rng,
-}
-
-impl Packets for LostPackets {
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        (self.rng.f64() >= self.lost).then_some(sent_s)
-    }
-}

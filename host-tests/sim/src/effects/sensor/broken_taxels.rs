@@ -1,6 +1,5 @@
 //! Taxels that are dead, stuck or shorted.
 
-use super::{Conductance, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
@@ -30,7 +29,19 @@ pub const EFFECT: Description = Description {
         for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
             build.values.pairs(name).iter().for_each(|[row, column]| taxels[*row as usize][*column as usize] = taxel);
         }
-        Part::Conductance(Box::new(BrokenTaxels { taxels, at_s: build.values.number("at_s") }))
+        let at_s = build.values.number("at_s");
+        Part::Conductance(Box::new(move |row, time_s, siemens| {
+            if time_s < at_s {
+                return;
+            }
+            for (taxel, siemens) in taxels[row].iter_mut().zip(siemens) {
+                match *taxel {
+                    Taxel::Sound => {}
+                    Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
+                    Taxel::Fixed(fixed) => *siemens = fixed,
+                }
+            }
+        }))
     },
 };
 
@@ -39,24 +50,4 @@ enum Taxel {
     Sound,
     Stuck,
     Fixed(f64),
-}
-
-struct BrokenTaxels {
-    taxels: [[Taxel; COLUMNS]; ROWS],
-    at_s: f64,
-}
-
-impl Conductance for BrokenTaxels {
-    fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
-        if time_s < self.at_s {
-            return;
-        }
-        for (taxel, siemens) in self.taxels[row].iter_mut().zip(siemens) {
-            match *taxel {
-                Taxel::Sound => {}
-                Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
-                Taxel::Fixed(fixed) => *siemens = fixed,
-            }
-        }
-    }
 }

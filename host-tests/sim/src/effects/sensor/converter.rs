@@ -1,6 +1,5 @@
 //! A converter that is coarser than 12 bits, and bent.
 
-use super::{Codes, Row};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -30,20 +29,12 @@ pub const EFFECT: Description = Description {
     zero: &[("bits", 12.0), ("inl_codes", 0.0)],
     build: |build: &Build| {
         let step = f64::from(1 << (12 - build.values.whole("bits")));
-        Part::Codes(Box::new(Converter { step, inl_codes: build.values.number("inl_codes") }))
+        let inl_codes = build.values.number("inl_codes");
+        Part::Codes(Box::new(move |_, _, codes| {
+            for code in codes {
+                let x = (*code / Array::CODES).clamp(0.0, 1.0);
+                *code = ((*code + inl_codes * 4.0 * x * (1.0 - x)) / step).floor() * step;
+            }
+        }))
     },
 };
-
-struct Converter {
-    step: f64,
-    inl_codes: f64,
-}
-
-impl Codes for Converter {
-    fn apply(&mut self, _slot: usize, _time_s: f64, codes: &mut Row) {
-        for code in codes {
-            let x = (*code / Array::CODES).clamp(0.0, 1.0);
-            *code = ((*code + self.inl_codes * 4.0 * x * (1.0 - x)) / self.step).floor() * self.step;
-        }
-    }
-}

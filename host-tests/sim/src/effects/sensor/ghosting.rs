@@ -1,6 +1,6 @@
 //! Without a virtual ground, current finds its way through other taxels.
 
-use super::{Network, Row};
+use super::Row;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -27,20 +27,15 @@ pub const EFFECT: Description = Description {
         1000.0,
     )],
     zero: &[("hold_ohm", 0.0)],
-    build: |build: &Build| Part::Network(Box::new(Ghosting { hold_ohm: build.values.number("hold_ohm") })),
+    build: |build: &Build| {
+        let hold_ohm = build.values.number("hold_ohm");
+        Part::Network(Box::new(move |row, array, seen| {
+            if hold_ohm > 0.0 {
+                *seen = short_circuit(row, array, 1.0 / hold_ohm);
+            }
+        }))
+    },
 };
-
-struct Ghosting {
-    hold_ohm: f64,
-}
-
-impl Network for Ghosting {
-    fn apply(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row) {
-        if self.hold_ohm > 0.0 {
-            *seen = short_circuit(row, array, 1.0 / self.hold_ohm);
-        }
-    }
-}
 
 fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
     let mut a = [[0.0; COLUMNS]; COLUMNS];

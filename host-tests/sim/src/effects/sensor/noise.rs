@@ -1,6 +1,6 @@
 //! Noise of amplifiers and converter.
 
-use super::{Codes, Row};
+use super::Row;
 use crate::effects::random::normals;
 use crate::effects::{Build, Part};
 use crate::key::Key;
@@ -19,18 +19,10 @@ pub const EFFECT: Description = Description {
     zero: &[("rms_codes", 0.0)],
     build: |build: &Build| {
         let rms_codes = build.values.number("rms_codes");
-        Part::Codes(Box::new(Noise { rms_codes, rng: Rng::with_seed(build.seed) }))
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Codes(Box::new(move |_, _, codes| {
+            let noise: Row = normals(&mut rng);
+            codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
+        }))
     },
 };
-
-struct Noise {
-    rms_codes: f64,
-    rng: Rng,
-}
-
-impl Codes for Noise {
-    fn apply(&mut self, _slot: usize, _time_s: f64, codes: &mut Row) {
-        let noise: Row = normals(&mut self.rng);
-        codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += self.rms_codes * noise);
-    }
-}

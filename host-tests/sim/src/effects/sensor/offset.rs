@@ -1,6 +1,6 @@
 //! Every taxel's reading starts from a level of its own.
 
-use super::{Codes, Row};
+use super::Row;
 use crate::effects::random::normal_within_3;
 use crate::effects::{Build, Part};
 use crate::key::Key;
@@ -21,17 +21,9 @@ pub const EFFECT: Description = Description {
     build: |build: &Build| {
         let mut rng = Rng::with_seed(build.seed);
         let rms_codes = build.values.number("rms_codes");
-        let codes = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
-        Part::Codes(Box::new(Offset { codes }))
+        let offsets = [(); SLOTS].map(|()| Row::default().map(|_| rms_codes * normal_within_3(&mut rng)));
+        Part::Codes(Box::new(move |slot, _, codes| {
+            codes.iter_mut().zip(offsets[slot]).for_each(|(code, offset)| *code += offset);
+        }))
     },
 };
-
-struct Offset {
-    codes: [Row; SLOTS],
-}
-
-impl Codes for Offset {
-    fn apply(&mut self, slot: usize, _time_s: f64, codes: &mut Row) {
-        codes.iter_mut().zip(self.codes[slot]).for_each(|(code, offset)| *code += offset);
-    }
-}

@@ -1,6 +1,5 @@
 //! The amplifiers reach their rail before the converter reaches its top.
 
-use super::{Row, Volts};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -18,16 +17,6 @@ pub const EFFECT: Description = Description {
     zero: &[("headroom_mv", 0.0)],
     build: |build: &Build| {
         let rail_v = Array::default().reference_v - build.values.number("headroom_mv") * 1e-3;
-        Part::Volts(Box::new(Saturation { rail_v }))
+        Part::Volts(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v))))
     },
 };
-
-struct Saturation {
-    rail_v: f64,
-}
-
-impl Volts for Saturation {
-    fn apply(&mut self, _slot: usize, _time_s: f64, volts: &mut Row) {
-        volts.iter_mut().for_each(|volts| *volts = volts.min(self.rail_v));
-    }
-}

@@ -1,6 +1,6 @@
 //! The columns are sampled before they have settled.
 
-use super::{Row, Volts};
+use super::Row;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::mechanics::decay::decay;
@@ -24,7 +24,8 @@ pub const EFFECT: Description = Description {
     zero: &[("tau_us", 0.0)],
     build: |build: &Build| {
         let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.values.number(key) * 1e-6);
-        Part::Volts(Box::new(Settling::new(tau_s, after_s)))
+        let mut settling = Settling::new(tau_s, after_s);
+        Part::Volts(Box::new(move |_, time_s, volts| settling.sample(time_s, volts)))
     },
 };
 
@@ -41,16 +42,8 @@ impl Settling {
     pub fn new(tau_s: f64, after_s: f64) -> Self {
         Self { tau_s, left: decay(after_s / tau_s), before: None }
     }
-}
-
-struct Before {
-    time_s: f64,
-    edge_v: Row,
-    end_v: Row,
-}
-
-impl Volts for Settling {
-    fn apply(&mut self, _slot: usize, time_s: f64, volts: &mut Row) {
+    /// What the columns have come to, in place of what they settle to, at a sample.
+    pub fn sample(&mut self, time_s: f64, volts: &mut Row) {
         let end_v = *volts;
         let edge_v = match &self.before {
             None => end_v,
@@ -64,4 +57,10 @@ impl Volts for Settling {
         }
         self.before = Some(Before { time_s, edge_v, end_v });
     }
+}
+
+struct Before {
+    time_s: f64,
+    edge_v: Row,
+    end_v: Row,
 }

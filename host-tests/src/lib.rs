@@ -11,6 +11,7 @@ pub mod fit_tables;
 pub mod imports;
 pub mod long_run;
 pub mod model_file;
+pub mod page;
 pub mod prove;
 pub mod stimulus;
 pub mod study;

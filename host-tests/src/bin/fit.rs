@@ -1,9 +1,8 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
 use fingertip::contact::FitLevel;
-use host_tests::fit_tables::{CASES, markdown, renewed};
+use host_tests::fit_tables::{CASES, PAGE, markdown};
 use std::io::{self, IsTerminal, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -63,25 +62,10 @@ fn run() -> Result<(), String> {
     if live {
         eprint!("\r{:60}\r", "");
     }
-    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/contact.md");
-    let renew = || -> Result<(String, String), String> {
-        let old = std::fs::read_to_string(&file).map_err(|error| format!("docs/contact.md: {error}"))?;
-        let new = renewed(&old, &tables).ok_or("docs/contact.md lacks the markers of its tables")?;
-        Ok((old, new))
-    };
     match page {
         Page::Print => print!("{tables}"),
-        Page::Write => {
-            std::fs::write(&file, renew()?.1).map_err(|error| format!("docs/contact.md: {error}"))?;
-            println!("written  docs/contact.md");
-        }
-        Page::Check => {
-            let (old, new) = renew()?;
-            if old != new {
-                return Err("docs/contact.md is stale: renew it with `cargo xtask fit --write`".into());
-            }
-            println!("fresh    docs/contact.md");
-        }
+        Page::Write => PAGE.write(&tables)?,
+        Page::Check => PAGE.check(&tables)?,
     }
     Ok(())
 }

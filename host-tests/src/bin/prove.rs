@@ -4,7 +4,6 @@
 //! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
 use std::io::{self, IsTerminal, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -16,7 +15,6 @@ use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
 const USAGE: &str = "prove [--quick | --write | --check]";
 
 /// What becomes of the tables of `docs/model.md`.
-#[derive(Clone, Copy, PartialEq, Eq)]
 enum Page {
     Leave,
     Write,
@@ -130,7 +128,13 @@ impl Report {
         if self.broken > 0 {
             return ExitCode::FAILURE;
         }
-        match renew(&tables::markdown(&self.sections), page) {
+        let text = tables::markdown(&self.sections);
+        let written = match page {
+            Page::Leave => Ok(()),
+            Page::Write => tables::PAGE.check(&text).or_else(|_| tables::PAGE.write(&text)),
+            Page::Check => tables::PAGE.check(&text),
+        };
+        match written {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 eprintln!("error: {error}");
@@ -138,23 +142,4 @@ impl Report {
             }
         }
     }
-}
-
-fn renew(tables: &str, page: Page) -> Result<(), String> {
-    if page == Page::Leave {
-        return Ok(());
-    }
-    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/model.md");
-    let failed = |error| format!("docs/model.md: {error}");
-    let old = std::fs::read_to_string(&file).map_err(failed)?;
-    let new = tables::renewed(&old, tables).ok_or("docs/model.md lacks the markers of its tables")?;
-    if old == new {
-        println!("fresh    docs/model.md");
-    } else if page == Page::Check {
-        return Err("docs/model.md is stale: renew it with `cargo xtask prove --write`".into());
-    } else {
-        std::fs::write(&file, new).map_err(failed)?;
-        println!("written  docs/model.md");
-    }
-    Ok(())
 }

@@ -64,10 +64,8 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     }
     let root = Path::new(env!("FINGERTIP_ROOT"));
     let mut files = Vec::new();
-    for (name, tables) in [("docs/study.md", page::markdown(&studied)), ("README.md", page::readme(&studied))] {
-        let old = fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
-        let new = page::renewed(&old, &tables).ok_or_else(|| format!("{name} lacks the markers of its tables"))?;
-        files.push((name.to_owned(), new));
+    for (page, tables) in [(page::PAGE, page::markdown(&studied)), (page::README, page::readme(&studied))] {
+        files.push((page.name.to_owned(), page.renewed(&tables)?.1));
     }
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
         let picture = pictures::draw(kernel, points).map_err(|error| error.to_string())?;

@@ -12,6 +12,7 @@ pub mod imports;
 pub mod long_run;
 pub mod model_file;
 pub mod page;
+pub mod program;
 pub mod prove;
 pub mod stimulus;
 pub mod study;

@@ -2,10 +2,8 @@
 
 use fingertip::contact::FitLevel;
 use host_tests::fit_tables::{CASES, PAGE, markdown};
-use std::io::{self, IsTerminal, Write};
+use host_tests::program::{Progress, ended};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 const USAGE: &str = "fit [--cases N] [--quick] [--fit-level N] [--write | --check]";
 
@@ -16,13 +14,7 @@ enum Page {
 }
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run())
 }
 
 fn run() -> Result<(), String> {
@@ -45,23 +37,11 @@ fn run() -> Result<(), String> {
             other => return Err(format!("unknown argument {other}: {USAGE}")),
         }
     }
-    // A log wants the results only.
-    let live = io::stderr().is_terminal();
-    let shown = Mutex::new(Instant::now());
+    let progress = Progress::begin();
     let tables = markdown(cases, fit_level, &|name, done| {
-        if live
-            && let Ok(mut shown) = shown.try_lock()
-            && shown.elapsed() > Duration::from_millis(500)
-        {
-            *shown = Instant::now();
-            eprint!("\r{name}: {done} of {cases}          ");
-            // Progress is a courtesy; a closed terminal is no reason to stop.
-            let _ = io::stderr().flush();
-        }
+        progress.show(format_args!("{name}: {done} of {cases}          "));
     });
-    if live {
-        eprint!("\r{:60}\r", "");
-    }
+    progress.end(format_args!("\r{:60}\r", ""));
     match page {
         Page::Print => print!("{tables}"),
         Page::Write => PAGE.write(&tables)?,

@@ -3,11 +3,10 @@
 //! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
 //! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
-use std::io::{self, IsTerminal, Write};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use host_tests::program::{Progress, ended};
 use host_tests::prove::domain::reference_tip;
 use host_tests::prove::tally::Tally;
 use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
@@ -96,24 +95,9 @@ struct Report {
 impl Report {
     fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
         println!("{title}");
-        // A log wants the results only.
-        let live = io::stderr().is_terminal();
-        let shown = Mutex::new(Instant::now());
-        let progress = |done: u64, of: u64| {
-            if live
-                && let Ok(mut shown) = shown.try_lock()
-                && shown.elapsed() > Duration::from_millis(500)
-            {
-                *shown = Instant::now();
-                eprint!("\r  {done} of {of}   ");
-                // Progress is a courtesy; a closed terminal is no reason to stop.
-                let _ = io::stderr().flush();
-            }
-        };
-        let tallies = judge(&progress);
-        if live {
-            eprint!("\r");
-        }
+        let progress = Progress::begin();
+        let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
+        progress.end("\r");
         for tally in &tallies {
             println!("  {tally}");
             self.inputs += tally.inputs;
@@ -129,17 +113,10 @@ impl Report {
             return ExitCode::FAILURE;
         }
         let text = tables::markdown(&self.sections);
-        let written = match page {
+        ended(match page {
             Page::Leave => Ok(()),
             Page::Write => tables::PAGE.check(&text).or_else(|_| tables::PAGE.write(&text)),
             Page::Check => tables::PAGE.check(&text),
-        };
-        match written {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => {
-                eprintln!("error: {error}");
-                ExitCode::FAILURE
-            }
-        }
+        })
     }
 }

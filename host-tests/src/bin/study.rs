@@ -5,6 +5,7 @@
 //! `study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
 //! is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
 
+use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
 use host_tests::study::page::Studied;
@@ -18,19 +19,12 @@ const USAGE: &str =
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+    ended(match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
         ["few", kept, full] => few(kept, full),
         ["report", shipped, quick, ref flags @ ..] => report([shipped, quick], flags),
         _ => Err(USAGE.into()),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    })
 }
 
 fn few(kept: &str, full: &str) -> Result<(), String> {

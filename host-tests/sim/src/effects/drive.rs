@@ -20,6 +20,7 @@ mod winding_inductance;
 
 use super::{Metered, Part};
 use crate::registry::Description;
+use crate::setup::Setup;
 use crate::watch::{Cost, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,21 @@ pub struct Circuit {
     pub henry: f64,
     /// Torque constant, and back-EMF constant in V s/rad.
     pub torque_nm_per_a: f64,
+}
+
+impl Circuit {
+    /// A setup's, before any effect.
+    pub fn of(setup: &Setup, duty: f64) -> Self {
+        Self {
+            source_v: setup.supply.source_v,
+            source_ohm: 0.0,
+            duty,
+            winding_ohm: setup.motor.resistance_ohm,
+            bridge_ohm: setup.supply.bridge_ohm,
+            henry: 0.0,
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+        }
+    }
 }
 
 /// What takes energy from the shaft, for a step.

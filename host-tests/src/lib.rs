@@ -5,6 +5,7 @@
 pub mod control_table;
 pub mod emulator;
 pub mod figures;
+pub mod finger;
 pub mod fit_cases;
 pub mod fit_statistics;
 pub mod fit_tables;

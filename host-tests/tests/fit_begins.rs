@@ -6,6 +6,7 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, TARE_FRAMES};
+use host_tests::finger::config;
 use sim::plant::{Plant, Setup};
 
 /// The fit of one geometry says nothing of another.
@@ -49,7 +50,7 @@ fn pressed(fit_level: FitLevel, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status
     let mut setup = Setup::default();
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
     let mut world = Plant::new(&setup);
-    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&config());
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let command = Command { tare_request: 1, fit_level, ..Command::default() };
     let mut frame = Frame::EMPTY;

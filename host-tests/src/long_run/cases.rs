@@ -1,6 +1,7 @@
 //! The machines: observer, drive, speed loop, baseline, tare, relaxation, winding.
 
 use super::{Machine, Outcome};
+use crate::finger::config;
 use fingertip::config::gains::PACES;
 use fingertip::config::heat::FRAMES;
 use fingertip::control::SpeedLoop;
@@ -176,7 +177,7 @@ fn baselines() -> Vec<Machine<Array>> {
         ("the extremes in turns", [12, most]),
     ];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = config();
         let frames = pair.map(frame);
         let mut start = Array::new();
         tare(&mut start, &frame(40), &config);
@@ -209,7 +210,7 @@ fn tare(array: &mut Array, frame: &Frame, config: &Config) {
 fn tares() -> Vec<Machine<Array>> {
     let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, SATURATED - 372 - 1])];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = config();
         let frames = pair.map(frame);
         Machine {
             name: format!("tare, {input}"),

@@ -227,25 +227,11 @@ pub fn pressed(number: usize, um_per_frame: f64, fit_level: FitLevel, configs: &
 /// Judges `cases` cases of a series on all threads, with this fit level of [`Fit`]; `progress` hears how many are done.
 pub fn judge(series: &Series, cases: usize, fit_level: FitLevel, progress: &(impl Fn(usize) + Sync)) -> Judged {
     let configs = Configs::default();
-    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get()).min(cases.max(1));
     let done = AtomicUsize::new(0);
-    let part = |range: std::ops::Range<usize>| -> Judged {
-        let one = |number| {
-            let verdict = Verdict::of(series, number, fit_level, &configs);
-            progress(done.fetch_add(1, Ordering::Relaxed) + 1);
-            verdict
-        };
-        range.map(one).collect()
-    };
-    std::thread::scope(|scope| {
-        let part = &part;
-        let start = |thread| scope.spawn(move || part(cases * thread / threads..cases * (thread + 1) / threads));
-        let running: Vec<_> = (0..threads).map(start).collect();
-        // A panic in a case is a panic here.
-        running
-            .into_iter()
-            .flat_map(|thread| thread.join().unwrap_or_else(|cause| std::panic::resume_unwind(cause)))
-            .collect()
+    sim::cores::map(0..cases, |number| {
+        let verdict = Verdict::of(series, number, fit_level, &configs);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        verdict
     })
 }
 

@@ -5,12 +5,15 @@
 pub mod control_table;
 pub mod emulator;
 pub mod figures;
+pub mod finger;
 pub mod fit_cases;
 pub mod fit_statistics;
 pub mod fit_tables;
 pub mod imports;
 pub mod long_run;
 pub mod model_file;
+pub mod page;
+pub mod program;
 pub mod prove;
 pub mod stimulus;
 pub mod study;

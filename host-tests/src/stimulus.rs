@@ -4,12 +4,12 @@
 //! Made anew where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
 //! seed.
 
+use crate::finger::config;
 use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use images::record::{Digest, MAGIC, Record};
 use sim::native::bench::Bench;
@@ -78,7 +78,7 @@ pub fn to_bytes(records: &[Record]) -> Vec<u8> {
 /// # Panics
 /// Never: the default parameters are sound, as the core's own tests show.
 pub fn digest(records: &[Record]) -> u64 {
-    let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
+    let config = config();
     let mut pipeline = Pipeline::new(&config);
     let mut digest = Digest::new();
     for Record { frame, sense, command } in records {

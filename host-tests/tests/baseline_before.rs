@@ -3,6 +3,7 @@
 use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::shipped::Config;
+use host_tests::finger::config;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
@@ -33,7 +34,7 @@ fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
     board.command().torque = false;
     board.command().goal = newtons(0);
     run(&mut board, 0.01);
-    board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
+    board.pipeline().configure(&config());
     board.place_object(50.0);
     board.place(0.0);
     run(&mut board, off_s);
@@ -69,9 +70,9 @@ fn a_characteristic_that_is_none_any_more_leaves_nothing() {
             }
         };
         noisy(&mut board, 200);
-        board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
+        board.pipeline().configure(&config());
         noisy(&mut board, 200_000);
-        let picture = board.pipeline().array().picture().clone();
+        let picture = *board.pipeline().array().picture();
         // 5.86 uN a sixteenth of a code.
         let off_n = f64::from(picture.sum) * 5.86e-6;
         if off_n.abs() > 0.015 {

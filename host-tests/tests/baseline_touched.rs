@@ -2,8 +2,7 @@
 //! learn it, so the next press does not press harder by it.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
-use fingertip::shipped::Config;
+use host_tests::finger::config;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
@@ -23,7 +22,7 @@ fn run(board: &mut Bench, seconds: f64) -> f64 {
 /// of that press.
 fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     let setup = Setup::default();
-    let mut board: Bench = Bench::of(&setup, &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board: Bench = Bench::of(&setup, &config());
     board.tare();
     board.command().goal = newtons(1_000);
     run(&mut board, 1.0);

@@ -1,10 +1,10 @@
 //! Gains and masks of single taxels.
 
 use fingertip::command::Command;
-use fingertip::params::Params;
 use fingertip::pressure::{CalibrationError, GAIN_MAX, GAIN_ONE};
-use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Calibration, Frame, Pipeline, ROWS, TARE_FRAMES};
 use fingertip::state::Mode;
+use host_tests::finger::{config, tared};
 use sim::plant::{Plant, Setup};
 
 const GAINS: [[u16; COLUMNS]; ROWS] = [[GAIN_ONE; COLUMNS]; ROWS];
@@ -19,20 +19,10 @@ fn frames() -> [Frame; 2] {
     frames
 }
 
-fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
-    let mut array = Array::new();
-    array.calibrate(calibration);
-    for _ in 0..TARE_FRAMES {
-        array.read(blank, config);
-        array.continue_tare();
-    }
-    array
-}
-
 #[test]
 fn a_gain_scales_its_taxel_and_no_other() {
     let [pressed, blank] = frames();
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
+    let config = config();
     let plain = *tared(&Calibration::NONE, &blank, &config).read(&pressed, &config);
     let mut gains = GAINS;
     gains[4][6] = GAIN_ONE / 2;
@@ -51,7 +41,7 @@ fn a_gain_scales_its_taxel_and_no_other() {
 #[test]
 fn a_masked_taxel_reads_as_nothing_and_is_no_fault() {
     let [mut pressed, blank] = frames();
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
+    let config = config();
     let mut mask = [0; ROWS];
     mask[4] = 1 << 5;
     mask[7] = 0x3ff;
@@ -91,7 +81,7 @@ fn what_cannot_be_is_refused_by_name() {
 #[test]
 fn a_new_calibration_needs_a_new_tare() {
     let [_, blank] = frames();
-    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&config());
     let mut command = Command { torque: true, tare_request: 1, ..Command::default() };
     let step = |pipeline: &mut Pipeline, command: &Command| {
         let sense = fingertip::frame::Sense { supply_mv: 6_000, ..Default::default() };

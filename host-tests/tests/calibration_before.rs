@@ -64,12 +64,16 @@ fn a_press_that_waits_and_is_refused_leaves_the_one_before() {
         board.command().calibrate_request += 1;
         board.step();
         while board.step().mode == Mode::Identify {}
-        (0..wait).for_each(|_| drop(board.step()));
+        for _ in 0..wait {
+            board.step();
+        }
         assert_eq!(board.status().calibration.state, State::Running);
         board.command().calibrate_request += 1;
         board.step();
         board.command().torque = false;
-        (0..5_000).for_each(|_| drop(board.step()));
+        for _ in 0..5_000 {
+            board.step();
+        }
         let standing = board.status().calibration;
         let proposal = *board.pipeline().proposal();
         let ones = (0..ROWS * COLUMNS).filter(|&place| proposal.gains.get(place) == GAIN_ONE).count();

@@ -1,10 +1,9 @@
 //! A contact is not judged by the one before.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pressure::{Calibration, GAIN_ONE};
-use fingertip::shipped::Config;
 use fingertip::state::Mode;
+use host_tests::finger::config;
 use sim::effects::set::{Named, Set};
 use sim::native::bench::Bench;
 use sim::plant::Taxel;
@@ -39,7 +38,7 @@ fn another_object_at_the_edge_is_taken_hold_of() {
             for history in ["none", "let go", "slipped away"] {
                 let mut setup = Setup::default();
                 setup.wall.centre_x_mm = x_mm;
-                let mut board: Bench = Bench::of(&setup, &Config::shipped(&Params::DEFAULT).unwrap());
+                let mut board: Bench = Bench::of(&setup, &config());
                 board.place_object(4.0);
                 board.tare();
                 if history != "none" {
@@ -155,7 +154,9 @@ fn taxels_that_are_masked_are_no_fault_any_more() {
     for frames_before in [0, 5] {
         let mut board = Bench::default();
         board.harm(|faults| (2..8).for_each(|column| faults.array.taxels[4][column] = Taxel::Dead));
-        (0..frames_before).for_each(|_| drop(board.step()));
+        for _ in 0..frames_before {
+            board.step();
+        }
         board.pipeline().calibrate(&calibration);
         board.tare();
         board.step();

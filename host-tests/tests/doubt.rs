@@ -3,18 +3,14 @@
 use fastrand::Rng;
 use fingertip::contact::Contact;
 use fingertip::contact::{FitLevel, from_sums};
-use fingertip::params::Params;
-use fingertip::shipped::{Config, Fit, Picture, ROWS};
+use fingertip::shipped::{Fit, Picture, ROWS};
 use fingertip::units::Millimetres;
+use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// The reference array's.
 const PITCH_MM: f64 = 1.5;
-
-fn config() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
-}
 
 fn mm(length: Millimetres) -> f64 {
     length.0.to_num()

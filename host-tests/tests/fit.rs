@@ -2,9 +2,9 @@
 
 use fingertip::contact::Contact;
 use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, from_sums};
-use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use fingertip::units::{Millimetres, Newtons};
+use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps, picture};
 use host_tests::fit_statistics::{BAD, CUT_MIN, FRAMES, GOOD, Judged, Outcome, Series, WAYS, judge, quantile};
 use images::single::{Refined, read};
@@ -18,10 +18,6 @@ const TWO: usize = 2;
 const FIT: usize = WAYS - 1;
 
 type Taxels = [[i32; COLUMNS]; ROWS];
-
-fn reference() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the default parameters are in range")
-}
 
 /// What a single look makes of a picture, and every fit level that has seen it long enough: the sums first.
 fn all_ways(picture: &Picture, config: &Config) -> Vec<Contact> {
@@ -72,14 +68,14 @@ fn plane(pitch_mm: f64, d_mm: f64, x_mm: f64, y_mm: f64) -> Scene {
 
 #[test]
 fn nothing_is_no_contact() {
-    for contact in all_ways(&Picture::EMPTY, &reference()) {
+    for contact in all_ways(&Picture::EMPTY, &config()) {
         assert_eq!(contact, Contact { confidence: 255, ..Contact::default() });
     }
 }
 
 #[test]
 fn one_taxel_is_its_own_sum() {
-    let config = reference();
+    let config = config();
     for (row, column) in [(0, 0), (0, 5), (4, 5), (9, 9)] {
         let mut taxels = Taxels::default();
         taxels[row][column] = 300 * 16;
@@ -95,7 +91,7 @@ fn one_taxel_is_its_own_sum() {
 #[test]
 fn saturated_everywhere_is_nothing_seen() {
     let picture = picture(&[[FULL; COLUMNS]; ROWS], [(1 << COLUMNS) - 1; ROWS]);
-    for contact in all_ways(&picture, &reference()) {
+    for contact in all_ways(&picture, &config()) {
         assert_eq!(contact, Contact { confidence: 255, bad_taxels: 100, ..Contact::default() });
     }
 }
@@ -103,7 +99,7 @@ fn saturated_everywhere_is_nothing_seen() {
 #[test]
 fn full_everywhere_is_flagged() {
     let picture = picture(&[[FULL; COLUMNS]; ROWS], NONE);
-    for contact in &all_ways(&picture, &reference())[BY_MODEL..] {
+    for contact in &all_ways(&picture, &config())[BY_MODEL..] {
         assert!(contact.confidence < CONFIDENCE_LEAST, "{contact:?}");
     }
 }
@@ -112,7 +108,7 @@ fn full_everywhere_is_flagged() {
 fn a_checkerboard_is_flagged() {
     for high in [40 * 16, 1000 * 16, FULL] {
         let taxels = core::array::from_fn(|row| core::array::from_fn(|column| high * ((row + column) as i32 & 1)));
-        for contact in &all_ways(&picture(&taxels, NONE), &reference())[BY_MODEL..] {
+        for contact in &all_ways(&picture(&taxels, NONE), &config())[BY_MODEL..] {
             assert_eq!(contact.confidence, 0, "{high}: {contact:?}");
         }
     }
@@ -120,7 +116,7 @@ fn a_checkerboard_is_flagged() {
 
 #[test]
 fn frames_between_the_extremes_leave_nothing_behind() {
-    let config = reference();
+    let config = config();
     let full = picture(&[[FULL; COLUMNS]; ROWS], NONE);
     let mut fit = Fit::default();
     for _ in 0..100 {

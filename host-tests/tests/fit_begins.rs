@@ -6,6 +6,7 @@ use fingertip::frame::Sense;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Fit, Frame, Picture, Pipeline, TARE_FRAMES};
+use host_tests::finger::config;
 use sim::plant::{Plant, Setup};
 
 /// The fit of one geometry says nothing of another.
@@ -59,7 +60,9 @@ fn a_fit_that_is_handed_another_geometry_begins_anew() {
             picture.taxels.as_flattened_mut().fill_with(|| rng.i32(0..60_000));
             picture.peak = *picture.taxels.as_flattened().iter().max().unwrap();
             picture.sum = picture.taxels.as_flattened().iter().sum();
-            (0..=change % 37).for_each(|_| drop(fit.read(&picture, &first)));
+            for _ in 0..=change % 37 {
+                fit.read(&picture, &first);
+            }
             let mut fresh = Fit::default();
             for _ in 0..20 {
                 assert_eq!(fit.read(&picture, &last), fresh.read(&picture, &last), "{pitch_um} um, change {change}");
@@ -74,7 +77,7 @@ fn pressed(fit_level: FitLevel, depth_mm: f64, [x, y]: [f64; 2]) -> (f64, Status
     let mut setup = Setup::default();
     (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (x, y);
     let mut world = Plant::new(&setup);
-    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&config());
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
     let command = Command { tare_request: 1, fit_level, ..Command::default() };
     let mut frame = Frame::EMPTY;

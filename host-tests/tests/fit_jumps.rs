@@ -1,16 +1,12 @@
 //! A fit whose contact is suddenly elsewhere.
 
 use fingertip::contact::{FitLevel, from_sums};
-use fingertip::params::Params;
-use fingertip::shipped::{Config, Fit, Picture, ROWS};
+use fingertip::shipped::{Fit, Picture, ROWS};
+use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 use images::single::{Refined, read};
 
 const NONE: [u32; ROWS] = [0; ROWS];
-
-fn config() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
-}
 
 /// A contact that reaches over the edge.
 fn cut_off(d_mm: f64, x_mm: f64) -> Picture {

@@ -3,18 +3,14 @@
 use fastrand::Rng;
 use fingertip::contact::Contact;
 use fingertip::contact::{CONFIDENCE_LEAST, FitLevel, from_sums};
-use fingertip::params::Params;
 use fingertip::shipped::{Config, Fit, Picture, ROWS};
+use host_tests::finger::config;
 use host_tests::fit_cases::{Noise, Object, Reading, Scene, Steps};
 
 const NONE: [u32; ROWS] = [0; ROWS];
 /// FitLevels that take the model, and the frames of a refinement.
 const BY_MODEL: [(FitLevel, usize); 4] =
     [(FitLevel::OneRow, 11), (FitLevel::TwoRows, 6), (FitLevel::FiveRows, 3), (FitLevel::AllRows, 1)];
-
-fn config() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
-}
 
 fn picture(scene: &Scene, noise: Noise, rng: &mut Rng) -> Picture {
     Reading { steps: Steps::Sixteenths, noise, dead: 0 }.picture(&scene.pressures(), NONE, rng).0

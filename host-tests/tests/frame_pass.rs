@@ -4,6 +4,7 @@ use fingertip::frame::SATURATED;
 use fingertip::params::Params;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Picture, ROWS, TARE_FRAMES};
+use host_tests::finger::tared;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -48,16 +49,6 @@ fn calibration() -> impl Strategy<Value = Calibration> {
 fn config(sag_ppb: i32, dead_codes: i32) -> Config {
     let params = Params { row_sag_ppb_per_code: sag_ppb, dead_codes, ..Params::DEFAULT };
     Config::shipped(&params).unwrap()
-}
-
-fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
-    let mut array = Array::new();
-    array.calibrate(calibration);
-    for _ in 0..TARE_FRAMES {
-        array.read(blank, config);
-        array.continue_tare();
-    }
-    array
 }
 
 /// The bad columns of a row by their definition.

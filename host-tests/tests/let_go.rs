@@ -1,9 +1,8 @@
 //! A goal of 0 lets go, whatever went before.
 
 use fingertip::config::newtons;
-use fingertip::params::Params;
-use fingertip::shipped::Config;
 use fingertip::state::Mode;
+use host_tests::finger::config;
 use sim::effects::set::{Named, Set};
 use sim::native::bench::Bench;
 use sim::scene::read;
@@ -17,7 +16,7 @@ fn run<E: Set>(board: &mut Bench<E>, seconds: f64) {
 }
 
 fn bench() -> Bench {
-    let mut board = Bench::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::of(&Setup::default(), &config());
     board.tare();
     board
 }

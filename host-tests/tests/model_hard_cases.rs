@@ -1,9 +1,8 @@
 //! The model's hard cases, one test each.
 
 use fingertip::model::{Displacement, Load, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
-use fingertip::params::Params;
-use fingertip::shipped::Config;
 use fingertip::units::{Kilopascals, Millimetres, Radians, Ratio};
+use host_tests::finger::config;
 use host_tests::prove::domain::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
 use host_tests::prove::exact;
 use host_tests::prove::reference::{Reference, error_ulp, real};
@@ -166,7 +165,7 @@ fn a_tip_outside_the_domain_is_refused_by_name_value_and_range() {
 /// A code more or less on one taxel, where there is no force: as documented, 10.9 um.
 #[test]
 fn noise_of_one_count_at_no_force() {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
+    let config = config();
     let newtons_of = |codes: i64| newtons(((16 * codes * config.newtons_per_sum_q48) >> 32) as i32);
     let d_of = |codes: i64| config.tip.indentation(newtons_of(codes)).0.to_num::<f64>();
     // 1/24 kPa on 1.5 mm by 1.5 mm are 93.75 uN, 6.14 units of the force.

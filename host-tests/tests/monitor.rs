@@ -5,11 +5,11 @@ use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
 use fingertip::safety::monitor::{Monitor, View, array_broken, array_sound};
-use fingertip::shipped::{COLUMNS, Config, Picture, ROWS};
+use fingertip::shipped::{COLUMNS, Picture, ROWS};
 use fingertip::state::Fault;
 use fingertip::units::{Millimetres, Newtons};
+use host_tests::finger::config;
 
 /// What a sound finger shows that presses with 1 N.
 #[derive(Clone, Copy)]
@@ -43,10 +43,6 @@ impl Shown {
         self.motion.observer.travel = Millimetres::from_bits((i64::from(um) * (1 << 24) / 1_000) as i32);
         self
     }
-}
-
-fn config() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
 }
 
 #[test]

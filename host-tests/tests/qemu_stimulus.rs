@@ -1,14 +1,14 @@
 //! The recording that QEMU replays: deterministic, and it goes everywhere.
 
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{Config, Pipeline};
+use fingertip::shipped::Pipeline;
 use fingertip::state::{Fault, Mode};
+use host_tests::finger::config;
 use host_tests::stimulus;
 use std::collections::BTreeSet;
 
 fn statuses() -> Vec<Status> {
-    let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).unwrap());
+    let mut pipeline = Pipeline::new(&config());
     stimulus::records().iter().map(|record| *pipeline.step(&record.frame, &record.sense, &record.command).1).collect()
 }
 

@@ -3,10 +3,10 @@
 
 use fingertip::config::newtons;
 use fingertip::identify::{Identification, Refusal};
-use fingertip::params::Params;
 use fingertip::pipeline::Taring;
-use fingertip::shipped::{Config, TARE_FRAMES};
+use fingertip::shipped::TARE_FRAMES;
 use fingertip::state::{Fault, Mode};
+use host_tests::finger::config;
 use images::record::Record;
 use sim::native::bench::Bench;
 use sim::plant::Taxel;
@@ -158,7 +158,7 @@ fn new_parameters_during_a_tare_begin_it_anew() {
     for _ in 0..100 {
         board.step();
     }
-    board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
+    board.pipeline().configure(&config());
     for _ in 1..TARE_FRAMES {
         assert_eq!(board.step().mode, Mode::Tare);
     }

@@ -2,16 +2,15 @@
 
 use fingertip::calibrate::scale::{Refusal, Scale, Standing};
 use fingertip::contact::Contact;
-use fingertip::params::Params;
-use fingertip::shipped::Config;
 use fingertip::state::Mode;
 use fingertip::units::Newtons;
+use host_tests::finger::config;
 
 /// As many numbers as it takes.
 const POINTS: usize = 8;
 
 fn held(scale: &mut Scale, read_n: f64, shown_mn: i32) -> Option<Refusal> {
-    let config = Config::shipped(&Params::DEFAULT).unwrap();
+    let config = config();
     let contact = Contact { force: Newtons::from_bits((read_n * 65_536.0) as i32), ..Contact::default() };
     scale.observe(Mode::Approach, contact.force, contact.force, &config);
     for _ in 0..8_000 {

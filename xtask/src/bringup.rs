@@ -106,9 +106,7 @@ pub fn build(toolchain: Toolchain, console: &mut Console) -> Result<Image> {
 /// The kernels' estimated cycles, with the flash's wait states, of the inputs that the image has: a file with a line
 /// each.
 fn estimates(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
-    let folder = paths::target().join("study");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
-    let folder = fs::canonicalize(&folder).with_context(|| paths::shown(&folder))?;
+    let folder = paths::made("study")?;
     let [kept, full, file] = ["kept.bin", "few.bin", "few.txt"].map(|name| folder.join(name));
     let mut inputs = Program::tool("study").build(console)?;
     console.run(inputs.arg("few").arg(&kept).arg(&full))?;

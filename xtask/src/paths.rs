@@ -1,7 +1,8 @@
 //! Where things are.
 
+use anyhow::{Context, Result};
 use std::{
-    env,
+    env, fs,
     path::{Path, PathBuf},
     sync::OnceLock,
 };
@@ -23,6 +24,16 @@ pub fn target() -> PathBuf {
     let named = env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
     // The commands run in the root; the user may be elsewhere.
     named.and_then(|folder| std::path::absolute(folder).ok()).unwrap_or_else(|| root().join("target"))
+}
+
+/// A folder of that name in the build folder, made where it is not there; as the system calls it.
+///
+/// # Errors
+/// It cannot be made.
+pub fn made(name: &str) -> Result<PathBuf> {
+    let folder = target().join(name);
+    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", shown(&folder)))?;
+    fs::canonicalize(&folder).with_context(|| shown(&folder))
 }
 
 /// A path as the user would type it: relative to the root where it lies below.

@@ -42,9 +42,7 @@ pub struct Args {
 /// Something does not build, a variant cannot be measured, or a figure is stale.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
-    let folder = paths::target().join("study");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
-    let folder = fs::canonicalize(&folder).with_context(|| paths::shown(&folder))?;
+    let folder = paths::made("study")?;
     let inputs = folder.join("inputs.bin");
     let judge = Program::tool("study");
     let mut command = judge.build(console)?;

@@ -109,7 +109,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 /// Something does not build, or the image fails.
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
-    let recording = folder()?.join("recording.bin");
+    let recording = paths::made("timing")?.join("recording.bin");
     let mut command = console::cargo("run");
     command.args(["--quiet", "--example", "recording", "--"]);
     console.run(command.arg(&recording))?;
@@ -123,8 +123,11 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
 pub fn measure(image: &Path, argument: Option<&Path>, console: &mut Console) -> Result<Run> {
     ensure(console)?;
     let plugin = plugin(console)?;
-    let file =
-        folder()?.join(format!("{}.{}.json", image.file_stem().unwrap_or_default().display(), std::process::id()));
+    let file = paths::made("timing")?.join(format!(
+        "{}.{}.json",
+        image.file_stem().unwrap_or_default().display(),
+        std::process::id()
+    ));
     let argument = argument.map_or_else(String::new, |argument| format!(",arg={}", argument.display()));
     let mut command = Command::new(PROGRAM);
     command.args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"]);
@@ -174,12 +177,6 @@ fn plugin(console: &mut Console) -> Result<PathBuf> {
     console.build(command.args(["--features", "plugin"]), "the timing plugin", progress::HOST)?;
     let file = paths::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| paths::shown(&file))
-}
-
-fn folder() -> Result<PathBuf> {
-    let folder = paths::target().join("timing");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", paths::shown(&folder)))?;
-    fs::canonicalize(&folder).with_context(|| paths::shown(&folder))
 }
 
 /// A line for each region: cycles of a pass.

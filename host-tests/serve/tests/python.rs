@@ -2,47 +2,26 @@
 //!
 //! `FINGERTIP_PYTHON` names a Python with `dynamixel-sdk`; `cargo xtask test` makes it and sets it.
 
-use std::io::{BufRead as _, BufReader, Write as _};
+mod common;
+
+use common::Served;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Stdio};
+use std::process::{Command, Stdio};
 
 /// As patient as it takes on the slowest machine.
 const PATIENCE_MS: &str = "600000";
 
-/// A served finger, stopped when dropped.
-struct Served {
-    child: Child,
-    side: ChildStdin,
-    said: BufReader<std::process::ChildStdout>,
-    port: String,
+/// A served finger that complains where the test does.
+fn serve() -> Served {
+    Served::begin(Stdio::inherit(), &[])
 }
 
-impl Served {
-    fn begin() -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_serve"));
-        let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
-        let side = child.stdin.take().expect("it was asked for");
-        let mut said = BufReader::new(child.stdout.take().expect("it was asked for"));
-        let mut lines = [String::new(), String::new()];
-        for line in &mut lines {
-            said.read_line(line).expect("it says where it is");
-        }
-        let port = lines[0].split_whitespace().nth(1).expect("it says where it is").to_owned();
-        Self { child, side, said, port }
-    }
-
-    fn command(&mut self, text: &str) {
-        writeln!(self.side, "{text}").expect("it listens");
-        self.said.read_line(&mut String::new()).expect("it answers");
-    }
-
-    /// What an example says.
-    fn example(&self, name: &str, arguments: &[&str]) -> String {
-        let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
-        let mut command = python();
-        command.arg(example).args(["--port", &self.port, "--timeout-ms", PATIENCE_MS]);
-        said(command.args(arguments))
-    }
+/// What an example says.
+fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
+    let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
+    let mut command = python();
+    command.arg(example).args(["--port", &served.name, "--timeout-ms", PATIENCE_MS]);
+    said(command.args(arguments))
 }
 
 /// A Python that finds the package.
@@ -61,21 +40,13 @@ fn said(command: &mut Command) -> String {
     said.into_owned()
 }
 
-impl Drop for Served {
-    fn drop(&mut self) {
-        // One that has ended already needs no more.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
-
 #[test]
 #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
 fn the_examples_stream_show_set_and_recover() {
-    let mut served = Served::begin();
+    let mut served = serve();
     let file = std::env::temp_dir().join(format!("fingertip-python-{}.csv", std::process::id()));
     let path = file.to_str().expect("a plain path");
-    served.example("stream_to_csv.py", &["--seconds", "1", "--rate-hz", "200", "--press", "1.5", path]);
+    example(&served, "stream_to_csv.py", &["--seconds", "1", "--rate-hz", "200", "--press", "1.5", path]);
     let text = std::fs::read_to_string(&file).expect("it was written");
     std::fs::remove_file(&file).expect("it is there");
     let rows: Vec<Vec<f64>> = text
@@ -91,35 +62,36 @@ fn the_examples_stream_show_set_and_recover() {
     let held = rows.last().expect("some states");
     assert!((held[2] - 1.5).abs() < 0.02, "{held:?}");
 
-    let map = served.example("heat_map.py", &["--seconds", "0.1"]);
+    let map = example(&served, "heat_map.py", &["--seconds", "0.1"]);
     assert!(map.contains("0.000 N  OFF"), "{map}");
-    let shown = served.example("parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
+    let shown =
+        example(&served, "parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
     assert!(shown.contains("300000  (was 250000)") && shown.contains("50  (was 40)"), "{shown}");
 
-    let drive = served.example("commission.py", &["--yes", "--save"]);
+    let drive = example(&served, "commission.py", &["--yes", "--save"]);
     assert!(drive.contains("torque_constant_unm_per_a ") && drive.ends_with("accepted\n"), "{drive}");
     // A wall is a plate, and its finger has no spread: what is proposed is near to 1.
     let arguments = ["--modulus", "--presses", "2", "--no-wait", "--holds", "1.5", "--shown", "160", "--save"];
-    let calibrated = served.example("calibrate.py", &arguments);
+    let calibrated = example(&served, "calibrate.py", &arguments);
     assert!(
         calibrated.contains("press 2: ") && calibrated.ends_with("done: tare before the next press\n"),
         "{calibrated}"
     );
     assert!(calibrated.contains("forces times 1.04") || calibrated.contains("forces times 1.05"), "{calibrated}");
 
-    served.command("fault supply-low");
-    served.command("mend");
-    let recovered = served.example("recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);
+    served.ask("fault supply-low");
+    served.ask("mend");
+    let recovered = example(&served, "recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);
     assert!(recovered.ends_with("times\n"), "{recovered}");
 }
 
 #[test]
 #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
 fn the_package_stands_what_is_wrong() {
-    let served = Served::begin();
+    let served = serve();
     said(python().args([
         &format!("{}/host-tests/serve/tests/package.py", env!("FINGERTIP_ROOT")),
-        &served.port,
+        &served.name,
         PATIENCE_MS,
     ]));
 }

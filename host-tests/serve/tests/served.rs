@@ -1,77 +1,19 @@
 //! The program behind its port: judged by bytes and words, never by the clock.
 
+mod common;
+
+use common::{Killed, Served, program};
+use serial2::SerialPort;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, Command, Output, Stdio};
-
-use serial2::SerialPort;
+use std::process::{Command, Output, Stdio};
 
 /// As patient as it takes on the slowest machine.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3600);
 const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 /// What the letters FT and the firmware's version come to.
 const PONG: [u8; 12] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00, b'F', b'T', 0x01];
-
-fn program(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_serve"));
-    command.args(arguments);
-    command
-}
-
-/// A served finger, stopped when dropped.
-struct Served {
-    child: Child,
-    name: String,
-    side: Option<ChildStdin>,
-    said: BufReader<std::process::ChildStdout>,
-}
-
-impl Served {
-    fn begin(arguments: &[&str]) -> Self {
-        let mut command = program(arguments);
-        let mut child =
-            command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
-        let (side, said) = (child.stdin.take(), BufReader::new(child.stdout.take().expect("it was asked for")));
-        let mut served = Self { child, name: String::new(), side, said };
-        let line = served.line();
-        served.name = line.split_whitespace().nth(1).unwrap_or_else(|| panic!("says where it is: {line:?}")).to_owned();
-        assert!(served.line().starts_with("scene    "));
-        served
-    }
-
-    fn line(&mut self) -> String {
-        let mut line = String::new();
-        self.said.read_line(&mut line).expect("a line");
-        line
-    }
-
-    /// Has a command carried out, and hears of it.
-    fn ask(&mut self, command: &str) -> String {
-        writeln!(self.side.as_mut().expect("it was asked for"), "{command}").expect("it listens");
-        self.line()
-    }
-
-    /// Ctrl-C: how it ended, what it said last, and what it complained of.
-    fn interrupt(mut self) -> (bool, String, String) {
-        let pid = i32::try_from(self.child.id()).expect("a process number");
-        let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
-        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
-        let (mut last, mut complained) = (String::new(), String::new());
-        self.said.read_to_string(&mut last).expect("words");
-        let stderr = self.child.stderr.as_mut().expect("it was asked for");
-        stderr.read_to_string(&mut complained).expect("words");
-        (self.child.wait().expect("it ends").success(), last, complained)
-    }
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // One that has ended already needs no more.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
-}
 
 fn link(name: &str) -> PathBuf {
     std::env::temp_dir().join(format!("fingertip-served-{}-{name}", std::process::id()))
@@ -104,10 +46,10 @@ fn a_link_is_served_by_one_and_gone_with_it() {
     let path = link("one");
     // What an earlier run left behind is replaced.
     std::os::unix::fs::symlink("/dev/null", &path).expect("a link");
-    let served = Served::begin(&["--pty", text(&path)]);
+    let served = Served::begin(Stdio::piped(), &["--pty", text(&path)]);
     assert_eq!(Path::new(&served.name), path);
     let second = refused(&program(&["--pty", text(&path)]).output().expect("it starts"));
-    let holder = format!("process {} serves a finger at {}", served.child.id(), path.display());
+    let holder = format!("process {} serves a finger at {}", served.child.0.id(), path.display());
     assert!(second.contains(&holder) && second.contains("name another link"), "{second}");
     // The first one is as it was.
     pings(&terminal(&served, 1_000_000));
@@ -132,13 +74,13 @@ fn a_file_is_no_link() {
 
 #[test]
 fn another_speed_is_not_heard() {
-    let served = Served::begin(&[]);
+    let served = Served::begin(Stdio::piped(), &[]);
     let port = terminal(&served, 57_600);
     port.write_all(&PING).expect("a terminal takes it");
     // It is told of what it does not hear, in its own time: then the answer is to the second alone.
     let mut served = served;
     let mut line = String::new();
-    let mut complaints = BufReader::new(served.child.stderr.take().expect("it was asked for"));
+    let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for"));
     complaints.read_line(&mut line).expect("a line");
     while !line.contains("unheard") {
         line.clear();
@@ -151,7 +93,7 @@ fn another_speed_is_not_heard() {
 
 #[test]
 fn tcp_takes_one_client_after_another_and_says_so() {
-    let served = Served::begin(&["--tcp", "0"]);
+    let served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
     let ping = |client: &mut TcpStream| {
         client.write_all(&PING).expect("it listens");
         let mut reply = [0; 14];
@@ -179,7 +121,7 @@ fn tcp_takes_one_client_after_another_and_says_so() {
 
 #[test]
 fn a_busy_port_says_so_also_to_who_speaks_first() {
-    let served = Served::begin(&["--tcp", "0"]);
+    let served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
     let _first = TcpStream::connect(&served.name).expect("it listens");
     for _ in 0..50 {
         let mut words = String::new();
@@ -192,8 +134,8 @@ fn a_busy_port_says_so_also_to_who_speaks_first() {
 
 #[test]
 fn who_has_gone_keeps_nobody_out() {
-    let mut served = Served::begin(&["--tcp", "0"]);
-    let pid = rustix::process::Pid::from_raw(served.child.id() as i32).expect("a process number");
+    let mut served = Served::begin(Stdio::piped(), &["--tcp", "0"]);
+    let pid = rustix::process::Pid::from_raw(served.child.0.id() as i32).expect("a process number");
     let signal = |signal| rustix::process::kill_process(pid, signal).expect("it runs");
     for _ in 0..20 {
         // It sleeps while one goes and the next comes, as on a busy machine.
@@ -223,7 +165,7 @@ fn what_is_there_is_told() {
 
 #[test]
 fn commands_change_the_scene() {
-    let mut served = Served::begin(&[]);
+    let mut served = Served::begin(Stdio::piped(), &[]);
     assert_eq!(served.ask("move 3"), "the object moves to 3.00 mm at 20.000 mm/s\n");
     assert_eq!(served.ask("remove"), "the object is taken away\n");
     assert!(served.ask("state").starts_with("finger 1: Off: travel 0.000 mm, true force 0.000 N"));
@@ -248,7 +190,7 @@ fn commands_change_the_scene() {
 
 #[test]
 fn a_last_line_needs_no_end_and_a_line_too_long_is_none() {
-    let mut served = Served::begin(&[]);
+    let mut served = Served::begin(Stdio::piped(), &[]);
     let side = served.side.as_mut().expect("it was asked for");
     writeln!(side, "{}remove", "x".repeat(1_001)).expect("it listens");
     write!(side, "state").expect("it listens");
@@ -257,16 +199,6 @@ fn a_last_line_needs_no_end_and_a_line_too_long_is_none() {
     assert_eq!(served.line(), "the object is at 5.00 mm\n", "nothing was taken away");
     let (well, _, complained) = served.interrupt();
     assert!(well && complained.contains("a line of more than 1000 bytes is no command"), "{complained}");
-}
-
-/// A process, and what runs in its terminal, ended when dropped.
-struct Killed(Child);
-
-impl Drop for Killed {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
 }
 
 /// A job in the background that reads from its terminal is stopped by the system.

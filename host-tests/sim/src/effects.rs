@@ -5,12 +5,12 @@
 
 /// A family's named effects: a list for each stage, filled from the parts of that name.
 macro_rules! named {
-    ($($part:ident $list:ident),*) => {
+    ($($part:ident($list:ident: $effect:ty),)*) => {
         /// The named effects.
         #[derive(Default)]
         pub struct Named {
             any: bool,
-            $($list: Vec<Metered<dyn $part>>),*
+            $($list: Vec<Metered<$effect>>),*
         }
 
         impl Named {
@@ -22,6 +22,11 @@ macro_rules! named {
                 }
                 self.any = true;
                 None
+            }
+
+            /// Whether there is one.
+            pub fn any(&self) -> bool {
+                self.any
             }
 
             /// What each has cost so far.
@@ -57,41 +62,41 @@ pub enum Part {
     /// See [`sensor::Pressure`].
     Pressure(Box<dyn sensor::Pressure>),
     /// See [`sensor::Conductance`].
-    Conductance(Box<dyn sensor::Conductance>),
+    Conductance(Box<sensor::Conductance>),
     /// See [`sensor::Network`].
-    Network(Box<dyn sensor::Network>),
+    Network(Box<sensor::Network>),
     /// See [`sensor::Volts`].
-    Volts(Box<dyn sensor::Volts>),
+    Volts(Box<sensor::Volts>),
     /// See [`sensor::Codes`].
-    Codes(Box<dyn sensor::Codes>),
+    Codes(Box<sensor::Codes>),
     /// See [`contact::Shape`].
     Shape(Box<dyn contact::Shape>),
     /// See [`contact::Memory`].
     Memory(Box<dyn contact::Memory>),
     /// See [`contact::Series`].
-    Series(Box<dyn contact::Series>),
+    Series(Box<contact::Series>),
     /// See [`contact::Strength`].
     Strength(Box<dyn contact::Strength>),
     /// See [`contact::Tangent`].
-    Tangent(Box<dyn contact::Tangent>),
+    Tangent(Box<contact::Tangent>),
     /// See [`contact::Body`].
-    Body(Box<dyn contact::Body>),
+    Body(Box<contact::Body>),
     /// See [`drive::Inertia`].
-    Inertia(Box<dyn drive::Inertia>),
+    Inertia(Box<drive::Inertia>),
     /// See [`drive::Electric`].
     Electric(Box<dyn drive::Electric>),
     /// See [`drive::Resist`].
-    Resist(Box<dyn drive::Resist>),
+    Resist(Box<drive::Resist>),
     /// See [`drive::Potential`].
     Potential(Box<dyn drive::Potential>),
     /// See [`drive::Play`].
-    Play(Box<dyn drive::Play>),
+    Play(Box<drive::Play>),
     /// See [`drive::Encoder`].
-    Encoder(Box<dyn drive::Encoder>),
+    Encoder(Box<drive::Encoder>),
     /// See [`link::Clock`].
-    Clock(Box<dyn link::Clock>),
+    Clock(Box<link::Clock>),
     /// See [`link::Packets`].
-    Packets(Box<dyn link::Packets>),
+    Packets(Box<link::Packets>),
 }
 
 /// The seed of an effect's or a drawn value's own stream, so that naming one does not change the numbers of another.

@@ -14,6 +14,7 @@ pub mod agreement;
 pub mod bridge;
 #[cfg(feature = "files")]
 pub mod cli;
+pub mod cores;
 pub mod demo;
 pub mod effects;
 #[cfg(feature = "files")]

@@ -27,7 +27,8 @@ pub struct Description {
     pub build: fn(&Build) -> Part,
 }
 
-/// Where an effect acts. Each family has a folder, and a trait for what its effects may touch.
+/// Where an effect acts. Each family has a folder, and for each of its stages a trait or a function's type: what its
+/// effects may touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Family {
     /// From the taxels' pressure to the frame's codes.

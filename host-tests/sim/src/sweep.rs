@@ -3,7 +3,6 @@
 //! Runs are numbered point by point and, within a point, seed by seed. A shard takes every n-th of them; what is merged
 //! from shards is the same, byte for byte, as one whole sweep.
 
-pub mod cores;
 pub mod files;
 mod merge;
 mod plots;
@@ -20,6 +19,7 @@ pub use table::Table;
 pub use vary::Vary;
 
 use crate::cli;
+use crate::cores;
 use crate::metrics::METRICS;
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;

@@ -2,6 +2,7 @@
 //! of the paper's compression test come out of its scene.
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
+use sim::cores;
 use sim::metrics::Verdict;
 use sim::native;
 use sim::registry;
@@ -9,7 +10,6 @@ use sim::run::run;
 use sim::scene::{Bound, Scene, library};
 use sim::watch::{Step, Watch};
 use std::collections::BTreeSet;
-use std::thread;
 
 fn scene(name: &str) -> Scene {
     sim::cli::load(name, &[], None).unwrap_or_else(|error| panic!("{error}"))
@@ -30,10 +30,7 @@ fn broken(name: &str, seed: Option<u64>) -> Vec<String> {
 fn every_scene_of_the_library_holds_its_bounds() {
     let names = library::names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
-    let broken: Vec<String> = thread::scope(|scope| {
-        let runs: Vec<_> = names.iter().map(|name| scope.spawn(|| broken(name, None))).collect();
-        runs.into_iter().flat_map(|run| run.join().expect("no panic")).collect()
-    });
+    let broken = cores::map(&names, |name| broken(name, None)).concat();
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
@@ -98,11 +95,7 @@ fn unbroken(name: &str, keys: &[&str]) -> BTreeSet<(String, &'static str)> {
 fn each_bound_of_the_library_breaks_on_either_side_when_something_is_wrong() {
     let names: Vec<&str> = BREAKERS.iter().map(|(name, _)| *name).collect();
     assert_eq!(names, library::names().expect("the library is there"));
-    thread::scope(|scope| {
-        for (name, keys) in BREAKERS {
-            scope.spawn(move || assert_eq!(unbroken(name, keys), BTreeSet::new(), "{name}"));
-        }
-    });
+    cores::map(BREAKERS, |(name, keys)| assert_eq!(unbroken(name, keys), BTreeSet::new(), "{name}"));
 }
 
 #[test]

@@ -1,12 +1,9 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
 use fingertip::contact::FitLevel;
-use host_tests::fit_tables::{CASES, markdown, renewed};
-use std::io::{self, IsTerminal, Write};
-use std::path::Path;
+use host_tests::fit_tables::{CASES, PAGE, markdown};
+use host_tests::program::{Progress, ended};
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 const USAGE: &str = "fit [--cases N] [--quick] [--fit-level N] [--write | --check]";
 
@@ -17,13 +14,7 @@ enum Page {
 }
 
 fn main() -> ExitCode {
-    match run() {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    ended(run())
 }
 
 fn run() -> Result<(), String> {
@@ -46,42 +37,15 @@ fn run() -> Result<(), String> {
             other => return Err(format!("unknown argument {other}: {USAGE}")),
         }
     }
-    // A log wants the results only.
-    let live = io::stderr().is_terminal();
-    let shown = Mutex::new(Instant::now());
+    let progress = Progress::begin();
     let tables = markdown(cases, fit_level, &|name, done| {
-        if live
-            && let Ok(mut shown) = shown.try_lock()
-            && shown.elapsed() > Duration::from_millis(500)
-        {
-            *shown = Instant::now();
-            eprint!("\r{name}: {done} of {cases}          ");
-            // Progress is a courtesy; a closed terminal is no reason to stop.
-            let _ = io::stderr().flush();
-        }
+        progress.show(format_args!("{name}: {done} of {cases}          "));
     });
-    if live {
-        eprint!("\r{:60}\r", "");
-    }
-    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/contact.md");
-    let renew = || -> Result<(String, String), String> {
-        let old = std::fs::read_to_string(&file).map_err(|error| format!("docs/contact.md: {error}"))?;
-        let new = renewed(&old, &tables).ok_or("docs/contact.md lacks the markers of its tables")?;
-        Ok((old, new))
-    };
+    progress.end(format_args!("\r{:60}\r", ""));
     match page {
         Page::Print => print!("{tables}"),
-        Page::Write => {
-            std::fs::write(&file, renew()?.1).map_err(|error| format!("docs/contact.md: {error}"))?;
-            println!("written  docs/contact.md");
-        }
-        Page::Check => {
-            let (old, new) = renew()?;
-            if old != new {
-                return Err("docs/contact.md is stale: renew it with `cargo xtask fit --write`".into());
-            }
-            println!("fresh    docs/contact.md");
-        }
+        Page::Write => PAGE.write(&tables)?,
+        Page::Check => PAGE.check(&tables)?,
     }
     Ok(())
 }

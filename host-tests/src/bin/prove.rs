@@ -3,12 +3,10 @@
 //! Prints, for each function, how many inputs were judged and the worst case; fails where a bound does not hold.
 //! `--write` puts these figures into `docs/model.md`, `--check` fails where they are stale there.
 
-use std::io::{self, IsTerminal, Write};
-use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
+use host_tests::program::{Progress, ended};
 use host_tests::prove::domain::reference_tip;
 use host_tests::prove::tally::Tally;
 use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
@@ -16,7 +14,6 @@ use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
 const USAGE: &str = "prove [--quick | --write | --check]";
 
 /// What becomes of the tables of `docs/model.md`.
-#[derive(Clone, Copy, PartialEq, Eq)]
 enum Page {
     Leave,
     Write,
@@ -98,24 +95,9 @@ struct Report {
 impl Report {
     fn section(&mut self, title: &str, judge: impl FnOnce(exhaustive::Progress<'_>) -> Vec<Tally>) {
         println!("{title}");
-        // A log wants the results only.
-        let live = io::stderr().is_terminal();
-        let shown = Mutex::new(Instant::now());
-        let progress = |done: u64, of: u64| {
-            if live
-                && let Ok(mut shown) = shown.try_lock()
-                && shown.elapsed() > Duration::from_millis(500)
-            {
-                *shown = Instant::now();
-                eprint!("\r  {done} of {of}   ");
-                // Progress is a courtesy; a closed terminal is no reason to stop.
-                let _ = io::stderr().flush();
-            }
-        };
-        let tallies = judge(&progress);
-        if live {
-            eprint!("\r");
-        }
+        let progress = Progress::begin();
+        let tallies = judge(&|done, of| progress.show(format_args!("  {done} of {of}   ")));
+        progress.end("\r");
         for tally in &tallies {
             println!("  {tally}");
             self.inputs += tally.inputs;
@@ -130,31 +112,11 @@ impl Report {
         if self.broken > 0 {
             return ExitCode::FAILURE;
         }
-        match renew(&tables::markdown(&self.sections), page) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(error) => {
-                eprintln!("error: {error}");
-                ExitCode::FAILURE
-            }
-        }
+        let text = tables::markdown(&self.sections);
+        ended(match page {
+            Page::Leave => Ok(()),
+            Page::Write => tables::PAGE.check(&text).or_else(|_| tables::PAGE.write(&text)),
+            Page::Check => tables::PAGE.check(&text),
+        })
     }
-}
-
-fn renew(tables: &str, page: Page) -> Result<(), String> {
-    if page == Page::Leave {
-        return Ok(());
-    }
-    let file = Path::new(env!("FINGERTIP_ROOT")).join("docs/model.md");
-    let failed = |error| format!("docs/model.md: {error}");
-    let old = std::fs::read_to_string(&file).map_err(failed)?;
-    let new = tables::renewed(&old, tables).ok_or("docs/model.md lacks the markers of its tables")?;
-    if old == new {
-        println!("fresh    docs/model.md");
-    } else if page == Page::Check {
-        return Err("docs/model.md is stale: renew it with `cargo xtask prove --write`".into());
-    } else {
-        std::fs::write(&file, new).map_err(failed)?;
-        println!("written  docs/model.md");
-    }
-    Ok(())
 }

@@ -5,6 +5,7 @@
 //! `study report SHIPPED QUICK [--check] [--json FILE] [--out DIR]` judges two runs, of the image built as the firmware
 //! is and built for speed: it renews or checks `docs/study.md`, the README's table and the pictures.
 
+use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
 use host_tests::study::page::Studied;
@@ -18,19 +19,12 @@ const USAGE: &str =
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let result = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+    ended(match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["inputs", file] => fs::write(file, Inputs::new().to_bytes()).map_err(|error| format!("{file}: {error}")),
         ["few", kept, full] => few(kept, full),
         ["report", shipped, quick, ref flags @ ..] => report([shipped, quick], flags),
         _ => Err(USAGE.into()),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::FAILURE
-        }
-    }
+    })
 }
 
 fn few(kept: &str, full: &str) -> Result<(), String> {
@@ -64,10 +58,8 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     }
     let root = Path::new(env!("FINGERTIP_ROOT"));
     let mut files = Vec::new();
-    for (name, tables) in [("docs/study.md", page::markdown(&studied)), ("README.md", page::readme(&studied))] {
-        let old = fs::read_to_string(root.join(name)).map_err(|error| format!("{name}: {error}"))?;
-        let new = page::renewed(&old, &tables).ok_or_else(|| format!("{name} lacks the markers of its tables"))?;
-        files.push((name.to_owned(), new));
+    for (page, tables) in [(page::PAGE, page::markdown(&studied)), (page::README, page::readme(&studied))] {
+        files.push((page.name.to_owned(), page.renewed(&tables)?.1));
     }
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
         let picture = pictures::draw(kernel, points).map_err(|error| error.to_string())?;

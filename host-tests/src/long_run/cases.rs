@@ -1,6 +1,7 @@
 //! The machines: observer, drive, speed loop, baseline, tare, relaxation, winding.
 
 use super::{Machine, Outcome};
+use crate::finger::config;
 use fingertip::config::gains::PACES;
 use fingertip::config::heat::FRAMES;
 use fingertip::control::SpeedLoop;
@@ -13,7 +14,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
 use fingertip::units::{Millimetres, Newtons, Ratio};
-use std::sync::Mutex;
+use sim::cores;
 
 /// Steps within which a machine must come to its cycle.
 const MOST: u64 = 200_000_000;
@@ -45,7 +46,7 @@ pub fn all(whole: bool) -> Vec<Outcome> {
     queue(&mut runs, tares(), false);
     queue(&mut runs, relaxations(whole), whole);
     queue(&mut runs, windings(whole), whole);
-    in_parallel(runs)
+    cores::map(runs, |run| run())
 }
 
 /// A motor that stays cool, for what has the winding beside what is looked at: it is a machine of its own below. While
@@ -58,28 +59,6 @@ type Run = Box<dyn FnOnce() -> Outcome + Send>;
 
 fn queue<S: Clone + PartialEq + Send + 'static>(runs: &mut Vec<Run>, machines: Vec<Machine<S>>, whole: bool) {
     runs.extend(machines.into_iter().map(|machine| Box::new(move || machine.run(MOST, whole)) as Run));
-}
-
-/// The outcomes in the order of the runs.
-fn in_parallel(runs: Vec<Run>) -> Vec<Outcome> {
-    let count = runs.len();
-    let queue = Mutex::new(runs.into_iter().enumerate());
-    let outcomes = Mutex::new(Vec::with_capacity(count));
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(|| {
-                loop {
-                    let next = queue.lock().expect("no run panicked").next();
-                    let Some((place, run)) = next else { break };
-                    let outcome = run();
-                    outcomes.lock().expect("no run panicked").push((place, outcome));
-                }
-            });
-        }
-    });
-    let mut outcomes = outcomes.into_inner().expect("no run panicked");
-    outcomes.sort_by_key(|(place, _)| *place);
-    outcomes.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
 /// Encoder and acceleration, held or in turns.
@@ -198,7 +177,7 @@ fn baselines() -> Vec<Machine<Array>> {
         ("the extremes in turns", [12, most]),
     ];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = config();
         let frames = pair.map(frame);
         let mut start = Array::new();
         tare(&mut start, &frame(40), &config);
@@ -231,7 +210,7 @@ fn tare(array: &mut Array, frame: &Frame, config: &Config) {
 fn tares() -> Vec<Machine<Array>> {
     let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, SATURATED - 372 - 1])];
     let machine = |(input, pair): (&str, [u16; 2])| {
-        let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+        let config = config();
         let frames = pair.map(frame);
         Machine {
             name: format!("tare, {input}"),

@@ -2,13 +2,13 @@
 //!
 //! From integers and the four operations alone, so that every machine makes the same.
 
+use crate::finger::config;
 use crate::fit_cases::Scene;
 use crate::fit_statistics::{FRAMES, GOOD, Series};
 use crate::stimulus;
 use bringup::script::{Bench, RECORDS};
 use fastrand::Rng;
-use fingertip::params::Params;
-use fingertip::shipped::{COLUMNS, Config, Frame, Picture, Pipeline, ROWS};
+use fingertip::shipped::{COLUMNS, Frame, Picture, Pipeline, ROWS};
 use images::record::Record;
 use sim::plant::{Plant, Setup};
 
@@ -193,7 +193,7 @@ impl Inputs {
     /// # Panics
     /// Never: the default parameters are sound, as the core's own tests show.
     pub fn few_with_records(&self) -> Vec<u8> {
-        let config = Config::shipped(&Params::DEFAULT).expect("the default parameters are sound");
+        let config = config();
         let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
         bench.finger.make_table();
         bench.restart();

@@ -2,9 +2,9 @@
 
 use fingertip::capture::{Capture, Ended, State};
 use fingertip::config::newtons;
-use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::{COLUMNS, Calibration, Config, Gains, ROWS, TAXELS};
+use fingertip::shipped::{COLUMNS, Calibration, Gains, ROWS, TAXELS};
+use host_tests::finger::config;
 use images::record::Record;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
@@ -19,7 +19,7 @@ pub struct Finger<const BYTES: usize> {
 impl<const BYTES: usize> Finger<BYTES> {
     /// 0.4 mm from the wall, with gains that differ.
     pub fn new() -> Self {
-        let config = Config::shipped(&Params::DEFAULT).expect("the defaults make a configuration");
+        let config = config();
         let mut setup = Setup::default();
         setup.wall.distance_mm = 0.4;
         let mut native = Bench::of(&setup, &config);

@@ -5,11 +5,11 @@ use fingertip::capture::{Ended, Frames, State};
 use fingertip::command::Command;
 use fingertip::contact::FitLevel;
 use fingertip::frame::Sense;
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, SLOTS};
+use fingertip::shipped::{COLUMNS, Frame, Pipeline, ROWS, SLOTS};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
+use host_tests::finger::config;
 use proptest::prelude::*;
 
 const BYTES: usize = 8 << 10;
@@ -76,7 +76,7 @@ proptest! {
 
     #[test]
     fn every_frame_comes_back_to_the_bit(steps in steps()) {
-        let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).expect("a configuration"));
+        let mut pipeline = Pipeline::new(&config());
         let mut capture = Box::new(Burst::<BYTES>::NEW);
         capture.arm();
         capture.begin(&mut pipeline);
@@ -105,7 +105,7 @@ proptest! {
     fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..900), real in any::<bool>()) {
         let mut bytes = bytes;
         if real {
-            let mut pipeline = Pipeline::new(&Config::shipped(&Params::DEFAULT).expect("a configuration"));
+            let mut pipeline = Pipeline::new(&config());
             let mut capture = Box::new(Burst::<BYTES>::NEW);
             capture.arm();
             capture.begin(&mut pipeline);
@@ -134,7 +134,7 @@ fn check(bytes: &[u8]) -> u32 {
 
 #[test]
 fn out_of_turn_nothing_is_kept() {
-    let config = Config::shipped(&Params::DEFAULT).expect("a configuration");
+    let config = config();
     let mut pipeline = Pipeline::new(&config);
     let mut capture = Box::new(Burst::<BYTES>::NEW);
     let (status, tare) = (Status::default(), Command { tare_request: 1, ..Command::default() });
@@ -173,7 +173,7 @@ fn out_of_turn_nothing_is_kept() {
 /// As `docs/captures.md` has it.
 #[test]
 fn a_frame_takes_what_its_noise_says() {
-    let config = Config::shipped(&Params::DEFAULT).expect("a configuration");
+    let config = config();
     let mut state = 1_u32;
     let mut uniform = || {
         state ^= state << 13;

@@ -4,6 +4,7 @@ use fingertip::identify::{Identification, Modulus, Refusal};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Mode;
+use host_tests::finger::config;
 use sim::native::bench::Bench;
 use sim::plant::{Setup, Taxel};
 
@@ -11,7 +12,7 @@ use sim::plant::{Setup, Taxel};
 const FRAMES_MAX: u32 = 60_000;
 
 fn board(setup: &Setup) -> Bench {
-    let mut board = Bench::of(setup, &Config::shipped(&Params::DEFAULT).unwrap());
+    let mut board = Bench::of(setup, &config());
     board.tare();
     board.step();
     board
@@ -167,7 +168,7 @@ fn torque_off_a_fault_and_new_parameters_interrupt_it() {
     let status = board.step();
     assert_eq!((status.mode, status.duty.0, status.identification), (Mode::Fault, 0, interrupted));
     let mut board = started();
-    board.pipeline().configure(&Config::shipped(&Params::DEFAULT).unwrap());
+    board.pipeline().configure(&config());
     assert_eq!(board.step().identification, interrupted);
 }
 

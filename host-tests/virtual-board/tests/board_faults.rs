@@ -2,26 +2,26 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, holding, image, on_a_shared, read_u8, scratch, write_u8};
-use fingertip::shipped::{REGISTERS, address};
-use rigless::emulator::{Access, AccessKind};
+use crate::common::{
+    PING, WAIT_NS, holding, image, on_a_shared, on_bus, poke, read_u8, reboot, register, running, scratch, write_u8,
+    write_u32,
+};
+use fingertip::shipped::address;
 use rigless::mcu::Operate;
 use rigless::soc::Width;
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use std::sync::Mutex;
 use virtual_board::{Fault, Options, Rig};
 
-/// A board that has run for 20 ms.
-fn running(options: &Options) -> Rig {
-    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), options).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
-    rig
+/// A sound board.
+fn sound() -> Rig {
+    running(&Setup::default(), &Options::default())
 }
 
-/// One of these that nothing lasting is done to.
+/// One that nothing lasting is done to.
 fn with_one_running(test: impl FnOnce(&mut Rig)) {
     static RUNNING: Mutex<Option<Rig>> = Mutex::new(None);
-    on_a_shared(&RUNNING, || running(&Options::default()), test);
+    on_a_shared(&RUNNING, sound, test);
 }
 
 fn frames(rig: &mut Rig) -> u64 {
@@ -33,17 +33,13 @@ fn frames(rig: &mut Rig) -> u64 {
 fn a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault() {
     let mut driven = holding();
     for off_us in [0, 30, 70] {
-        let mut rig = if off_us == 0 { running(&Options::default()) } else { holding() };
+        let mut rig = if off_us == 0 { sound() } else { holding() };
         rig.run_until_ns(rig.now_ns() + off_us * 1_000).expect("it runs");
         hangs(&mut rig);
     }
     // Parameters at which eight frames take longer than a millisecond: 50 us a row.
-    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
-    let written = driven.client(WAIT_NS, |bus| {
-        bus.write_u8(1, address::TORQUE_ENABLE, 0)?;
-        bus.write_u32(1, settle.address, 50_000).map(drop)
-    });
-    written.expect("the client runs").expect("the image obeys");
+    write_u8(&mut driven, address::TORQUE_ENABLE, 0);
+    write_u32(&mut driven, register("settle_ns"), 50_000);
     driven.run_ms(20).expect("it runs");
     assert_eq!(read_u8(&mut driven, address::FAULT), 0, "a slower scan is no hang");
     assert_eq!(driven.resets().expect("it runs"), vec![]);
@@ -94,44 +90,32 @@ fn a_clock_that_fails_cuts_the_bridge_and_the_board_comes_up_without_torque() {
     assert!((1_000..=1_005).contains(&(after - before)), "{} frames in 100 ms", after - before);
     // With its clock it starts as ever.
     rig.mend(Fault::ClockLost).expect("it runs");
-    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
-    rig.run_ms(20).expect("it runs");
+    reboot(&mut rig, 20);
     assert_eq!((read_u8(&mut rig, address::FAULT), read_u8(&mut rig, address::PRESENT_MODE)), (0, 0));
 }
 
 #[test]
 fn a_part_as_the_factory_left_it_refuses_torque_until_its_brown_out_level_is_programmed() {
-    let mut rig = running(&Options { brown_out_bits: 3, ..Options::default() });
+    let mut rig = running(&Setup::default(), &Options { brown_out_bits: 3, ..Options::default() });
     assert_eq!(read_u8(&mut rig, address::FAULT), 18);
     write_u8(&mut rig, address::CLEAR_FAULT, 1);
     rig.run_ms(1).expect("it runs");
     assert_eq!(read_u8(&mut rig, address::FAULT), 18);
     // What `cargo xtask flash` writes: two keys, the level, the start.
-    let writes = |stand: &mut virtual_board::stand::Stand<'_>| {
-        const OPTKEYR: u64 = 0x4002_3c08;
-        const OPTCR: u64 = 0x4002_3c14;
-        let mut write = |address, value| {
-            let access = Access::new(AccessKind::Write, address, Width::W32, value);
-            let access = access.at(stand.stop.instruction_count, stand.stop.at);
-            stand.session.access(access, stand.host);
-        };
-        for (address, value) in
-            [(OPTKEYR, 0x0819_2a3b), (OPTKEYR, 0x4c5d_6e7f), (OPTCR, 0x0fff_aae0), (OPTCR, 0x0fff_aae2)]
-        {
-            write(address, value);
-        }
-    };
-    rig.with(writes).expect("it runs");
+    const OPTKEYR: u64 = 0x4002_3c08;
+    const OPTCR: u64 = 0x4002_3c14;
+    for (place, value) in [(OPTKEYR, 0x0819_2a3b), (OPTKEYR, 0x4c5d_6e7f), (OPTCR, 0x0fff_aae0), (OPTCR, 0x0fff_aae2)] {
+        poke(&mut rig, place, value);
+    }
     rig.run_ms(1).expect("it runs");
-    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("it answers before it reboots");
-    rig.run_ms(20).expect("it runs");
+    reboot(&mut rig, 20);
     assert_eq!(read_u8(&mut rig, address::FAULT), 0);
     rig.check_gaps().expect("no unknown gap");
 }
 
 #[test]
 fn a_store_just_below_ram_is_a_hard_fault_there_and_then() {
-    let mut rig = running(&Options::default());
+    let mut rig = sound();
     rig.inject(Fault::StoreBelowRam).expect("it runs");
     rig.run_ms(1).expect("it runs");
     assert_eq!(rig.resets().expect("it runs").first().map(|reset| reset.cause.clone()).as_deref(), Some("software"));
@@ -146,7 +130,7 @@ fn a_store_just_below_ram_is_a_hard_fault_there_and_then() {
 
 #[test]
 fn without_the_scans_interrupt_the_image_misses_frames_that_go_on() {
-    let mut rig = running(&Options::default());
+    let mut rig = sound();
     assert_eq!(alert(&mut rig), Some(false));
     rig.inject(Fault::ScanInterruptLost).expect("it runs");
     let before = frames(&mut rig);
@@ -157,7 +141,6 @@ fn without_the_scans_interrupt_the_image_misses_frames_that_go_on() {
 
 /// The alert bit in the answer to a ping.
 fn alert(rig: &mut Rig) -> Option<bool> {
-    const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
     let reply = rig.transact(&PING, WAIT_NS).expect("it runs");
     reply.get(8).map(|error| error & 0x80 != 0)
 }
@@ -165,22 +148,20 @@ fn alert(rig: &mut Rig) -> Option<bool> {
 #[test]
 fn what_is_stored_survives_a_snapshot_and_a_reboot() {
     let file = scratch("flash.snapshot");
-    let mut rig = running(&Options::default());
+    let mut rig = sound();
     // Register 7 is the ID, register 262 stores it.
-    let written = rig.client(WAIT_NS, |bus| bus.write_u8(1, 7, 42).and_then(|_| bus.write_u8(42, 262, 1)).map(drop));
-    written.expect("the client runs").expect("the ID is taken and stored");
+    on_bus(&mut rig, |bus| bus.write_u8(1, 7, 42).and_then(|_| bus.write_u8(42, 262, 1)).map(drop));
     rig.run_ms(10).expect("it runs");
     rig.snapshot(&file).expect("a snapshot is taken");
     drop(rig);
 
     let mut rig = Rig::restore(&image(), &file, &Options::default()).expect("the snapshot is restored");
     std::fs::remove_file(&file).expect("the snapshot's file was there");
-    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(42).map(drop)).expect("the client runs");
-    rebooted.expect("it answers before it reboots");
+    on_bus(&mut rig, |bus| bus.reboot(42).map(drop));
     rig.run_ms(20).expect("it runs");
     assert_eq!(rig.resets().expect("it runs").len(), 1);
-    let found = rig.client(WAIT_NS, |bus| bus.ping(42).map(drop)).expect("the client runs");
-    found.expect("it answers to the stored ID");
+    // It answers to the stored ID.
+    on_bus(&mut rig, |bus| bus.ping(42).map(drop));
     rig.check_gaps().expect("no unknown gap");
 }
 

@@ -2,7 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, holding, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use crate::common::{WAIT_NS, away, holding, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_u8};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
 use fingertip::link::crc;
@@ -10,12 +10,10 @@ use fingertip::link::sender::Sender;
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
-use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
-    let read = rig.client(WAIT_NS, move |bus| bus.read(1, register, bytes).map(|reply| reply.data));
-    read.expect("the client runs").expect("the image answers")
+    on_bus(rig, move |bus| bus.read(1, register, bytes).map(|reply| reply.data))
 }
 
 /// State, time and pressures, in the one read that holds all of them.
@@ -59,10 +57,7 @@ fn frames_have_true_times() {
 
 #[test]
 fn before_the_first_tare_no_force_is_told() {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::default()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = running(&away(0.5), &Options::default());
     let told = |rig: &mut Rig| {
         let pressures = read(rig, address::PRESSURES, 2 * TAXELS as u16);
         (read_u32(rig, address::PRESENT_FORCE_MN), pressures.iter().all(|&byte| byte == 0))

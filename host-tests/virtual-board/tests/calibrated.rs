@@ -3,9 +3,10 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use crate::common::{
+    away, read_u8, read_u16, read_u32, reboot, refused, register, running, write_goal, write_u8, write_u16, write_u32,
+};
 use fingertip::shipped::address;
-use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 /// The longest that a press takes, with what is worked out after it.
@@ -14,21 +15,12 @@ const GAIN_ONE: u16 = 16_384;
 
 /// A plate 0.5 mm away, where two taxels conduct a quarter more and a quarter less than their gains say.
 fn start() -> Rig {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
-    write_gain(&mut rig, 44, GAIN_ONE / 4 * 5);
-    write_gain(&mut rig, 35, GAIN_ONE / 4 * 3);
+    let mut rig = running(&away(0.5), &Options::confirmed());
+    write_u16(&mut rig, address::GAINS + 2 * 44, GAIN_ONE / 4 * 5);
+    write_u16(&mut rig, address::GAINS + 2 * 35, GAIN_ONE / 4 * 3);
     rig.run_ms(2).expect("it runs");
     tare(&mut rig);
     rig
-}
-
-fn write_gain(rig: &mut Rig, taxel: u16, gain: u16) {
-    let place = address::GAINS + 2 * taxel;
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u16(1, place, gain).map(drop));
-    written.expect("the client runs").expect("the image obeys");
 }
 
 fn tare(rig: &mut Rig) {
@@ -81,8 +73,7 @@ fn a_press_is_evaluated_accepted_saved_and_there_after_a_reset() {
 
     // Nothing of it counts yet, and with torque on it is not accepted.
     assert_eq!(read_u16(&mut rig, address::GAINS + 88), GAIN_ONE / 4 * 5);
-    let refused = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::CALIBRATE, 3).map(drop)).expect("it runs");
-    assert!(refused.is_err());
+    assert_ne!(refused(&mut rig, address::CALIBRATE, 3), 0);
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);
     write_u8(&mut rig, address::CALIBRATE, 3);
     assert_eq!(gains(&mut rig, address::GAINS), proposed);
@@ -90,9 +81,7 @@ fn a_press_is_evaluated_accepted_saved_and_there_after_a_reset() {
     write_u8(&mut rig, address::SAVE_PARAMETERS, 1);
     rig.run_ms(30).expect("it runs");
     assert_eq!((read_u8(&mut rig, address::SAVED_STATE), read_u8(&mut rig, address::FAULT)), (0, 0));
-    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop));
-    rebooted.expect("the client runs").expect("it answers before it reboots");
-    rig.run_ms(100).expect("it runs");
+    reboot(&mut rig, 100);
     assert_eq!(gains(&mut rig, address::GAINS), proposed);
     assert_eq!(read_u8(&mut rig, address::FAULT), 0);
 
@@ -101,21 +90,14 @@ fn a_press_is_evaluated_accepted_saved_and_there_after_a_reset() {
     write_goal(&mut rig, 2_000);
     rig.run_ms(700).expect("it runs");
     let read_mn = read_u32(&mut rig, address::PRESENT_FORCE_MN);
-    let shown = move |bus: &mut virtual_board::client::Client| {
-        bus.write_u32(1, address::SCALE_SHOWS_MN, read_mn * 11 / 10).map(drop)
-    };
-    rig.client(WAIT_NS, shown).expect("the client runs").expect("the image obeys");
+    write_u32(&mut rig, address::SCALE_SHOWS_MN, read_mn * 11 / 10);
     rig.run_ms(2).expect("it runs");
     assert_eq!((read_u8(&mut rig, address::SCALE_POINTS), read_u8(&mut rig, address::SCALE_REFUSAL)), (1, 0));
     let factor_ppm = read_u32(&mut rig, address::SCALE_FACTOR_PPM);
     assert!((1_095_000..1_105_000).contains(&factor_ppm), "{factor_ppm}");
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);
     write_u8(&mut rig, address::SCALE, 3);
-    let place = |name: &str| {
-        let found = fingertip::shipped::REGISTERS.iter().find(|register| register.name == name);
-        found.expect("there is such a register").address
-    };
-    let codes = read_u32(&mut rig, place("codes_per_kpa_milli"));
+    let codes = read_u32(&mut rig, register("codes_per_kpa_milli"));
     assert!((21_700..21_950).contains(&codes), "{codes}");
     rig.check_gaps().expect("no unknown gap");
 }
@@ -131,16 +113,13 @@ fn what_is_interrupted_leaves_the_old_gains() {
     rig.run_ms(2).expect("it runs");
     assert_eq!((read_u8(&mut rig, address::CALIBRATE_STATE), read_u8(&mut rig, address::CALIBRATE_REFUSAL)), (3, 9));
     assert_eq!((read_u8(&mut rig, address::CALIBRATE_PRESSES), gains(&mut rig, address::GAINS)), (0, before));
-    let refused = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::CALIBRATE, 3).map(drop)).expect("it runs");
-    assert!(refused.is_err(), "there is nothing to accept");
+    assert_ne!(refused(&mut rig, address::CALIBRATE, 3), 0, "there is nothing to accept");
     // The power goes in the middle of another one.
     rig.run_ms(500).expect("it runs");
     tare(&mut rig);
     write_u8(&mut rig, address::CALIBRATE, 1);
     rig.run_ms(600).expect("it runs");
-    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop));
-    rebooted.expect("the client runs").expect("it answers before it reboots");
-    rig.run_ms(100).expect("it runs");
+    reboot(&mut rig, 100);
     assert_eq!(gains(&mut rig, address::GAINS), vec![GAIN_ONE; 100], "what was never saved is gone");
     assert_eq!((read_u8(&mut rig, address::CALIBRATE_STATE), read_u8(&mut rig, address::FAULT)), (0, 0));
 }

@@ -3,11 +3,12 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_param, write_u8};
+use crate::common::{
+    away, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8, write_u16,
+};
 use fingertip::capture::{Ended, Replayed, replay};
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
-use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
 
 const NONE: u8 = 0;
@@ -22,11 +23,7 @@ const WINDOW: u16 = 248;
 
 /// A board whose tip is 0.4 mm away from a plate.
 fn start() -> Rig {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.4;
-    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
-    rig
+    running(&away(0.4), &Options::confirmed())
 }
 
 /// Arms, tares, and presses with half a newton from then on.
@@ -51,11 +48,10 @@ fn until_done(rig: &mut Rig) {
 }
 
 fn window(rig: &mut Rig, offset: u32) -> Vec<u8> {
-    let read = rig.client(WAIT_NS, move |bus| {
+    on_bus(rig, move |bus| {
         bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
         bus.read(1, address::CAPTURE_DATA, WINDOW).map(|reply| reply.data.to_vec())
-    });
-    read.expect("the client runs").expect("the image answers")
+    })
 }
 
 fn fetch(rig: &mut Rig) -> Vec<u8> {
@@ -83,15 +79,6 @@ fn same(rig: &mut Rig, bytes: &[u8]) -> (Replayed<ROWS, COLUMNS>, Vec<Mode>) {
     assert_eq!(replayed.head.frames, read_u32(rig, address::CAPTURE_FRAMES));
     assert_eq!(replayed.head.ended as u8, read_u8(rig, address::CAPTURE_ENDED));
     (replayed, modes)
-}
-
-/// What a write is refused with.
-fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
-    match written.expect("the client runs") {
-        Err(dynamixel2::TransferError::ReadError(dynamixel2::ReadError::MotorError(error))) => error.raw & 0x7F,
-        other => panic!("{other:?}"),
-    }
 }
 
 #[test]
@@ -130,9 +117,7 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     rig.run_ms(300).expect("it runs");
     let taxels = [(44, 20_480_u16), (35, 12_288), (0, 8_192), (99, 32_767)];
     for (taxel, gain) in taxels {
-        let place = address::GAINS + 2 * taxel;
-        let written = rig.client(WAIT_NS, move |bus| bus.write_u16(1, place, gain).map(drop));
-        written.expect("the client runs").expect("the image obeys");
+        write_u16(&mut rig, address::GAINS + 2 * taxel, gain);
     }
     rig.run_ms(5).expect("it runs");
     press(&mut rig);
@@ -189,9 +174,7 @@ fn out_of_turn_and_interrupted() {
     rig.run_ms(1).expect("it runs");
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(5).expect("it runs");
-    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop));
-    rebooted.expect("the client runs").expect("the image obeys");
-    rig.run_ms(30).expect("it runs");
+    reboot(&mut rig, 30);
     assert_eq!((read_u8(&mut rig, address::CAPTURE_STATE), read_u8(&mut rig, address::CAPTURE_COUNT)), (NONE, 0));
     assert_eq!((read_u32(&mut rig, address::CAPTURE_BYTES), window(&mut rig, 0)), (0, vec![0; WINDOW.into()]));
     write_u8(&mut rig, address::CAPTURE, 1);

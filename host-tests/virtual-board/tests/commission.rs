@@ -1,10 +1,9 @@
 //! The drive of the emulated board, commissioned over the bus as its owner would.
 
-use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_u8};
-use fingertip::params::Params;
+use crate::common::{away, read_u8, read_u16, read_u32, reboot, refused, register, running, write_u8};
 use fingertip::shipped::address;
 use fingertip::state::Mode;
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use virtual_board::{Options, Rig};
 
 /// The parameters that commissioning may change.
@@ -13,32 +12,15 @@ const CHANGED: [&str; 4] = ["torque_constant_unm_per_a", "inertia_ug_m2", "frict
 const RESULT: u8 = 1;
 
 fn params(rig: &mut Rig) -> [u32; 4] {
-    CHANGED.map(|name| {
-        let place = Params::RANGES.iter().position(|(other, ..)| *other == name).expect("a parameter");
-        read_u32(rig, address::PARAMS + 4 * place as u16)
-    })
+    CHANGED.map(|name| read_u32(rig, register(name)))
 }
 
 /// A board with a blank flash, tared, its tip 5 mm from a wall.
 fn new_board(setup: &Setup) -> Rig {
-    let mut rig = Rig::new(&image(), Plant::new(setup), &Options::default()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = running(setup, &Options::default());
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");
     rig
-}
-
-fn setup() -> Setup {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 5.0;
-    setup
-}
-
-fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop)).expect("the client runs");
-    let text = written.expect_err("it is refused").to_string();
-    assert!(text.contains("0x1"), "{text}");
-    RESULT
 }
 
 /// Runs what was asked for to its end: its state and its refusal. Watches travel and duty.
@@ -60,7 +42,7 @@ fn outcome(rig: &mut Rig, task: u8) -> (u8, u8) {
 
 #[test]
 fn a_new_board_is_commissioned_and_keeps_it() {
-    let setup = setup();
+    let setup = away(5.0);
     let mut rig = new_board(&setup);
     let old = params(&mut rig);
     assert_eq!(old[3], 0, "nobody knows yet which way the motor goes");
@@ -100,15 +82,14 @@ fn a_new_board_is_commissioned_and_keeps_it() {
     rig.run_ms(50).expect("it runs");
     let new = params(&mut rig);
     assert!(new[3] == 1 && new[0] != old[0], "{new:?}");
-    rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("the image obeys");
-    rig.run_ms(50).expect("it runs");
+    reboot(&mut rig, 50);
     assert_eq!(params(&mut rig), new, "it outlives a reset");
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
 }
 
 #[test]
 fn swapped_leads_and_channels_are_told() {
-    let mut rig = new_board(&setup());
+    let mut rig = new_board(&away(5.0));
     rig.world(|world| world.faults.leads_swapped = true).expect("it runs");
     assert_eq!(outcome(&mut rig, 1), (4, 5));
     rig.world(|world| (world.faults.leads_swapped, world.faults.encoder_reversed) = (false, true)).expect("it runs");
@@ -122,7 +103,7 @@ fn swapped_leads_and_channels_are_told() {
 /// By a stop, by a reset, and by a fault: the old parameters stay, and the motor rests.
 #[test]
 fn an_interruption_leaves_the_old_parameters() {
-    let mut rig = new_board(&setup());
+    let mut rig = new_board(&away(5.0));
     assert_eq!(outcome(&mut rig, 1), (2, 0));
     write_u8(&mut rig, address::COMMISSION_ACCEPT, 1);
     write_u8(&mut rig, address::SAVE_PARAMETERS, 1);
@@ -136,7 +117,7 @@ fn an_interruption_leaves_the_old_parameters() {
             rig.run_ms(after_ms).expect("it runs");
             assert_eq!(read_u8(&mut rig, address::COMMISSION_STATE), 1);
             if reset {
-                rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop)).expect("the client runs").expect("the image obeys");
+                reboot(&mut rig, 0);
             } else {
                 write_u8(&mut rig, address::TORQUE_ENABLE, 0);
             }

@@ -1,16 +1,23 @@
 //! What the tests of the flash image share.
 
-use fingertip::params::Params;
-use fingertip::shipped::{Record, address};
+use dynamixel2::{ReadError, TransferError};
+use fingertip::shipped::{REGISTERS, Record, address};
+use rigless::emulator::{Access, AccessKind};
+use rigless::soc::Width;
 use sim::encode;
 use sim::plant::{Plant, Setup};
+use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
+use virtual_board::client::Client;
 use virtual_board::flash::SECTOR;
 use virtual_board::{Options, Rig};
 
 /// Virtual time that an answer may take.
 pub const WAIT_NS: u64 = 5_000_000;
+
+/// An instruction packet that asks ID 1 whether it is there.
+pub const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 
 /// The flash image under test.
 pub fn image() -> PathBuf {
@@ -18,29 +25,80 @@ pub fn image() -> PathBuf {
     path.expect("FINGERTIP_IMAGE must name the flash image: run `cargo xtask test`, which builds it and sets it").into()
 }
 
+/// What a client does on the bus of a board that answers.
+pub fn on_bus<T: Send, E: Debug + Send>(rig: &mut Rig, ask: impl FnOnce(&mut Client) -> Result<T, E> + Send) -> T {
+    rig.client(WAIT_NS, ask).expect("the client runs").expect("the image answers and obeys")
+}
+
 pub fn write_u8(rig: &mut Rig, register: u16, value: u8) {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
-    written.expect("the client runs").expect("the image obeys");
+    on_bus(rig, move |bus| bus.write_u8(1, register, value).map(drop));
+}
+
+pub fn write_u16(rig: &mut Rig, register: u16, value: u16) {
+    on_bus(rig, move |bus| bus.write_u16(1, register, value).map(drop));
+}
+
+pub fn write_u32(rig: &mut Rig, register: u16, value: u32) {
+    on_bus(rig, move |bus| bus.write_u32(1, register, value).map(drop));
 }
 
 pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, address::GOAL_FORCE_MN, goal_mn).map(drop));
-    written.expect("the client runs").expect("the image obeys");
+    write_u32(rig, address::GOAL_FORCE_MN, goal_mn);
 }
 
 pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
-    let read = rig.client(WAIT_NS, move |bus| bus.read_u8(1, register).map(|reply| reply.data));
-    read.expect("the client runs").expect("the image answers")
+    on_bus(rig, move |bus| bus.read_u8(1, register).map(|reply| reply.data))
 }
 
 pub fn read_u16(rig: &mut Rig, register: u16) -> u16 {
-    let read = rig.client(WAIT_NS, move |bus| bus.read_u16(1, register).map(|reply| reply.data));
-    read.expect("the client runs").expect("the image answers")
+    on_bus(rig, move |bus| bus.read_u16(1, register).map(|reply| reply.data))
 }
 
 pub fn read_u32(rig: &mut Rig, register: u16) -> u32 {
-    let read = rig.client(WAIT_NS, move |bus| bus.read_u32(1, register).map(|reply| reply.data));
-    read.expect("the client runs").expect("the image answers")
+    on_bus(rig, move |bus| bus.read_u32(1, register).map(|reply| reply.data))
+}
+
+/// Reboots the board, and gives it time to start.
+pub fn reboot(rig: &mut Rig, ms: u64) {
+    on_bus(rig, |bus| bus.reboot(1).map(drop));
+    rig.run_ms(ms).expect("it runs");
+}
+
+/// What a write is refused with.
+pub fn refused(rig: &mut Rig, register: u16, value: u8) -> u8 {
+    let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, register, value).map(drop));
+    match written.expect("the client runs") {
+        Err(TransferError::ReadError(ReadError::MotorError(error))) => error.raw & 0x7F,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The address of a register, or of a parameter, by its name.
+pub fn register(name: &str) -> u16 {
+    REGISTERS.iter().find(|register| register.name == name).expect("there is such a register").address
+}
+
+/// Writes to a peripheral's register as the core does.
+pub fn poke(rig: &mut Rig, register: u64, bits: u64) {
+    rig.with(move |stand| {
+        let access = Access::new(AccessKind::Write, register, Width::W32, bits);
+        stand.session.access(access.at(stand.stop.instruction_count, stand.stop.at), stand.host);
+    })
+    .expect("it runs");
+}
+
+/// A board that has run for 20 ms, so that it is up.
+pub fn running(setup: &Setup, options: &Options) -> Rig {
+    let mut rig = Rig::new(&image(), Plant::new(setup), options).expect("the image starts");
+    rig.run_until_ns(20_000_000).expect("it runs");
+    rig
+}
+
+/// A finger whose tip is so far away from what it touches.
+pub fn away(distance_mm: f64) -> Setup {
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = distance_mm;
+    setup
 }
 
 /// A board that serves one test after another, in any order: to start one costs more than most of what is asked of it.
@@ -62,10 +120,7 @@ pub fn scratch(name: &str) -> PathBuf {
 
 /// Writes a parameter.
 pub fn write_param(rig: &mut Rig, name: &str, value: u32) {
-    let place = Params::RANGES.iter().position(|(other, ..)| *other == name).expect("a parameter");
-    let register = address::PARAMS + 4 * place as u16;
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, register, value).map(drop));
-    written.expect("the client runs").expect("the image obeys");
+    write_u32(rig, register(name), value);
     // The scan starts anew.
     rig.run_ms(5).expect("it runs");
 }
@@ -77,10 +132,7 @@ pub fn confirm_direction(rig: &mut Rig) {
 
 /// Starts a board, which then holds 1 N against a wall 0.5 mm away.
 fn hold(options: &Options) -> Rig {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.5;
-    let mut rig = Rig::new(&image(), Plant::new(&setup), options).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = running(&away(0.5), options);
     confirm_direction(&mut rig);
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");

@@ -3,19 +3,11 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, image, read_u8, read_u16, read_u32, write_goal, write_u8};
+use crate::common::{away, read_u8, read_u16, read_u32, register, running, write_goal, write_u8, write_u32};
 use fingertip::contact::FitLevel;
-use fingertip::params::Params;
 use fingertip::shipped::address;
 use fingertip::state::Limits;
-use sim::plant::{Plant, Setup};
 use virtual_board::{Options, Rig};
-
-/// The place of a parameter.
-fn param(name: &str) -> u16 {
-    let place = Params::RANGES.iter().position(|(other, ..)| *other == name).expect("a parameter");
-    address::PARAMS + 4 * place as u16
-}
 
 /// Holds 1 N half a millimetre away, over the array's edge: its last column is centred at 6.75 mm.
 fn hold(rig: &mut Rig) {
@@ -28,10 +20,9 @@ fn hold(rig: &mut Rig) {
 
 /// A board that holds a contact of which the array sees a half.
 fn holding_over_the_edge() -> Rig {
-    let mut setup = Setup::default();
-    (setup.wall.distance_mm, setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (0.5, 7.5, 1.0);
-    let mut rig = Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut setup = away(0.5);
+    (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (7.5, 1.0);
+    let mut rig = running(&setup, &Options::confirmed());
     write_u8(&mut rig, address::TARE, 1);
     rig.run_ms(20).expect("it runs");
     // As long as a frame in the air: the fit level goes by the longest, and a tare must not miss its deadline.
@@ -94,9 +85,7 @@ fn slower_frames_leave_room_for_the_highest_fit_level() {
     let (in_use, held_back, _) = said(&mut rig);
     assert!(in_use < 5 && held_back, "{in_use}");
     write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-    let settle_ns = param("settle_ns");
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, settle_ns, 12_000).map(drop));
-    written.expect("the client runs").expect("the image obeys");
+    write_u32(&mut rig, register("settle_ns"), 12_000);
     rig.run_ms(100).expect("it runs");
     // The new scan has cost some.
     let missed = read_u32(&mut rig, address::MISSED_FRAMES);

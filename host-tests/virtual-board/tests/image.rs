@@ -2,53 +2,42 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, holding, image, on_a_shared, read_u8, read_u16, read_u32, scratch};
+use crate::common::{
+    PING, WAIT_NS, away, holding, image, on_a_shared, read_u8, read_u16, read_u32, register, running, scratch,
+    write_goal, write_u8, write_u32,
+};
 use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, address};
-use sim::plant::{Plant, Setup};
+use sim::plant::Plant;
 use std::sync::Mutex;
 use virtual_board::{Options, Rig};
 
 fn rig() -> Rig {
-    let mut setup = Setup::default();
-    setup.wall.distance_mm = 0.5;
-    Rig::new(&image(), Plant::new(&setup), &Options::confirmed()).expect("the image starts")
+    Rig::new(&image(), Plant::new(&away(0.5)), &Options::confirmed()).expect("the image starts")
 }
 
-/// A board that is up.
+/// The same, up.
+fn up() -> Rig {
+    running(&away(0.5), &Options::confirmed())
+}
+
+/// A board that is up, for one test after another.
 fn with_one_that_is_up(test: impl FnOnce(&mut Rig)) {
     static UP: Mutex<Option<Rig>> = Mutex::new(None);
-    let start = || {
-        let mut rig = rig();
-        rig.run_until_ns(20_000_000).expect("it runs");
-        rig
-    };
-    on_a_shared(&UP, start, test);
+    on_a_shared(&UP, up, test);
 }
 
-/// An instruction packet that asks ID 1 whether it is there.
-const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
 /// 300 ms in which the array is tared and the tip goes for the wall, 0.5 mm away, with a ping in the middle.
 fn eventful(rig: &mut Rig) {
-    let write = |rig: &mut Rig, address, value| {
-        let written = rig.client(WAIT_NS, move |bus| bus.write_u8(1, address, value).map(drop));
-        written.expect("the client runs").expect("the image obeys");
-    };
     rig.run_until_ns(50_000_000).expect("it runs");
-    write(rig, TARE, 1);
+    write_u8(rig, address::TARE, 1);
     rig.run_until_ns(150_000_000).expect("it runs");
-    write(rig, TORQUE_ENABLE, 1);
-    let goal = rig.client(WAIT_NS, |bus| bus.write_u32(1, GOAL_FORCE_MN, 1_000).map(drop));
-    goal.expect("the client runs").expect("the image obeys");
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 1_000);
     rig.run_until_ns(250_000_000).expect("it runs");
     rig.transact(&PING, WAIT_NS).expect("it runs");
     rig.run_until_ns(300_000_000).expect("it runs");
 }
-
-/// Registers of the control table.
-const TORQUE_ENABLE: u16 = 64;
-const GOAL_FORCE_MN: u16 = 256;
-const TARE: u16 = 260;
 
 #[test]
 fn it_boots_and_frames_arrive_at_the_scans_rate() {
@@ -70,8 +59,7 @@ fn it_boots_and_frames_arrive_at_the_scans_rate() {
 #[test]
 fn its_clock_begins_at_zero_and_never_falls_back() {
     // A turn of the timer behind the clock is 65.536 ms.
-    let mut rig = rig();
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = up();
     for _ in 0..400 {
         let true_ms = rig.now_ns() / 1_000_000;
         let tick_ms = u64::from(read_u16(&mut rig, address::REALTIME_TICK));
@@ -121,13 +109,10 @@ fn the_line_is_given_back_right_after_the_last_stop_bit() {
 /// and leaves them time until the first row: each row would then be read a slot late.
 #[test]
 fn a_settle_time_that_is_lowered_leaves_the_rows_in_step() {
-    let settle = REGISTERS.iter().find(|register| register.name == "settle_ns").expect("there is such a register");
-    let mut rig = rig();
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = up();
     for (turn, settle_ns) in [100_000, 20_000, 90_000, 15_000, 100_000, 10_000].into_iter().enumerate() {
         rig.run_until_ns(rig.now_ns() + 10_000 * turn as u64).expect("it runs");
-        let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, settle.address, settle_ns).map(drop));
-        written.expect("the client runs").expect("the image obeys");
+        write_u32(&mut rig, register("settle_ns"), settle_ns);
         rig.run_ms(20).expect("it runs");
         let bad = read_u8(&mut rig, address::BAD_TAXELS);
         assert_eq!(bad, 0, "taxels that read nothing, with {settle_ns} ns");

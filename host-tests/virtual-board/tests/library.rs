@@ -4,10 +4,9 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::image;
+use sim::cores;
 use sim::run::run;
 use sim::scene::library;
-use std::sync::Mutex;
-use std::thread;
 use virtual_board::scene::simulate;
 
 /// Runs a scene. Says which bounds it breaks.
@@ -25,14 +24,7 @@ fn every_scene_of_the_library_holds_its_bounds_on_the_image() {
     let mut names = library::names().expect("the library is there");
     assert!(names.len() >= 14, "{names:?}");
     // The longest begins first: it takes as long as all others together.
-    names.sort_by_key(|name| name == "hot_hour");
-    let left = Mutex::new(names);
-    let next = || left.lock().expect("nobody panics there").pop();
-    let broken: Vec<String> = thread::scope(|scope| {
-        let work = || std::iter::from_fn(next).flat_map(|name| broken(&name)).collect::<Vec<_>>();
-        let workers: Vec<_> =
-            (0..thread::available_parallelism().map_or(1, usize::from)).map(|_| scope.spawn(work)).collect();
-        workers.into_iter().flat_map(|worker| worker.join().expect("no panic")).collect()
-    });
+    names.sort_by_key(|name| name != "hot_hour");
+    let broken = cores::map(&names, |name| broken(name)).concat();
     assert!(broken.is_empty(), "{broken:#?}");
 }

@@ -2,7 +2,7 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, image, read_u8, read_u32};
+use crate::common::{image, read_u8, read_u32, reboot, register, write_u8, write_u32};
 use fingertip::link::table::address;
 use fingertip::shipped::Record;
 use fingertip::store::SLOT_BYTES;
@@ -40,26 +40,15 @@ fn start(presets: Vec<(u64, Vec<u8>)>) -> Rig {
 }
 
 fn set_and_save(rig: &mut Rig, pitch_um: u32) {
-    let pitch = fingertip::shipped::REGISTERS.iter().find(|register| register.name == "pitch_um");
-    let place = pitch.expect("there is such a register").address;
-    let written = rig.client(WAIT_NS, move |bus| bus.write_u32(1, place, pitch_um).map(drop));
-    written.expect("the client runs").expect("the image obeys");
+    write_u32(rig, register("pitch_um"), pitch_um);
     rig.run_ms(10).expect("it runs");
-    let saved = rig.client(WAIT_NS, |bus| bus.write_u8(1, address::SAVE_PARAMETERS, 1).map(drop));
-    saved.expect("the client runs").expect("the image obeys");
+    write_u8(rig, address::SAVE_PARAMETERS, 1);
     // 98 words of 100 us.
     rig.run_ms(12).expect("it runs");
 }
 
 fn pitch_um(rig: &mut Rig) -> u32 {
-    let pitch = fingertip::shipped::REGISTERS.iter().find(|register| register.name == "pitch_um");
-    read_u32(rig, pitch.expect("there is such a register").address)
-}
-
-fn reboot(rig: &mut Rig, ms: u64) {
-    let rebooted = rig.client(WAIT_NS, |bus| bus.reboot(1).map(drop));
-    rebooted.expect("the client runs").expect("it answers before it reboots");
-    rig.run_ms(ms).expect("it runs");
+    read_u32(rig, register("pitch_um"))
 }
 
 fn words_and_erases(rig: &mut Rig) -> (u64, u64) {

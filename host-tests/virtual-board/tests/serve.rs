@@ -48,23 +48,25 @@ impl Drop for Board {
     }
 }
 
+/// What an example of the Python package says, with the board at a port.
+fn example(name: &str, port: &Path, arguments: &[&str]) -> String {
+    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
+    let mut python = Command::new(named("FINGERTIP_PYTHON"));
+    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", &package).arg(package.join("examples").join(name));
+    let output = python.arg("--port").arg(port).args(arguments).output().expect("Python starts");
+    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success(), "{said}{complained}");
+    said.into_owned()
+}
+
 #[test]
 fn the_python_example_touches_holds_and_lets_go() {
     let link = std::env::temp_dir().join(format!("fingertip-bus-{}", std::process::id()));
     let board = Board::serve(&["--pty", link.to_str().expect("a plain path")]);
     assert_eq!(Path::new(&board.name), link);
 
-    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
-    let example = package.join("examples/force.py");
-    let mut python = Command::new(named("FINGERTIP_PYTHON"));
-    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", package).arg(example).arg("--port").arg(&link);
     // As patient as it takes on the slowest machine: two hours mean that the board hangs.
-    let output = python
-        .args(["--newtons", "1.5", "--readings", "200", "--patience-ms", "7200000"])
-        .output()
-        .expect("Python starts");
-    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{said}{complained}");
+    let said = example("force.py", &link, &["--newtons", "1.5", "--readings", "200", "--patience-ms", "7200000"]);
     // The letters FT.
     assert!(said.starts_with("model 21574\ntared, force 0 mN\n"), "{said}");
     let held = said.lines().find_map(|line| line.strip_prefix("holding ")).expect(&said);
@@ -80,13 +82,7 @@ fn the_python_example_touches_holds_and_lets_go() {
 fn the_python_package_commissions_the_drive() {
     let link = std::env::temp_dir().join(format!("fingertip-drive-{}", std::process::id()));
     let board = Board::serve(&["--pty", link.to_str().expect("a plain path")]);
-    let package = Path::new(env!("FINGERTIP_ROOT")).join("python");
-    let example = package.join("examples/commission.py");
-    let mut python = Command::new(named("FINGERTIP_PYTHON"));
-    python.env("PYTHONDONTWRITEBYTECODE", "1").env("PYTHONPATH", package).arg(example).arg("--port").arg(&link);
-    let output = python.args(["--yes", "--save", "--timeout-ms", "7200000"]).output().expect("Python starts");
-    let (said, complained) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert!(output.status.success(), "{said}{complained}");
+    let said = example("commission.py", &link, &["--yes", "--save", "--timeout-ms", "7200000"]);
     // The simulated motor's: 5350 uN m/A.
     let line = said.lines().find_map(|line| line.strip_prefix("torque_constant_unm_per_a ")).expect(&said);
     let found: f64 = line.split(' ').next().and_then(|number| number.parse().ok()).expect(line);

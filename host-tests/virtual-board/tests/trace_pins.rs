@@ -2,10 +2,10 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{image, write_param};
+use crate::common::{running, write_param};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
-use sim::plant::{Plant, Setup};
+use sim::plant::Setup;
 use virtual_board::measure::PinEdge;
 use virtual_board::{Fault, Options, Rig};
 
@@ -29,15 +29,9 @@ fn widths_ns(edges: &[PinEdge], pin: usize) -> Vec<[u64; 2]> {
     own.windows(3).step_by(2).map(|three| [three[1].at_ns - three[0].at_ns, three[2].at_ns - three[0].at_ns]).collect()
 }
 
-fn running() -> Rig {
-    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &Options::default()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
-    rig
-}
-
 #[test]
 fn the_frame_pin_is_high_for_a_slot_in_each_frame() {
-    let mut rig = running();
+    let mut rig = running(&Setup::default(), &Options::default());
     let widths = widths_ns(&edges(&mut rig, 10), FRAME);
     assert!(widths.len() >= 98, "{} frames", widths.len());
     for [high, period] in widths {
@@ -48,7 +42,7 @@ fn the_frame_pin_is_high_for_a_slot_in_each_frame() {
 /// Two turns a frame: a short one when half of the rows are driven, and the step.
 #[test]
 fn the_control_pin_is_high_while_control_is_busy() {
-    let mut rig = running();
+    let mut rig = running(&Setup::default(), &Options::default());
     let widths: Vec<u64> = widths_ns(&edges(&mut rig, 10), CONTROL).into_iter().map(|[high, _]| high).collect();
     assert!((198..=202).contains(&widths.len()), "{} turns in 10 ms", widths.len());
     let steps: Vec<_> = widths.iter().filter(|width| **width > 5_000).collect();
@@ -60,7 +54,7 @@ fn the_control_pin_is_high_while_control_is_busy() {
 
 #[test]
 fn the_guard_pin_pulses_where_the_guard_trips() {
-    let mut rig = running();
+    let mut rig = running(&Setup::default(), &Options::default());
     assert_eq!(edges(&mut rig, 5).iter().filter(|edge| edge.pin == GUARD).count(), 0, "a sound board");
     rig.inject(Fault::ConvertersStall).expect("it runs");
     let widths = widths_ns(&edges(&mut rig, 2), GUARD);
@@ -74,7 +68,7 @@ fn the_guard_pin_pulses_where_the_guard_trips() {
 /// The edges of a duty come at the same places of each frame, whatever the scan.
 #[test]
 fn the_bridge_keeps_step_with_the_scan() {
-    let mut rig = running();
+    let mut rig = running(&Setup::default(), &Options::default());
     for settle_ns in [2_400, 1_001, 7_777, 60_000] {
         write_param(&mut rig, "settle_ns", settle_ns);
         let params = Params { settle_ns: settle_ns as i32, ..Params::DEFAULT };

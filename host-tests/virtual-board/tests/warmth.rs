@@ -3,12 +3,10 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{image, read_u16, read_u32, write_goal, write_param, write_u8};
+use crate::common::{image, poke, read_u16, read_u32, running, write_goal, write_param, write_u8};
 use fingertip::chip::Factory;
 use fingertip::params::Params;
 use fingertip::shipped::{Record, address};
-use rigless::emulator::{Access, AccessKind};
-use rigless::soc::Width;
 use sim::encode;
 use sim::plant::{Plant, Setup};
 use sim::run::run;
@@ -27,14 +25,6 @@ const ADC1_CR1: u64 = 0x4001_2004;
 const SCAN: u64 = 1 << 8;
 const INJECTED_FOLLOWS: u64 = 1 << 10;
 const ADC1_SMPR1: u64 = 0x4001_200c;
-
-fn set(rig: &mut Rig, register: u64, bits: u64) {
-    rig.with(move |stand| {
-        let access = Access::new(AccessKind::Write, register, Width::W32, bits);
-        stand.session.access(access.at(stand.stop.instruction_count, stand.stop.at), stand.host);
-    })
-    .expect("it runs");
-}
 
 fn chip_mc(rig: &mut Rig) -> i32 {
     read_u32(rig, address::CHIP_MC) as i32
@@ -144,25 +134,24 @@ fn codes_that_stay_away_are_no_temperature_and_the_finger_holds_on() {
     rig.run_ms(200).expect("it runs");
     assert!(chip_mc(&mut rig) > 25_000);
     // No injected group behind the supply.
-    set(&mut rig, ADC1_CR1, SCAN);
+    poke(&mut rig, ADC1_CR1, SCAN);
     rig.run_ms(80).expect("it runs");
     assert_eq!((chip_mc(&mut rig), read_u16(&mut rig, address::ANALOGUE_SUPPLY_MV)), (UNMEASURED_MC, 0));
     assert!((5_900..=6_100).contains(&read_u16(&mut rig, address::SUPPLY_MV)), "the supply is read");
     assert!(read_u32(&mut rig, address::PRESENT_FORCE_MN) > 900, "it holds its goal all the same");
-    set(&mut rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
+    poke(&mut rig, ADC1_CR1, SCAN | INJECTED_FOLLOWS);
     rig.run_ms(80).expect("it runs");
     assert!(chip_mc(&mut rig) > 25_000);
     // The emulated converter tells where they are sampled too shortly.
     rig.check_gaps().expect("nothing is missing");
-    set(&mut rig, ADC1_SMPR1, 0);
+    poke(&mut rig, ADC1_SMPR1, 0);
     rig.run_ms(1).expect("it runs");
     rig.check_gaps().expect_err("3 cycles are too few");
 }
 
 #[test]
 fn frames_shorter_than_the_three_conversions_find_the_supply_too() {
-    let mut rig = Rig::new(&image(), Plant::new(&Setup::default()), &Options::default()).expect("the image starts");
-    rig.run_until_ns(20_000_000).expect("it runs");
+    let mut rig = running(&Setup::default(), &Options::default());
     write_u8(&mut rig, address::FIT_LEVEL, 0);
     write_param(&mut rig, "sample_cycles", 3);
     write_param(&mut rig, "settle_ns", 500);

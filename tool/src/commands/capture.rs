@@ -1,6 +1,6 @@
 //! `fingertip capture`.
 
-use super::{Interrupt, TOUCHED, aside, no_fault, say, say_json, stopped, wait_for};
+use super::{Interrupt, TOUCHED, aside, no_fault, press, say, say_json, stopped, wait_for};
 use crate::captured::{self, About};
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
@@ -11,9 +11,6 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// The motor stops where this program falls silent for longer.
-const WATCHDOG_MS: i64 = 500;
-const WATCHDOG_UNIT_MS: i64 = 20;
 /// How often it looks.
 const LOOK: Duration = Duration::from_millis(5);
 /// `CAPTURE_STATE`.
@@ -76,7 +73,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         client.set(address::CAPTURE, 0)?;
     }
     if goal_mn.is_some() {
-        super::press::direction_confirmed(client)?;
+        press::direction_confirmed(client)?;
     }
     let part = Part::begin(&args.out)?;
     let interrupt = Interrupt::catch()?;
@@ -88,8 +85,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
     let kept = keep(args, goal_mn, client, &interrupt, &say_on);
     if goal_mn.is_some() {
-        let let_go = super::press::let_go(args.within_s, client)
-            .and_then(|()| client.again(|client| client.set(address::BUS_WATCHDOG, watchdog)));
+        let let_go = press::let_go(args.within_s, watchdog, client);
         // What went wrong first is what to tell.
         kept.as_ref().map_err(|why| Error::from(why.to_string()))?;
         let_go?;
@@ -145,7 +141,7 @@ fn keep(
     client.set(address::TARE, 1)?;
     if let Some(goal_mn) = goal_mn {
         // During the tare, so that the approach begins right after it.
-        client.set(address::BUS_WATCHDOG, WATCHDOG_MS / WATCHDOG_UNIT_MS)?;
+        client.set(address::BUS_WATCHDOG, press::WATCHDOG)?;
         client.set(address::TORQUE_ENABLE, 1)?;
         client.set(address::GOAL_FORCE_MN, goal_mn)?;
     }

@@ -2,8 +2,7 @@
 
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
 use crate::state::{ANEW, Clock, State};
-use crate::{Client, Error, numbers};
-use fingertip::params::Params;
+use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
@@ -17,7 +16,8 @@ const NEAR: f64 = 0.02;
 const NEAR_MN: f64 = 10.0;
 /// The motor stops where this program falls silent for longer.
 const WATCHDOG_MS: i64 = 500;
-const WATCHDOG_UNIT_MS: i64 = 20;
+/// The same as `BUS_WATCHDOG` has it, in 20 ms.
+pub(super) const WATCHDOG: i64 = WATCHDOG_MS / 20;
 
 /// What to press, and for how long.
 #[derive(Debug, clap::Args)]
@@ -60,12 +60,10 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let interrupt = Interrupt::catch()?;
     let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
-    client.set(address::BUS_WATCHDOG, WATCHDOG_MS / WATCHDOG_UNIT_MS)?;
+    client.set(address::BUS_WATCHDOG, WATCHDOG)?;
     let pressed = press(args, goal_mn as i64, client, json, &interrupt);
     // Whatever came of it, and first of all.
-    let let_go = let_go(args.within_s, client);
-    // While torque may be on, nothing but the watchdog stops the motor once this program has ended.
-    let let_go = let_go.and_then(|()| client.again(|client| client.set(address::BUS_WATCHDOG, watchdog)));
+    let let_go = let_go(args.within_s, watchdog, client);
     let held = match (pressed, let_go) {
         (Ok(held), Ok(())) => held,
         (Err(why), Ok(())) => return Err(why),
@@ -97,8 +95,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 
 /// The controller refuses torque before.
 pub(super) fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
-    let place = Params::RANGES.iter().position(|(name, ..)| *name == "direction_confirmed").unwrap_or_default();
-    if client.number(address::PARAMS + 4 * place as u16)? != 0 {
+    if client.number(table::find("direction_confirmed")?.address)? != 0 {
         return Ok(());
     }
     Err("nobody confirmed yet which way the motor goes: `fingertip commission jog`, and watch the tip".into())
@@ -153,8 +150,9 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
     }
 }
 
-/// Lets go, and turns torque off once nothing is touched: the tip is then clear of the object.
-pub(super) fn let_go(within_s: f64, client: &mut Client) -> Result<(), Error> {
+/// Lets go, and turns torque off once nothing is touched: the tip is then clear of the object. The bus watchdog is then
+/// what it was.
+pub(super) fn let_go(within_s: f64, watchdog: i64, client: &mut Client) -> Result<(), Error> {
     client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
     let begun = Instant::now();
     loop {
@@ -166,5 +164,7 @@ pub(super) fn let_go(within_s: f64, client: &mut Client) -> Result<(), Error> {
         }
         std::thread::sleep(LOOK);
     }
-    client.again(|client| client.set(address::TORQUE_ENABLE, 0))
+    client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+    // While torque may be on, nothing but the watchdog stops the motor once this program has ended.
+    client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))
 }

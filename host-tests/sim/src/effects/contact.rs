@@ -63,11 +63,8 @@ pub trait Memory: Send {
     fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>);
 }
 
-/// The object yields like a spring behind its surface.
-pub trait Series: Send {
-    /// How far for each force. Asked for once.
-    fn mm_per_n(&mut self) -> f64;
-}
+/// The object yields like a spring behind its surface: how far, mm, for each N. Asked for once.
+pub type Series = dyn FnMut() -> f64 + Send;
 
 /// What an object bears.
 pub trait Strength: Send {
@@ -95,17 +92,11 @@ pub struct Grip {
     pub drift_from_s: f64,
 }
 
-/// Acts along the surface.
-pub trait Tangent: Send {
-    /// Asked for once a step.
-    fn grip(&mut self) -> Grip;
-}
+/// Acts along the surface. Asked for once a step.
+pub type Tangent = dyn FnMut() -> Grip + Send;
 
-/// The object can move.
-pub trait Body: Send {
-    /// Its mass. Asked for once.
-    fn mass_kg(&mut self) -> f64;
-}
+/// The object can move: its mass, kg. Asked for once.
+pub type Body = dyn FnMut() -> f64 + Send;
 
 /// The stages as the contact calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
@@ -129,7 +120,7 @@ pub trait Stages {
     }
     /// See [`Memory::relax`].
     fn relax(&mut self, _dt_s: f64, _elastic_n: Option<f64>) {}
-    /// The sum of [`Series::mm_per_n`].
+    /// The sum of [`Series`].
     fn mm_per_n(&mut self) -> f64 {
         0.0
     }
@@ -143,7 +134,7 @@ pub trait Stages {
     fn grip(&mut self) -> Option<Grip> {
         None
     }
-    /// The sum of [`Body::mass_kg`]; none where the object stands fast.
+    /// The sum of [`Body`]; none where the object stands fast.
     fn mass_kg(&mut self) -> Option<f64> {
         None
     }
@@ -165,11 +156,18 @@ impl Stages for () {
     }
 }
 
-named!(Shape shape, Memory memory, Series series, Strength strength, Tangent tangent, Body body);
+named! {
+    Shape(shape: dyn Shape),
+    Memory(memory: dyn Memory),
+    Series(series: Series),
+    Strength(strength: dyn Strength),
+    Tangent(tangent: Tangent),
+    Body(body: Body),
+}
 
 impl Stages for Named {
     fn none(&self) -> bool {
-        !self.any
+        !self.any()
     }
 
     fn shaped(&self) -> bool {
@@ -197,7 +195,7 @@ impl Stages for Named {
     }
 
     fn mm_per_n(&mut self) -> f64 {
-        self.series.iter_mut().map(|effect| effect.call(|part| part.mm_per_n())).sum()
+        self.series.iter_mut().map(|effect| effect.call(|part| part())).sum()
     }
 
     fn breaks(&self) -> bool {
@@ -209,11 +207,11 @@ impl Stages for Named {
     }
 
     fn grip(&mut self) -> Option<Grip> {
-        self.tangent.iter_mut().map(|effect| effect.call(|part| part.grip())).last()
+        self.tangent.iter_mut().map(|effect| effect.call(|part| part())).last()
     }
 
     fn mass_kg(&mut self) -> Option<f64> {
-        self.body.iter_mut().map(|effect| effect.call(|part| part.mass_kg())).reduce(|all, more| all + more)
+        self.body.iter_mut().map(|effect| effect.call(|part| part())).reduce(|all, more| all + more)
     }
 
     #[inline]

@@ -20,6 +20,7 @@ mod winding_inductance;
 
 use super::{Metered, Part};
 use crate::registry::Description;
+use crate::setup::Setup;
 use crate::watch::{Cost, Truth};
 use serde::{Deserialize, Serialize};
 
@@ -57,6 +58,21 @@ pub struct Circuit {
     pub torque_nm_per_a: f64,
 }
 
+impl Circuit {
+    /// A setup's, before any effect.
+    pub fn of(setup: &Setup, duty: f64) -> Self {
+        Self {
+            source_v: setup.supply.source_v,
+            source_ohm: 0.0,
+            duty,
+            winding_ohm: setup.motor.resistance_ohm,
+            bridge_ohm: setup.supply.bridge_ohm,
+            henry: 0.0,
+            torque_nm_per_a: setup.motor.torque_nm_per_a,
+        }
+    }
+}
+
 /// What takes energy from the shaft, for a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Friction {
@@ -70,11 +86,8 @@ pub struct Friction {
     pub viscous_nm_s: f64,
 }
 
-/// Adds inertia.
-pub trait Inertia: Send {
-    /// At the shaft, where the tip moves so far for each angle. Asked for once.
-    fn kg_m2(&mut self, m_per_rad: f64) -> f64;
-}
+/// Inertia added at the shaft, kg m^2, where the tip moves so far, m, for each rad. Asked for once.
+pub type Inertia = dyn FnMut(f64) -> f64 + Send;
 
 /// Acts on what feeds the winding.
 pub trait Electric: Send {
@@ -88,11 +101,8 @@ pub trait Electric: Send {
     fn tell(&self, _truth: &mut Truth) {}
 }
 
-/// Acts on what takes energy from the shaft.
-pub trait Resist: Send {
-    /// Adds to the friction of a step whose mean speed is about this.
-    fn apply(&mut self, speed_rad_per_s: f64, friction: &mut Friction);
-}
+/// Adds to what takes energy from the shaft in a step whose mean speed is about this, rad/s.
+pub type Resist = dyn FnMut(f64, &mut Friction) + Send;
 
 /// A torque on the shaft that gives back what it takes.
 pub trait Potential: Send {
@@ -106,17 +116,11 @@ pub trait Potential: Send {
     fn steepest_nm_per_rad(&self) -> f64;
 }
 
-/// What lies between shaft and tip.
-pub trait Play: Send {
-    /// Where the tip is: the pressing flank stands at `flank_mm`, the object's surface at `surface_mm`.
-    fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64;
-}
+/// What lies between shaft and tip: where the tip is, with the pressing flank and the object's surface there, all in mm.
+pub type Play = dyn FnMut(f64, f64) -> f64 + Send;
 
-/// Acts on the encoder's count.
-pub trait Encoder: Send {
-    /// What is read for a count; asked for as often as it is read, so it remembers nothing.
-    fn read(&mut self, count: i32) -> i32;
-}
+/// What is read for a count of the encoder; asked for as often as it is read, so it remembers nothing.
+pub type Encoder = dyn FnMut(i32) -> i32 + Send;
 
 /// The stages as the finger calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
@@ -166,15 +170,22 @@ impl Stages for () {
     }
 }
 
-named!(Inertia inertia, Electric electric, Resist resist, Potential potential, Play play, Encoder encoder);
+named! {
+    Inertia(inertia: Inertia),
+    Electric(electric: dyn Electric),
+    Resist(resist: Resist),
+    Potential(potential: dyn Potential),
+    Play(play: Play),
+    Encoder(encoder: Encoder),
+}
 
 impl Stages for Named {
     fn none(&self) -> bool {
-        !self.any
+        !self.any()
     }
 
     fn inertia_kg_m2(&mut self, m_per_rad: f64) -> f64 {
-        self.inertia.iter_mut().map(|effect| effect.call(|part| part.kg_m2(m_per_rad))).sum()
+        self.inertia.iter_mut().map(|effect| effect.call(|part| part(m_per_rad))).sum()
     }
 
     fn circuit(&mut self, circuit: &mut Circuit) {
@@ -186,7 +197,7 @@ impl Stages for Named {
     }
 
     fn friction(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
-        self.resist.iter_mut().for_each(|effect| effect.call(|part| part.apply(speed_rad_per_s, friction)));
+        self.resist.iter_mut().for_each(|effect| effect.call(|part| part(speed_rad_per_s, friction)));
     }
 
     fn potential_nm(&mut self, from_rad: f64, to_rad: f64) -> f64 {
@@ -203,11 +214,11 @@ impl Stages for Named {
 
     fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
         let plays = self.play.iter_mut();
-        plays.fold(flank_mm, |tip_mm, effect| effect.call(|part| part.tip_mm(tip_mm, surface_mm)))
+        plays.fold(flank_mm, |tip_mm, effect| effect.call(|part| part(tip_mm, surface_mm)))
     }
 
     fn count(&mut self, count: i32) -> i32 {
-        self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part.read(count)))
+        self.encoder.iter_mut().fold(count, |count, effect| effect.call(|part| part(count)))
     }
 
     #[inline]

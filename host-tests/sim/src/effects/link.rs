@@ -19,17 +19,12 @@ pub const EFFECTS: &[&Description] = &[
     &corrupted_packets::EFFECT,
 ];
 
-/// Acts on the controller's clock.
-pub trait Clock: Send {
-    /// How long a second of the controller lasts in the world, from this time on.
-    fn second_s(&mut self, time_s: f64) -> f64;
-}
+/// Acts on the controller's clock: how long a second of it lasts in the world, s, from this time on, s.
+pub type Clock = dyn FnMut(f64) -> f64 + Send;
 
-/// Acts on the packets from the host to the controller.
-pub trait Packets: Send {
-    /// When a packet sent at a time arrives; none where it does not.
-    fn pass(&mut self, sent_s: f64) -> Option<f64>;
-}
+/// Acts on the packets from the host to the controller: when one sent at a time arrives, both in s; none where it does
+/// not.
+pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
 /// The stages as the board and the host call them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
@@ -46,37 +41,18 @@ pub trait Stages {
 
 impl Stages for () {}
 
-/// The named effects.
-#[derive(Default)]
-pub struct Named {
-    clock: Vec<Metered<dyn Clock>>,
-    packets: Vec<Metered<dyn Packets>>,
-}
-
-impl Named {
-    /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
-    pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
-        match part {
-            Part::Clock(part) => self.clock.push(Metered::new(name, part)),
-            Part::Packets(part) => self.packets.push(Metered::new(name, part)),
-            other => return Some(other),
-        }
-        None
-    }
-
-    /// What each has cost so far.
-    pub fn costs(&self) -> impl Iterator<Item = Cost> {
-        self.clock.iter().map(Metered::cost).chain(self.packets.iter().map(Metered::cost))
-    }
+named! {
+    Clock(clock: Clock),
+    Packets(packets: Packets),
 }
 
 impl Stages for Named {
     #[inline]
     fn second_s(&mut self, time_s: f64) -> f64 {
-        self.clock.iter_mut().map(|effect| effect.call(|part| part.second_s(time_s))).product()
+        self.clock.iter_mut().map(|effect| effect.call(|part| part(time_s))).product()
     }
 
     fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        self.packets.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part.pass(sent_s)))
+        self.packets.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part(sent_s)))
     }
 }

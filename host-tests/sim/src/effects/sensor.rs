@@ -54,29 +54,18 @@ pub trait Pressure: Send {
     }
 }
 
-/// Acts on the conductance of a row's taxels, S.
-pub trait Conductance: Send {
-    /// See [`Pressure::apply`].
-    fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row);
-}
+/// Acts on the conductance of a row's taxels, S: row, time and conductance as in [`Pressure::apply`].
+pub type Conductance = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Acts on the conductance that each column sees of the driven row, S.
-pub trait Network: Send {
-    /// `array` holds every taxel's conductance as of its row's last sample, `seen` what the columns see.
-    fn apply(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row);
-}
+/// Acts on the conductance that each column sees of the driven row, S: the row, every taxel's conductance as of its row's
+/// last sample, and what the columns see.
+pub type Network = dyn FnMut(usize, &[Row; ROWS], &mut Row) + Send;
 
-/// Acts on the amplifiers' voltages.
-pub trait Volts: Send {
-    /// `slot` is a row, or [`ROWS`] where none is driven.
-    fn apply(&mut self, slot: usize, time_s: f64, volts: &mut Row);
-}
+/// Acts on the amplifiers' voltages: the slot, which is a row, or [`ROWS`] where none is driven, its time, and the voltages.
+pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Acts on the converter's codes, not yet rounded.
-pub trait Codes: Send {
-    /// See [`Volts::apply`].
-    fn apply(&mut self, slot: usize, time_s: f64, codes: &mut Row);
-}
+/// Acts on the converter's codes, not yet rounded: slot, time and codes as in [`Volts`].
+pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
 /// The stages as the readout calls them: of the named effects, or `()`, in which none is compiled.
 pub trait Stages {
@@ -104,11 +93,17 @@ impl Stages for () {
     }
 }
 
-named!(Pressure pressure, Conductance conductance, Network network, Volts volts, Codes codes);
+named! {
+    Pressure(pressure: dyn Pressure),
+    Conductance(conductance: Conductance),
+    Network(network: Network),
+    Volts(volts: Volts),
+    Codes(codes: Codes),
+}
 
 impl Stages for Named {
     fn none(&self) -> bool {
-        !self.any
+        !self.any()
     }
 
     fn chip_c(&self, time_s: f64) -> Option<f64> {
@@ -120,19 +115,19 @@ impl Stages for Named {
     }
 
     fn conductance(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
-        self.conductance.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, time_s, siemens)));
+        self.conductance.iter_mut().for_each(|effect| effect.call(|part| part(row, time_s, siemens)));
     }
 
     fn network(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row) {
-        self.network.iter_mut().for_each(|effect| effect.call(|part| part.apply(row, array, seen)));
+        self.network.iter_mut().for_each(|effect| effect.call(|part| part(row, array, seen)));
     }
 
     fn volts(&mut self, slot: usize, time_s: f64, volts: &mut Row) {
-        self.volts.iter_mut().for_each(|effect| effect.call(|part| part.apply(slot, time_s, volts)));
+        self.volts.iter_mut().for_each(|effect| effect.call(|part| part(slot, time_s, volts)));
     }
 
     fn codes(&mut self, slot: usize, time_s: f64, codes: &mut Row) {
-        self.codes.iter_mut().for_each(|effect| effect.call(|part| part.apply(slot, time_s, codes)));
+        self.codes.iter_mut().for_each(|effect| effect.call(|part| part(slot, time_s, codes)));
     }
 }
 

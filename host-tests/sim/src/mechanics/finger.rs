@@ -66,15 +66,6 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         };
         let contact = Contact::new(setup, contact);
         let (shaft, bridge) = (Shaft::default(), Bridge::Coast);
-        let circuit = Circuit {
-            source_v: setup.supply.source_v,
-            source_ohm: 0.0,
-            duty: 0.0,
-            winding_ohm: setup.motor.resistance_ohm,
-            bridge_ohm: setup.supply.bridge_ohm,
-            henry: 0.0,
-            torque_nm_per_a: setup.motor.torque_nm_per_a,
-        };
         Self {
             contact,
             drive,
@@ -87,7 +78,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             winding_a: 0.0,
             tip_mm: 0.0,
             bridge,
-            circuit,
+            circuit: Circuit::of(setup, 0.0),
             friction: Friction::default(),
             dt_s: 0.0,
         }
@@ -113,19 +104,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.before = self.shaft;
         self.dt_s = dt_s;
         self.bridge = bridge;
-        let base = Circuit {
-            source_v: self.setup.supply.source_v,
-            source_ohm: 0.0,
-            duty: match bridge {
-                Bridge::Coast => 0.0,
-                Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
-            },
-            winding_ohm: self.setup.motor.resistance_ohm,
-            bridge_ohm: self.setup.supply.bridge_ohm,
-            henry: 0.0,
-            torque_nm_per_a: self.setup.motor.torque_nm_per_a,
+        let duty = match bridge {
+            Bridge::Coast => 0.0,
+            Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
         };
-        self.circuit = base;
+        self.circuit = Circuit::of(&self.setup, duty);
         self.friction = Friction::default();
         if !self.drive.none() {
             self.drive.circuit(&mut self.circuit);

@@ -35,8 +35,8 @@ impl Digest {
     }
 }
 
-// Taken apart field by field, so that a field cannot be forgotten.
-
+/// What a step takes beside the codes. Of the command all but the requests to commission and to calibrate: what becomes
+/// of them is in what the step gives.
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
     let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
     let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =

@@ -2,8 +2,8 @@
 
 use super::{ArrayFaults, Faults, Row, Taxel};
 use crate::effects::drive::{self, Circuit, Friction};
+use crate::effects::sensor;
 use crate::effects::sensor::settling::Settling;
-use crate::effects::sensor::{self, Volts as _};
 use crate::effects::set::{Parts, Set};
 use crate::scene::{Scene, controller};
 use crate::setup::{Array, Setup};
@@ -143,6 +143,6 @@ impl sensor::Stages for Sensor {
         }
         let reference_v = self.array.reference_v;
         *volts = volts.map(|volts| if self.faults.saturated { reference_v } else { volts.min(reference_v) });
-        self.settling.apply(slot, time_s, volts);
+        self.settling.sample(time_s, volts);
     }
 }

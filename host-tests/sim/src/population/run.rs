@@ -2,8 +2,9 @@
 
 use super::Population;
 use super::report::Ran;
+use crate::cores;
 use crate::run::{Run, RunError, run};
-use crate::sweep::{Shard, cores, progress};
+use crate::sweep::{Shard, progress};
 use std::collections::BTreeSet;
 
 /// Draws fingers and runs them on all cores.

@@ -28,7 +28,7 @@ impl Table {
 }
 
 const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Key {
-    Key { name, about, kind: Kind::Number { min, max, default: Some(default) } }
+    Key::number(name, about, min, max, default)
 }
 
 /// What stands before the first table.
@@ -42,11 +42,7 @@ pub const ROOT: Table = Table {
             about: "Virtual time, from the moment at which the finger is tared and its torque enabled.",
             kind: Kind::Number { min: 0.0, max: 1e6, default: None },
         },
-        Key {
-            name: "seed",
-            about: "Where all randomness comes from.",
-            kind: Kind::Whole { min: 0, max: i64::MAX, default: Some(1) },
-        },
+        Key::whole("seed", "Where all randomness comes from.", 0, i64::MAX, 1),
     ],
 };
 
@@ -107,11 +103,7 @@ pub const TABLES: &[Table] = &[
             number("resistance_ohm", "Terminal resistance.", 0.05, 200.0, 2.83),
             number("torque_mnm_per_a", "Torque constant; also the back-EMF constant in mV s/rad.", 0.1, 200.0, 5.35),
             number("inertia_g_cm2", "Inertia at the shaft.", 0.01, 200.0, 0.71),
-            Key {
-                name: "encoder_counts_per_turn",
-                about: "Quadrature counts for one turn.",
-                kind: Kind::Whole { min: 16, max: 65_536, default: Some(1600) },
-            },
+            Key::whole("encoder_counts_per_turn", "Quadrature counts for one turn.", 16, 65_536, 1600),
         ],
     },
     Table {
@@ -147,7 +139,7 @@ pub const TABLES: &[Table] = &[
         name: "hand",
         about: "The fingers: one, or two that press against each other.",
         keys: &[
-            Key { name: "fingers", about: "How many.", kind: Kind::Whole { min: 1, max: 2, default: Some(1) } },
+            Key::whole("fingers", "How many.", 1, 2, 1),
             number("lift_mm", "How far the hand lifts.", 0.0, 1e3, 0.0),
             number("lift_at_s", "From when.", 0.0, 1e6, 0.0),
             number("lift_s", "For how long, from rest to rest.", 1e-3, 1e6, 0.5),
@@ -164,11 +156,7 @@ pub const TABLES: &[Table] = &[
                 force and centre of pressure, and asks for more before the contact slips, or when it did.",
         keys: &[
             number("period_ms", "Time from a command to its repetition.", 0.1, 10_000.0, 10.0),
-            Key {
-                name: "watchdog_ms",
-                about: "Bus watchdog that it sets in the controller; 0 is off.",
-                kind: Kind::Whole { min: 0, max: 65_535, default: Some(0) },
-            },
+            Key::whole("watchdog_ms", "Bus watchdog that it sets in the controller; 0 is off.", 0, 65_535, 0),
             number("read_ms", "Time from a reading to the next; 0 reads nothing, and does not grip.", 0.0, 1000.0, 0.0),
             number("grip_friction", "Share of the force that the host trusts along the surface.", 0.01, 10.0, 0.5),
             number("grip_n_per_mm", "What it takes for the patch's stiffness along the surface.", 0.001, 1000.0, 1.0),

@@ -77,7 +77,7 @@ fn bursts_come_and_last_as_asked() {
     let steps = 2_000_000;
     for step in 0..steps {
         let mut codes = [1000.0; COLUMNS];
-        burst.apply(step % SLOTS, step as f64 * 1e-4, &mut codes);
+        burst(step % SLOTS, step as f64 * 1e-4, &mut codes);
         let is = codes != [1000.0; COLUMNS];
         assert!(codes.iter().all(|code| (code - 1000.0).abs() <= 100.0));
         noisy += usize::from(is);

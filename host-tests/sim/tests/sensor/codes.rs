@@ -9,7 +9,7 @@ fn noise_has_its_deviation_and_no_bias() {
     let mut draws = Vec::new();
     for n in 0..10_000 {
         let mut row = all(0.0);
-        effect.apply(n % SLOTS, 0.0, &mut row);
+        effect(n % SLOTS, 0.0, &mut row);
         draws.extend(row);
     }
     let count = draws.len() as f64;
@@ -32,7 +32,7 @@ fn offsets_stay_as_they_were_drawn() {
         (0..SLOTS)
             .flat_map(|slot| {
                 let mut row = all(100.0);
-                effect.apply(slot, 0.0, &mut row);
+                effect(slot, 0.0, &mut row);
                 row
             })
             .collect::<Vec<_>>()
@@ -51,7 +51,7 @@ fn a_coarse_converter_rounds_down_to_its_steps() {
         let mut effect = codes("converter", &format!("bits = {bits}"), 1);
         for code in (0..4096).step_by(7) {
             let mut row = all(f64::from(code) + 0.25);
-            effect.apply(0, 0.0, &mut row);
+            effect(0, 0.0, &mut row);
             assert_eq!(row[0], f64::from(code / step * step));
         }
     }
@@ -62,7 +62,7 @@ fn a_bent_converter_errs_most_in_its_middle() {
     let mut effect = codes("converter", "bits = 12\ninl_codes = 3", 1);
     for (code, more) in [(0.0, 0.0), (1024.0, 2.25), (2048.0, 3.0), (3072.0, 2.25)] {
         let mut row = all(code);
-        effect.apply(0, 0.0, &mut row);
+        effect(0, 0.0, &mut row);
         assert_eq!(row[0], code + f64::floor(more));
     }
 }

@@ -23,22 +23,22 @@ fn pressure(name: &str, keys: &str) -> Box<dyn Pressure> {
     part
 }
 
-fn conductance(name: &str, keys: &str) -> Box<dyn Conductance> {
+fn conductance(name: &str, keys: &str) -> Box<Conductance> {
     let Part::Conductance(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
     part
 }
 
-fn network(name: &str, keys: &str) -> Box<dyn Network> {
+fn network(name: &str, keys: &str) -> Box<Network> {
     let Part::Network(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
     part
 }
 
-fn volts(name: &str, keys: &str) -> Box<dyn Volts> {
+fn volts(name: &str, keys: &str) -> Box<Volts> {
     let Part::Volts(part) = part(name, keys, 1) else { panic!("{name} acts elsewhere") };
     part
 }
 
-fn codes(name: &str, keys: &str, seed: u64) -> Box<dyn Codes> {
+fn codes(name: &str, keys: &str, seed: u64) -> Box<Codes> {
     let Part::Codes(part) = part(name, keys, seed) else { panic!("{name} acts elsewhere") };
     part
 }

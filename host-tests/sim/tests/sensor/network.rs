@@ -6,7 +6,7 @@ use sim::effects::sensor::Row;
 
 fn ghosted(hold: &str, row: usize, array: &[Row; ROWS]) -> Row {
     let mut seen = array[row];
-    network("ghosting", &format!("hold_ohm = {hold}")).apply(row, array, &mut seen);
+    network("ghosting", &format!("hold_ohm = {hold}"))(row, array, &mut seen);
     seen
 }
 
@@ -88,7 +88,7 @@ fn a_row_sags_by_its_switch() {
     for (switch_ohm, ohm, percent) in [(70.0, 1e3, 41.2), (5.0, 1e3, 4.76), (70.0, 1e4, 6.54), (5.0, 1e4, 0.498)] {
         let array = [all(1.0 / ohm); ROWS];
         let mut seen = array[2];
-        network("row_sag", &format!("switch_ohm = {switch_ohm}")).apply(2, &array, &mut seen);
+        network("row_sag", &format!("switch_ohm = {switch_ohm}"))(2, &array, &mut seen);
         for siemens in seen {
             let sag = 100.0 * (1.0 - siemens * ohm);
             let exact = 100.0 * (1.0 - 1.0 / (1.0 + switch_ohm * 10.0 / ohm));
@@ -103,7 +103,7 @@ fn a_column_settles_with_the_exponential() {
         let mut effect = volts("settling", &format!("tau_us = {tau_us}\nafter_us = {after_us}"));
         let mut sample = |slot: usize, time_us: f64, v: f64| {
             let mut volts = all(v);
-            effect.apply(slot, time_us * 1e-6, &mut volts);
+            effect(slot, time_us * 1e-6, &mut volts);
             volts[0]
         };
         // A step from 0.3 V, settled, to 2.3 V, and on to 1.3 V 9 us later, before it has settled.
@@ -120,8 +120,8 @@ fn half_a_bit_of_twelve_takes_nine_time_constants() {
     let missing = |after_us: f64| {
         let mut effect = volts("settling", &format!("tau_us = 1\nafter_us = {after_us}"));
         let (mut low, mut high) = (all(0.0), all(4096.0));
-        effect.apply(0, 0.0, &mut low);
-        effect.apply(1, 1.0, &mut high);
+        effect(0, 0.0, &mut low);
+        effect(1, 1.0, &mut high);
         4096.0 - high[0]
     };
     assert!(missing(8.99) > 0.5 && missing(9.03) < 0.5 && missing(9.03) > 0.48);
@@ -133,7 +133,7 @@ fn an_amplifier_ends_at_its_rail() {
     let mut row = all(0.0);
     row[1] = 3.19;
     row[2] = 3.21;
-    effect.apply(0, 0.0, &mut row);
+    effect(0, 0.0, &mut row);
     assert_eq!(row[..2], [0.0, 3.19]);
     assert!((row[2] - 3.2).abs() < 1e-12);
 }

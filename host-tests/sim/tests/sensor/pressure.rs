@@ -132,7 +132,7 @@ fn broken_taxels_conduct_as_broken() {
         conductance("broken_taxels", "dead = [[3, 1]]\nshorted = [[3, 2]]\nstuck = [[3, 4], [4, 4]]\nat_s = 0.5");
     let mut see = |row: usize, time_s: f64, siemens: f64| {
         let mut array = all(siemens);
-        effect.apply(row, time_s, &mut array);
+        effect(row, time_s, &mut array);
         array
     };
     assert_eq!(see(3, 0.4, 1e-5), all(1e-5));

@@ -86,7 +86,7 @@ fn stribeck_friction_breaks_away_higher_than_it_slides() {
     };
     for (speed, share) in [(0.0, 1.0), (5.0, 0.5), (-5.0, 0.5), (50.0, 1.0 / 101.0)] {
         let mut friction = Friction::default();
-        part.apply(speed, &mut friction);
+        part(speed, &mut friction);
         close(friction.sliding_nm, 0.06e-3 * share, 1e-12);
     }
 }

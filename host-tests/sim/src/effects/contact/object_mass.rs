@@ -1,6 +1,5 @@
 //! The object can move: it has a mass, and weighs.
 
-use super::Body;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -18,15 +17,8 @@ pub const EFFECT: Description = Description {
     reference: "Newton; g = 9.80665 m/s^2",
     keys: &[Key::number("mass_g", "Its mass; 0 stands fast.", 0.0, 10000.0, 20.0)],
     zero: &[("mass_g", 0.0)],
-    build: |build: &Build| Part::Body(Box::new(ObjectMass { kg: build.values.number("mass_g") * 1e-3 })),
+    build: |build: &Build| {
+        let kg = build.values.number("mass_g") * 1e-3;
+        Part::Body(Box::new(move || kg))
+    },
 };
-
-struct ObjectMass {
-    kg: f64,
-}
-
-impl Body for ObjectMass {
-    fn mass_kg(&mut self) -> f64 {
-        self.kg
-    }
-}

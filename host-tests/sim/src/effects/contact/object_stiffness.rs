@@ -1,6 +1,5 @@
 //! The object yields like a spring behind its surface.
 
-use super::Series;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -15,15 +14,8 @@ pub const EFFECT: Description = Description {
     reference: "two springs in series; a soft ball 0.1 to 2 mm/N",
     keys: &[Key::number("yield_mm_per_n", "How far it yields for each force; 0 is rigid.", 0.0, 1000.0, 0.5)],
     zero: &[("yield_mm_per_n", 0.0)],
-    build: |build: &Build| Part::Series(Box::new(ObjectStiffness { mm_per_n: build.values.number("yield_mm_per_n") })),
+    build: |build: &Build| {
+        let mm_per_n = build.values.number("yield_mm_per_n");
+        Part::Series(Box::new(move || mm_per_n))
+    },
 };
-
-struct ObjectStiffness {
-    mm_per_n: f64,
-}
-
-impl Series for ObjectStiffness {
-    fn mm_per_n(&mut self) -> f64 {
-        self.mm_per_n
-    }
-}

@@ -1,6 +1,6 @@
 //! Friction along the surface: the patch gives a little, sticks, and slips.
 
-use super::{Grip, Tangent};
+use super::Grip;
 use crate::effects::random::normal_within_3;
 use crate::effects::{Build, Part};
 use crate::key::Key;
@@ -40,21 +40,14 @@ pub const EFFECT: Description = Description {
         let values = build.values;
         let spread = values.number("spread_percent") / 100.0;
         let drawn = 1.0 + spread * normal_within_3(&mut Rng::with_seed(build.seed));
-        Part::Tangent(Box::new(Tangential(Grip {
+        let grip = Grip {
             n_per_mm: values.number("n_per_mm"),
             n_s_per_mm: values.number("damping_n_s_per_mm"),
             still: drawn * values.number("still"),
             slipping: drawn * values.number("slipping").min(values.number("still")),
             drift_mm_per_s: values.number("drift_mm_per_s"),
             drift_from_s: values.number("drift_from_s"),
-        })))
+        };
+        Part::Tangent(Box::new(move || grip))
     },
 };
-
-struct Tangential(Grip);
-
-impl Tangent for Tangential {
-    fn grip(&mut self) -> Grip {
-        self.0
-    }
-}

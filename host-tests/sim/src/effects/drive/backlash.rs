@@ -1,6 +1,5 @@
 //! The gear has play: between its flanks the tip stays where it is.
 
-use super::Play;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -20,18 +19,11 @@ pub const EFFECT: Description = Description {
     keys: &[Key::number("play_um", "Play at the tip.", 0.0, 10000.0, 100.0)],
     zero: &[("play_um", 0.0)],
     build: |build: &Build| {
-        Part::Play(Box::new(Backlash { play_mm: build.values.number("play_um") * 1e-3, tip_mm: 0.0 }))
+        let play_mm = build.values.number("play_um") * 1e-3;
+        let mut tip_mm = 0.0_f64;
+        Part::Play(Box::new(move |flank_mm, surface_mm| {
+            tip_mm = tip_mm.min(surface_mm).min(flank_mm + play_mm).max(flank_mm);
+            tip_mm
+        }))
     },
 };
-
-struct Backlash {
-    play_mm: f64,
-    tip_mm: f64,
-}
-
-impl Play for Backlash {
-    fn tip_mm(&mut self, flank_mm: f64, surface_mm: f64) -> f64 {
-        self.tip_mm = self.tip_mm.min(surface_mm).min(flank_mm + self.play_mm).max(flank_mm);
-        self.tip_mm
-    }
-}

@@ -1,6 +1,5 @@
 //! Friction of brushes and bearings that does not depend on speed, and sticks.
 
-use super::{Friction, Resist};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -15,16 +14,11 @@ pub const EFFECT: Description = Description {
     reference: "FAULHABER data sheet 1331 ... SR: 0.12 mNm",
     keys: &[Key::number("torque_mnm", "Friction torque at the motor's shaft.", 0.0, 20.0, 0.12)],
     zero: &[("torque_mnm", 0.0)],
-    build: |build: &Build| Part::Resist(Box::new(DryFriction { torque_nm: build.values.number("torque_mnm") * 1e-3 })),
+    build: |build: &Build| {
+        let torque_nm = build.values.number("torque_mnm") * 1e-3;
+        Part::Resist(Box::new(move |_, friction| {
+            friction.sliding_nm += torque_nm;
+            friction.holding_nm += torque_nm;
+        }))
+    },
 };
-
-struct DryFriction {
-    torque_nm: f64,
-}
-
-impl Resist for DryFriction {
-    fn apply(&mut self, _speed_rad_per_s: f64, friction: &mut Friction) {
-        friction.sliding_nm += self.torque_nm;
-        friction.holding_nm += self.torque_nm;
-    }
-}

@@ -1,6 +1,5 @@
 //! The encoder's disc is coarser than what is counted: the count jumps.
 
-use super::Encoder;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -16,16 +15,7 @@ pub const EFFECT: Description = Description {
     keys: &[Key::whole("step_counts", "Counts by which the reading jumps.", 1, 4096, 4)],
     zero: &[("step_counts", 1.0)],
     build: |build: &Build| {
-        Part::Encoder(Box::new(EncoderResolution { step: build.values.whole("step_counts") as i32 }))
+        let step = build.values.whole("step_counts") as i32;
+        Part::Encoder(Box::new(move |count| count.div_euclid(step).wrapping_mul(step)))
     },
 };
-
-struct EncoderResolution {
-    step: i32,
-}
-
-impl Encoder for EncoderResolution {
-    fn read(&mut self, count: i32) -> i32 {
-        count.div_euclid(self.step).wrapping_mul(self.step)
-    }
-}

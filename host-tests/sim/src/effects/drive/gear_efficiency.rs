@@ -1,6 +1,5 @@
 //! The gear takes a share of the torque that goes through it.
 
-use super::{Friction, Resist};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -25,16 +24,7 @@ pub const EFFECT: Description = Description {
     )],
     zero: &[("efficiency", 1.0)],
     build: |build: &Build| {
-        Part::Resist(Box::new(GearEfficiency { share: 1.0 / build.values.number("efficiency") - 1.0 }))
+        let share = 1.0 / build.values.number("efficiency") - 1.0;
+        Part::Resist(Box::new(move |_, friction| friction.load_share += share))
     },
 };
-
-struct GearEfficiency {
-    share: f64,
-}
-
-impl Resist for GearEfficiency {
-    fn apply(&mut self, _speed_rad_per_s: f64, friction: &mut Friction) {
-        friction.load_share += self.share;
-    }
-}

@@ -1,6 +1,5 @@
 //! Inertia of the gear and mass of the finger, beside the rotor's.
 
-use super::Inertia;
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -20,17 +19,7 @@ pub const EFFECT: Description = Description {
     zero: &[("gear_g_cm2", 0.0), ("finger_g", 0.0)],
     build: |build: &Build| {
         let gear_kg_m2 = build.values.number("gear_g_cm2") * 1e-7;
-        Part::Inertia(Box::new(MoreInertia { gear_kg_m2, finger_kg: build.values.number("finger_g") * 1e-3 }))
+        let finger_kg = build.values.number("finger_g") * 1e-3;
+        Part::Inertia(Box::new(move |m_per_rad| gear_kg_m2 + finger_kg * m_per_rad * m_per_rad))
     },
 };
-
-struct MoreInertia {
-    gear_kg_m2: f64,
-    finger_kg: f64,
-}
-
-impl Inertia for MoreInertia {
-    fn kg_m2(&mut self, m_per_rad: f64) -> f64 {
-        self.gear_kg_m2 + self.finger_kg * m_per_rad * m_per_rad
-    }
-}

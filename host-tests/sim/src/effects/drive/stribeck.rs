@@ -1,6 +1,5 @@
 //! Friction that is higher at low speed: what starts moving jumps.
 
-use super::{Friction, Resist};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -23,20 +22,12 @@ pub const EFFECT: Description = Description {
     ],
     zero: &[("torque_mnm", 0.0)],
     build: |build: &Build| {
-        let (torque_nm, speed) = (build.values.number("torque_mnm") * 1e-3, build.values.number("speed_rad_per_s"));
-        Part::Resist(Box::new(Stribeck { torque_nm, speed_rad_per_s: speed }))
+        let torque_nm = build.values.number("torque_mnm") * 1e-3;
+        let half_rad_per_s = build.values.number("speed_rad_per_s");
+        Part::Resist(Box::new(move |speed_rad_per_s, friction| {
+            let share = speed_rad_per_s / half_rad_per_s;
+            friction.sliding_nm += torque_nm / (1.0 + share * share);
+            friction.holding_nm += torque_nm;
+        }))
     },
 };
-
-struct Stribeck {
-    torque_nm: f64,
-    speed_rad_per_s: f64,
-}
-
-impl Resist for Stribeck {
-    fn apply(&mut self, speed_rad_per_s: f64, friction: &mut Friction) {
-        let share = speed_rad_per_s / self.speed_rad_per_s;
-        friction.sliding_nm += self.torque_nm / (1.0 + share * share);
-        friction.holding_nm += self.torque_nm;
-    }
-}

@@ -1,6 +1,5 @@
 //! Friction that grows with the speed.
 
-use super::{Friction, Resist};
 use crate::effects::{Build, Part};
 use crate::key::Key;
 use crate::registry::{Description, Family};
@@ -15,15 +14,8 @@ pub const EFFECT: Description = Description {
     reference: "grease and eddy currents; a tenth of k_t^2 / R of the reference motor is 1 uNm s",
     keys: &[Key::number("torque_unm_s", "Torque for each rad/s at the motor's shaft.", 0.0, 10000.0, 0.1)],
     zero: &[("torque_unm_s", 0.0)],
-    build: |build: &Build| Part::Resist(Box::new(ViscousFriction { nm_s: build.values.number("torque_unm_s") * 1e-6 })),
+    build: |build: &Build| {
+        let nm_s = build.values.number("torque_unm_s") * 1e-6;
+        Part::Resist(Box::new(move |_, friction| friction.viscous_nm_s += nm_s))
+    },
 };
-
-struct ViscousFriction {
-    nm_s: f64,
-}
-
-impl Resist for ViscousFriction {
-    fn apply(&mut self, _speed_rad_per_s: f64, friction: &mut Friction) {
-        friction.viscous_nm_s += self.nm_s;
-    }
-}

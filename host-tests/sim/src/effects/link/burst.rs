@@ -1,9 +1,8 @@
 //! Something near the finger switches, and the array's lines pick it up.
 
 use crate::effects::random::waiting_s;
-use crate::effects::sensor::{Codes, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 
@@ -19,55 +18,27 @@ pub const EFFECT: Description = Description {
     state: "begin and end of bursts, the random numbers' (8 bytes)",
     reference: "the bursts of IEC 61000-4-4 as a conversion sees them: repeated, short, of any sign",
     keys: &[
-        Key {
-            name: "rate_per_s",
-            about: "Bursts in a second, on average.",
-            kind: Kind::Number { min: 0.0, max: 10_000.0, default: Some(10.0) },
-        },
-        Key {
-            name: "length_us",
-            about: "How long each lasts.",
-            kind: Kind::Number { min: 1.0, max: 1e6, default: Some(300.0) },
-        },
-        Key {
-            name: "amplitude_codes",
-            about: "The largest deviation, in codes of the 12-bit converter.",
-            kind: Kind::Number { min: 0.0, max: 4096.0, default: Some(100.0) },
-        },
+        Key::number("rate_per_s", "Bursts in a second, on average.", 0.0, 10_000.0, 10.0),
+        Key::number("length_us", "How long each lasts.", 1.0, 1e6, 300.0),
+        Key::number("amplitude_codes", "The largest deviation, in codes of the 12-bit converter.", 0.0, 4096.0, 100.0),
     ],
     zero: &[("amplitude_codes", 0.0)],
     build: |build: &Build| {
-        let number = |name| build.values.number(name);
-        Part::Codes(Box::new(Burst {
-            rate_per_s: number("rate_per_s"),
-            length_s: number("length_us") * 1e-6,
-            amplitude_codes: number("amplitude_codes"),
-            next_s: None,
-            until_s: f64::NEG_INFINITY,
-            rng: Rng::with_seed(build.seed),
+        let [rate_per_s, length_us, amplitude_codes] =
+            ["rate_per_s", "length_us", "amplitude_codes"].map(|name| build.values.number(name));
+        let length_s = length_us * 1e-6;
+        let mut rng = Rng::with_seed(build.seed);
+        let (mut next_s, mut until_s) = (None, f64::NEG_INFINITY);
+        Part::Codes(Box::new(move |_, time_s, codes| {
+            let mut begin_s = next_s.unwrap_or_else(|| time_s + waiting_s(&mut rng, rate_per_s));
+            while begin_s <= time_s {
+                until_s = begin_s + length_s;
+                begin_s += waiting_s(&mut rng, rate_per_s);
+            }
+            next_s = Some(begin_s);
+            if time_s < until_s {
+                codes.iter_mut().for_each(|code| *code += amplitude_codes * (2.0 * rng.f64() - 1.0));
+            }
         }))
     },
 };
-
-struct Burst {
-    rate_per_s: f64,
-    length_s: f64,
-    amplitude_codes: f64,
-    next_s: Option<f64>,
-    until_s: f64,
-    rng: Rng,
-}
-
-impl Codes for Burst {
-    fn apply(&mut self, _slot: usize, time_s: f64, codes: &mut Row) {
-        let mut next_s = self.next_s.unwrap_or_else(|| time_s + waiting_s(&mut self.rng, self.rate_per_s));
-        while next_s <= time_s {
-            self.until_s = next_s + self.length_s;
-            next_s += waiting_s(&mut self.rng, self.rate_per_s);
-        }
-        self.next_s = Some(next_s);
-        if time_s < self.until_s {
-            codes.iter_mut().for_each(|code| *code += self.amplitude_codes * (2.0 * self.rng.f64() - 1.0));
-        }
-    }
-}

@@ -1,8 +1,7 @@
 //! The controller's clock is not the world's.
 
-use super::Clock;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 
 /// What a scene names.
@@ -13,23 +12,10 @@ pub const EFFECT: Description = Description {
     equations: &["a second of the controller lasts 1 / (1 + fast_ppm 10^-6) s"],
     state: "none",
     reference: "STM32F446 data sheet: internal oscillator +-1 % at 25 C; crystals some 50 ppm",
-    keys: &[Key {
-        name: "fast_ppm",
-        about: "How much it runs fast; below 0, slow.",
-        kind: Kind::Number { min: -50_000.0, max: 50_000.0, default: Some(50.0) },
-    }],
+    keys: &[Key::number("fast_ppm", "How much it runs fast; below 0, slow.", -50_000.0, 50_000.0, 50.0)],
     zero: &[("fast_ppm", 0.0)],
     build: |build: &Build| {
-        Part::Clock(Box::new(ClockTolerance { second_s: 1.0 / (1.0 + build.values.number("fast_ppm") * 1e-6) }))
+        let second_s = 1.0 / (1.0 + build.values.number("fast_ppm") * 1e-6);
+        Part::Clock(Box::new(move |_| second_s))
     },
 };
-
-struct ClockTolerance {
-    second_s: f64,
-}
-
-impl Clock for ClockTolerance {
-    fn second_s(&mut self, _time_s: f64) -> f64 {
-        self.second_s
-    }
-}

@@ -1,8 +1,7 @@
 //! Packets whose bits flip on the way.
 
-use super::Packets;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 use fingertip::link::crc;
@@ -19,15 +18,17 @@ pub const EFFECT: Description = Description {
     ],
     state: "the random numbers' (8 bytes)",
     reference: "DYNAMIXEL Protocol 2.0, CRC-16/BUYPASS; a binary symmetric channel",
-    keys: &[Key {
-        name: "bit_error_ppm",
-        about: "Probability for each bit.",
-        kind: Kind::Number { min: 0.0, max: 1e6, default: Some(100.0) },
-    }],
+    keys: &[Key::number("bit_error_ppm", "Probability for each bit.", 0.0, 1e6, 100.0)],
     zero: &[("bit_error_ppm", 0.0)],
     build: |build: &Build| {
         let flips = build.values.number("bit_error_ppm") * 1e-6;
-        Part::Packets(Box::new(CorruptedPackets { flips, rng: Rng::with_seed(build.seed) }))
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Packets(Box::new(move |sent_s| {
+            let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(rng.f64() < flips) << bit);
+            let body = BODY.map(|byte| byte ^ flipped());
+            let sum = crc::update(crc::START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
+            (crc::update(crc::START, &body) == sum).then_some(sent_s)
+        }))
     },
 };
 
@@ -36,17 +37,3 @@ const BODY: [u8; 14] = {
     let [a, b, c, d] = HEADER;
     [a, b, c, d, 1, 9, 0, instruction::WRITE, 0, 0, 0, 0, 0, 0]
 };
-
-struct CorruptedPackets {
-    flips: f64,
-    rng: Rng,
-}
-
-impl Packets for CorruptedPackets {
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(self.rng.f64() < self.flips) << bit);
-        let body = BODY.map(|byte| byte ^ flipped());
-        let sum = crc::update(crc::START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
-        (crc::update(crc::START, &body) == sum).then_some(sent_s)
-    }
-}

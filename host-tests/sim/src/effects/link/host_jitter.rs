@@ -1,6 +1,5 @@
 //! A host that does not keep time.
 
-use super::Packets;
 use crate::effects::random::normal;
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
@@ -18,11 +17,7 @@ pub const EFFECT: Description = Description {
     state: "the random numbers' (8 bytes)",
     reference: "wake-up latency of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
     keys: &[
-        Key {
-            name: "delay_ms",
-            about: "The largest delay (uniform) or its deviation (normal).",
-            kind: Kind::Number { min: 0.0, max: 1000.0, default: Some(2.0) },
-        },
+        Key::number("delay_ms", "The largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0),
         Key {
             name: "distribution",
             about: "How the delays are spread.",
@@ -31,23 +26,12 @@ pub const EFFECT: Description = Description {
     ],
     zero: &[("delay_ms", 0.0)],
     build: |build: &Build| {
-        Part::Packets(Box::new(HostJitter {
-            delay_s: build.values.number("delay_ms") * 1e-3,
-            normal: build.values.word("distribution") == "normal",
-            rng: Rng::with_seed(build.seed),
+        let delay_s = build.values.number("delay_ms") * 1e-3;
+        let is_normal = build.values.word("distribution") == "normal";
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Packets(Box::new(move |sent_s| {
+            let draw = if is_normal { normal(&mut rng).abs() } else { rng.f64() };
+            Some(sent_s + delay_s * draw)
         }))
     },
 };
-
-struct HostJitter {
-    delay_s: f64,
-    normal: bool,
-    rng: Rng,
-}
-
-impl Packets for HostJitter {
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        let draw = if self.normal { normal(&mut self.rng).abs() } else { self.rng.f64() };
-        Some(sent_s + self.delay_s * draw)
-    }
-}

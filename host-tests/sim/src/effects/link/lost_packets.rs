@@ -1,8 +1,7 @@
 //! Packets that never arrive.
 
-use super::Packets;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 
@@ -14,25 +13,11 @@ pub const EFFECT: Description = Description {
     equations: &["each packet is lost with the probability lost_percent / 100, whatever became of the others"],
     state: "the random numbers' (8 bytes)",
     reference: "a Bernoulli channel",
-    keys: &[Key {
-        name: "lost_percent",
-        about: "Share of the packets that is lost.",
-        kind: Kind::Number { min: 0.0, max: 100.0, default: Some(1.0) },
-    }],
+    keys: &[Key::number("lost_percent", "Share of the packets that is lost.", 0.0, 100.0, 1.0)],
     zero: &[("lost_percent", 0.0)],
     build: |build: &Build| {
         let lost = build.values.number("lost_percent") / 100.0;
-        Part::Packets(Box::new(LostPackets { lost, rng: Rng::with_seed(build.seed) }))
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Packets(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s)))
     },
 };
-
-struct LostPackets {
-    lost: f64,
-    rng: Rng,
-}
-
-impl Packets for LostPackets {
-    fn pass(&mut self, sent_s: f64) -> Option<f64> {
-        (self.rng.f64() >= self.lost).then_some(sent_s)
-    }
-}

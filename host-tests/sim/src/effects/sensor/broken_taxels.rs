@@ -1,6 +1,5 @@
 //! Taxels that are dead, stuck or shorted.
 
-use super::{Conductance, Row};
 use crate::effects::{Build, Part};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
@@ -21,11 +20,7 @@ pub const EFFECT: Description = Description {
         Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
         Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },
         Key { name: "stuck", about: "Taxels that no longer change, by row and column.", kind: TAXELS },
-        Key {
-            name: "at_s",
-            about: "When they break; -10 is before the tare.",
-            kind: Kind::Number { min: -10.0, max: 1e6, default: Some(-10.0) },
-        },
+        Key::number("at_s", "When they break; -10 is before the tare.", -10.0, 1e6, -10.0),
     ],
     zero: &[],
     build: |build: &Build| {
@@ -34,7 +29,19 @@ pub const EFFECT: Description = Description {
         for (name, taxel) in [("stuck", Taxel::Stuck), ("shorted", shorted), ("dead", Taxel::Fixed(0.0))] {
             build.values.pairs(name).iter().for_each(|[row, column]| taxels[*row as usize][*column as usize] = taxel);
         }
-        Part::Conductance(Box::new(BrokenTaxels { taxels, at_s: build.values.number("at_s") }))
+        let at_s = build.values.number("at_s");
+        Part::Conductance(Box::new(move |row, time_s, siemens| {
+            if time_s < at_s {
+                return;
+            }
+            for (taxel, siemens) in taxels[row].iter_mut().zip(siemens) {
+                match *taxel {
+                    Taxel::Sound => {}
+                    Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
+                    Taxel::Fixed(fixed) => *siemens = fixed,
+                }
+            }
+        }))
     },
 };
 
@@ -43,24 +50,4 @@ enum Taxel {
     Sound,
     Stuck,
     Fixed(f64),
-}
-
-struct BrokenTaxels {
-    taxels: [[Taxel; COLUMNS]; ROWS],
-    at_s: f64,
-}
-
-impl Conductance for BrokenTaxels {
-    fn apply(&mut self, row: usize, time_s: f64, siemens: &mut Row) {
-        if time_s < self.at_s {
-            return;
-        }
-        for (taxel, siemens) in self.taxels[row].iter_mut().zip(siemens) {
-            match *taxel {
-                Taxel::Sound => {}
-                Taxel::Stuck => *taxel = Taxel::Fixed(*siemens),
-                Taxel::Fixed(fixed) => *siemens = fixed,
-            }
-        }
-    }
 }

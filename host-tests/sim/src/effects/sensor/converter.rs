@@ -1,8 +1,7 @@
 //! A converter that is coarser than 12 bits, and bent.
 
-use super::{Codes, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use crate::setup::Array;
 
@@ -18,30 +17,24 @@ pub const EFFECT: Description = Description {
     state: "none",
     reference: "Tekscan I-Scan, the paper's kind of sensor: 8 bits; STM32F446 data sheet: INL 2 to 3 codes of 12 bits",
     keys: &[
-        Key { name: "bits", about: "Resolution.", kind: Kind::Whole { min: 1, max: 12, default: Some(8) } },
-        Key {
-            name: "inl_codes",
-            about: "Largest deviation from the straight line, in the middle, in codes of the 12-bit converter.",
-            kind: Kind::Number { min: -50.0, max: 50.0, default: Some(0.0) },
-        },
+        Key::whole("bits", "Resolution.", 1, 12, 8),
+        Key::number(
+            "inl_codes",
+            "Largest deviation from the straight line, in the middle, in codes of the 12-bit converter.",
+            -50.0,
+            50.0,
+            0.0,
+        ),
     ],
     zero: &[("bits", 12.0), ("inl_codes", 0.0)],
     build: |build: &Build| {
         let step = f64::from(1 << (12 - build.values.whole("bits")));
-        Part::Codes(Box::new(Converter { step, inl_codes: build.values.number("inl_codes") }))
+        let inl_codes = build.values.number("inl_codes");
+        Part::Codes(Box::new(move |_, _, codes| {
+            for code in codes {
+                let x = (*code / Array::CODES).clamp(0.0, 1.0);
+                *code = ((*code + inl_codes * 4.0 * x * (1.0 - x)) / step).floor() * step;
+            }
+        }))
     },
 };
-
-struct Converter {
-    step: f64,
-    inl_codes: f64,
-}
-
-impl Codes for Converter {
-    fn apply(&mut self, _slot: usize, _time_s: f64, codes: &mut Row) {
-        for code in codes {
-            let x = (*code / Array::CODES).clamp(0.0, 1.0);
-            *code = ((*code + self.inl_codes * 4.0 * x * (1.0 - x)) / self.step).floor() * self.step;
-        }
-    }
-}

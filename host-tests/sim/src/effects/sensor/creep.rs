@@ -3,7 +3,7 @@
 use super::since::Since;
 use super::{Pressure, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 use fingertip::shipped::{COLUMNS, ROWS};
@@ -20,11 +20,7 @@ pub const EFFECT: Description = Description {
     ],
     state: "9 numbers for each taxel",
     reference: "Interlink FSR 400 integration guide: drift under 5 % per decade of time; a Prony series with a term for each decade",
-    keys: &[Key {
-        name: "rate_percent_per_decade",
-        about: "Growth of the reading.",
-        kind: Kind::Number { min: 0.0, max: 50.0, default: Some(5.0) },
-    }],
+    keys: &[Key::number("rate_percent_per_decade", "Growth of the reading.", 0.0, 50.0, 5.0)],
     zero: &[("rate_percent_per_decade", 0.0)],
     build: |build: &Build| {
         let share = build.values.number("rate_percent_per_decade") / 100.0;

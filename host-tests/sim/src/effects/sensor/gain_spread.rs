@@ -3,7 +3,7 @@
 use super::{Pressure, Row};
 use crate::effects::random::normal_within_3;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 use fingertip::shipped::ROWS;
@@ -18,11 +18,7 @@ pub const EFFECT: Description = Description {
     ],
     state: "none; 100 gains drawn at the start",
     reference: "Interlink FSR 400 integration guide: part to part +-6 %; Tekscan sensors differ by 5 to 32 %",
-    keys: &[Key {
-        name: "rms_percent",
-        about: "Deviation of the taxels' gains.",
-        kind: Kind::Number { min: 0.0, max: 50.0, default: Some(6.0) },
-    }],
+    keys: &[Key::number("rms_percent", "Deviation of the taxels' gains.", 0.0, 50.0, 6.0)],
     zero: &[("rms_percent", 0.0)],
     build: |build: &Build| {
         let mut rng = Rng::with_seed(build.seed);

@@ -1,8 +1,8 @@
 //! Without a virtual ground, current finds its way through other taxels.
 
-use super::{Network, Row};
+use super::Row;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fingertip::shipped::{COLUMNS, ROWS};
 
@@ -19,26 +19,23 @@ pub const EFFECT: Description = Description {
     ],
     state: "none; it sees each other row as of its last sample, at most a frame ago",
     reference: "D'Alessio, Measurement errors in the scanning of piezoresistive sensors arrays, Sensors and Actuators A 72 (1999)",
-    keys: &[Key {
-        name: "hold_ohm",
-        about: "Resistance through which lines are held; 0 is a perfect virtual ground, 1e12 none.",
-        kind: Kind::Number { min: 0.0, max: 1e12, default: Some(1000.0) },
-    }],
+    keys: &[Key::number(
+        "hold_ohm",
+        "Resistance through which lines are held; 0 is a perfect virtual ground, 1e12 none.",
+        0.0,
+        1e12,
+        1000.0,
+    )],
     zero: &[("hold_ohm", 0.0)],
-    build: |build: &Build| Part::Network(Box::new(Ghosting { hold_ohm: build.values.number("hold_ohm") })),
+    build: |build: &Build| {
+        let hold_ohm = build.values.number("hold_ohm");
+        Part::Network(Box::new(move |row, array, seen| {
+            if hold_ohm > 0.0 {
+                *seen = short_circuit(row, array, 1.0 / hold_ohm);
+            }
+        }))
+    },
 };
-
-struct Ghosting {
-    hold_ohm: f64,
-}
-
-impl Network for Ghosting {
-    fn apply(&mut self, row: usize, array: &[Row; ROWS], seen: &mut Row) {
-        if self.hold_ohm > 0.0 {
-            *seen = short_circuit(row, array, 1.0 / self.hold_ohm);
-        }
-    }
-}
 
 fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
     let mut a = [[0.0; COLUMNS]; COLUMNS];

@@ -2,7 +2,7 @@
 
 use super::{Pressure, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fingertip::shipped::{COLUMNS, ROWS};
 
@@ -18,11 +18,13 @@ pub const EFFECT: Description = Description {
     state: "y of each taxel (100 numbers)",
     reference: "Interlink FSR 400 integration guide: hysteresis +10 %; the play operator: Brokate and Sprekels, Hysteresis and \
                 Phase Transitions, 1996, section 2.1",
-    keys: &[Key {
-        name: "width_percent",
-        about: "How much more it reads letting go than pressing, of the pressure.",
-        kind: Kind::Number { min: 0.0, max: 100.0, default: Some(10.0) },
-    }],
+    keys: &[Key::number(
+        "width_percent",
+        "How much more it reads letting go than pressing, of the pressure.",
+        0.0,
+        100.0,
+        10.0,
+    )],
     zero: &[("width_percent", 0.0)],
     build: |build: &Build| {
         let half = build.values.number("width_percent") / 200.0;

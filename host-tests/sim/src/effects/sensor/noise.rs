@@ -1,9 +1,9 @@
 //! Noise of amplifiers and converter.
 
-use super::{Codes, Row};
+use super::Row;
 use crate::effects::random::normals;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use fastrand::Rng;
 
@@ -15,26 +15,14 @@ pub const EFFECT: Description = Description {
     equations: &["code' = code + rms_codes g, g normal, drawn for each conversion"],
     state: "the random numbers' (8 bytes)",
     reference: "ST application note AN4073, averaging against converter noise: a few codes",
-    keys: &[Key {
-        name: "rms_codes",
-        about: "Its deviation, in codes of the 12-bit converter.",
-        kind: Kind::Number { min: 0.0, max: 500.0, default: Some(1.5) },
-    }],
+    keys: &[Key::number("rms_codes", "Its deviation, in codes of the 12-bit converter.", 0.0, 500.0, 1.5)],
     zero: &[("rms_codes", 0.0)],
     build: |build: &Build| {
         let rms_codes = build.values.number("rms_codes");
-        Part::Codes(Box::new(Noise { rms_codes, rng: Rng::with_seed(build.seed) }))
+        let mut rng = Rng::with_seed(build.seed);
+        Part::Codes(Box::new(move |_, _, codes| {
+            let noise: Row = normals(&mut rng);
+            codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += rms_codes * noise);
+        }))
     },
 };
-
-struct Noise {
-    rms_codes: f64,
-    rng: Rng,
-}
-
-impl Codes for Noise {
-    fn apply(&mut self, _slot: usize, _time_s: f64, codes: &mut Row) {
-        let noise: Row = normals(&mut self.rng);
-        codes.iter_mut().zip(noise).for_each(|(code, noise)| *code += self.rms_codes * noise);
-    }
-}

@@ -1,10 +1,8 @@
 //! The driven row's switch and trace take a part of its voltage.
 
-use super::{Network, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
-use fingertip::shipped::ROWS;
 
 /// What a scene names.
 pub const EFFECT: Description = Description {
@@ -15,22 +13,13 @@ pub const EFFECT: Description = Description {
     equations: &["G' = G / (1 + R_on S), S = the row's sum of G: a loss of R_on S / (1 + R_on S)"],
     state: "none",
     reference: "docs/board.md: 30 Ohm; R_min 1 kOhm in all ten columns loses 41 % at 70 Ohm and 4.8 % at 5 Ohm",
-    keys: &[Key {
-        name: "switch_ohm",
-        about: "Resistance of switch and trace, R_on.",
-        kind: Kind::Number { min: 0.0, max: 300.0, default: Some(30.0) },
-    }],
+    keys: &[Key::number("switch_ohm", "Resistance of switch and trace, R_on.", 0.0, 300.0, 30.0)],
     zero: &[("switch_ohm", 0.0)],
-    build: |build: &Build| Part::Network(Box::new(RowSag { switch_ohm: build.values.number("switch_ohm") })),
+    build: |build: &Build| {
+        let switch_ohm = build.values.number("switch_ohm");
+        Part::Network(Box::new(move |_, _, seen| {
+            let left = 1.0 + switch_ohm * seen.iter().sum::<f64>();
+            seen.iter_mut().for_each(|siemens| *siemens /= left);
+        }))
+    },
 };
-
-struct RowSag {
-    switch_ohm: f64,
-}
-
-impl Network for RowSag {
-    fn apply(&mut self, _row: usize, _array: &[Row; ROWS], seen: &mut Row) {
-        let left = 1.0 + self.switch_ohm * seen.iter().sum::<f64>();
-        seen.iter_mut().for_each(|siemens| *siemens /= left);
-    }
-}

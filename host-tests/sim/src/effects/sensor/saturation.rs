@@ -1,8 +1,7 @@
 //! The amplifiers reach their rail before the converter reaches its top.
 
-use super::{Row, Volts};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::registry::{Description, Family};
 use crate::setup::Array;
 
@@ -14,24 +13,10 @@ pub const EFFECT: Description = Description {
     equations: &["v' = min(v, V_ref - headroom_mv)"],
     state: "none",
     reference: "output swing to the rail in data sheets of amplifiers, 5 to 200 mV",
-    keys: &[Key {
-        name: "headroom_mv",
-        about: "How far below the reference of 3.3 V they end.",
-        kind: Kind::Number { min: 0.0, max: 3000.0, default: Some(50.0) },
-    }],
+    keys: &[Key::number("headroom_mv", "How far below the reference of 3.3 V they end.", 0.0, 3000.0, 50.0)],
     zero: &[("headroom_mv", 0.0)],
     build: |build: &Build| {
         let rail_v = Array::default().reference_v - build.values.number("headroom_mv") * 1e-3;
-        Part::Volts(Box::new(Saturation { rail_v }))
+        Part::Volts(Box::new(move |_, _, volts| volts.iter_mut().for_each(|volts| *volts = volts.min(rail_v))))
     },
 };
-
-struct Saturation {
-    rail_v: f64,
-}
-
-impl Volts for Saturation {
-    fn apply(&mut self, _slot: usize, _time_s: f64, volts: &mut Row) {
-        volts.iter_mut().for_each(|volts| *volts = volts.min(self.rail_v));
-    }
-}

@@ -1,8 +1,8 @@
 //! The columns are sampled before they have settled.
 
-use super::{Row, Volts};
+use super::Row;
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 
@@ -18,21 +18,14 @@ pub const EFFECT: Description = Description {
     state: "voltage of each column at the last edge, and what it settles to (20 numbers)",
     reference: "docs/plant.md, readout: 0.2 us; half a bit of 12 takes 9.0 tau",
     keys: &[
-        Key {
-            name: "tau_us",
-            about: "Time constant.",
-            kind: Kind::Number { min: 0.0, max: 100.0, default: Some(0.2) },
-        },
-        Key {
-            name: "after_us",
-            about: "From the edge to the sample.",
-            kind: Kind::Number { min: 0.1, max: 1000.0, default: Some(2.4) },
-        },
+        Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2),
+        Key::number("after_us", "From the edge to the sample.", 0.1, 1000.0, 2.4),
     ],
     zero: &[("tau_us", 0.0)],
     build: |build: &Build| {
         let [tau_s, after_s] = ["tau_us", "after_us"].map(|key| build.values.number(key) * 1e-6);
-        Part::Volts(Box::new(Settling::new(tau_s, after_s)))
+        let mut settling = Settling::new(tau_s, after_s);
+        Part::Volts(Box::new(move |_, time_s, volts| settling.sample(time_s, volts)))
     },
 };
 
@@ -49,16 +42,8 @@ impl Settling {
     pub fn new(tau_s: f64, after_s: f64) -> Self {
         Self { tau_s, left: decay(after_s / tau_s), before: None }
     }
-}
-
-struct Before {
-    time_s: f64,
-    edge_v: Row,
-    end_v: Row,
-}
-
-impl Volts for Settling {
-    fn apply(&mut self, _slot: usize, time_s: f64, volts: &mut Row) {
+    /// What the columns have come to, in place of what they settle to, at a sample.
+    pub fn sample(&mut self, time_s: f64, volts: &mut Row) {
         let end_v = *volts;
         let edge_v = match &self.before {
             None => end_v,
@@ -72,4 +57,10 @@ impl Volts for Settling {
         }
         self.before = Some(Before { time_s, edge_v, end_v });
     }
+}
+
+struct Before {
+    time_s: f64,
+    edge_v: Row,
+    end_v: Row,
 }

@@ -2,7 +2,7 @@
 
 use super::{Pressure, Row};
 use crate::effects::{Build, Part};
-use crate::key::{Key, Kind};
+use crate::key::Key;
 use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 
@@ -19,36 +19,24 @@ pub const EFFECT: Description = Description {
     state: "none: T is a function of time",
     reference: "Tekscan FlexiForce A201 data sheet: 0.36 %/K; the zero's drift is an assumption",
     keys: &[
-        Key {
-            name: "warming_k",
-            about: "How much warmer it is in the end.",
-            kind: Kind::Number { min: -60.0, max: 100.0, default: Some(20.0) },
-        },
-        Key {
-            name: "time_constant_s",
-            about: "Time in which it has come to 63 % of that.",
-            kind: Kind::Number { min: 0.001, max: 1e6, default: Some(600.0) },
-        },
-        Key {
-            name: "gain_percent_per_k",
-            about: "Change of the gain.",
-            kind: Kind::Number { min: -1.0, max: 1.0, default: Some(0.36) },
-        },
-        Key {
-            name: "zero_kpa_per_k",
-            about: "Change of the reading without pressure.",
-            kind: Kind::Number { min: -1.0, max: 1.0, default: Some(0.01) },
-        },
-        Key {
-            name: "chip_share",
-            about: "How much of the array's warming the microcontroller's temperature shows.",
-            kind: Kind::Number { min: -2.0, max: 4.0, default: Some(1.0) },
-        },
-        Key {
-            name: "chip_time_constant_s",
-            about: "The microcontroller's time constant; 0 is that of the array.",
-            kind: Kind::Number { min: 0.0, max: 1e6, default: Some(0.0) },
-        },
+        Key::number("warming_k", "How much warmer it is in the end.", -60.0, 100.0, 20.0),
+        Key::number("time_constant_s", "Time in which it has come to 63 % of that.", 0.001, 1e6, 600.0),
+        Key::number("gain_percent_per_k", "Change of the gain.", -1.0, 1.0, 0.36),
+        Key::number("zero_kpa_per_k", "Change of the reading without pressure.", -1.0, 1.0, 0.01),
+        Key::number(
+            "chip_share",
+            "How much of the array's warming the microcontroller's temperature shows.",
+            -2.0,
+            4.0,
+            1.0,
+        ),
+        Key::number(
+            "chip_time_constant_s",
+            "The microcontroller's time constant; 0 is that of the array.",
+            0.0,
+            1e6,
+            0.0,
+        ),
     ],
     zero: &[("warming_k", 0.0)],
     build: |build: &Build| {

@@ -2,9 +2,31 @@
 
 use crate::run::RunError;
 use std::num::NonZero;
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::{Mutex, mpsc};
 use std::thread;
+
+/// Does the tasks on all cores, the first ones first. The results are in the order of the tasks.
+///
+/// # Panics
+/// Where a task does.
+pub fn map<T, R: Send>(tasks: impl IntoIterator<Item = T, IntoIter: Send>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
+    let tasks = Mutex::new(tasks.into_iter().enumerate());
+    let next = || tasks.lock().expect("a task is only taken there").next();
+    let some = || std::iter::from_fn(next).map(|(place, task)| (place, work(task))).collect::<Vec<_>>();
+    let mut results: Vec<(usize, R)> = thread::scope(|scope| {
+        let threads: Vec<_> = (0..count()).map(|_| scope.spawn(some)).collect();
+        let joined = threads.into_iter().map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic)));
+        joined.flatten().collect()
+    });
+    results.sort_unstable_by_key(|(place, _)| *place);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+fn count() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
+}
 
 /// Does the tasks on all cores, and hands each result to `done` as it comes, in any order. The first error ends it.
 ///
@@ -18,9 +40,8 @@ pub fn each<T: Sync, R: Send>(
     let next = AtomicUsize::new(0);
     let stop = AtomicBool::new(false);
     let (sender, results) = mpsc::channel();
-    let cores = thread::available_parallelism().map_or(1, NonZero::get);
     thread::scope(|scope| {
-        for _ in 0..cores {
+        for _ in 0..count() {
             let (sender, next, stop, work) = (sender.clone(), &next, &stop, &work);
             scope.spawn(move || {
                 while let Some(task) = tasks.get(next.fetch_add(1, Ordering::Relaxed)) {

@@ -1,0 +1,23 @@
+//! The reference finger as its firmware knows it.
+
+use fingertip::params::Params;
+use fingertip::shipped::{Array, Calibration, Config, Frame, TARE_FRAMES};
+
+/// The configuration that the default parameters make.
+///
+/// # Panics
+/// Where the core does not allow them: a mistake in the core.
+pub fn config() -> Config {
+    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
+}
+
+/// An array that was tared with nothing on it.
+pub fn tared(calibration: &Calibration, blank: &Frame, config: &Config) -> Array {
+    let mut array = Array::new();
+    array.calibrate(calibration);
+    for _ in 0..TARE_FRAMES {
+        array.read(blank, config);
+        array.continue_tare();
+    }
+    array
+}

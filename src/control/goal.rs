@@ -72,9 +72,10 @@ impl Goal {
     ) -> Reference {
         let travel = motion.observer.travel;
         // Nothing is pressed that deep: it was lost indeed.
-        self.lost &= self
-            .surface
-            .is_some_and(|surface| travel.0.saturating_sub(surface.0) <= config.tip.indentation(config.force_fault).0);
+        self.lost = self.lost
+            && self.surface.is_some_and(|surface| {
+                travel.0.saturating_sub(surface.0) <= config.tip.indentation(config.force_fault).0
+            });
         self.enter(mode, contact, travel, config);
         self.creep.observe(mode == Mode::Force, contact.force, config);
         let (way, quick, slack) = if mode == Mode::Release {

@@ -238,7 +238,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
             return self.refuse(if stalled { Refusal::Stalled } else { Refusal::TooLittle });
         }
         let radii = |length: Millimetres| {
-            number::held((i64::from(length.to_bits()) * i64::from(config.geometry.inverse_radius)) >> (56 - BITS))
+            number::clamped((i64::from(length.to_bits()) * i64::from(config.geometry.inverse_radius)) >> (56 - BITS))
         };
         self.centre = [radii(contact.centre_x), radii(contact.centre_y)];
         self.pose = Pose { touch: radii(self.press.touched()), axis: self.centre, tilt: [0; 2], roundness: 0 };

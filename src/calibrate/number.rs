@@ -10,8 +10,8 @@ pub const ONE: i64 = 1 << BITS;
 /// What is beyond has no meaning here; below it products and their sums over a series stay within 64 bits.
 const MOST: i64 = 2 * ONE - 1;
 
-/// Held to within 2.
-pub const fn held(x: i64) -> i64 {
+/// Clamped to within 2.
+pub const fn clamped(x: i64) -> i64 {
     if x > MOST {
         MOST
     } else if x < -MOST {
@@ -28,13 +28,13 @@ pub const fn mul(x: i64, y: i64) -> i64 {
     ((x as i32 as i64) * (y as i32 as i64)) >> BITS
 }
 
-/// x / y, to 2^-28 of itself; held to within 2, and 0 where y is 0.
+/// x / y, to 2^-28 of itself; clamped to within 2, and 0 where y is 0.
 pub fn div(x: i64, y: i64) -> i64 {
     if y == 0 {
         return 0;
     }
     // A bit less than there is room for: near to 1 the divisor stops before its end.
-    let quotient = held(i64::from(Divisor::new(y.unsigned_abs()).divide(x, BITS - 1)) << 1);
+    let quotient = clamped(i64::from(Divisor::new(y.unsigned_abs()).divide(x, BITS - 1)) << 1);
     if y < 0 { -quotient } else { quotient }
 }
 
@@ -45,7 +45,7 @@ pub fn mean(sum: i64, count: i64) -> i64 {
 
 /// The root of a number within 2; 0 of what is below 0.
 pub fn root(x: i64) -> i64 {
-    i64::from(floor_sqrt(held(x).max(0).unsigned_abs() << BITS))
+    i64::from(floor_sqrt(clamped(x).max(0).unsigned_abs() << BITS))
 }
 
 #[cfg(test)]

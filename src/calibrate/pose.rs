@@ -5,7 +5,7 @@
 //! line in x, and the line's zero, `z = x_c + 1 - L - t rho`, does not depend on g: so the pose is found from the zeros
 //! of all lines, whatever the gains are, by least squares. The tilt and the axis' place differ by what L differs from 1.
 
-use super::number::{BITS, ONE, div, held, mean, mul, root};
+use super::number::{BITS, ONE, clamped, div, mean, mul, root};
 use super::series::{STEPS, Series};
 
 /// Unknowns: x_c, the axis along columns and rows, the tilt along both, the roundness.
@@ -45,7 +45,7 @@ pub struct Pose {
 impl Pose {
     /// Where a column stands from the axis, and how long it is; None where the tip is too low there.
     pub fn column(&self, place: [i64; 2]) -> Option<Column> {
-        let [x, y] = [held(place[0] - self.axis[0]), held(place[1] - self.axis[1])];
+        let [x, y] = [clamped(place[0] - self.axis[0]), clamped(place[1] - self.axis[1])];
         let length = root(ONE - mul(x, x) - mul(y, y));
         (length >= SHORTEST).then_some(Column { from_axis: [x, y], length })
     }
@@ -59,7 +59,7 @@ impl Pose {
 
     /// How steep the compression is there, along the columns and the rows.
     pub fn slope(&self, column: &Column) -> [i64; 2] {
-        let round = held(div(ONE, column.length) + self.roundness);
+        let round = clamped(div(ONE, column.length) + self.roundness);
         let [x, y] = column.from_axis;
         [self.tilt[0] - mul(x, round), self.tilt[1] - mul(y, round)]
     }
@@ -74,7 +74,7 @@ impl Pose {
         }
         let zero = self.touch + ONE - div(ONE, inverse) - self.lift(&column);
         let [slope_x, slope_y] = self.slope(&column);
-        let from = zero + mul(pitch, held(slope_x.abs() + slope_y.abs())) / 2 + MARGIN;
+        let from = zero + mul(pitch, clamped(slope_x.abs() + slope_y.abs())) / 2 + MARGIN;
         let [x, y] = column.from_axis;
         let apart = (mul(x, x) + mul(y, y)) / 2;
         Some(Zero { zero, from, slopes: [ONE, slope_x, slope_y, -x, -y, apart] })
@@ -169,7 +169,7 @@ impl Equations {
 
     /// Takes a taxel.
     pub fn take(&mut self, zero: &Zero, line: &Line) {
-        let (residual, bend, slopes) = (held(line.zero - zero.zero), line.bend, zero.slopes);
+        let (residual, bend, slopes) = (clamped(line.zero - zero.zero), line.bend, zero.slopes);
         for ((squares, right), one) in self.squares.iter_mut().zip(&mut self.right).zip(slopes) {
             for (sum, other) in squares.iter_mut().zip(slopes) {
                 *sum += mul(one, other) >> SUM_BITS;

@@ -1,6 +1,6 @@
 //! What a press leaves of every taxel: its mean reading in each of 24 steps of the travel.
 
-use super::number::{BITS, held};
+use super::number::{BITS, clamped};
 use crate::config::Config;
 use crate::pressure::Picture;
 
@@ -108,7 +108,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Readings<ROWS, COLUMNS> {
             return (None, 0);
         }
         let way = ways.checked_div((*frames).into()).unwrap_or(0);
-        let travel = held((way * i64::from(config.geometry.inverse_radius)) >> (56 - BITS));
+        let travel = clamped((way * i64::from(config.geometry.inverse_radius)) >> (56 - BITS));
         // Q8 of the sixteenths over Q8: what the pressure Y shows.
         let whole = (i64::from(*frames) * i64::from(config.geometry.modulus_q8)) >> 8;
         let part = (1_i64 << (BITS + WHOLE_BITS)).checked_div(whole).unwrap_or(0);

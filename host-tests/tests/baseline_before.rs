@@ -7,17 +7,6 @@ use host_tests::finger::config;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
-/// The largest true force in these seconds.
-fn run(board: &mut Bench, seconds: f64) -> f64 {
-    let until = board.time_s() + seconds;
-    let mut largest: f64 = 0.0;
-    while board.time_s() < until {
-        board.step();
-        largest = largest.max(board.truth().force_n);
-    }
-    largest
-}
-
 fn bench(params: &Params) -> Bench {
     let mut board = Bench::of(&Setup::default(), &Config::shipped(params).unwrap());
     board.tare();
@@ -29,19 +18,19 @@ fn after_a_curve(touching: bool, off_s: f64, goal_mn: i32) -> f64 {
     let mut board = bench(&Params { curve_permille: 500, ..Params::DEFAULT });
     if touching {
         board.command().goal = newtons(1_000);
-        run(&mut board, 0.5);
+        board.run(0.5);
     }
     board.command().torque = false;
     board.command().goal = newtons(0);
-    run(&mut board, 0.01);
+    board.run(0.01);
     board.pipeline().configure(&config());
     board.place_object(50.0);
     board.place(0.0);
-    run(&mut board, off_s);
+    board.run(off_s);
     board.place_object(5.0);
     board.command().torque = true;
     board.command().goal = newtons(goal_mn);
-    run(&mut board, 2.0)
+    board.run(2.0)
 }
 
 /// `curve_permille` to 0 while the tip touches: the baseline learns the last bent frame's row for ever.
@@ -100,19 +89,19 @@ fn what_presses_for_seconds_is_not_left_of_what_was_held() {
     for (goal_mn, first_mm, then_mm) in [(2_000, 0.95, 0.75), (6_000, 1.6, 1.3)] {
         let mut board = bench(&Params::DEFAULT);
         board.command().goal = newtons(goal_mn);
-        run(&mut board, 1.0);
+        board.run(1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.1);
         let travel = board.truth().travel_mm;
         board.place_object(travel - first_mm);
-        run(&mut board, 5.0);
+        board.run(5.0);
         board.place_object(4.0 - then_mm);
-        run(&mut board, 3.0);
+        board.run(3.0);
         let (held, read) = (board.truth().force_n, board.status().contact.force.0.to_num::<f64>());
         board.place_object(5.0);
-        run(&mut board, 0.05);
+        board.run(0.05);
         board.command().goal = newtons(1_000);
-        let largest = run(&mut board, 1.0);
+        let largest = board.run(1.0);
         if (held - read).abs() > 0.02 || largest > 1.02 {
             failed.push(format!("after {goal_mn} mN: {held:.3} N read {read:.3} N; goal 1 N then has {largest:.3} N"));
         }
@@ -128,26 +117,26 @@ fn a_tare_forgets_what_was_held() {
         let mut board = bench(&Params::DEFAULT);
         if history {
             board.command().goal = newtons(6_000);
-            run(&mut board, 1.0);
+            board.run(1.0);
             board.command().torque = false;
             board.command().goal = newtons(0);
-            run(&mut board, 0.2);
+            board.run(0.2);
             board.place_object(50.0);
             board.place(0.0);
-            run(&mut board, 5.0);
+            board.run(5.0);
             board.place_object(5.0);
             board.tare();
         }
         board.command().goal = newtons(200);
-        run(&mut board, 1.0);
+        board.run(1.0);
         board.command().goal = newtons(0);
         clear(&mut board, 4.2);
         board.place_object(3.0);
-        run(&mut board, 3.0);
+        board.run(3.0);
         board.place_object(5.0);
-        run(&mut board, 0.05);
+        board.run(0.05);
         board.command().goal = newtons(1_000);
-        *largest = run(&mut board, 1.0);
+        *largest = board.run(1.0);
     }
     assert!(largest[1] < largest[0] + 0.02, "goal 1 N has {largest:?} N without and with a history");
 }

@@ -6,17 +6,6 @@ use host_tests::finger::config;
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
-/// The largest true force in these seconds.
-fn run(board: &mut Bench, seconds: f64) -> f64 {
-    let until = board.time_s() + seconds;
-    let mut largest: f64 = 0.0;
-    while board.time_s() < until {
-        board.step();
-        largest = largest.max(board.truth().force_n);
-    }
-    largest
-}
-
 /// A press of 1 N, let go; so long after that the object comes to the tip, this deep, for 5 s; then it is gone, and the
 /// next press has 1 N for its goal. What the array reads in the end of the touch, what is true, and the largest force
 /// of that press.
@@ -25,19 +14,19 @@ fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     let mut board: Bench = Bench::of(&setup, &config());
     board.tare();
     board.command().goal = newtons(1_000);
-    run(&mut board, 1.0);
+    board.run(1.0);
     board.command().goal = newtons(0);
-    run(&mut board, after_s);
+    board.run(after_s);
     board.command().torque = torque;
     let travel = board.truth().travel_mm;
     board.place_object(travel - depth_mm);
-    run(&mut board, 5.0);
+    board.run(5.0);
     let touch = [board.status().contact.force.0.to_num(), board.truth().force_n];
     board.place_object(setup.wall.distance_mm);
-    run(&mut board, 0.01);
+    board.run(0.01);
     (board.command().torque, board.command().goal) = (true, newtons(1_000));
     let [read, held] = touch;
-    [read, held, run(&mut board, 2.0)]
+    [read, held, board.run(2.0)]
 }
 
 #[test]

@@ -6,20 +6,13 @@ use fingertip::params::Params;
 use fingertip::pressure::{Calibration, GAIN_ONE};
 use fingertip::shipped::{COLUMNS, Config, ROWS, address};
 use fingertip::state::Mode;
-use sim::effects::set::{Named, Set};
+use sim::effects::set::Named;
 use sim::native::bench::Bench;
 use sim::scene::read;
 
 #[path = "link/bench.rs"]
 #[allow(dead_code, reason = "the link's tests take more of it")]
 mod bus;
-
-fn run<E: Set>(board: &mut Bench<E>, seconds: f64) {
-    let until = board.time_s() + seconds;
-    while board.time_s() < until {
-        board.step();
-    }
-}
 
 /// Accepted twice before the loop has the new parameters: each number is changed once.
 #[test]
@@ -92,9 +85,9 @@ fn a_number_for_another_goal_waits() {
         let mut board = Bench::default();
         board.tare();
         board.command().goal = newtons(2_000);
-        run(&mut board, 1.5);
+        board.run(1.5);
         board.command().goal = newtons(4_000);
-        run(&mut board, wait_s);
+        board.run(wait_s);
         board.command().shown_mn = (1e3 * board.truth().force_n) as i32;
         board.command().shown_request += 1;
         let scale = board.step().scale;

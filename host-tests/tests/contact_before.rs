@@ -10,13 +10,6 @@ use sim::plant::Taxel;
 use sim::scene::{Scene, read};
 use sim::setup::Setup;
 
-fn run<E: Set>(board: &mut Bench<E>, seconds: f64) {
-    let until = board.time_s() + seconds;
-    while board.time_s() < until {
-        board.step();
-    }
-}
-
 fn told<E: Set>(board: &mut Bench<E>) -> String {
     let (truth, status) = (board.truth(), *board.status());
     format!(
@@ -43,15 +36,15 @@ fn another_object_at_the_edge_is_taken_hold_of() {
                 board.tare();
                 if history != "none" {
                     board.command().goal = newtons(goal_mn);
-                    run(&mut board, 0.7);
+                    board.run(0.7);
                 }
                 if history == "let go" {
                     board.command().goal = newtons(0);
-                    run(&mut board, 0.7);
+                    board.run(0.7);
                 }
                 board.place_object(13.0);
                 board.command().goal = newtons(goal_mn);
-                run(&mut board, 2.0);
+                board.run(2.0);
                 let off = (board.truth().force_n - 1e-3 * f64::from(goal_mn)).abs();
                 if off > 0.02 || board.status().mode != Mode::Force {
                     failed.push(format!("{history}, {x_mm} mm, goal {goal_mn} mN: {}", told(&mut board)));
@@ -78,13 +71,8 @@ fn a_press_that_measures_loses_the_fit() {
         let mut board: Bench<Named> = Bench::new(&scene(6.8)).unwrap();
         board.tare();
         board.command().goal = newtons(2_000);
-        run(&mut board, 1.0);
-        let command = board.command();
-        if gains {
-            command.calibrate_request += 1
-        } else {
-            command.identify_request += 1
-        }
+        board.run(1.0);
+        board.ask_press(gains);
         board.step();
         while board.step().contact.force >= newtons(15) {}
         let travel_mm = board.truth().travel_mm;
@@ -118,18 +106,18 @@ fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
             board.tare();
             if history {
                 board.command().goal = newtons(6_000);
-                run(&mut board, 3.0);
+                board.run(3.0);
                 board.command().torque = false;
                 board.command().goal = newtons(0);
-                run(&mut board, 0.3);
+                board.run(0.3);
                 board.place_object(60.0);
                 board.place(0.0);
-                run(&mut board, 0.01);
+                board.run(0.01);
                 board.place_object(5.0);
                 board.command().torque = true;
             }
             board.command().goal = newtons(1_000);
-            run(&mut board, 2.0);
+            board.run(2.0);
             let (mut least, mut most) = (f64::MAX, 0.0_f64);
             for _ in 0..10_000 {
                 board.step();

@@ -9,17 +9,19 @@ use fingertip::shipped::{Config, Fit, Frame, Picture, Pipeline, TARE_FRAMES};
 use host_tests::finger::config;
 use sim::plant::{Plant, Setup};
 
+/// The reference finger with another pitch and tip.
+fn with(pitch_um: i32, tip_radius_um: i32) -> Config {
+    Config::shipped(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT }).unwrap()
+}
+
 /// The fit of one geometry says nothing of another.
 #[test]
 fn other_parameters_begin_the_fit_anew() {
-    let config = |pitch_um: i32, tip_radius_um: i32| {
-        Config::shipped(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT }).unwrap()
-    };
-    let last = config(4_000, 4_000);
+    let last = with(4_000, 4_000);
     for (pitch_um, tip_radius_um) in [(500, 16_000), (1_500, 10_000), (500, 4_000)] {
         let mut setup = Setup::default();
         (setup.wall.centre_x_mm, setup.wall.centre_y_mm) = (5.0, 4.0);
-        let mut pipelines = [&config(pitch_um, tip_radius_um), &last].map(Pipeline::new);
+        let mut pipelines = [&with(pitch_um, tip_radius_um), &last].map(Pipeline::new);
         let sense = Sense { supply_mv: 6_000, ..Sense::default() };
         let command = Command { tare_request: 1, ..Command::default() };
         let mut world = Plant::new(&setup);
@@ -48,14 +50,11 @@ fn other_parameters_begin_the_fit_anew() {
 /// overflow.
 #[test]
 fn a_fit_that_is_handed_another_geometry_begins_anew() {
-    let config = |pitch_um: i32, tip_radius_um: i32| {
-        Config::shipped(&Params { pitch_um, tip_radius_um, ..Params::DEFAULT }).unwrap()
-    };
     let mut rng = fastrand::Rng::with_seed(7);
     let mut picture = Picture::EMPTY;
-    let (mut fit, last) = (Fit::default(), config(4_000, 4_000));
+    let (mut fit, last) = (Fit::default(), with(4_000, 4_000));
     for (pitch_um, tip_radius_um) in [(500, 16_000), (1_500, 10_000), (500, 4_000)] {
-        let first = config(pitch_um, tip_radius_um);
+        let first = with(pitch_um, tip_radius_um);
         for change in 1..200 {
             picture.taxels.as_flattened_mut().fill_with(|| rng.i32(0..60_000));
             picture.peak = *picture.taxels.as_flattened().iter().max().unwrap();

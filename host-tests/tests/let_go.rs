@@ -8,13 +8,6 @@ use sim::native::bench::Bench;
 use sim::scene::read;
 use sim::setup::Setup;
 
-fn run<E: Set>(board: &mut Bench<E>, seconds: f64) {
-    let until = board.time_s() + seconds;
-    while board.time_s() < until {
-        board.step();
-    }
-}
-
 fn bench() -> Bench {
     let mut board = Bench::of(&Setup::default(), &config());
     board.tare();
@@ -56,16 +49,20 @@ fn carry<E: Set>(board: &mut Bench<E>, from: f64, to: f64) {
     }
 }
 
+/// Asks to let go, and says what is still held so many seconds later.
+fn kept<E: Set>(board: &mut Bench<E>, seconds: f64) -> Option<String> {
+    board.command().goal = newtons(0);
+    board.run(seconds);
+    (board.truth().force_n > 0.0).then(|| told(board))
+}
+
 fn moved_while_held<E: Set>(board: &mut Bench<E>, goal_mn: i32, moved_mm: f64) -> Option<String> {
     board.command().goal = newtons(goal_mn);
-    run(board, 0.7);
+    board.run(0.7);
     carry(board, 5.0, 5.0 - moved_mm);
-    run(board, 0.3);
+    board.run(0.3);
     let held = board.truth().force_n;
-    board.command().goal = newtons(0);
-    run(board, 2.0);
-    let kept = board.truth().force_n > 0.0;
-    kept.then(|| format!("goal {goal_mn} mN, {moved_mm} mm: held {held:.3} N, then let go: {}", told(board)))
+    kept(board, 2.0).map(|told| format!("goal {goal_mn} mN, {moved_mm} mm: held {held:.3} N, then let go: {told}"))
 }
 
 /// Another finger pushes the object towards this one while both hold it: the loop goes along and holds the force, the
@@ -91,17 +88,9 @@ fn an_object_that_came_along_while_it_was_held_is_let_go() {
 fn goal_0_during_a_press<E: Set>(board: &mut Bench<E>, gains: bool) -> Option<String> {
     board.command().goal = newtons(1_000);
     board.step();
-    let command = board.command();
-    if gains {
-        command.calibrate_request += 1
-    } else {
-        command.identify_request += 1
-    }
-    run(board, 0.05);
-    board.command().goal = newtons(0);
-    run(board, 6.0);
-    let kept = board.truth().force_n > 0.0;
-    kept.then(|| format!("gains {gains}: {}", told(board)))
+    board.ask_press(gains);
+    board.run(0.05);
+    kept(board, 6.0).map(|told| format!("gains {gains}: {told}"))
 }
 
 /// A press asked for during the first approach; the host takes the goal back while it presses.
@@ -127,13 +116,8 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     for gains in [false, true] {
         let mut board = bench();
         board.step();
-        let command = board.command();
-        if gains {
-            command.calibrate_request += 1
-        } else {
-            command.identify_request += 1
-        }
-        run(&mut board, 3.0);
+        board.ask_press(gains);
+        board.run(3.0);
         let behind_mm = 5.0 - board.truth().travel_mm;
         if !(0.75..1.25).contains(&behind_mm) {
             failed.push(format!("gains {gains}: {behind_mm:.3} mm behind, {}", told(&mut board)));
@@ -143,12 +127,12 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     let mut board = bench();
     board.place_object(10.0);
     board.command().goal = newtons(1_000);
-    run(&mut board, 1.0);
+    board.run(1.0);
     board.command().goal = newtons(0);
-    run(&mut board, 0.7);
+    board.run(0.7);
     carry(&mut board, 10.0, 7.5);
-    board.command().identify_request += 1;
-    run(&mut board, 6.0);
+    board.ask_press(false);
+    board.run(6.0);
     if board.truth().force_n > 0.0 {
         failed.push(format!("nearer: {}", told(&mut board)));
     }
@@ -162,22 +146,18 @@ fn what_came_to_a_released_tip_is_held_and_let_go() {
     for (to_mm, goal_mn) in [(3.0, 1_000), (2.5, 1_000), (2.0, 1_000), (1.5, 200), (0.8, 200)] {
         let mut board = bench();
         board.command().goal = newtons(1_000);
-        run(&mut board, 0.7);
+        board.run(0.7);
         board.command().goal = newtons(0);
-        run(&mut board, 0.7);
+        board.run(0.7);
         carry(&mut board, 5.0, to_mm);
-        run(&mut board, 0.3);
+        board.run(0.3);
         board.command().goal = newtons(goal_mn);
-        run(&mut board, 1.0);
+        board.run(1.0);
         let held = board.truth().force_n;
         if (held - f64::from(goal_mn) * 1e-3).abs() > 0.05 || board.status().mode != Mode::Force {
             failed.push(format!("to {to_mm} mm, goal {goal_mn} mN: {}", told(&mut board)));
         }
-        board.command().goal = newtons(0);
-        run(&mut board, 2.0);
-        if board.truth().force_n > 0.0 {
-            failed.push(format!("to {to_mm} mm, let go of {goal_mn} mN: {}", told(&mut board)));
-        }
+        failed.extend(kept(&mut board, 2.0).map(|told| format!("to {to_mm} mm, let go of {goal_mn} mN: {told}")));
     }
     assert!(failed.is_empty(), "{failed:#?}");
 }

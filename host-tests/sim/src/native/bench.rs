@@ -97,6 +97,24 @@ impl<E: Set> Bench<E> {
         *status
     }
 
+    /// Steps for so long; the largest true force on the way, N.
+    pub fn run(&mut self, seconds: f64) -> f64 {
+        let until_s = self.time_s() + seconds;
+        let mut largest_n: f64 = 0.0;
+        while self.time_s() < until_s {
+            self.step();
+            largest_n = largest_n.max(self.truth().force_n);
+        }
+        largest_n
+    }
+
+    /// Asks for a press that measures: for the taxels' gains, or for the modulus.
+    pub fn ask_press(&mut self, gains: bool) {
+        let command = self.command();
+        let request = if gains { &mut command.calibrate_request } else { &mut command.identify_request };
+        *request = request.wrapping_add(1);
+    }
+
     /// Torque off, a tare, torque on; nothing may touch.
     pub fn tare(&mut self) {
         let command = self.command();

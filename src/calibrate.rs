@@ -37,10 +37,7 @@ pub mod parts {
 
 use crate::config::Shaped;
 use crate::contact::Contact;
-use crate::control::SpeedLoop;
-use crate::control::profile::Reference;
 use crate::identify::{Identification, Press, PressView};
-use crate::state::Limits;
 use crate::units::Millimetres;
 use judge::Totals;
 use number::BITS;
@@ -51,7 +48,6 @@ use series::{Readings, STEPS, Series};
 /// A calibration under way, and what it proposes.
 #[derive(Clone, Debug)]
 pub struct Calibrator<const ROWS: usize, const COLUMNS: usize> {
-    press: Press,
     phase: Phase,
     standing: Standing,
     readings: Readings<ROWS, COLUMNS>,
@@ -114,7 +110,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
     /// Nothing asked for.
     pub const fn new() -> Self {
         Self {
-            press: Press::new(),
             phase: Phase::Idle,
             standing: Standing { state: State::None, progress: 0, presses: 0, reached: 0, proposals: 0 },
             readings: Readings::NONE,
@@ -163,8 +158,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
     }
 
     /// Starts a press; what was proposed before stands.
-    pub fn start(&mut self, motion: &SpeedLoop) {
-        self.press.start_deep(motion);
+    pub fn start(&mut self) {
         self.cleared = 0;
         self.phase = Phase::Press;
         (self.standing.state, self.standing.progress) = (State::Running, 0);
@@ -197,21 +191,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
         };
     }
 
-    /// The speed to follow while it presses.
-    pub fn reference(&self, motion: &mut SpeedLoop, config: &Shaped<ROWS, COLUMNS>, limits: &mut Limits) -> Reference {
-        self.press.reference(motion, config, limits)
-    }
-
     /// Takes a frame of the press.
-    pub fn observe(&mut self, view: &PressView<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
+    pub fn observe(&mut self, press: &Press, view: &PressView<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
         if !self.running() {
             return;
         }
-        self.press.observe(view, config);
         if self.cleared < ROWS {
             self.readings.clear(self.cleared);
             self.cleared += 1;
-        } else if let Some(way) = self.press.sampled() {
+        } else if let Some(way) = press.sampled() {
             let whole = Press::depth_goal(config).to_bits();
             self.readings.take(way.to_bits(), whole, view.picture);
             self.standing.progress = percent(i64::from(way.to_bits()), i64::from(whole)).min(50);
@@ -220,13 +208,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
                 return self.refuse(Refusal::Lost);
             }
         }
-        if let Identification::Refused(cause) = self.press.outcome() {
-            self.end(cause, view.contact, config);
+        if let Identification::Refused(cause) = press.outcome() {
+            self.end(cause, press, view.contact, config);
         }
     }
 
     /// The press is at its end: what became of it is worked out, or why not.
-    fn end(&mut self, cause: crate::identify::Refusal, contact: &Contact, config: &Shaped<ROWS, COLUMNS>) {
+    fn end(
+        &mut self,
+        cause: crate::identify::Refusal,
+        press: &Press,
+        contact: &Contact,
+        config: &Shaped<ROWS, COLUMNS>,
+    ) {
         use crate::identify::Refusal as Cause;
         match cause {
             Cause::NoContact => return self.refuse(Refusal::NoContact),
@@ -241,7 +235,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibrator<ROWS, COLUMNS> {
             number::clamped((i64::from(length.to_bits()) * i64::from(config.geometry.inverse_radius)) >> (56 - BITS))
         };
         self.centre = [radii(contact.centre_x), radii(contact.centre_y)];
-        self.pose = Pose { touch: radii(self.press.touched()), axis: self.centre, tilt: [0; 2], roundness: 0 };
+        self.pose = Pose { touch: radii(press.touched()), axis: self.centre, tilt: [0; 2], roundness: 0 };
         self.phase = Phase::Travel(0);
     }
 }

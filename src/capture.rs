@@ -137,6 +137,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
             bus_watchdog_ms: 0,
             fit_level: crate::contact::FitLevel::Sum,
             tare_request: 0,
+            tare_forced: false,
             clear_request: 0,
             identify_request: 0,
             commission_request: 0,

@@ -26,6 +26,9 @@ pub struct Command {
     pub fit_level: FitLevel,
     /// A change of this number asks for a tare.
     pub tare_request: u8,
+    /// Whether a tare is made, and torque may be enabled after it, although something touches the tip: every force then
+    /// reads less by what presses.
+    pub tare_forced: bool,
     /// A change of this number clears a fault.
     pub clear_request: u8,
     /// A change of this number asks for a measurement of Young's modulus.

@@ -36,6 +36,8 @@ pub(crate) use numbers::{exp2, millimetres, narrow, speed};
 use numbers::{thousandths, wide};
 use warm::Warm;
 
+/// The least supply must give this part of the largest voltage: 1/4.
+const SUPPLY_PART: i32 = 4;
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
 /// and so many counts of the encoder;
@@ -181,6 +183,9 @@ impl Config {
             if low + apart > high {
                 return Err(ConfigError::Order([(names.0, low), (names.1, high)]));
             }
+        }
+        if p.voltage_max_mv / SUPPLY_PART > p.supply_min_mv {
+            return Err(ConfigError::Supply(p.voltage_max_mv, p.supply_min_mv));
         }
         let timing = ScanTiming::new(p.settle_ns as u32, p.sample_cycles as u16, shape, clocks);
         let timing = timing.map_err(ConfigError::Scan)?;

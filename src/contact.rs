@@ -63,34 +63,48 @@ pub fn covers<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
 ) -> bool {
-    overhang::<ROWS, COLUMNS>(contact, config) <= 0 && !hides(contact, picture, config)
+    overhang::<ROWS, COLUMNS>(contact, config) <= 0 && hidden(contact, picture, config).is_none()
 }
 
-/// Whether a bad taxel hides a part of a contact.
-fn hides<const ROWS: usize, const COLUMNS: usize>(
+/// The share of a contact's force that bad taxels hide, Q8; none where none of them is within reach of it.
+///
+/// The pressure is taken for a parabola over the radius, whose mean is half of its peak: a taxel of the area A at the
+/// distance r from the centre has the share 2 A (1 - r^2 / r_c^2) / (pi r_c^2).
+#[inline(never)]
+fn hidden<const ROWS: usize, const COLUMNS: usize>(
     contact: &Contact,
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
-) -> bool {
+) -> Option<u32> {
     if picture.bad.iter().all(|bad| *bad == 0) {
-        return false;
+        return None;
     }
-    let [x, y, radius, half_pitch] =
-        [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
+    // In 2^-7 mm: squares of 128 mm fit 28 bits.
+    let [x, y, radius, half_pitch] = [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch]
+        .map(|length| ((length.to_bits() >> 16) + 1) >> 1);
     // A bad taxel whose middle is nearer than the rim and half of its own diagonal may hide pressure.
     let reach = radius + half_pitch + (half_pitch >> 1);
+    let square = (radius * radius).max(1);
+    let mut rest: Option<i32> = None;
     for (row, bad) in picture.bad.iter().enumerate() {
         let mut left = *bad;
         let dy = (2 * row as i32 + 1 - ROWS as i32) * half_pitch - y;
         while left != 0 {
             let dx = (2 * left.trailing_zeros() as i32 + 1 - COLUMNS as i32) * half_pitch - x;
-            if i64::from(dx) * i64::from(dx) + i64::from(dy) * i64::from(dy) < i64::from(reach) * i64::from(reach) {
-                return true;
+            let distance = dx * dx + dy * dy;
+            if distance < reach * reach {
+                rest = Some(rest.unwrap_or(0).saturating_add((square - distance).max(0)));
             }
             left &= left - 1;
         }
     }
-    false
+    // Over the square of the radius: the pressures of the taxels in Q8, and the share of a taxel in the middle in Q16.
+    // 8 / pi in Q8 is 652. No division is wider than 32 bits.
+    let square = (square >> 8).max(1);
+    rest.map(|rest| {
+        let middle = half_pitch * half_pitch * 652 / square;
+        ((i64::from(rest / square) * i64::from(middle)) >> 16).min(1 << 8) as u32
+    })
 }
 
 /// 255 at no residual, falling to 0 at `RESIDUAL_MAX`; what the converter's steps leave does not count.

@@ -25,7 +25,6 @@
 mod arith;
 pub mod creep;
 pub mod drive;
-pub mod goal;
 pub mod observer;
 pub mod pace;
 pub mod profile;
@@ -70,10 +69,8 @@ impl SpeedLoop {
 
     /// The duty for a voltage (g V, Q8 mm/s^2) that no law asks for.
     pub fn push(&mut self, voltage: i32, supply_mv: u16, config: &Config, limits: &mut Limits) -> Duty {
-        let speed = clamp_bits(self.observer.speed.to_bits(), 28);
-        let back_emf = clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4;
         self.drive.allow(self.winding.share());
-        self.drive.apply(voltage, back_emf, supply_mv, config, limits);
+        self.drive.apply(voltage, self.back_emf(config), supply_mv, config, limits);
         self.drive.duty(supply_mv, config)
     }
 
@@ -124,11 +121,31 @@ impl SpeedLoop {
         (limited, limited != reference)
     }
 
-    /// The bridge is off: no current flows, so neither voltage nor back-EMF acts.
-    pub fn coast(&mut self) -> Duty {
+    /// The bridge is open: no current flows, so neither voltage nor back-EMF acts.
+    pub fn coast(&mut self) {
         self.drive = Drive::new();
         self.pace = Pace::QUICK;
-        Duty::ZERO
+    }
+
+    /// The motor is shorted: only the back-EMF acts.
+    pub fn short(&mut self, config: &Config) {
+        self.coast();
+        self.drive.short(self.back_emf(config));
+    }
+
+    /// No farther than to the end of the travel.
+    pub fn within_travel(&self, distance: Millimetres, config: &Config, limits: &mut Limits) -> Millimetres {
+        let left = Millimetres(config.travel_max.0.saturating_sub(self.observer.travel.0));
+        if left < distance {
+            limits.set(Limits::TRAVEL);
+        }
+        distance.min(left)
+    }
+
+    /// c v, what the back-EMF takes away at this speed, Q8 mm/s^2.
+    fn back_emf(&self, config: &Config) -> i32 {
+        let speed = clamp_bits(self.observer.speed.to_bits(), 28);
+        clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4
     }
 
     /// The deceleration that the motor can surely give to a motion in the direction of `way`, with the current that its

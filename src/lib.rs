@@ -40,6 +40,8 @@ pub mod pressure;
 
 pub mod contact;
 
+pub mod touch;
+
 pub mod command;
 
 pub mod control;
@@ -50,7 +52,13 @@ pub mod calibrate;
 
 pub mod commission;
 
+pub mod grip;
+
 pub mod safety;
+
+pub mod activity;
+
+pub mod status;
 
 pub mod pipeline;
 

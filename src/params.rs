@@ -129,7 +129,7 @@ params! {
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
     /// Speed of the approach and of the release. Must not be above speed_max_um_per_s.
     approach_um_per_s = 30_000 in 500..=200_000;
-    /// How far the tip may travel from where torque was enabled.
+    /// How far the tip may travel from where torque was first enabled.
     travel_max_um = 20_000 in 100..=100_000;
     /// How far the tip backs off after contact is lost on release.
     clearance_um = 1_000 in 0..=20_000;

@@ -1,29 +1,28 @@
 //! One frame's way from codes to duty.
 
-mod between;
 pub mod budget;
-mod modes;
-mod report;
 mod requests;
-mod words;
 
-pub use report::{Bridge, Status, Taken, Taring};
+pub use crate::status::{Bridge, Status, Taken, Taring};
 
+use crate::activity::{Activity, Halt};
 use crate::calibrate::scale::Scale;
-use crate::calibrate::{Calibrator, Proposal, Refusal as Unfit};
+use crate::calibrate::{Calibrator, Proposal};
 use crate::command::Command;
-use crate::commission::{self, Run, Task};
+use crate::commission::{self, Commissioning};
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
 use crate::control::SpeedLoop;
-use crate::control::goal::Goal;
-use crate::control::observer::Observer;
+use crate::control::warmth::Warmth;
+use crate::control::winding::Winding;
 use crate::frame::{Frame, Sense, Shape};
-use crate::identify::{Press, PressView, Refusal};
-use crate::pressure::Array;
+use crate::grip::Goal;
+use crate::identify::PressView;
+use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
 use crate::state::{Fault, Limits, Mode};
+use crate::touch::{Felt, Touch};
 use crate::units::{Duty, Newtons};
 use budget::Budget;
 
@@ -35,17 +34,19 @@ use budget::Budget;
 pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     status: Status,
     tared: bool,
+    /// True once the travel has its zero: the place where torque was first enabled.
+    zeroed: bool,
     motion: SpeedLoop,
+    touch: Touch,
+    warmth: Warmth,
     monitor: Monitor,
     guard: Guard,
-    goal: Goal,
+    activity: Activity,
     fit: Fit<ROWS, COLUMNS>,
     array: Array<ROWS, COLUMNS>,
     config: Shaped<ROWS, COLUMNS>,
     budget: Budget<ROWS, COLUMNS>,
     scale: Scale,
-    press: Press,
-    commission: Run,
     calibrator: Calibrator<ROWS, COLUMNS>,
 }
 
@@ -60,16 +61,305 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             budget: Budget::new(),
             fit: Fit::default(),
             motion: SpeedLoop::new(),
+            touch: Touch::default(),
+            warmth: Warmth::default(),
             monitor: Monitor::default(),
             guard: Guard::default(),
-            goal: Goal::default(),
-            press: Press::new(),
-            commission: Run::new(),
+            activity: Activity::Off(Halt::OPEN),
             calibrator: Calibrator::new(),
             scale: Scale::new(),
             status: Status::default(),
             tared: false,
+            zeroed: false,
         }
+    }
+
+    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy
+    /// it takes as long as the speed law.
+    // One function, however it is called: what it takes in turn has one caller each and goes into it.
+    #[inline(never)]
+    pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
+        let mut limits = self.count_frames(frame.sequence);
+        self.set_fit_level(command, sense, &mut limits);
+        self.motion.observe(sense.encoder, &self.config);
+        self.warmth.observe(sense.chip, &self.config);
+
+        // The tactile image and the contact in it. A broken array shows none: the contact is then the last one's, and
+        // the motor gets no voltage by it.
+        self.array.read(frame, &self.config);
+        let sound = monitor::array_sound(self.array.picture(), &self.config);
+        let contact = self.contact(sound);
+
+        // What the host asks for, and whether the finger may go on as it does.
+        let tares = command.tare_request == self.status.taken.tare;
+        if self.asked(command) {
+            self.serve(command, sense, &contact);
+        }
+        if let Some(fault) = self.judge(&contact, sound, sense, command) {
+            self.stop(fault);
+        }
+
+        // What the finger does, and what the guard lets through of it.
+        if sound && self.tared {
+            let presses = self.activity.mode(&self.touch) != Mode::Release;
+            let Self { touch, guard, config, array, motion, .. } = self;
+            let (summed, travel) = (array.picture().force(config), motion.observer.travel);
+            let felt = Felt { contact: &contact, summed, travel, presses };
+            touch.observe(&felt, || guard.depth_felt(config), config);
+            self.learn_baseline(contact.force);
+        }
+        let wanted = self.act(&contact, sound && tares, sense, command, &mut limits);
+        let duty = if sound { self.guard.allow(wanted, &mut limits) } else { Duty::ZERO };
+        if duty != wanted {
+            self.motion.drive.cut();
+        }
+
+        self.report(duty, &contact, sense, command, limits);
+        (duty, &self.status)
+    }
+
+    /// Counts missed frames from the gap in the sequence.
+    fn count_frames(&mut self, sequence: u32) -> Limits {
+        let mut limits = Limits::default();
+        let missed = sequence.wrapping_sub(self.status.sequence).wrapping_sub(1);
+        if self.status.sequence != 0 && missed != 0 {
+            self.status.missed_frames = self.status.missed_frames.wrapping_add(missed);
+            limits.set(Limits::FRAME_MISSED);
+        }
+        self.status.sequence = sequence;
+        limits
+    }
+
+    fn set_fit_level(&mut self, command: &Command, sense: &Sense, limits: &mut Limits) {
+        let fit_level = self.budget.next(command.fit_level, sense.answer, self.config.timing.deadline);
+        self.fit.set_fit_level(fit_level);
+        self.status.fit_level = fit_level;
+        if fit_level < command.fit_level {
+            limits.set(Limits::FIT_LEVEL);
+        }
+    }
+
+    fn contact(&mut self, sound: bool) -> Contact {
+        let fits = sound && self.activity.fits();
+        let contact = if fits {
+            self.fit.read(self.array.picture(), &self.config)
+        } else if sound || !self.activity.drives() {
+            contact::from_sums(self.array.picture(), &self.config)
+        } else {
+            self.status.contact
+        };
+        if !self.activity.fits() {
+            self.fit.lose();
+        }
+        self.budget.note(fits && self.fit.at_work());
+        contact
+    }
+
+    /// The first reason to stop, the most direct evidence first. While the motor is not driven there is none, but for a
+    /// tare, which a broken array, a silent bus and the bridge end.
+    fn judge(&mut self, contact: &Contact, sound: bool, sense: &Sense, command: &Command) -> Option<Fault> {
+        let drives = self.activity.drives();
+        let picture = self.array.picture();
+        let seen = Seen {
+            encoder: sense.encoder,
+            force: if sound { contact.force.max(picture.force(&self.config)) } else { contact.force },
+            pressing: self.activity.mode(&self.touch) != Mode::Release,
+            goal: command.goal,
+            voltage: self.motion.drive.voltage(),
+        };
+        if !drives && self.tared {
+            self.guard.observe(&seen, &self.config);
+        }
+        if !drives && !matches!(self.activity, Activity::Tare { .. }) {
+            return None;
+        }
+        if sense.bridge_fault {
+            return Some(Fault::Bridge);
+        }
+        if let Some(fault) = monitor::array_broken(picture, &self.config) {
+            return Some(fault);
+        }
+        let unsafe_motion = if drives { self.guard.check(&seen, &self.config) } else { None };
+        let pressed = self.guard.presses_in();
+        let view = View { picture, contact, pressed, sense, motion: &self.motion, command };
+        self.monitor.check(&view, drives, &self.config).or(unsafe_motion)
+    }
+
+    /// Lets the baseline learn what the array reads without a contact.
+    #[inline(always)]
+    fn learn_baseline(&mut self, force: Newtons) {
+        if self.config.params.baseline_follows == 0 || !self.activity.learns() {
+            return;
+        }
+        if let Some(weight) = self.touch.learns(force, ROWS as u32, &self.config) {
+            let share = self.array.follow_drift(weight);
+            self.warmth.zero(share);
+        }
+    }
+
+    /// A frame of the activity: the duty that it wants. An activity that ends makes way for the next one.
+    #[inline(always)]
+    fn act(&mut self, contact: &Contact, tares: bool, sense: &Sense, command: &Command, limits: &mut Limits) -> Duty {
+        self.status.drift = self.warmth.force(command.goal, &self.config);
+        let Self { activity, motion, touch, config, array, status, calibrator, .. } = self;
+        let (picture, supply_mv) = (array.picture(), sense.supply_mv);
+        let reference = match activity {
+            Activity::Grip(grip) => {
+                let goal = Goal { force: command.goal, drift: status.drift };
+                grip.reference(&goal, contact, touch, motion, config, limits)
+            }
+            Activity::Press(press) => {
+                let view = PressView { picture, contact, encoder: sense.encoder, motion };
+                press.observe(&view, config);
+                calibrator.observe(press, &view, config);
+                if !press.deep() {
+                    status.identification = press.outcome();
+                }
+                press.reference(motion, config, limits)
+            }
+            Activity::Strokes(run) => {
+                let held_back = motion.drive.voltage() != config.push(run.voltage_mv());
+                let force = contact.force.max(picture.force(config));
+                run.observe(&commission::View { encoder: sense.encoder, force, supply_mv, held_back }, config);
+                status.commissioning = run.outcome();
+                let voltage = config.push(run.voltage_mv());
+                if !run.running() {
+                    *activity = Activity::Off(Halt::BRAKES);
+                }
+                return motion.push(voltage, supply_mv, config, limits);
+            }
+            Activity::Off(_) | Activity::Tare { .. } | Activity::Fault(_) => {
+                self.rest(tares);
+                return Duty::ZERO;
+            }
+        };
+        motion.follow(reference, supply_mv, config, limits)
+    }
+
+    /// A frame in which the motor is not driven.
+    #[inline(never)]
+    fn rest(&mut self, tares: bool) {
+        let Self { activity, motion, config, array, status, .. } = self;
+        status.braking = match activity {
+            Activity::Off(halt) | Activity::Tare { halt, .. } => halt.brakes(motion, config),
+            _ => true,
+        };
+        if status.braking {
+            motion.short(config)
+        } else {
+            motion.coast()
+        }
+        let Activity::Tare { halt, free } = activity else { return };
+        // Not in the frame that asked for it, which was read with the tare before.
+        if tares && array.continue_tare() {
+            if !*free {
+                array.judge_tare(config);
+            }
+            (self.tared, status.tare) = (true, Taring::Done);
+            *activity = Activity::Off(*halt);
+        }
+        self.warmth.zero(1 << 16);
+    }
+
+    #[inline(always)]
+    fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, command: &Command, mut limits: Limits) {
+        for (held, flag) in [
+            (self.array.picture().bad_count > 0, Limits::TAXELS),
+            (!self.tared, Limits::NOT_TARED),
+            (self.array.tared_touching(), Limits::TARED_TOUCHING),
+        ] {
+            limits.set(if held { flag } else { 0 });
+        }
+        self.calibrator.work(&self.array, &self.config);
+        self.report_activity();
+        self.status.creep = if let Activity::Grip(grip) = &self.activity { grip.creep.force() } else { Newtons::ZERO };
+        let held = contact.force.0.saturating_sub(self.status.creep.0).saturating_sub(self.status.drift.0);
+        self.scale.observe(self.status.mode, command.goal, Newtons(held), &self.config);
+        if command.shown_request != self.status.taken.shown {
+            self.status.taken.shown = command.shown_request;
+            self.scale.take(command.shown_mn, contact);
+        }
+        self.status.scale = self.scale.standing();
+        self.status.limits = limits;
+        self.status.contact = *contact;
+        self.status.travel = self.motion.observer.travel;
+        self.status.speed = self.motion.observer.speed;
+        self.status.duty = duty;
+        self.status.chip = sense.chip;
+        self.status.winding = self.motion.winding.temperature(&self.config);
+    }
+
+    /// Reports what the finger does.
+    fn report_activity(&mut self) {
+        self.status.mode = self.activity.mode(&self.touch);
+        if let Activity::Fault(fault) = self.activity {
+            self.status.fault = Some(fault);
+        }
+        self.status.calibration = self.calibrator.standing();
+    }
+
+    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array
+    /// seems broken, and tells whether. A taxel that fails just after it was read is seen a frame later; without this
+    /// look the motor would be driven until that frame's end. Whether it is a fault is for the step to say.
+    pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
+        let broken = self.activity.drives()
+            && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
+        if broken {
+            self.motion.drive.cut();
+            self.status.duty = Duty::ZERO;
+        }
+        broken
+    }
+
+    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins
+    /// again, as does the contact's fit.
+    pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
+        self.config = config.clone();
+        self.array.forget_line();
+        self.restart();
+        // What was measured belonged to the parameters before.
+        if !matches!(self.status.commissioning, Commissioning::Refused(_)) {
+            self.status.commissioning = Commissioning::None;
+        }
+    }
+
+    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one
+    /// under way begins again.
+    pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
+        self.array.calibrate(calibration);
+        self.tared = false;
+        self.restart();
+    }
+
+    fn restart(&mut self) {
+        self.fit.lose();
+        self.touch = Touch::default();
+        self.forget();
+        match self.activity {
+            Activity::Tare { .. } => self.array.start_tare(),
+            Activity::Off(_) => {}
+            _ => {
+                self.leave(Halt::BRAKES);
+                self.status.braking = true;
+            }
+        }
+        self.report_activity();
+    }
+
+    /// Makes all anew but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests with
+    /// these numbers count as taken up, and so many frames as missed before. The motor stays as warm as it is told.
+    pub fn renew(&mut self, taken: Taken, missed_frames: u32, winding: Winding) {
+        self.array.renew();
+        self.budget = Budget::new();
+        self.fit = Fit::default();
+        self.motion = SpeedLoop { winding, ..SpeedLoop::new() };
+        (self.touch, self.warmth) = (Touch::default(), Warmth::default());
+        (self.monitor, self.guard) = (Monitor::default(), Guard::default());
+        self.activity = Activity::Off(Halt::OPEN);
+        self.scale = Scale::new();
+        self.calibrator.renew();
+        self.status = Status { taken, missed_frames, ..Status::default() };
+        (self.tared, self.zeroed) = (false, false);
     }
 
     /// What the last step reported.
@@ -92,191 +382,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         &self.config
     }
 
-    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy
-    /// it takes as long as the speed law.
-    // One function, however it is called: what it takes in turn has one caller each and goes into it.
-    #[inline(never)]
-    pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
-        let mut limits = self.count_frames(frame.sequence);
-        let asked = self.take_requests(command);
-        let fit_level = self.budget.next(command.fit_level, sense.answer, self.config.timing.deadline);
-        self.fit.set_fit_level(fit_level);
-        if fit_level < command.fit_level {
-            limits.set(Limits::FIT_LEVEL);
-        }
-
-        // What the array feels, where it can be trusted: the bridge does not wait for the rest. The frame that turns
-        // torque on drives already, so it is judged like all after it.
-        let drives = command.torque || asked.commission.is_some_and(|task| task != Task::Stop);
-        let starting = self.status.mode == Mode::Off && drives && self.tared && !asked.tare;
-        let watched = self.watched() || starting;
-        let picture = self.array.read(frame, &self.config);
-        let broken = monitor::array_broken(picture, &self.config);
-        let fault = if sense.bridge_fault { Some(Fault::Bridge) } else { broken };
-        if let Some(fault) = fault.filter(|_| watched) {
-            self.stop(fault);
-            self.refuse(asked, command);
-            return (Duty::ZERO, &self.status);
-        }
-        // A press that measures the modulus must not lean on the configured one, as the fit does; nor is there anything
-        // to fit to in a broken array. Where a frame shows nothing while the bridge is driven, the contact is the last
-        // one's.
-        let sound = monitor::array_sound(picture, &self.config);
-        let fits = sound && !matches!(self.status.mode, Mode::Identify | Mode::Commission);
-        if matches!(self.status.mode, Mode::Identify | Mode::Commission) {
-            self.fit.lose();
-        }
-        let contact = if fits {
-            self.fit.read(picture, &self.config)
-        } else if sound || !watched {
-            contact::from_sums(picture, &self.config)
-        } else {
-            self.status.contact
-        };
-        self.budget.note(fits && self.fit.at_work());
-        if picture.bad_count > 0 {
-            limits.set(Limits::TAXELS);
-        }
-
-        self.goal.warmth.observe(sense.chip, &self.config);
-
-        // What the finger does.
-        self.motion.observe(sense.encoder, &self.config);
-        if starting {
-            self.motion.observer = Observer::zeroed_at(sense.encoder);
-            self.goal.start();
-        }
-
-        // Whether that is sound.
-        let driven = watched && self.status.mode != Mode::Tare;
-        let seen = Seen {
-            encoder: sense.encoder,
-            force: if sound { contact.force.max(picture.force(&self.config)) } else { contact.force },
-            pressing: self.status.mode != Mode::Release,
-            voltage: self.motion.drive.voltage(),
-        };
-        if starting {
-            self.guard = Guard::start(sense.encoder, &self.config);
-        }
-        let unsafe_motion = if driven { self.guard.check(&seen, &self.config) } else { None };
-        let pressed = self.guard.presses_in();
-        let view = View { picture, contact: &contact, pressed, sense, motion: &self.motion, command };
-        if starting {
-            self.monitor.restart(&view);
-        }
-        let unsound = if watched { self.monitor.check(&view, driven, &self.config) } else { None };
-        if let Some(fault) = unsound.or(unsafe_motion) {
-            self.status.mode = Mode::Fault;
-            self.status.fault = Some(fault);
-        }
-
-        // What a press that measures the modulus makes of it.
-        if self.status.mode == Mode::Identify {
-            let view = PressView { picture, contact: &contact, encoder: sense.encoder, motion: &self.motion };
-            self.press.observe(&view, &self.config);
-            self.calibrator.observe(&view, &self.config);
-        }
-
-        // What motions that measure the drive make of it.
-        if self.status.mode == Mode::Commission {
-            let held_back = self.motion.drive.voltage() != self.config.push(self.commission.voltage_mv());
-            let view =
-                commission::View { encoder: sense.encoder, force: seen.force, supply_mv: sense.supply_mv, held_back };
-            self.commission.observe(&view, &self.config);
-        }
-
-        // What to do about it.
-        let mode = self.next_mode(asked, command, &contact, sound, sense.encoder);
-        self.status.mode = mode;
-        if self.press.running() && mode != Mode::Identify {
-            self.press.refuse(Refusal::Interrupted);
-        }
-        if mode != Mode::Commission {
-            self.interrupt_commission();
-        }
-        if mode != Mode::Identify {
-            self.calibrator.interrupt();
-        }
-        if mode == Mode::Identify {
-            self.goal.measures();
-        }
-        let reference = match mode {
-            Mode::Off | Mode::Tare | Mode::Fault | Mode::Commission => None,
-            Mode::Approach | Mode::Force | Mode::Release => {
-                Some(self.goal.reference(mode, command.goal, &contact, &mut self.motion, &self.config, &mut limits))
-            }
-            Mode::Identify if self.calibrator.running() => {
-                Some(self.calibrator.reference(&mut self.motion, &self.config, &mut limits))
-            }
-            Mode::Identify => Some(self.press.reference(&mut self.motion, &self.config, &mut limits)),
-        };
-        let duty = match reference {
-            Some(reference) => self.motion.follow(reference, sense.supply_mv, &self.config, &mut limits),
-            None if mode == Mode::Commission => {
-                let voltage = self.config.push(self.commission.voltage_mv());
-                self.motion.push(voltage, sense.supply_mv, &self.config, &mut limits)
-            }
-            None => self.motion.coast(),
-        };
-        // Nor does it drive by a frame that shows nothing: for that long the motor is shorted.
-        let allowed = if sound { self.guard.allow(duty, &mut limits) } else { Duty::ZERO };
-        if allowed != duty {
-            self.motion.drive.cut();
-        }
-        let duty = allowed;
-        if !self.tared {
-            limits.set(Limits::NOT_TARED);
-        }
-        if self.array.tared_touching() {
-            limits.set(Limits::TARED_TOUCHING);
-        }
-
-        self.calibrator.work(&self.array, &self.config);
-        self.status.drift = self.goal.warmth.force(command.goal, &self.config);
-        let held = self.goal.creep.less(contact.force).0.saturating_sub(self.status.drift.0);
-        self.scale.observe(mode, command.goal, Newtons(held), &self.config);
-        if command.shown_request != self.status.taken.shown {
-            self.status.taken.shown = command.shown_request;
-            self.scale.take(command.shown_mn, &contact);
-        }
-        self.status.scale = self.scale.standing();
-        self.status.identification = self.press.outcome();
-        self.status.commissioning = self.commission.outcome();
-        self.status.calibration = self.calibrator.standing();
-        self.status.limits = limits;
-        self.status.fit_level = fit_level;
-        self.status.contact = contact;
-        self.status.travel = self.motion.observer.travel;
-        self.status.speed = self.motion.observer.speed;
-        self.status.duty = duty;
-        self.status.creep = self.goal.creep.force();
-        self.status.chip = sense.chip;
-        self.status.winding = self.motion.winding.temperature(&self.config);
-        (duty, &self.status)
-    }
-
-    /// Ends motions that measure the drive, for the reason that another mode begins.
-    fn interrupt_commission(&mut self) {
-        if self.commission.running() {
-            self.commission.refuse(commission::Refusal::Interrupted);
-            self.status.commissioning = self.commission.outcome();
-        }
-    }
-
-    /// Whether faults count: not while the bridge is off anyhow.
-    fn watched(&self) -> bool {
-        !matches!(self.status.mode, Mode::Off | Mode::Fault)
-    }
-
-    /// Counts missed frames from the gap in the sequence.
-    fn count_frames(&mut self, sequence: u32) -> Limits {
-        let mut limits = Limits::default();
-        let missed = sequence.wrapping_sub(self.status.sequence).wrapping_sub(1);
-        if self.status.sequence != 0 && missed != 0 {
-            self.status.missed_frames = self.status.missed_frames.wrapping_add(missed);
-            limits.set(Limits::FRAME_MISSED);
-        }
-        self.status.sequence = sequence;
-        limits
+    /// How warm the motor's winding is, and all that this follows from.
+    pub fn winding(&self) -> &Winding {
+        &self.motion.winding
     }
 }

@@ -23,7 +23,6 @@ pub use picture::Picture;
 
 use crate::config::Config;
 use crate::frame::{Frame, Shape};
-use crate::units::Newtons;
 use lanes::{BOOST_BITS, Codes, GAIN_BITS, Row};
 use row::Sound;
 use touched::Touched;
@@ -54,10 +53,6 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     baseline_row: usize,
     /// What that row read above its tare, where its picture says what it carries instead.
     baseline_line: Option<[i32; COLUMNS]>,
-    /// Rounds of the baseline over all rows since a contact.
-    clear_rounds: i32,
-    /// The largest force since the baseline was last learnt after a contact.
-    held: Newtons,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Default for Array<ROWS, COLUMNS> {
@@ -81,8 +76,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             touched: Touched::NONE,
             baseline_row: 0,
             baseline_line: None,
-            clear_rounds: 0,
-            held: Newtons::ZERO,
         }
     }
 

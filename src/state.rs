@@ -2,17 +2,17 @@
 //!
 //! | mode | bridge | leaves when |
 //! | --- | --- | --- |
-//! | 0 off | outputs low, motor coasts | torque is enabled on a tared array: approach (goal > 0), release (goal = 0) |
-//! | 1 tare | outputs low | enough frames are averaged: off |
+//! | 0 off | shorted until the tip is at rest, then open | torque is enabled on a tared array and the tip is slow: approach, force or release |
+//! | 1 tare | as in off | enough frames are averaged: off |
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
-//! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0: release; contact is lost: approach |
-//! | 4 release | backs off to the set clearance behind the surface that it touched, then holds there | goal > 0: approach |
+//! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0, or the force vanished at once: release; contact is lost: approach |
+//! | 4 release | backs off to the set clearance behind the surface, farther while something is pressed, then holds there | goal > 0: approach, or force where something is pressed |
 //! | 7 commission | small steps of voltage, to learn what the drive is like | done, refused or stopped: off |
-//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force, for the modulus or the taxels' gains | done or refused: approach (goal > 0), release (goal = 0) |
+//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force, for the modulus or the taxels' gains | done or refused: as from off |
 //! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
 //! Commission is asked for in off, with torque off. Identify, which measures Young's modulus or calibrates the taxels,
-//! is asked for in approach, force or release.
+//! is asked for in approach, force or release. [`crate::activity`] owns the state behind each mode.
 //!
 //! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault,
 //! and from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what
@@ -62,7 +62,7 @@ impl Mode {
 pub enum Fault {
     /// No frame within 1.75 frame times of the last one: the scan stands.
     LostFrames = 1,
-    /// More taxels are dead or saturated than allowed.
+    /// More taxels are dead or saturated than allowed, or all together read far less than at the tare.
     ArrayBroken = 2,
     /// A column shows current with no row driven: a row is stuck on.
     RowStuck = 3,
@@ -149,7 +149,7 @@ impl Limits {
     pub const SLEW: u16 = 1 << 8;
     /// There is no time for the fit level that was asked for; see [`crate::pipeline::budget`].
     pub const FIT_LEVEL: u16 = 1 << 9;
-    /// Something touched the tip during the last tare: what the array shows is less by that.
+    /// Something touched the tip during the last tare: what the array shows is less by that, and torque is refused.
     pub const TARED_TOUCHING: u16 = 1 << 10;
     /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds
     /// it from above.

@@ -7,6 +7,9 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
 use sim::native::bench::Bench;
 
+/// What ends a grip.
+type End = fn(&mut Bench);
+
 /// Holds 1 N, with the duty that this takes.
 fn holding() -> Bench {
     let mut board = Bench::default();
@@ -59,18 +62,84 @@ fn nothing_is_looked_at_while_the_bridge_is_off() {
     assert!(!board.pipeline().check_part(&frame));
 }
 
-/// A fault brakes, that of the bridge itself puts it to sleep; off and tare let the motor coast.
+/// A fault brakes, that of the bridge itself puts it to sleep; off and tare brake while the tip moves, and open then.
 #[test]
-fn each_mode_tells_the_bridge_what_to_do() {
-    let told = |mode, fault| Status { mode, fault, duty: Duty(-77), ..Status::default() }.bridge();
-    for mode in [Mode::Off, Mode::Tare] {
-        assert_eq!(told(mode, None), Bridge::Open, "{mode:?}");
+fn each_mode_has_its_command_for_the_bridge() {
+    let bridge = |mode, fault, braking| Status { mode, fault, braking, duty: Duty(-77), ..Status::default() }.bridge();
+    for (braking, expected) in [(false, Bridge::Open), (true, Bridge::Brakes)] {
+        for mode in [Mode::Off, Mode::Tare] {
+            assert_eq!(bridge(mode, None, braking), expected, "{mode:?}");
+        }
+        for mode in [Mode::Approach, Mode::Force, Mode::Release, Mode::Identify, Mode::Commission] {
+            assert_eq!(bridge(mode, None, braking), Bridge::Driven(Duty(-77)), "{mode:?}");
+        }
+        assert_eq!(bridge(Mode::Fault, Some(Fault::Bridge), braking), Bridge::Asleep);
+        for fault in [Fault::LostFrames, Fault::OverForce, Fault::SupplyLow, Fault::Crash] {
+            assert_eq!(bridge(Mode::Fault, Some(fault), braking), Bridge::Brakes, "{fault:?}");
+        }
     }
-    for mode in [Mode::Approach, Mode::Force, Mode::Release, Mode::Identify] {
-        assert_eq!(told(mode, None), Bridge::Driven(Duty(-77)), "{mode:?}");
+}
+
+/// Torque off, a tare, new parameters and a cleared fault short the motor of a pressed tip until it has been at rest for
+/// 20 ms; then the bridge opens and stays open.
+#[test]
+fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
+    let endings: [(&str, End); 4] = [
+        ("torque off", |board| board.command().torque = false),
+        ("tare", |board| (board.command().torque, board.command().tare_request) = (false, 77)),
+        ("parameters", |board| {
+            let config = board.pipeline().config().clone();
+            board.command().torque = false;
+            board.pipeline().configure(&config);
+        }),
+        ("fault", |board| {
+            board.pipeline().stop(Fault::LostFrames);
+            board.command().torque = false;
+            assert_eq!(board.step().bridge(), Bridge::Brakes);
+            board.command().clear_request += 1;
+        }),
+    ];
+    for (name, end) in endings {
+        let mut board = holding();
+        end(&mut board);
+        let mut travel_mm = vec![board.truth().travel_mm];
+        while board.step().bridge() == Bridge::Brakes {
+            assert!(!drives(board.status().mode), "{name}: {:?}", board.status().mode);
+            travel_mm.push(board.truth().travel_mm);
+            assert!(travel_mm.len() < 20_000, "{name}: it brakes for 2 s");
+        }
+        let count_mm: f64 = board.pipeline().config().count.0.to_num();
+        let moved_mm = |frames: usize| {
+            let last = &travel_mm[travel_mm.len().saturating_sub(frames)..];
+            let [least, most] = [f64::min, f64::max].map(|of| last.iter().copied().reduce(of).unwrap());
+            most - least
+        };
+        let (before_mm, rest_mm) = (moved_mm(225), moved_mm(195));
+        assert!(rest_mm <= 2.0 * (0.005 + count_mm), "{name}: {rest_mm} mm within 20 ms of its rest");
+        assert!(before_mm > 0.005, "{name}: it rested sooner, {before_mm} mm");
+        // A tip that flies back moves by millimetres.
+        let rest_mm = board.truth().travel_mm;
+        assert!((5.8..6.14).contains(&rest_mm), "{name}: {rest_mm} mm");
+        for _ in 0..1_000 {
+            assert_eq!(board.step().bridge(), Bridge::Open, "{name}");
+        }
+        let moved_mm = (board.truth().travel_mm - rest_mm).abs();
+        assert!(moved_mm < 0.1, "{name}: {moved_mm} mm with the bridge open");
     }
-    assert_eq!(told(Mode::Fault, Some(Fault::Bridge)), Bridge::Asleep);
-    for fault in [Fault::LostFrames, Fault::OverForce, Fault::SupplyLow, Fault::Crash] {
-        assert_eq!(told(Mode::Fault, Some(fault)), Bridge::Brakes, "{fault:?}");
-    }
+}
+
+/// What acts between two steps shorts the motor before the next one.
+#[test]
+fn a_stop_and_new_parameters_brake_at_once() {
+    let mut board = holding();
+    let config = board.pipeline().config().clone();
+    board.pipeline().configure(&config);
+    assert_eq!((board.status().mode, board.status().bridge()), (Mode::Off, Bridge::Brakes));
+    let mut board = holding();
+    board.pipeline().stop(Fault::LostFrames);
+    assert_eq!((board.status().mode, board.status().bridge()), (Mode::Fault, Bridge::Brakes));
+}
+
+fn drives(mode: Mode) -> bool {
+    !matches!(mode, Mode::Off | Mode::Tare | Mode::Fault)
 }

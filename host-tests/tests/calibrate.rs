@@ -96,7 +96,7 @@ fn a_modulus_asked_for_meanwhile_waits_and_so_does_a_press() {
         if both && status.taken.calibrate == 1 && status.taken.identify == 1 {
             assert!(matches!(status.identification, Identification::Done(_)), "{:?}", status.identification);
             assert_eq!(status.calibration.state, State::Done);
-            assert_eq!(modes.iter().filter(|mode| **mode == Mode::Identify).count(), 2, "{modes:?}");
+            assert_eq!(modes, [Mode::Off, Mode::Identify, Mode::Release], "one press right behind the other");
             return;
         }
     }
@@ -171,4 +171,24 @@ fn it_presses_no_harder_than_allowed_and_lets_go() {
     let status = board.step();
     assert_eq!((status.calibration.state, status.mode, board.truth().force_n), (State::Done, Mode::Release, 0.0));
     assert!((3.7..4.2).contains(&peak_n), "{peak_n} N");
+}
+
+/// What ends the calibration ends the press: the tip does not go on pressing.
+#[test]
+fn a_calibration_that_ends_early_ends_its_press() {
+    for (forgets, refusal) in [(true, Refusal::Interrupted), (false, Refusal::Lost)] {
+        let mut board = board(&Setup::default(), &Params::DEFAULT, &Gains::ONE);
+        board.command().calibrate_request += 1;
+        while board.truth().force_n < 1.0 {
+            board.step();
+        }
+        if forgets {
+            board.command().forget_request += 1;
+        } else {
+            board.place_object(40.0);
+        }
+        board.run(0.01);
+        let status = board.step();
+        assert_eq!((status.calibration.state, status.mode), (State::Refused(refusal), Mode::Release));
+    }
 }

@@ -90,7 +90,6 @@ fn a_press_that_measures_loses_the_fit() {
 /// array's edge. What hysteresis and creep left of the first one reads as a contact in the air, which is where the surface
 /// is taken to be.
 #[test]
-#[ignore = "not met: docs/safety.md, what it does not promise"]
 fn what_is_left_of_a_contact_in_the_air_is_no_surface() {
     let mut failed = Vec::new();
     for seed in 0..4 {

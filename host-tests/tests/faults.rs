@@ -85,6 +85,62 @@ fn taxels_that_are_bad_for_one_frame_are_no_fault() {
     assert_eq!(spoil(&mut holding(1_000), 0, 51).fault, Some(Fault::ArrayBroken));
 }
 
+/// Interference in a single frame, too weak to make a taxel bad, changes the force that is held for no longer.
+#[test]
+fn a_frame_that_reads_too_much_or_too_little_is_forgotten() {
+    let mut failed = Vec::new();
+    for goal_mn in [100, 1_000, 3_000] {
+        for (rows, codes) in
+            [(0..10, 15), (0..10, 40), (0..10, 150), (3..7, 60), (0..10, -15), (3..7, -60), (3..7, -300)]
+        {
+            let mut board = holding(goal_mn);
+            let name = format!("goal {goal_mn} mN, {codes} codes in rows {rows:?}");
+            let status = board.step_with(|record| {
+                for (row, column) in rows.flat_map(|row| (0..10).map(move |column| (row, column))) {
+                    let code = i32::from(record.frame.code(row, column)) + codes;
+                    record.frame.set_code(row, column, code.max(400) as u16);
+                }
+            });
+            let (mut least_n, mut largest_n) = (f64::MAX, 0.0_f64);
+            for _ in 0..10_000 {
+                let mode = board.step().mode;
+                let force_n = if mode == Mode::Force { board.truth().force_n } else { 0.0 };
+                (least_n, largest_n) = (least_n.min(force_n), largest_n.max(force_n));
+            }
+            let goal_n = f64::from(goal_mn) * 1e-3;
+            if least_n < 0.9 * goal_n || largest_n > 1.1 * goal_n {
+                let (read_n, last_n): (f64, _) = (status.contact.force.0.to_num(), board.truth().force_n);
+                failed.push(format!(
+                    "{name}, read as {read_n:.3} N: {least_n:.3} to {largest_n:.3} N, then {last_n:.3} N"
+                ));
+            }
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// As many dead taxels as are allowed, in the middle of the contact: the fit gives the force without them, which stays
+/// what was asked for.
+#[test]
+fn taxels_that_die_within_the_contact_do_not_change_the_force() {
+    let mut failed = Vec::new();
+    for goal_mn in [200, 1_000, 4_000] {
+        let mut board = holding(goal_mn);
+        let allowed = board.pipeline().config().params.bad_taxels_max as usize;
+        let middle = [(4, 4), (4, 5), (5, 4), (5, 5), (3, 4), (6, 5)];
+        board.harm(|faults| {
+            middle[..allowed].iter().for_each(|(row, column)| faults.array.taxels[*row][*column] = Taxel::Dead)
+        });
+        let largest_n = board.run(1.0);
+        let (held_n, goal_n) = (board.truth().force_n, f64::from(goal_mn) * 1e-3);
+        if (held_n - goal_n).abs() > 0.05 * goal_n + 0.01 || largest_n > 1.1 * goal_n + 0.02 {
+            let read_n: f64 = board.status().contact.force.0.to_num();
+            failed.push(format!("goal {goal_n} N: {held_n:.3} N held, {read_n:.3} N read, at most {largest_n:.3} N"));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
 #[test]
 fn a_few_bad_taxels_are_a_limit() {
     let mut board = holding(1_000);
@@ -223,7 +279,7 @@ fn a_fault_stays_until_it_is_cleared_with_torque_off() {
     let status = board.step();
     assert_eq!((status.mode, status.fault), (Mode::Off, None));
     board.command().torque = true;
-    assert_eq!(board.step().mode, Mode::Approach);
+    assert_eq!(board.step().mode, Mode::Force, "what it touches is still known");
 }
 
 #[test]

@@ -1,8 +1,10 @@
 //! The loop natively: touch, steps, release. The same bounds hold for the flash image on the virtual board.
 
 use fingertip::config::newtons;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::state::{Limits, Mode};
+use fingertip::shipped::Config;
+use fingertip::state::{Fault, Limits, Mode};
 use sim::native::bench::Bench;
 use sim::setup::Setup;
 
@@ -87,11 +89,19 @@ fn a_goal_beyond_the_limit_is_cut_and_said() {
     assert!(status.limits.has(Limits::GOAL));
 }
 
+/// Takes the object 10 mm away, at half a metre in a second.
+fn withdraw(board: &mut Bench) {
+    for frame in 1..=200 {
+        board.place_object(5.0 + 0.05 * f64::from(frame));
+        board.step();
+    }
+}
+
 #[test]
 fn an_object_that_goes_away_is_not_chased() {
     let mut board = board();
     run(&mut board, 2_000, 0.5);
-    board.place_object(15.0);
+    withdraw(&mut board);
     let (_, status) = run(&mut board, 2_000, 0.05);
     assert_eq!(status.mode, Mode::Approach);
     let speed = board.truth().speed_mm_per_s;
@@ -111,13 +121,61 @@ fn the_end_of_the_travel_stops_an_approach() {
     assert!(board.truth().speed_mm_per_s.abs() < 1.0);
 }
 
+/// The reading vanishes within a frame while the tip stands still: it is the array's, so the finger does not press
+/// harder. After 3 ms without a force the finger releases the object, and seeks it then.
 #[test]
-fn torque_off_lets_the_motor_coast() {
-    let mut board = board();
-    run(&mut board, 2_000, 0.5);
-    board.command().torque = false;
-    let status = board.step();
-    assert_eq!((status.mode, status.duty.0), (Mode::Off, 0));
+fn a_reading_that_vanishes_at_once_does_not_make_it_press_harder() {
+    for goal_mn in [200, 1_000, 5_000] {
+        let mut board = board();
+        run(&mut board, goal_mn, 0.5);
+        let blank = {
+            let mut free = Bench::default();
+            free.step();
+            free.frame().codes
+        };
+        let (mut largest_n, mut modes) = (0.0_f64, Vec::new());
+        for _ in 0..20_000 {
+            let mode = board.step_with(|record| record.frame.codes = blank).mode;
+            largest_n = largest_n.max(board.truth().force_n);
+            if modes.last() != Some(&mode) {
+                modes.push(mode);
+            }
+            if mode == Mode::Approach {
+                break;
+            }
+        }
+        assert!(largest_n < 1.02e-3 * f64::from(goal_mn) + 0.005, "{goal_mn} mN: {largest_n} N");
+        assert_eq!(modes, [Mode::Force, Mode::Release, Mode::Approach], "{goal_mn} mN");
+        assert_eq!((board.truth().force_n, board.status().fault), (0.0, None), "{goal_mn} mN");
+    }
+}
+
+/// A motor that is shorted at any moment of a step stops below 1.3 times the goal and 0.4 N.
+#[test]
+fn a_motor_that_is_shorted_on_the_way_stops_within_its_bound() {
+    for (from_mn, goal_mn) in [(0, 100), (0, 1_000), (0, 7_000), (100, 500), (200, 2_000), (200, 7_000), (2_000, 5_000)]
+    {
+        for stopped_after in (1..40).map(|step| 5 * step) {
+            let mut board = board();
+            let goal_n = f64::from(goal_mn) * 1e-3;
+            if from_mn > 0 {
+                run(&mut board, from_mn, 0.4);
+            } else {
+                // Counted from just before the touch.
+                run(&mut board, goal_mn, 0.16);
+            }
+            board.command().goal = newtons(goal_mn);
+            for _ in 0..stopped_after {
+                board.step();
+            }
+            board.pipeline().stop(Fault::LostFrames);
+            let largest_n = board.run(0.1);
+            assert!(
+                largest_n < 1.3 * goal_n + 0.4,
+                "{from_mn} to {goal_mn} mN, shorted after {stopped_after} frames: {largest_n} N"
+            );
+        }
+    }
 }
 
 #[test]
@@ -148,4 +206,21 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
     let mut board = board();
     let (_, status) = run(&mut board, 40, 0.5);
     assert!(!status.limits.has(Limits::GOAL), "the least is none that is moved");
+}
+
+/// An object that yields at 100 mm/s: the force falls by more than a quarter within a frame of a slow scan.
+#[test]
+fn a_slow_scan_follows_an_object_that_yields() {
+    let config = Config::shipped(&Params { settle_ns: 100_000, sample_cycles: 480, ..Params::DEFAULT }).unwrap();
+    let frame_s = f64::from(config.timing.frame_ns) * 1e-9;
+    let mut board = Bench::of(&Setup::default(), &config);
+    board.tare();
+    run(&mut board, 1_000, 1.0);
+    for frame in 1..=3 {
+        board.place_object(5.0 + 100.0 * frame_s * f64::from(frame));
+        board.step();
+    }
+    let (_, status) = run(&mut board, 1_000, 2.0);
+    let force_n = board.truth().force_n;
+    assert!(status.mode == Mode::Force && (force_n - 1.0).abs() < 0.02, "{force_n} N, {:?}", status.mode);
 }

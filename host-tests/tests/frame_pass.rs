@@ -153,7 +153,7 @@ proptest! {
         let mut array = Array::new();
         array.calibrate(&calibration);
         array.read(&frame, &config);
-        array.follow_drift(false);
+        array.follow_drift(1 << 14);
         array.continue_tare();
         array.read(&frame, &config);
         array.continue_tare();

@@ -25,6 +25,12 @@ fn config(rng: &mut Rng) -> Config {
     Config::shipped(&params).expect("allowed")
 }
 
+fn started(encoder: i32, config: &Config) -> Guard {
+    let mut guard = Guard::default();
+    guard.start(encoder, encoder, config);
+    guard
+}
+
 fn count_mm(config: &Config) -> f64 {
     config.count.0.to_num()
 }
@@ -48,37 +54,117 @@ fn lets_through(guard: &Guard) -> [bool; 2] {
     })
 }
 
-/// Beyond an end of the travel, or behind the floor, no duty drives the tip farther out, and 1 mm beyond it is stopped:
-/// for any counts, forces and voltages, jumps included.
+/// The rear end that promise 1 allows, from the frames alone. It moves back only behind a push: the mean force rises by the
+/// least contact over an earlier frame, and the tip was not farther forward since that frame.
+struct RearEnd {
+    mm: f64,
+    /// Mean force as the guard measures it, Q16 N.
+    force: i32,
+    /// Earlier frames that the tip has not been in front of since: the travel, and the least mean force up to that frame.
+    /// The farthest comes first.
+    earlier: Vec<(f64, i32)>,
+    pushes: u32,
+}
+
+impl RearEnd {
+    fn started(config: &Config) -> Self {
+        Self { mm: -config.bounds.back.0.to_num::<f64>(), force: 0, earlier: vec![(0.0, 0)], pushes: 0 }
+    }
+
+    fn frame(&mut self, travel_mm: f64, force: Newtons, config: &Config) {
+        self.force += (force.to_bits().max(0) - self.force) >> 4;
+        while self.earlier.pop_if(|(earlier_mm, _)| *earlier_mm < travel_mm).is_some() {}
+        let least = self.earlier.last().map_or(i32::MAX, |(_, least)| *least);
+        if self.force > least.saturating_add(config.contact_on.to_bits()) {
+            let depth_mm: f64 = config.tip.indentation(Newtons::from_bits(self.force)).0.to_num();
+            self.mm = self.mm.min(travel_mm - depth_mm - config.clearance.0.to_num::<f64>() - 1.0);
+            self.pushes += 1;
+        }
+        self.earlier.push((travel_mm, least.min(self.force)));
+    }
+}
+
+/// Beyond an end of the travel no duty drives the tip farther out, and 1 mm beyond it is stopped: for any counts, forces
+/// and voltages, jumps included. The front end never opens. The rear end opens only behind an object that pushes, by at
+/// most the indentation, the clearance and 1 mm behind the place of the push.
 #[test]
 fn no_input_opens_an_end() {
     let mut rng = Rng::with_seed(1);
-    for _ in 0..1_000 {
+    // Runs without and with a push, and frames behind a rear end that a push had moved.
+    let (mut runs, mut behind) = ([0; 2], 0);
+    for run in 0..1_000 {
         let config = config(&mut rng);
-        let (end, back): (f64, f64) = (config.travel_max.0.to_num(), config.bounds.back.0.to_num());
+        let end: f64 = config.travel_max.0.to_num();
         let origin = rng.i32(..);
-        let mut guard = Guard::start(origin, &config);
+        let mut guard = started(origin, &config);
+        let mut rear = RearEnd::started(&config);
         let (mut counts, mut pace) = (0_i32, 1);
+        // No force, or a force that rises too little for a push; forces of a few newtons; anything.
+        let most = [config.contact_on.to_bits(), 90_000, i32::MAX][run % 3];
         for _ in 0..STEPS / 1_000 {
             if rng.u8(..) == 0 {
                 pace = 1 << rng.u32(0..10);
             }
             counts = if rng.u16(..) == 0 { rng.i32(..) } else { counts.saturating_add(rng.i32(-pace..=pace)) };
+            let wild = most == i32::MAX && rng.u8(..) < 8;
             let seen = Seen {
                 encoder: origin.wrapping_add(counts),
-                force: Newtons::from_bits(if rng.u8(..) < 8 { rng.i32(..) } else { rng.i32(-9_000..90_000) }),
+                force: Newtons::from_bits(if wild { rng.i32(..) } else { rng.i32(-9_000..most.min(90_000)) }),
                 pressing: rng.bool(),
+                goal: newtons(rng.i32(-1..8_000)),
                 voltage: rng.i32(..) >> rng.u32(0..8),
             };
             let fault = guard.check(&seen, &config);
             let [forward, backward] = lets_through(&guard);
             let travel = travel_mm(&guard);
+            rear.frame(travel, seen.force, &config);
             assert!(travel <= end || !forward, "{travel} mm of {end}");
-            assert!(travel >= -back || !backward, "{travel} mm of -{back}");
-            if travel > end + 1.001 || travel < -back - 1.001 {
+            assert!(travel >= rear.mm || !backward, "{travel} mm of {}, {} pushes", rear.mm, rear.pushes);
+            if travel > end + 1.001 || travel < rear.mm - 1.001 {
                 assert!(fault.is_some(), "{travel} mm");
             }
+            behind += u32::from(rear.pushes > 0 && travel < rear.mm);
         }
+        runs[usize::from(rear.pushes > 0)] += 1;
+    }
+    assert!(runs.iter().all(|count| *count > 300) && behind > 1_000, "{runs:?}, {behind} frames behind a moved end");
+}
+
+/// An object that pushes the tip back is released: the rear end moves to the clearance and 1 mm behind where it pushed
+/// last. A force that only remains moves no end.
+#[test]
+fn only_a_push_takes_the_rear_end_along() {
+    let config = Config::shipped(&Params::DEFAULT).expect("allowed");
+    let back_mm: f64 = config.bounds.back.0.to_num();
+    let behind_mm = config.clearance.0.to_num::<f64>() + 1.0;
+    let from_mm = 0.5 - back_mm;
+    for rises in [true, false] {
+        let mut guard = started(0, &config);
+        let mut at = |travel_mm: f64, force_mn: i32| {
+            let force = newtons(force_mn);
+            let encoder = counts(travel_mm, &config);
+            let fault =
+                guard.check(&Seen { encoder, force, pressing: false, goal: Newtons::ZERO, voltage: 0 }, &config);
+            (fault, lets_through(&guard)[1])
+        };
+        // The tip goes back slowly. The force comes when the tip is back, or is constant from the start.
+        let mut travel_mm = 0.0;
+        while travel_mm > from_mm {
+            assert_eq!(at(travel_mm, if rises { 0 } else { 300 }), (None, true), "{travel_mm} mm");
+            travel_mm -= 0.001;
+        }
+        let depth_mm: f64 = config.tip.indentation(newtons(300)).0.to_num();
+        for _ in 0..1_000 {
+            assert_eq!(at(travel_mm, 300).0, None);
+        }
+        // The constant force rose at 0 mm.
+        let place_mm = if rises { travel_mm } else { 0.0 };
+        let expected_mm = (place_mm - depth_mm - behind_mm).min(-back_mm);
+        while at(travel_mm, 300).1 {
+            travel_mm -= 0.001;
+            assert!(travel_mm > expected_mm - 0.1, "open at {travel_mm} mm, {expected_mm} expected");
+        }
+        assert!((expected_mm - 0.01..expected_mm + 0.3).contains(&travel_mm), "{travel_mm} mm, {expected_mm} expected");
     }
 }
 
@@ -118,14 +204,14 @@ fn no_duty_makes_it_fast_in_the_air() {
     for _ in 0..1_000 {
         let config = config(&mut rng);
         let (strength, offset_mn) = (rng.f64() * 0.6 + 0.7, [0, 10, 200, 2_000][rng.usize(0..4)]);
-        let mut guard = Guard::start(0, &config);
+        let mut guard = started(0, &config);
         let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty: 0, left: 0 };
         let limit = 1.5 * f64::from(config.params.approach_um_per_s) * 1e-3;
         let (mut voltage, mut air, mut since, mut forward) = (0, 0, 0, false);
         for _ in 0..STEPS / 1_000 {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
-            let seen = Seen { encoder, force, pressing: rng.bool(), voltage };
+            let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, voltage };
             if guard.check(&seen, &config).is_some() {
                 stopped += 1;
                 break;
@@ -155,7 +241,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
         let strength = rng.f64() * 0.6 + 0.7;
         let wall_mm = rng.f64() * 8.0;
         let per_n = f64::from(config.bounds.acceleration_per_n) / 256.0;
-        let mut guard = Guard::start(0, &config);
+        let mut guard = started(0, &config);
         let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty: 0, left: 0 };
         let mut voltage = 0;
         for _ in 0..STEPS / 1_000 {
@@ -167,7 +253,8 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
             }
             let sensed = force_n * (0.8 + 0.4 * strength / 1.3) + rng.f64() * 0.01;
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
-            let seen = Seen { encoder, force: newtons((1e3 * sensed) as i32), pressing: true, voltage };
+            let seen =
+                Seen { encoder, force: newtons((1e3 * sensed) as i32), pressing: true, goal: Newtons::ZERO, voltage };
             match guard.check(&seen, &config) {
                 Some(Fault::Runaway) => break,
                 None => {}
@@ -186,13 +273,16 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
     let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
     for (turns, expected) in [(-1.0, Fault::Reversed), (0.0, Fault::EncoderFrozen)] {
         for duty in [Duty::FULL, -Duty::FULL] {
-            let mut guard = Guard::start(0, &config);
+            let mut guard = started(0, &config);
             let mut finger = Adversary { travel_mm: 0.0, speed_mm_per_s: 0.0, duty, left: u32::MAX };
             let mut rng = Rng::with_seed(4);
             let mut voltage = 0;
             let frames = (1..200).find(|_| {
                 let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
-                let fault = guard.check(&Seen { encoder, force: Newtons::ZERO, pressing: true, voltage }, &config);
+                let fault = guard.check(
+                    &Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage },
+                    &config,
+                );
                 voltage = finger.frame(&guard, &config, 1.0, 0.0, &mut rng);
                 assert!(fault.is_none_or(|fault| fault == expected), "{fault:?}");
                 fault.is_some()
@@ -215,9 +305,9 @@ fn counts(travel_mm: f64, config: &Config) -> i32 {
 fn a_touch_bounds_the_retreat() {
     let config = Config::shipped(&Params { clearance_um: 2_000, ..Params::DEFAULT }).expect("allowed");
     for (pressing, floor_mm) in [(true, 10.0 - 2.0 - 1.0), (false, -f64::from(config.bounds.back.0.to_num::<f32>()))] {
-        let mut guard = Guard::start(0, &config);
+        let mut guard = started(0, &config);
         let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
-            let seen = Seen { encoder: counts(travel_mm, &config), force, pressing, voltage: 0 };
+            let seen = Seen { encoder: counts(travel_mm, &config), force, pressing, goal: Newtons::ZERO, voltage: 0 };
             guard.check(&seen, &config)
         };
         // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.

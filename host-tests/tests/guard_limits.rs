@@ -22,7 +22,8 @@ impl Finger {
     fn new() -> Self {
         let params = Params { encoder_counts_per_turn: 65_536, clearance_um: 10_000, ..Params::DEFAULT };
         let config = Config::shipped(&params).expect("allowed");
-        let guard = Guard::start(0, &config);
+        let mut guard = Guard::default();
+        guard.start(0, 0, &config);
         Self { guard, config, travel_mm: 0.0, speed_mm_per_s: 0.0, force: Newtons::ZERO, pressing: true }
     }
 
@@ -37,7 +38,7 @@ impl Finger {
         let damping = f64::from(self.config.damping_q17_per_s) / 131_072.0;
         let voltage = (damping * self.speed_mm_per_s * 256.0) as i32 + beyond;
         let encoder = (self.travel_mm / count_mm).round() as i32;
-        let seen = Seen { encoder, force: self.force, pressing: self.pressing, voltage };
+        let seen = Seen { encoder, force: self.force, pressing: self.pressing, goal: Newtons::ZERO, voltage };
         self.guard.check(&seen, &self.config)
     }
 
@@ -257,4 +258,28 @@ fn the_travel_is_that_of_the_encoder() {
     finger.placed(3.0);
     let travel: f64 = finger.guard.travel().0.to_num();
     assert!((travel - 3.0).abs() < 1e-3, "{travel} mm");
+}
+
+/// A jump of the encoder before torque (an encoder that comes back, a finger that is carried) is no motion against the
+/// drive.
+#[test]
+fn a_jump_before_torque_is_forgotten() {
+    for jump_mm in [0.0, 0.5, -0.5, 5.0, -5.0] {
+        let mut finger = Finger::new();
+        finger.travel_mm = jump_mm;
+        let count_mm = finger.config.mm_per_count_q40 as f64 / 2_f64.powi(40);
+        let encoder = (jump_mm / count_mm).round() as i32;
+        let seen = Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage: 0 };
+        // 1 ms at rest.
+        for _ in 0..10 {
+            finger.guard.observe(&seen, &finger.config);
+        }
+        finger.guard.start(encoder, encoder, &finger.config);
+        // 40 m/s^2 up to 160 mm/s.
+        let acceleration = 40_000.0;
+        for _ in 0..(160.0 / acceleration / finger.frame_s()) as u32 {
+            finger.speed_mm_per_s += acceleration * finger.frame_s();
+            assert_eq!(finger.pushed((acceleration * 256.0) as i32), None, "{jump_mm} mm");
+        }
+    }
 }

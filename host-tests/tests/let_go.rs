@@ -139,6 +139,34 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
+/// What a contact left in the array is no object that could be released: parameters are written with torque off, so the
+/// touch is not remembered, and the object is taken away.
+#[test]
+fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
+    let mut failed = Vec::new();
+    for seed in 0..4 {
+        let mut board = ordinary(seed);
+        board.command().goal = newtons(6_000);
+        board.run(3.0);
+        board.command().torque = false;
+        board.command().goal = newtons(0);
+        board.run(0.3);
+        let config = board.pipeline().config().clone();
+        board.pipeline().configure(&config);
+        carry(&mut board, 5.0, 15.0);
+        let before_mm = board.truth().travel_mm;
+        let residue_n: f64 = board.status().contact.force.0.to_num();
+        board.command().torque = true;
+        board.run(1.0);
+        let back_mm = before_mm - board.truth().travel_mm;
+        // The clearance, half a millimetre to see that the force does not fall, and the residue's indentation.
+        if !(-0.1..2.2).contains(&back_mm) {
+            failed.push(format!("{seed}: a residue of {residue_n:.3} N, {back_mm:.3} mm back: {}", told(&mut board)));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+}
+
 /// The object comes to a released tip, is held, and is let go again.
 #[test]
 fn what_came_to_a_released_tip_is_held_and_let_go() {
@@ -160,4 +188,21 @@ fn what_came_to_a_released_tip_is_held_and_let_go() {
         failed.extend(kept(&mut board, 2.0).map(|told| format!("to {to_mm} mm, let go of {goal_mn} mN: {told}")));
     }
     assert!(failed.is_empty(), "{failed:#?}");
+}
+
+/// Torque off and on again does not move the zero of the travel, so the finger goes no farther than without it.
+#[test]
+fn torque_off_does_not_extend_the_travel() {
+    let mut board = bench();
+    board.place_object(100.0);
+    board.command().goal = newtons(1_000);
+    let most_mm = 20.0;
+    for _ in 0..3 {
+        board.run(1.0);
+        let travel_mm = board.truth().travel_mm;
+        assert!((most_mm - 1.0..most_mm + 1.0).contains(&travel_mm), "{travel_mm} mm: {}", told(&mut board));
+        board.command().torque = false;
+        board.run(0.1);
+        board.command().torque = true;
+    }
 }

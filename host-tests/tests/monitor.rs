@@ -5,11 +5,13 @@ use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::frame::Sense;
+use fingertip::pressure::GAIN_ONE;
 use fingertip::safety::monitor::{Monitor, View, array_broken, array_sound};
-use fingertip::shipped::{COLUMNS, Picture, ROWS};
+use fingertip::shipped::{COLUMNS, Calibration, Frame, Picture, ROWS};
 use fingertip::state::Fault;
-use fingertip::units::{Millimetres, Newtons};
-use host_tests::finger::config;
+use fingertip::units::{Millimetres, MillimetresPerSecond2, Newtons};
+use host_tests::finger::{config, tared};
+use sim::plant::{Plant, Setup};
 
 /// What a sound finger shows that presses with 1 N.
 #[derive(Clone, Copy)]
@@ -43,6 +45,19 @@ impl Shown {
         self.motion.observer.travel = Millimetres::from_bits((i64::from(um) * (1 << 24) / 1_000) as i32);
         self
     }
+
+    /// The object pushes the tip back with so much more.
+    fn loaded(mut self, mn: i32) -> Self {
+        self.motion.observer.disturbance = MillimetresPerSecond2::from_bits(-load(mn));
+        self
+    }
+}
+
+fn restarted(um: i32) -> Monitor {
+    let Shown { picture, motion, .. } = Shown::sound().at(um);
+    let mut monitor = Monitor::default();
+    monitor.restart(&picture, &motion);
+    monitor
 }
 
 #[test]
@@ -104,43 +119,181 @@ fn a_supply_outside_its_window_for_five_frames_stops() {
     }
 }
 
-/// 0.2 mm, either way, with a picture that is the same to the last bit.
-#[test]
-fn an_array_that_shows_the_same_while_the_tip_moves_stops() {
+/// The motor's load that a force of this many thousandths of a newton is.
+fn load(mn: i32) -> i32 {
+    (i64::from(config().bounds.acceleration_per_n) * i64::from(mn) / 1_000) as i32
+}
+
+/// A tip that moves forward by this many micrometres in each frame over a picture that stays the same, while the motor's
+/// load grows by this much in all of 0.1 mm: the travel at which it is stopped.
+fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> Option<i32> {
     let config = config();
-    for sign in [-1, 1] {
-        let mut monitor = Monitor::default();
-        monitor.restart(&Shown::sound().at(5_000).view());
-        for (um, fault) in [(0, None), (199, None), (201, Some(Fault::ArrayFrozen)), (150, None)] {
-            let shown = Shown::sound().at(5_000 + sign * um);
-            assert_eq!(monitor.check(&shown.view(), true, &config), fault, "{um} um");
+    let mut monitor = restarted(5_000);
+    (1..=6_000 / um_per_frame).map(|frame| frame * um_per_frame).find(|um| {
+        let mut shown = Shown::sound().at(5_000 + um).loaded(load_mn * (um - 100).clamp(0, 100) / 100);
+        (shown.contact.force, shown.command.goal) = (newtons(force_mn), newtons(goal_mn));
+        monitor.check(&shown.view(), true, &config) == Some(Fault::ArrayFrozen)
+    })
+}
+
+/// A motor that pushes more, by 0.25 N and half of the force, over a picture that stays the same: within 0.2 mm and what
+/// the load's mean is late by. Without more load the object may move: 4 mm.
+#[test]
+fn an_array_that_shows_the_same_while_the_tip_presses_on_stops() {
+    for force_mn in [100, 1_000, 3_000] {
+        let least_mn = 250 + force_mn / 2;
+        for more_mn in [least_mn + 100, 2 * least_mn] {
+            let um = stopped_um(1, more_mn, force_mn, 9_000).expect("it is stopped");
+            assert!((200..=500).contains(&um), "{force_mn} mN, {more_mn} mN more: {um} um");
+        }
+        for less_mn in [-2_000, 0, least_mn - 20] {
+            let um = stopped_um(1, less_mn, force_mn, 9_000).expect("it is stopped");
+            assert!((4_000..=4_002).contains(&um), "{force_mn} mN, {less_mn} mN more: {um} um");
         }
     }
 }
 
+/// A force within an eighth of its goal is held: an object may carry the tip.
+#[test]
+fn a_force_that_is_held_may_stay_the_same() {
+    for (goal_mn, stops) in [(0, true), (888, true), (890, false), (1_000, false), (1_140, false), (1_144, true)] {
+        assert_eq!(stopped_um(1, 2_000, 1_000, goal_mn).is_some(), stops, "{goal_mn} mN");
+    }
+}
+
+/// Every change of the picture counts, and so does what makes an unchanged picture no wonder: a tip that does not press,
+/// hardly any force, and the way back.
 #[test]
 fn an_array_that_shows_any_change_or_no_contact_does_not() {
     let config = config();
-    let changes: [fn(&mut Shown); 5] = [
-        |shown| shown.picture.sum += 1,
-        |shown| shown.picture.moment_x += 1,
-        |shown| shown.picture.moment_y -= 1,
-        |shown| shown.pressed = false,
-        |shown| shown.contact.force = Newtons::from_bits(newtons(15).to_bits() - 1),
+    let changes: [fn(&mut Shown, i32); 6] = [
+        |shown, frame| shown.picture.sum += frame % 2,
+        |shown, frame| shown.picture.moment_x += frame % 2,
+        |shown, frame| shown.picture.moment_y -= frame % 2,
+        |shown, _| shown.pressed = false,
+        |shown, _| shown.contact.force = Newtons::from_bits(newtons(15).to_bits() - 1),
+        |shown, frame| *shown = shown.at(5_000 - frame),
     ];
     for (number, change) in changes.into_iter().enumerate() {
-        let mut monitor = Monitor::default();
-        monitor.restart(&Shown::sound().at(5_000).view());
-        let mut changed = Shown::sound().at(5_150);
-        change(&mut changed);
-        assert_eq!(monitor.check(&changed.view(), true, &config), None, "{number}");
-        // From there on it counts anew.
-        let mut later = changed.at(5_340);
-        (later.pressed, later.contact.force) = (true, newtons(15));
-        assert_eq!(monitor.check(&later.view(), true, &config), None, "{number}");
-        let later = later.at(5_360);
-        assert_eq!(monitor.check(&later.view(), true, &config), Some(Fault::ArrayFrozen), "{number}");
+        let mut monitor = restarted(5_000);
+        for frame in 1..5_000 {
+            let mut shown = Shown::sound().at(5_000 + frame).loaded(frame);
+            change(&mut shown, frame);
+            assert_eq!(monitor.check(&shown.view(), true, &config), None, "{number}");
+        }
     }
+}
+
+/// All taxels together read less than at the tare by three times the least contact, for three frames.
+#[test]
+fn an_array_that_reads_less_than_at_its_tare_is_broken() {
+    let config = config();
+    let with = |sum| {
+        let mut shown = Shown::sound();
+        (shown.picture.sum, shown.contact.force, shown.pressed) = (sum, Newtons::ZERO, false);
+        shown
+    };
+    // Half of the least contact is `touch_line`.
+    let least = -6 * config.touch_line;
+    let of_contacts = f64::from(least) * config.newtons_per_sum_q48 as f64 / 2_f64.powi(48);
+    assert!((-0.121..-0.119).contains(&of_contacts), "{of_contacts} N are not three times 40 mN");
+    for sum in [least, 0, 1_000_000] {
+        let mut monitor = Monitor::default();
+        for _ in 0..100 {
+            assert_eq!(monitor.check(&with(sum).view(), true, &config), None, "{sum}");
+        }
+    }
+    let broken = Some(Fault::ArrayBroken);
+    for sum in [least - 1, 10 * least, i32::MIN] {
+        let mut monitor = Monitor::default();
+        for _ in 0..3 {
+            let faults = [sum, sum, least].map(|sum| monitor.check(&with(sum).view(), true, &config));
+            assert_eq!(faults, [None; 3], "{sum}: one good frame is enough");
+        }
+        let faults = [(); 5].map(|()| monitor.check(&with(sum).view(), true, &config));
+        assert_eq!(faults, [None, None, broken, broken, broken], "{sum}");
+        // A new start forgets the frames before.
+        let Shown { picture, motion, .. } = with(sum);
+        monitor.restart(&picture, &motion);
+        let faults = [(); 3].map(|()| monitor.check(&with(sum).view(), true, &config));
+        assert_eq!(faults, [None, None, broken], "{sum}");
+        let mut monitor = Monitor::default();
+        let faults = [(); 5].map(|()| monitor.check(&with(sum).view(), false, &config));
+        assert_eq!(faults, [None; 5], "{sum}: nothing is driven");
+    }
+}
+
+/// Taxels that are masked, or that fail after the tare, take what they read at the tare with them; a contact beside
+/// them is no less than nothing.
+/// Sums of consecutive frames while 1 N is requested; the frame of the fault.
+fn stopped_by_sums(goal_mn: i32, sums: impl Iterator<Item = (i32, u16)>) -> Option<usize> {
+    let config = config();
+    let mut shown = Shown::sound();
+    shown.command.goal = newtons(goal_mn);
+    let mut monitor = restarted(0);
+    let mut fault = |(sum, bad_count)| {
+        shown.picture = Picture { sum, bad_count, moment_x: sum, ..shown.picture };
+        let fault = monitor.check(&shown.view(), true, &config);
+        assert!(matches!(fault, None | Some(Fault::ArrayBroken)), "{fault:?}");
+        fault
+    };
+    sums.into_iter().position(|frame| fault(frame).is_some())
+}
+
+/// A step of the sum that no contact can cause stops the motor after 8 ms: not where it goes back before, not where taxels
+/// recover, not in a release.
+#[test]
+fn an_array_that_reads_much_more_within_a_frame_is_broken() {
+    let config = config();
+    let frames = 8_000_000 / config.timing.frame_ns as usize;
+    let most = 1_000 / 4 + 4 * config.touch_line;
+    let stepped =
+        |up, length, bad| (0..4 * frames).map(move |frame| if frame < length { (1_000 + up, bad) } else { (1_000, 0) });
+    assert_eq!(stopped_by_sums(1_000, stepped(most, 4 * frames, 0)), None);
+    assert_eq!(stopped_by_sums(1_000, stepped(most + 1, 4 * frames, 0)), Some(frames));
+    assert_eq!(stopped_by_sums(1_000, stepped(most + 1, frames - 1, 0)), None);
+    assert_eq!(stopped_by_sums(1_000, stepped(most + 1, 4 * frames, 1)), None);
+    assert_eq!(stopped_by_sums(0, stepped(most + 1, 4 * frames, 0)), None);
+    // A contact that grows by a fifth in each frame does not step.
+    let grows = (0..4 * frames).map(|frame| ((1_000.0 * 1.2_f64.powi(frame.min(30) as i32)) as i32, 0));
+    assert_eq!(stopped_by_sums(1_000, grows), None);
+}
+
+#[test]
+fn an_array_without_some_of_its_taxels_does_not_read_less() {
+    let config = config();
+    let mut world = Plant::new(&Setup::default());
+    let [mut blank, mut pressed] = [Frame::EMPTY; 2];
+    world.fill_frame(&mut blank);
+    world.place(world.setup().wall.distance_mm + 1.5);
+    world.fill_frame(&mut pressed);
+    let most = config.params.bad_taxels_max as usize;
+    for masked in 0..=ROWS {
+        let mask = core::array::from_fn(|row| if row < masked { (1 << COLUMNS) - 1 } else { 0 });
+        let calibration = Calibration::new(&[[GAIN_ONE; COLUMNS]; ROWS], &mask).unwrap();
+        for (frame, dead) in [(blank, 0), (blank, most), (pressed, 0), (pressed, most)] {
+            let mut array = tared(&calibration, &blank, &config);
+            let mut frame = frame;
+            (0..dead).for_each(|place| frame.set_code(ROWS - 1, place, 0));
+            let (mut monitor, mut shown) = (Monitor::default(), Shown::sound());
+            (shown.contact.force, shown.pressed) = (Newtons::ZERO, false);
+            for _ in 0..10 {
+                shown.picture = *array.read(&frame, &config);
+                let sum = shown.picture.sum;
+                assert_eq!(monitor.check(&shown.view(), true, &config), None, "{masked} rows, {dead} dead: {sum}");
+            }
+        }
+    }
+    // An array that lost a tenth of its codes, as by its supply, does.
+    let mut array = tared(&Calibration::NONE, &blank, &config);
+    let mut frame = blank;
+    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+        frame.set_code(row, column, blank.code(row, column) / 10 * 9);
+    }
+    let shown = Shown { picture: *array.read(&frame, &config), ..Shown::sound() };
+    let mut monitor = Monitor::default();
+    let faults = [(); 3].map(|()| monitor.check(&shown.view(), true, &config));
+    assert_eq!(faults, [None, None, Some(Fault::ArrayBroken)], "a sum of {}", shown.picture.sum);
 }
 
 /// The same taxels twice, or half of all once; and a column that shows current with no row driven.

@@ -3,7 +3,8 @@
 
 use fingertip::config::newtons;
 use fingertip::identify::{Identification, Refusal};
-use fingertip::pipeline::Taring;
+use fingertip::pipeline::{Bridge, Taring};
+use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::TARE_FRAMES;
 use fingertip::state::{Fault, Mode};
 use host_tests::finger::config;
@@ -151,6 +152,22 @@ fn a_second_tare_during_a_tare_begins_anew() {
     tares(&mut board);
 }
 
+/// The array is the same, so is its tare, to the rounding of its means.
+#[test]
+fn a_tare_does_not_depend_on_the_one_before() {
+    let mut board = Bench::default();
+    let mut tared = || {
+        board.tare();
+        let array = board.pipeline().array();
+        (array.tare().flatten().copied().collect::<Vec<_>>(), array.picture().sum)
+    };
+    let (first, sum) = tared();
+    assert!(first.iter().all(|tare| *tare > 20 << TARE_BITS) && sum.abs() < 100, "{sum}");
+    let (second, sum) = tared();
+    let worst = first.iter().zip(&second).map(|(first, second)| first.abs_diff(*second)).max().unwrap();
+    assert!(worst < 1 << (TARE_BITS - 4) && sum.abs() < 100, "{worst}, {sum}");
+}
+
 #[test]
 fn new_parameters_during_a_tare_begin_it_anew() {
     let mut board = Bench::default();
@@ -171,7 +188,8 @@ fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
         let mut board = ready();
         board.command().identify_request += 1;
         let status = board.step_with(spoil);
-        assert_eq!((status.mode, status.fault, status.identification), (Mode::Fault, Some(fault), NOT_READY));
+        let interrupted = Identification::Refused(Refusal::Interrupted);
+        assert_eq!((status.mode, status.fault, status.identification), (Mode::Fault, Some(fault), interrupted));
     }
 }
 
@@ -195,7 +213,6 @@ fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     board.step();
     board.command().torque = true;
     board.command().identify_request += 1;
-    assert_eq!(board.step().mode, Mode::Release);
     assert_eq!(board.step().mode, Mode::Identify);
 }
 
@@ -221,10 +238,9 @@ fn identify_without_a_tare_is_refused() {
     assert_eq!(board.step().identification, NOT_READY);
 }
 
-/// A host that asks for another measurement in the frame in which one ends gets another, and the first one's end is not
-/// spoilt.
+/// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.
 #[test]
-fn identify_in_the_frame_in_which_another_ends_begins_anew() {
+fn identify_in_the_frame_in_which_another_ends_has_its_outcome() {
     let refused_at = {
         let mut board = measuring();
         (1..20_000).find(|_| board.step().identification != Identification::Running).expect("an end")
@@ -233,9 +249,11 @@ fn identify_in_the_frame_in_which_another_ends_begins_anew() {
     for _ in 1..refused_at {
         assert_eq!(board.step().identification, Identification::Running);
     }
-    board.command().identify_request += 1;
-    assert_eq!(board.step().identification, Identification::Refused(Refusal::NoContact));
-    assert_eq!(board.step().identification, Identification::Running);
+    for outcome in [Identification::Refused(Refusal::NoContact), Identification::Running] {
+        board.command().identify_request += 1;
+        let status = board.step();
+        assert_eq!((status.identification, status.taken.identify), (outcome, board.command().identify_request));
+    }
 }
 
 /// With nothing to touch.
@@ -261,5 +279,40 @@ fn the_first_frame_with_torque_is_judged_before_it_drives() {
         board.command().torque = true;
         let status = board.step_with(spoil);
         assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
+    }
+}
+
+/// A tip that is faster than half of the approach speed is braked first, and driven from there on.
+#[test]
+fn torque_waits_until_the_tip_is_slow() {
+    let mut board = ready();
+    let config = config();
+    let (count_mm, frame_s): (f64, _) = (config.count.0.to_num(), f64::from(config.timing.frame_ns) * 1e-9);
+    board.command().torque = false;
+    let mut travel_mm = 0.0;
+    let mut moves = |board: &mut Bench, speed_mm_per_s: f64| {
+        travel_mm += speed_mm_per_s * frame_s;
+        board.step_with(|record| record.sense.encoder = (travel_mm / count_mm).floor() as i32)
+    };
+    for speed in [20.0, -20.0] {
+        for _ in 0..500 {
+            assert_eq!(moves(&mut board, speed).mode, Mode::Off);
+        }
+        board.command().torque = true;
+        for _ in 0..300 {
+            let status = moves(&mut board, speed);
+            assert_eq!((status.mode, status.bridge()), (Mode::Off, Bridge::Brakes), "at {speed} mm/s");
+        }
+        // Half of 30 mm/s, give or take what the encoder's counts leave of the speed.
+        let mut slower = speed;
+        while moves(&mut board, slower).mode == Mode::Off {
+            slower *= 0.999;
+        }
+        assert!((13.0..17.5).contains(&slower.abs()), "driven from {slower} mm/s on");
+        board.command().torque = false;
+        for _ in 0..1_000 {
+            moves(&mut board, 0.0);
+        }
+        assert_eq!(board.status().bridge(), Bridge::Open);
     }
 }

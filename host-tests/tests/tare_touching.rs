@@ -1,4 +1,5 @@
-//! A tare while something touches is told from one on a free tip, over arrays as they come; and it is never refused.
+//! A tare while something touches is told from one on a free tip, over arrays as they come. The tare is never
+//! refused; torque after it is.
 
 use fastrand::Rng;
 use fingertip::command::Command;
@@ -7,7 +8,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::Taring;
 use fingertip::pressure::GAIN_ONE;
 use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use fingertip::state::Limits;
+use fingertip::state::{Limits, Mode};
 use sim::mechanics::cells::Cell;
 use sim::setup::Setup;
 
@@ -161,9 +162,10 @@ fn a_later_tare_under_two_tenths_of_a_newton_and_more_is_flagged_and_a_clean_one
     }
 }
 
-/// An array that is uneven beyond what is usual, by a patch of its own: flagged, and at work all the same.
+/// An array that is uneven beyond what is usual, by a patch of its own: flagged, so torque is refused until the host
+/// insists.
 #[test]
-fn an_odd_array_is_flagged_and_works() {
+fn torque_after_a_flagged_tare_is_refused_unless_it_was_forced() {
     let mut finger = Finger::new(1, 250.0);
     for row in 4..7 {
         for column in 4..7 {
@@ -172,11 +174,14 @@ fn an_odd_array_is_flagged_and_works() {
     }
     assert!(finger.tare(0.0, [0.0; 2]));
     finger.command.torque = true;
-    finger.frame.sequence += 1;
     let sense = Sense { supply_mv: 6_000, ..Sense::default() };
-    let status = finger.pipeline.step(&finger.frame, &sense, &finger.command).1;
-    assert!(status.fault.is_none() && status.limits.has(Limits::TARED_TOUCHING));
-    assert_eq!(status.mode, fingertip::state::Mode::Release);
+    for (forced, mode) in [(false, Mode::Off), (false, Mode::Off), (true, Mode::Release), (true, Mode::Release)] {
+        finger.command.tare_forced = forced;
+        finger.frame.sequence += 1;
+        let status = finger.pipeline.step(&finger.frame, &sense, &finger.command).1;
+        assert!(status.fault.is_none() && status.limits.has(Limits::TARED_TOUCHING));
+        assert_eq!(status.mode, mode);
+    }
 }
 
 /// A tare that was taken with one calibration says nothing of the next.

@@ -193,6 +193,7 @@ fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
     let byte = |bits: &mut Reader<'_>| bits.get(8).map(|byte| byte as u8);
     Some(Command {
         torque: bits.get(1)? == 1,
+        tare_forced: bits.get(1)? == 1,
         goal: Newtons::from_bits(bits.get(32)?.cast_signed()),
         bus_watchdog_ms: bits.get(16)? as u16,
         fit_level: FitLevel::from_number(byte(bits)?),

@@ -164,10 +164,11 @@ fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {
     if !changed {
         return;
     }
-    let Command { torque, goal, bus_watchdog_ms, fit_level, shown_mn, .. } = *command;
+    let Command { torque, goal, bus_watchdog_ms, fit_level, shown_mn, tare_forced, .. } = *command;
     let Command { tare_request, clear_request, identify_request, commission_request, .. } = *command;
     let Command { calibrate_request, forget_request, shown_request, .. } = *command;
     out.put(torque.into(), 1);
+    out.put(tare_forced.into(), 1);
     out.put(goal.to_bits().cast_unsigned(), 32);
     out.put(bus_watchdog_ms.into(), 16);
     out.put(fit_level as u32, 8);

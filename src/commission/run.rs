@@ -108,10 +108,9 @@ impl Run {
         }
     }
 
-    /// Starts anew, at rest at this count.
-    #[inline(never)]
-    pub fn start(&mut self, task: Task, encoder: i32, config: &Config) {
-        *self = Self {
+    /// Begins a commissioning, at rest at this count.
+    pub fn begun(task: Task, encoder: i32, config: &Config) -> Self {
+        Self {
             phase: Phase::Jog,
             outcome: Commissioning::Running(0),
             task,
@@ -119,7 +118,7 @@ impl Run {
             origin: encoder,
             begun: encoder,
             ..Self::new()
-        };
+        }
     }
 
     /// Whether it still needs the motor.

@@ -16,13 +16,15 @@ const CHANGE: f32 = 40.0;
 const RUBBED: f32 = 3.0;
 /// and by what so many counts in that time may be wrong by.
 const COUNTS: f32 = 16.0;
+/// The part of the friction that varies along the travel.
+const VARIES: f32 = 0.25;
 /// What the model of a sound motor is off by while it goes steadily, mm/s.
 const OFF: f32 = 0.5;
 
 /// The ends and speeds that the guard holds, and its model of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bounds {
-    /// How far behind where torque was enabled the tip may go: from the largest force to the clearance, and 1 mm.
+    /// Distance that the tip may go behind the zero of its travel: from the largest force to the clearance, and 1 mm.
     pub back: Millimetres,
     /// Where nothing is pressed: 1.5 times the approach speed.
     pub speed_loose: MillimetresPerSecond,
@@ -38,9 +40,8 @@ pub struct Bounds {
     pub change_per_n: i32,
     /// The change of speed that must be expected before it counts, Q16 mm/s.
     pub change_least: i32,
-    /// What the speed changes less than expected by a contact that the array does not see: by 1 N and the friction, Q16
-    /// mm/s.
-    pub change_unseen: i32,
+    /// What the speed may change less than expected in the air: friction that varies, and the encoder's counts, Q16 mm/s.
+    pub change_free: i32,
     /// The part of such a change that counts and model may be wrong by.
     pub change_unsure: i32,
 }
@@ -63,7 +64,7 @@ impl Bounds {
         let change_per_n = 1e3 / mass * tau_s;
         let (count, rubbed) = (mm_per_count / tau_s, friction_n * change_per_n);
         let change_least = (0.25 * driven * tau_s).min(CHANGE).max(RUBBED * rubbed) + COUNTS * count;
-        let change_unseen = change_per_n + rubbed + 0.5 * COUNTS * count + OFF;
+        let change_free = VARIES * rubbed + 0.25 * COUNTS * count + OFF;
         let deepest = tip.indentation(newtons(p.force_max_mn));
         Self {
             back: Millimetres(deepest.0.saturating_add(millimetres(p.clearance_um + 1_000).0)),
@@ -74,7 +75,7 @@ impl Bounds {
             acceleration_per_n: narrow(1e3 / mass * exp2(8)),
             change_per_n: narrow(change_per_n * exp2(16)),
             change_least: narrow(change_least * exp2(16)),
-            change_unseen: narrow(change_unseen * exp2(16)),
+            change_free: narrow(change_free * exp2(16)),
             change_unsure: narrow((2.0 * count + 0.2 * OFF) * exp2(16)),
         }
     }

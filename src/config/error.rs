@@ -13,6 +13,8 @@ pub enum ConfigError {
     Scan(ScanError),
     /// Two contradict each other, by name and value: the first must be below the second; the speeds may be equal.
     Order([(&'static str, i32); 2]),
+    /// The largest voltage at the motor, mV, is more than four times the least supply.
+    Supply(i32, i32),
 }
 
 impl core::fmt::Display for ConfigError {
@@ -22,6 +24,9 @@ impl core::fmt::Display for ConfigError {
             Self::Scan(error) => error.fmt(f),
             Self::Order([(low, low_value), (high, high_value)]) => {
                 write!(f, "{low} of {low_value}: below {high}, which is {high_value}, is allowed")
+            }
+            Self::Supply(voltage, supply) => {
+                write!(f, "voltage_max_mv of {voltage}: up to 4 times supply_min_mv, which is {supply}, is allowed")
             }
         }
     }

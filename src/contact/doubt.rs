@@ -5,7 +5,7 @@
 //! touches the array's edge.
 
 use super::fitted::RATIO_BITS;
-use super::{hides, overhang};
+use super::{hidden, overhang};
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::pressure::Picture;
@@ -13,6 +13,8 @@ use crate::pressure::Picture;
 /// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two
 /// fifths.
 const RATIO_DOUBTED: [i32; 2] = [(5 << RATIO_BITS) / 4, (7 << RATIO_BITS) / 4];
+/// Shares of the force hidden by bad taxels, Q8, between which the sums are doubted.
+const HIDDEN: [i32; 2] = [1 << 5, 1 << 7];
 /// Confidences between which a fit is a good likeness.
 const CONFIDENCE: [i32; 2] = [96, 160];
 
@@ -23,18 +25,16 @@ pub(super) fn of_fit(ratio: i32, confidence: u8) -> u8 {
     ((u32::from(hidden) * (u32::from(unlike) + 1)) >> 8) as u8
 }
 
-/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on or where a bad
-/// taxel hides a part.
+/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on; none while bad
+/// taxels hide an eighth of the force, all where they hide half of it.
 pub(super) fn of_sums<const ROWS: usize, const COLUMNS: usize>(
     sums: &Contact,
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
 ) -> u8 {
-    if hides(sums, picture, config) {
-        return u8::MAX;
-    }
+    let hidden = ramp(hidden(sums, picture, config).unwrap_or(0).cast_signed(), HIDDEN);
     let half_pitch = config.half_pitch.to_bits() >> 4;
-    ramp(overhang::<ROWS, COLUMNS>(sums, config), [half_pitch, 3 * half_pitch])
+    hidden.max(ramp(overhang::<ROWS, COLUMNS>(sums, config), [half_pitch, 3 * half_pitch]))
 }
 
 /// Q8: it comes within some 8 frames and goes within some 64.

@@ -51,6 +51,11 @@ impl Drive {
         (self.voltage, self.net) = (0, self.net.saturating_sub(self.voltage));
     }
 
+    /// The motor is shorted: only the back-EMF (Q8 mm/s^2) acts.
+    pub fn short(&mut self, back_emf: i32) {
+        (self.voltage, self.net) = (0, back_emf.saturating_neg());
+    }
+
     /// The share of the current limit that the winding's temperature leaves, Q8.
     pub fn allow(&mut self, share: i32) {
         self.allowed = share;

@@ -45,6 +45,19 @@ impl Observer {
         Self { origin: encoder, ..Self::new() }
     }
 
+    /// Makes this count the zero of the travel; the motion goes on. Returns the travel there before.
+    pub fn zero(&mut self, encoder: i32, config: &Config) -> Millimetres {
+        let travel = self.measured(encoder, config);
+        self.travel = Millimetres(self.travel.0.saturating_sub(travel.0));
+        self.origin = encoder;
+        travel
+    }
+
+    /// Encoder count at which the travel is zero.
+    pub fn origin(&self) -> i32 {
+        self.origin
+    }
+
     /// Travel that an encoder count means, held to the type's range but for a count.
     pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
         config.travel(encoder.wrapping_sub(self.origin))

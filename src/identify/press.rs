@@ -11,7 +11,6 @@ use crate::config::Config;
 use crate::contact;
 use crate::contact::Contact;
 use crate::control::SpeedLoop;
-use crate::control::goal::within_travel;
 use crate::control::profile::Reference;
 use crate::pressure::Picture;
 use crate::root::floor_sqrt;
@@ -91,20 +90,21 @@ impl Press {
         }
     }
 
-    /// Starts anew; the tip may touch or not.
-    pub fn start(&mut self, motion: &SpeedLoop) {
-        *self = Self {
+    /// Begins a press; the tip may touch or not. A deep one only ends with the depth, the force, the travel or a taxel
+    /// that fails, and gives no modulus.
+    pub fn begin(deep: bool, motion: &SpeedLoop) -> Self {
+        Self {
             phase: Phase::Retreat,
             outcome: Identification::Running,
             moved_to: motion.observer.travel,
+            deep,
             ..Self::new()
-        };
+        }
     }
 
-    /// The same for a press that only ends with the depth, the force, the travel or a taxel that goes bad.
-    pub fn start_deep(&mut self, motion: &SpeedLoop) {
-        self.start(motion);
-        self.deep = true;
+    /// Whether it is a deep one, which calibrates the taxels.
+    pub fn deep(&self) -> bool {
+        self.deep
     }
 
     /// How far the tip went since the touch was noticed, where this frame is one of the press.
@@ -173,8 +173,8 @@ impl Press {
         let (way, speed) = match self.phase {
             Phase::Idle => (Millimetres::ZERO, config.approach),
             Phase::Retreat => (Millimetres(-FAR.0), config.approach),
-            Phase::Seek => (within_travel(FAR, motion, config, limits), config.approach),
-            Phase::Squeeze => (within_travel(FAR, motion, config, limits), config.approach.min(SPEED)),
+            Phase::Seek => (motion.within_travel(FAR, config, limits), config.approach),
+            Phase::Squeeze => (motion.within_travel(FAR, config, limits), config.approach.min(SPEED)),
         };
         motion.towards(way, Millimetres::ZERO, speed, config).0
     }

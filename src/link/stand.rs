@@ -29,6 +29,7 @@ pub(super) struct Stand {
     taken: Taken,
     mode: Mode,
     tared: bool,
+    tared_touching: bool,
     supply_mv: u16,
     bad_taxels: u8,
     /// Taxels have gains proposed.
@@ -61,6 +62,7 @@ impl Stand {
             taken: status.taken,
             mode: status.mode,
             tared: !status.limits.has(Limits::NOT_TARED),
+            tared_touching: status.limits.has(Limits::TARED_TOUCHING),
             supply_mv: snapshot.supply_mv,
             bad_taxels: status.contact.bad_taxels,
             // While a press runs, or is worked out, there may be a mixture.
@@ -84,6 +86,11 @@ impl Stand {
         } else {
             Hindrance::None
         }
+    }
+
+    /// Whether torque is refused because something touched the tip during the last tare.
+    pub fn touched(&self, command: &Command) -> bool {
+        self.tared_touching && !command.tare_forced && command.tare_request == self.taken.tare
     }
 
     /// Whether what was measured is about to be forgotten.

@@ -1,18 +1,6 @@
 //! The reading without contact: measured at once by a tare, followed slowly by the baseline.
 
 use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
-use crate::units::Newtons;
-
-/// Weight of a frame in the baseline, Q16; of ten rows each is visited every tenth frame, so the time constant is
-/// 10,240 frames.
-const BASELINE_WEIGHT: i32 = 64;
-
-/// The first frames after a contact are weighed as if so many had come before.
-const CLEAR_ROUNDS_FIRST: i32 = 4;
-/// For so many rounds a clear tip may read what is left of a contact: of ten rows 0.26 s. By then it is learnt.
-const LEFT_ROUNDS: i32 = 256;
-/// What is left of a force is at most this share of it: a quarter.
-const LEFT_BITS: u32 = 2;
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Frames of a tare: of ten rows 160, 16 ms at 10 kHz.
@@ -31,7 +19,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_sums = [0; 3];
         self.tare_frames = 0;
         self.baseline_line = None;
-        self.held = Newtons::ZERO;
     }
 
     /// Another characteristic may count from now on.
@@ -60,44 +47,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_frames >= Self::TARE_FRAMES
     }
 
-    /// Lets the baseline follow the picture, one row a frame; call it only where there is no contact. Where the tip is
-    /// surely clear, the first frames after a contact count most: the mean of all since then, until they are as many as
-    /// the filter holds. So what creep, warmth and hysteresis left is gone in a tenth of a second.
+    /// Lets the baseline learn a share (Q16) of what the next row reads above it. [`crate::touch::Touch::learns`] gives
+    /// the share, where there is one.
     ///
-    /// Gives what share of the baseline this learnt anew, Q16: with a round's last row that of the round, else 0.
-    pub fn follow_drift(&mut self, clear: bool) -> i32 {
-        let quick = (1 << 16) / (self.clear_rounds.max(0) + CLEAR_ROUNDS_FIRST);
-        let weight = if clear { quick.max(BASELINE_WEIGHT) } else { BASELINE_WEIGHT };
+    /// Returns the share of the baseline that this renewed, Q16: with a round's last row that of the round, else 0.
+    pub fn follow_drift(&mut self, weight: u32) -> i32 {
+        let weight = weight.min(1 << 16).cast_signed();
         self.learn(self.baseline_row, weight);
         self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
-        if self.baseline_row != 0 {
-            return 0;
-        }
-        if clear {
-            self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
-        }
-        weight
-    }
-
-    /// A frame of a clear tip that is not learnt from: what comes later is another touch.
-    pub fn pass(&mut self) {
-        self.baseline_row = if self.baseline_row + 1 < ROWS { self.baseline_row + 1 } else { 0 };
-        if self.baseline_row == 0 {
-            self.clear_rounds = (self.clear_rounds + 1).min(1 << 16);
-        }
-    }
-
-    /// Something is touched with this force: the baseline that it leaves is learnt anew.
-    pub fn touched(&mut self, force: Newtons) {
-        let before = if self.clear_rounds < LEFT_ROUNDS { self.held } else { Newtons::ZERO };
-        self.held = before.max(force);
-        self.clear_rounds = 0;
-    }
-
-    /// Whether what a tip that stands clear reads may be left of what it held: soon after, and at most a quarter of it.
-    /// All else is another touch, as of something that was moved along.
-    pub fn may_be_left(&self, force: Newtons) -> bool {
-        self.clear_rounds < LEFT_ROUNDS && force.0 <= self.held.0 >> LEFT_BITS
+        if self.baseline_row == 0 { weight } else { 0 }
     }
 
     /// Moves each tare of a row by `weight` (Q16) of what the taxel now reads above it. It wraps only for codes that no

@@ -6,13 +6,14 @@
 //!
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
 //! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm
-//!    on, the motor stops.
+//!    on, the motor stops. An object that pushes a tip which does not move forward takes that place, and the rear end,
+//!    along.
 //! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a
 //!    tip that stays so fast for 20 ms stops.
 //! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of
 //!    full drive.
-//! 5. A tip that goes steadily forward stops where the motor feels 1 N and its friction more than before, and the array
-//!    no contact; see `unseen.rs`.
+//! 5. A tip that moves steadily forward stops where the motor measures three eighths of the goal more than before, and
+//!    the array no contact; see `unseen.rs`.
 //!
 //! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells,
 //! and the one that its model of the motor expects. Both pass the same two filters, so a sound finger shows the same
@@ -42,6 +43,10 @@ const YIELDING: i32 = 1 << 23;
 /// So many on the way forward, and on the way back: what yields goes along with the tip.
 const DEEPER: i32 = 2;
 const DEEPER_BACK: i32 = 5;
+/// A touch moves back with the tip where the force falls over this travel, 0.5 mm, Q24,
+const RETREAT: i32 = 1 << 23;
+/// by 0.1 N, Q16, or by half of itself.
+const FALLS: i32 = (1 << 16) / 10;
 /// The force's mean follows it by 1/16 in each frame.
 const FORCE_BITS: u32 = 4;
 
@@ -52,8 +57,10 @@ pub struct Seen {
     pub encoder: i32,
     /// The force on the array: the larger of the sum and what the loop goes by.
     pub force: Newtons,
-    /// Whether the host asks for a force.
+    /// Whether the finger presses or seeks an object.
     pub pressing: bool,
+    /// The force that the host asks for.
+    pub goal: Newtons,
     /// g V that the bridge was given in the last frame, Q8 mm/s^2.
     pub voltage: i32,
 }
@@ -64,8 +71,13 @@ pub struct Guard {
     origin: i32,
     /// All lengths Q24 mm.
     travel: i32,
-    /// No farther back than here.
+    /// No farther back than here, for this touch and for any.
     floor: i32,
+    rear: i32,
+    /// The tip touched when torque was enabled, and still does.
+    inherited: bool,
+    /// Travel and force at which the tip last began to go back.
+    from: [i32; 2],
     /// Where a touch began, less its indentation.
     surface: Option<i32>,
     touching: bool,
@@ -98,10 +110,35 @@ struct May {
 }
 
 impl Guard {
-    /// Torque is enabled with the encoder at this count.
-    pub fn start(encoder: i32, config: &Config) -> Self {
-        let floor = config.bounds.back.to_bits().saturating_neg();
-        Self { origin: encoder, floor, may: May { forward: true, back: true }, ..Self::default() }
+    /// Torque is enabled with the encoder at this count; travel counts from `zero`. What is touched already is known, as
+    /// far as it was seen since the last tare.
+    pub fn start(&mut self, encoder: i32, zero: i32, config: &Config) {
+        let shift = config.travel(zero.wrapping_sub(self.origin)).to_bits();
+        let travel = config.travel(encoder.wrapping_sub(zero)).to_bits();
+        let rear = config.bounds.back.to_bits().saturating_neg();
+        let surface = self.surface.filter(|_| self.touching).map(|surface| surface.saturating_sub(shift));
+        let rear = surface.map_or(rear, |surface| behind(surface, config).min(rear));
+        *self = Self {
+            origin: zero,
+            travel,
+            floor: rear,
+            rear,
+            surface,
+            touching: self.touching,
+            inherited: self.touching,
+            placed: self.placed,
+            force: self.force,
+            from: [travel, self.force],
+            may: May { forward: true, back: true },
+            ..Self::default()
+        };
+    }
+
+    /// Takes a frame while the motor is not driven.
+    #[inline(never)]
+    pub fn observe(&mut self, seen: &Seen, config: &Config) {
+        self.measure(seen, config);
+        self.touch(true, config.tip.indentation(Newtons::from_bits(self.force)), config);
     }
 
     /// Takes a frame: what is to stop the motor.
@@ -131,7 +168,7 @@ impl Guard {
         if outside || self.fast_ns > LOOSE_NS {
             return Some(Fault::Runaway);
         }
-        self.disagreement(seen, config).or_else(|| self.unseen(config))
+        self.disagreement(seen, config).or_else(|| self.unseen(seen.goal, config))
     }
 
     /// The duty that is let through; sets [`Limits::GUARD`] where that is not what was asked for.
@@ -149,7 +186,7 @@ impl Guard {
         self.presses
     }
 
-    /// Travel since torque was enabled, by the encoder alone.
+    /// Travel from its zero, by the encoder alone.
     pub fn travel(&self) -> Millimetres {
         Millimetres::from_bits(self.travel)
     }
@@ -169,7 +206,7 @@ impl Guard {
     }
 
     /// Travel, force, and the two changes of speed.
-    #[inline(always)]
+    #[inline(never)]
     fn measure(&mut self, seen: &Seen, config: &Config) {
         let before = self.travel;
         self.travel = config.travel(seen.encoder.wrapping_sub(self.origin)).to_bits();
@@ -192,39 +229,59 @@ impl Guard {
     }
 
     /// Where a touch begins and how far back it lets the tip go.
-    #[inline(always)]
+    #[inline(never)]
     fn touch(&mut self, pressing: bool, depth: Millimetres, config: &Config) {
         if self.force < config.contact_off.to_bits() {
-            self.touching = false;
+            (self.touching, self.inherited) = (false, false);
         } else if self.force >= config.contact_on.to_bits() {
+            let begins = !self.touching;
             self.touching = true;
             let surface = self.travel.saturating_sub(depth.to_bits());
-            let back = surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND);
-            let back = back.max(config.bounds.back.to_bits().saturating_neg());
+            let back = behind(surface, config);
+            let [travel, force] = self.from;
+            let falls = travel.saturating_sub(self.travel) > RETREAT && {
+                self.from = [self.travel, self.force];
+                force.saturating_sub(self.force) > FALLS.min(force >> 1)
+            };
+            if falls {
+                // An object that springs back moves with the tip. What was pressed before torque was may be far away.
+                self.surface = self.surface.map(|before| before.min(surface));
+                self.rear = if self.inherited { self.rear.min(back) } else { self.rear };
+            }
+            let pushed = travel >= self.travel && self.force > force.saturating_add(config.contact_on.to_bits());
+            if pushed {
+                // An object that comes to a tip which does not move forward takes the rear end along.
+                self.from = [self.travel, self.force];
+                self.rear = self.rear.min(back);
+            }
             if pressing && !self.placed {
                 self.placed = true;
                 self.surface = Some(surface);
-                self.floor = back;
-            } else if pressing {
-                // What is held may come along, towards the finger.
-                self.floor = self.floor.min(back);
+                self.floor = back.max(self.rear);
+            } else if pressing || falls || pushed || begins {
+                // What is held may come along, towards the finger, and so may what comes to a released tip.
+                self.floor = self.floor.min(back.max(self.rear));
             }
         }
-        self.placed &= self.touching && pressing;
+        if self.travel > self.from[0] || !self.touching {
+            self.from = [self.travel, self.force];
+        }
+        self.placed &= self.touching;
     }
 
     /// What the motor feels where the array shows nothing.
     #[inline(always)]
-    fn unseen(&mut self, config: &Config) -> Option<Fault> {
+    fn unseen(&mut self, goal: Newtons, config: &Config) -> Option<Fault> {
         if self.force >= config.contact_off.to_bits() {
             self.unseen.seen();
             return None;
         }
         let told = self.speed.saturating_sub(self.slow_speed);
-        self.unseen.check(&Going { speed: self.speed, told, expected: self.late_change }, config)
+        self.unseen.check(&Going { speed: self.speed, told, expected: self.late_change }, goal, config)
     }
 
     /// How deep the tip is by what the motor felt before the array saw a contact.
+    #[inline(never)]
     pub fn depth_felt(&self, config: &Config) -> Millimetres {
         self.unseen.depth(self.force, self.speed, config)
     }
@@ -252,6 +309,11 @@ impl Guard {
         let wrong = along.max(speed_along) < -(expected >> NONE_BITS);
         (self.other_ns > OTHER_NS).then_some(if wrong { Fault::Reversed } else { Fault::EncoderFrozen })
     }
+}
+
+/// How far behind a surface the tip may go: the clearance and 1 mm.
+fn behind(surface: i32, config: &Config) -> i32 {
+    surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND)
 }
 
 /// `value` moved by a share (Q16, at most a half) of the way to `goal`.

@@ -4,15 +4,40 @@ use crate::command::Command;
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::SpeedLoop;
+use crate::control::observer::Observer;
 use crate::frame::{Sense, Shape};
 use crate::pressure::Picture;
 use crate::state::Fault;
-use crate::units::Millimetres;
+use crate::touch::FRAME_NS_MAX;
+use crate::units::{Millimetres, MillimetresPerSecond2, Newtons};
 
-/// Travel that must not leave the picture of a contact unchanged to the last bit (0.2 mm).
+/// Travel forward that must not leave the picture of a contact unchanged to the last bit, where the motor pushes more
+/// than before (0.2 mm), and in any case (4 mm: what holds an object may move that far).
 const BLIND_TRAVEL: Millimetres = Millimetres::from_bits((1 << 24) / 5);
+const BLIND_TRAVEL_MAX: Millimetres = Millimetres::from_bits(4 << 24);
+/// The part of that travel after which the motor has overcome its friction forward: 1/2.
+const FORWARD_BITS: u32 = 1;
+/// Growth of the load that means "pushes more", as a part of what 1 N does to the tip: 1/4,
+const LOAD_BITS: u32 = 2;
+/// plus this part of the contact force, which a gear may lose: 1/2.
+const LOST_BITS: u32 = 1;
+/// Share by which the mean of the disturbance follows it in each frame: 1/64.
+const MEAN_BITS: u32 = 6;
+/// A force this near to the goal is held: 1/8.
+const HOLDS_BITS: u32 = 3;
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
 const SUPPLY_FRAMES: u8 = 5;
+
+/// All taxels together read less than at the tare by three times the least contact, in halves of it,
+const LESS: i32 = 6;
+/// for this many frames: interference changes one.
+const LESS_FRAMES: u8 = 3;
+/// Largest growth of the sum of all taxels in one frame that a contact can cause, as a part of the sum: 1/4,
+const MORE_BITS: u32 = 2;
+/// plus twice the least contact, in halves of the least contact.
+const MORE: i32 = 4;
+/// Time for which a larger growth must remain before it counts as a fault, ns: longer than a burst of interference.
+const MORE_NS: u32 = 8_000_000;
 
 /// What a frame shows, for judgement.
 pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
@@ -35,13 +60,27 @@ pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
 pub struct Monitor {
     sums: [i32; 3],
     travel: Millimetres,
+    disturbance: MillimetresPerSecond2,
+    mean: MillimetresPerSecond2,
+    /// Larger sum of the last two frames; sum and number of bad taxels of the last frame.
+    before: (i32, i32, u16),
+    /// Sum in the middle of the step; time since the step, ns, while the sum stays above that.
+    step: i32,
+    step_ns: Option<u32>,
     supply_frames: u8,
+    less_frames: u8,
 }
 
 impl Monitor {
     /// Starts anew from this frame.
-    pub fn restart<const ROWS: usize, const COLUMNS: usize>(&mut self, view: &View<ROWS, COLUMNS>) {
-        *self = Self { sums: sums(view.picture), travel: view.motion.observer.travel, ..Self::default() };
+    pub fn restart<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        picture: &Picture<ROWS, COLUMNS>,
+        motion: &SpeedLoop,
+    ) {
+        let Observer { travel, disturbance, .. } = motion.observer;
+        let before = (picture.sum, picture.sum, picture.bad_count);
+        *self = Self { sums: sums(picture), travel, disturbance, mean: disturbance, before, ..Self::default() };
     }
 
     /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off
@@ -61,7 +100,10 @@ impl Monitor {
         if !driven {
             return None;
         }
-        self.supply(view, config).or_else(|| self.array(view, config))
+        self.supply(view, config)
+            .or_else(|| self.less(view, config))
+            .or_else(|| self.more(view, config))
+            .or_else(|| self.array(view, config))
     }
 
     fn supply<const ROWS: usize, const COLUMNS: usize>(
@@ -79,20 +121,68 @@ impl Monitor {
         (self.supply_frames >= SUPPLY_FRAMES).then_some(if low { Fault::SupplyLow } else { Fault::SupplyHigh })
     }
 
-    /// The array must see what the encoder sees.
+    /// No contact lowers what the array reads without one: its supply, its gain or its connector changed.
+    fn less<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        config: &Config,
+    ) -> Option<Fault> {
+        let less = view.picture.sum < config.touch_line.saturating_mul(-LESS);
+        self.less_frames = if less { self.less_frames.saturating_add(1) } else { 0 };
+        (self.less_frames >= LESS_FRAMES).then_some(Fault::ArrayBroken)
+    }
+
+    /// A step up of the sum that no contact can cause: a row or a taxel is stuck at a high code.
+    fn more<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        config: &Config,
+    ) -> Option<Fault> {
+        let &Picture { sum, bad_count, .. } = view.picture;
+        let (most, last, bad) = self.before;
+        self.before = (last.max(sum), sum, bad_count);
+        let least = (most.max(0) >> MORE_BITS).saturating_add(config.touch_line.saturating_mul(MORE));
+        let up = sum.saturating_sub(most);
+        // Taxels that recover bring their share of the sum; in a slow frame, and to a released tip, an object can come.
+        let comparable =
+            bad == bad_count && view.command.goal > Newtons::ZERO && config.timing.frame_ns <= FRAME_NS_MAX;
+        if self.step_ns.is_none() && up > least && comparable {
+            (self.step, self.step_ns) = (sum.saturating_sub(up / 2), Some(0));
+        }
+        self.step_ns = self.step_ns.filter(|_| sum > self.step).map(|ns| ns.saturating_add(config.timing.frame_ns));
+        self.step_ns.is_some_and(|ns| ns > MORE_NS).then_some(Fault::ArrayBroken)
+    }
+
+    /// The array must see what the encoder and the motor see: a tip that presses on is pressed more. An object that
+    /// leaves as fast as the tip follows shows the same for a while; the motor then has no more to push.
     fn array<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
         config: &Config,
     ) -> Option<Fault> {
         let sums = sums(view.picture);
-        let travel = view.motion.observer.travel;
-        // In the air the array may well show the same for ever.
-        if sums != self.sums || !view.pressed || view.contact.force < config.contact_off {
-            self.sums = sums;
-            self.travel = travel;
+        let Observer { travel, disturbance, .. } = view.motion.observer;
+        // Counts of the encoder make the disturbance of a frame too uncertain.
+        let way = disturbance.0.saturating_sub(self.mean.0);
+        self.mean.0 = self.mean.0.saturating_add(way >> MEAN_BITS);
+        let disturbance = self.mean;
+        // In the air the array may well show the same for ever, and so may an object that carries a tip at its goal.
+        let (force, goal) = (view.contact.force, view.command.goal);
+        let holds = force.0.saturating_sub(goal.0).saturating_abs() <= goal.0 >> HOLDS_BITS;
+        let idle = !view.pressed || holds || force < config.contact_off || travel < self.travel;
+        if sums != self.sums || idle {
+            *self = Self { sums, travel, disturbance, ..*self };
         }
-        (distance(travel, self.travel) > BLIND_TRAVEL).then_some(Fault::ArrayFrozen)
+        let moved = travel.0.saturating_sub(self.travel.0);
+        // What the motor pushes counts from where it has overcome its friction forward.
+        if moved < BLIND_TRAVEL.0 >> FORWARD_BITS {
+            self.disturbance = disturbance;
+        }
+        let load = self.disturbance.0.saturating_sub(disturbance.0).to_bits();
+        // A gear that loses torque changes its load by a part of the force where the motion turns.
+        let lost = (i64::from(config.bounds.acceleration_per_n) * i64::from(force.to_bits() >> LOST_BITS)) >> 16;
+        let pushes = i64::from(load) > i64::from(config.bounds.acceleration_per_n >> LOAD_BITS) + lost;
+        (moved > BLIND_TRAVEL.0 && pushes || moved > BLIND_TRAVEL_MAX.0).then_some(Fault::ArrayFrozen)
     }
 }
 
@@ -127,8 +217,4 @@ fn bus_silent<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS
 
 fn sums<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>) -> [i32; 3] {
     [picture.sum, picture.moment_x, picture.moment_y]
-}
-
-fn distance(a: Millimetres, b: Millimetres) -> Millimetres {
-    Millimetres(a.0.saturating_sub(b.0).saturating_abs())
 }

@@ -17,6 +17,10 @@ const STEADY_NS: u32 = 20_000_000;
 /// It must feel more for so long, ns.
 const FELT_NS: u32 = 500_000;
 
+/// A force that the motor feels is three eighths of the goal, but no less and no more than these, Q16 N: 0.2 and 1 N.
+const LEAST: i32 = (1 << 16) / 5;
+const MOST: i32 = 1 << 16;
+
 /// Much more than the array sees: so many times as much.
 const HIDDEN: i32 = 4;
 
@@ -47,7 +51,7 @@ pub(super) struct Unseen {
 impl Unseen {
     /// Takes a frame without a contact.
     #[inline(always)]
-    pub fn check(&mut self, going: &Going, config: &Config) -> Option<Fault> {
+    pub fn check(&mut self, going: &Going, goal: Newtons, config: &Config) -> Option<Fault> {
         let Going { speed, told, expected } = *going;
         let (approach, frame_ns) = (config.approach.to_bits(), config.timing.frame_ns);
         let steady =
@@ -61,7 +65,11 @@ impl Unseen {
         self.more = felt.saturating_sub(self.free);
         let [down, up] = FREE_BITS;
         self.free = self.free.saturating_add(self.more >> if self.more < 0 { down } else { up });
-        self.felt_ns = if self.more > config.bounds.change_unseen { self.felt_ns.saturating_add(frame_ns) } else { 0 };
+        // Without a goal the finger measures.
+        let contact = if goal > Newtons::ZERO { (goal.to_bits() / 8).saturating_mul(3) } else { MOST };
+        let contact = i64::from(contact.max(LEAST).min(MOST)) * i64::from(config.bounds.change_per_n);
+        let contact = saturated(contact >> 16).saturating_add(config.bounds.change_free);
+        self.felt_ns = if self.more > contact { self.felt_ns.saturating_add(frame_ns) } else { 0 };
         (self.felt_ns > FELT_NS).then_some(Fault::Unseen)
     }
 

@@ -100,13 +100,15 @@ fn give_up(params: &mut Params, error: ConfigError) {
         ConfigError::Param(error) => [error.name; 2],
         ConfigError::Scan(_) => ["settle_ns", "sample_cycles"],
         ConfigError::Order([(low, _), (high, _)]) => [low, high],
+        ConfigError::Supply(..) => ["voltage_max_mv", "supply_min_mv"],
     };
     let mut values = params.to_array();
+    let mut changed = false;
     for (value, (name, default, ..)) in values.iter_mut().zip(&Params::RANGES) {
         if names.contains(name) {
+            changed |= *value != *default;
             *value = *default;
         }
     }
-    let changed = Params::from_array(&values);
-    *params = if changed == *params { Params::DEFAULT } else { changed };
+    *params = if changed { Params::from_array(&values) } else { Params::DEFAULT };
 }

@@ -35,7 +35,8 @@ const UNASKED: Command = Command {
     goal: Newtons::from_bits(0),
     bus_watchdog_ms: 0,
     fit_level: FitLevel::OneRow,
-    tare_request: 1,
+    tare_request: 0,
+    tare_forced: false,
     clear_request: 0,
     identify_request: 0,
     commission_request: 0,
@@ -186,6 +187,8 @@ impl Bench {
         self.finger.fill(&mut self.frame);
         self.sense = self.finger.sense(answer);
         self.frames += 1;
+        // The first frame is empty, which would end a tare.
+        self.command.tare_request = 1;
         self.command.torque = self.frames >= TORQUE_AT;
         self.way.add(self.finger.force_n());
         if self.frames < self.until {

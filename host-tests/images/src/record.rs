@@ -88,6 +88,7 @@ impl Record {
             clear_request: u8::from_le_bytes(take(&mut rest)),
             identify_request: u8::from_le_bytes(take(&mut rest)),
             commission_request: 0,
+            tare_forced: false,
             calibrate_request: u8::from_le_bytes(take(&mut rest)),
             forget_request: u8::from_le_bytes(take(&mut rest)),
             shown_request: u8::from_le_bytes(take(&mut rest)),

@@ -4,7 +4,7 @@
 //! needs no entry.
 
 /// Words that a unit is made of, and how they are shown.
-const WORDS: [(&str, &str); 39] = [
+const WORDS: [(&str, &str); 40] = [
     ("a", "A"),
     ("c", "degrees Celsius"),
     ("cm2", "cm^2"),
@@ -15,6 +15,7 @@ const WORDS: [(&str, &str); 39] = [
     ("decade", "decade of time"),
     ("deg", "degrees"),
     ("g", "g"),
+    ("hz", "Hz"),
     ("k", "K"),
     ("kpa", "kPa"),
     ("m2", "m^2"),

@@ -29,7 +29,7 @@ const DELAY: Duration = Duration::from_micros(500);
     echo move 3 | serve wall --pty /tmp/finger"
 )]
 struct Args {
-    /// The scene: a file, or a name out of the library; its script, metrics and bounds are left out
+    /// The scene: a file, or a name out of the library; its script, events, metrics and bounds are left out
     #[arg(default_value = "wall")]
     scene: String,
     /// Makes a symbolic link of this name to the pseudo-terminal

@@ -1,6 +1,7 @@
 //! What a scene computes, what it may name, and the page of it all.
 
 use crate::effects::{Build, Part};
+use crate::events::{EVENT, KINDS, own_keys};
 use crate::key::{Key, Values};
 use crate::metrics;
 use crate::registry::{self, Description, Family};
@@ -13,9 +14,10 @@ pub fn scene(scene: &Scene) -> String {
     let mut text = format!("{}: {}\n", scene.name, scene.about);
     let _ = writeln!(
         text,
-        "{} s, {} events, {} bounds, seed {}",
+        "{} s, {} goals, {} events, {} bounds, seed {}",
         scene.duration_s,
         scene.script.len(),
+        scene.events.len(),
         scene.bounds.len(),
         scene.seed
     );
@@ -53,8 +55,11 @@ pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
 /// Every key, for a terminal.
 pub fn keys() -> String {
     let mut text = String::new();
-    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
+    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EVENT, &EXPECT]) {
         keys_of(&mut text, &table.title(), table.about, table.keys);
+    }
+    for kind in &KINDS {
+        keys_of(&mut text, &kind.title(), kind.about, own_keys(kind));
     }
     for effect in registry::all() {
         keys_of(&mut text, &format!("[effects.{}]", effect.name), effect.about, effect.keys);
@@ -83,11 +88,19 @@ pub fn page() -> String {
     library_of(&mut page);
     stages(&mut page);
     page.push_str("\n## Tables\n");
-    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EXPECT]) {
+    for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EVENT, &EXPECT]) {
         let title =
             if table.name.is_empty() { "Before the first table".into() } else { format!("`{}`", table.title()) };
         let _ = write!(page, "\n### {title}\n\n{}\n\n", table.about);
         table_of(&mut page, table);
+    }
+    page.push_str("\n## Events\n\nWhat each kind of `[[event]]` does, and its own keys.\n");
+    for kind in &KINDS {
+        let _ = write!(page, "\n### `{}`\n\n{}\n", kind.name, kind.about);
+        if !own_keys(kind).is_empty() {
+            page.push('\n');
+            table_of(&mut page, &Table { keys: own_keys(kind), ..*kind });
+        }
     }
     page.push_str("\n## Effects\n\nThey act in this order within a stage, whatever the order in the scene.\n");
     for family in [Family::Contact, Family::Drive, Family::Sensor, Family::Link] {

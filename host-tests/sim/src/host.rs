@@ -4,14 +4,17 @@
 pub mod grip;
 
 use crate::effects::link::Stages;
-use crate::scene::{Event, Scene};
+use crate::events::{self, Request};
+use crate::scene::{Goal, Scene};
 use grip::{Grip, Reading};
 use std::collections::VecDeque;
 
 /// The host of one finger.
 #[derive(Clone, Debug)]
 pub struct Host {
-    script: Vec<Event>,
+    script: Vec<Goal>,
+    requests: VecDeque<(f64, Request)>,
+    silences: Vec<[f64; 2]>,
     next: usize,
     period_s: f64,
     goal_n: f64,
@@ -50,6 +53,8 @@ impl Host {
         });
         Self {
             script: scene.script.clone(),
+            requests: Request::all(&scene.events).into(),
+            silences: events::silences(&scene.events),
             next: 0,
             period_s: scene.table("host").number("period_ms") * 1e-3,
             goal_n: 0.0,
@@ -99,13 +104,13 @@ impl Host {
     pub fn arrival(&mut self, time_s: f64, stages: &mut impl Stages) -> Option<(f64, f64)> {
         self.judge(time_s, stages);
         loop {
-            let event = self.script.get(self.next).filter(|event| event.at_s <= self.send_s);
-            let at_s = event.map_or(self.send_s, |event| event.at_s);
+            let goal = self.script.get(self.next).filter(|goal| goal.at_s <= self.send_s);
+            let at_s = goal.map_or(self.send_s, |goal| goal.at_s);
             if at_s > time_s {
                 break;
             }
-            if let Some(event) = event {
-                self.goal_n = event.goal_n;
+            if let Some(goal) = goal {
+                self.goal_n = goal.goal_n;
                 self.next += 1;
             }
             self.send(at_s, stages);
@@ -113,6 +118,17 @@ impl Host {
         let packet = self.flying.pop_front_if(|(at_s, _)| *at_s <= time_s)?;
         (self.arrived_s, self.arrived_n) = packet;
         Some(packet)
+    }
+
+    /// The next request that reaches the controller by a time. The host repeats a request until it is acknowledged, so
+    /// none is lost; those of a silent host wait. Times never fall.
+    pub fn request(&mut self, time_s: f64) -> Option<Request> {
+        let due = self.requests.front().is_some_and(|(at_s, _)| *at_s <= time_s);
+        if !due || self.silent(time_s) { None } else { self.requests.pop_front().map(|(_, request)| request) }
+    }
+
+    fn silent(&self, time_s: f64) -> bool {
+        self.silences.iter().any(|[from_s, until_s]| (*from_s..*until_s).contains(&time_s))
     }
 
     /// Since the last packet that arrived, as the controller tells it.
@@ -139,7 +155,8 @@ impl Host {
         self.repeats += 1;
         self.send_s = self.said_s + self.repeats as f64 * self.period_s;
         let goal_n = self.reader.as_ref().map_or(self.goal_n, |reader| reader.grip.goal_n(self.goal_n));
-        match stages.pass(at_s) {
+        let silent = self.silent(at_s);
+        match stages.pass(at_s).filter(|_| !silent) {
             Some(arrives_s) => {
                 let last_s = self.flying.back().map_or(arrives_s, |(at_s, _)| *at_s);
                 self.flying.push_back((arrives_s.max(last_s), goal_n));

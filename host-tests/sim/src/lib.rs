@@ -17,6 +17,7 @@ pub mod cli;
 pub mod cores;
 pub mod demo;
 pub mod effects;
+pub mod events;
 #[cfg(feature = "files")]
 pub mod explain;
 pub mod host;

@@ -125,6 +125,8 @@ struct Board<E: Set> {
     slot_s: f64,
     longest_s: f64,
     digest: Digest,
+    /// True once the finger is tared: from then on the host sends.
+    runs: bool,
     /// What the first finger was given beside its parameters.
     calibration: Option<watch::Gains>,
 }
@@ -150,11 +152,11 @@ impl<E: Set> Board<E> {
         fingers: impl Iterator<Item = Parts<E>>,
     ) -> Result<Self, SimError> {
         let (mut units, mut effects) = (Vec::new(), Vec::new());
-        for parts in fingers {
+        for (finger, parts) in fingers.enumerate() {
             effects.push((parts.drive, parts.contact));
             units.push(Unit {
                 pipeline: Pipeline::new(config),
-                readout: Readout::new(&setup.array),
+                readout: Readout::new(&setup.array).with_events(scene, finger),
                 sensor: parts.sensor,
                 link: parts.link,
                 host: Host::new(scene),
@@ -179,6 +181,7 @@ impl<E: Set> Board<E> {
             slot_s,
             longest_s,
             digest: Digest::new(),
+            runs: false,
             calibration: None,
         })
     }
@@ -216,6 +219,7 @@ impl<E: Set> Board<E> {
     }
 
     fn run(&mut self, scene: &Scene, watch: &mut dyn Watch) {
+        self.runs = true;
         for unit in &mut self.units {
             unit.command.torque = true;
             unit.command.bus_watchdog_ms = scene.table("host").whole("watchdog_ms") as u16;
@@ -249,16 +253,19 @@ impl<E: Set> Board<E> {
         let unit = &mut self.units[finger];
         unit.frame.sequence = unit.frame.sequence.wrapping_add(1);
         let mut silent_ms = 0;
-        if unit.command.torque {
+        if self.runs {
             let goal_n = unit.host.goal_n(time_s, &mut unit.link);
             unit.command.goal = newtons((goal_n * 1e3 + 0.5).floor() as i32);
             silent_ms = unit.host.silent_ms(time_s);
+            while let Some(request) = unit.host.request(time_s) {
+                request.apply(&mut unit.command);
+            }
         }
         let sense = self.sense(finger, silent_ms);
         let unit = &mut self.units[finger];
         let (duty, status) = unit.pipeline.step(&unit.frame, &sense, &unit.command);
         unit.next = Bridge::of(status);
-        if unit.command.torque {
+        if self.runs {
             unit.host.read(time_s, || Reading::of(status), &mut unit.link);
         }
         self.digest.add(&unit.frame, &sense, &unit.command, duty, status);

@@ -42,6 +42,7 @@ pub struct Population {
     pub text: String,
     variables: Vec<(String, Draw)>,
     places: Vec<Place>,
+    events: Option<Events>,
     /// What is counted beside the envelope.
     pub counted: Vec<Counted>,
 }
@@ -57,6 +58,16 @@ struct Place {
     whole: bool,
     /// How it is drawn; none where the scene has nothing.
     draw: Option<Draw>,
+}
+
+/// Events that are drawn for each finger.
+#[derive(Clone, Debug)]
+struct Events {
+    count: Place,
+    at_s: Place,
+    kind: Place,
+    /// The keys of each kind.
+    keys: Vec<(&'static str, Place)>,
 }
 
 /// Fingers whose metric is above something are counted.
@@ -111,6 +122,34 @@ impl Population {
             from = at.end;
         }
         text += &self.text[from..];
+        if let Some(events) = &self.events {
+            let variables = drawn[..self.variables.len()].to_vec();
+            let one = |name: &str, place: &Place| {
+                let how = place.draw.as_ref().expect("an event's key is drawn");
+                draw(name, how, place.whole, &variables)
+            };
+            let count = one("events.count", &events.count).number().unwrap_or_default() as usize;
+            let mut all = Vec::new();
+            for event in 0..count {
+                let name = |key: &str| format!("events.{event}.{key}");
+                let kind = one(&name("kind"), &events.kind);
+                let draws = events.keys.iter().filter(|(of, _)| Drawn::Word((*of).into()) == kind);
+                let at_s = one(&name("at_s"), &events.at_s);
+                let mut event =
+                    format!("\n[[event]]\nkind = {}\nat_s = {}\n", written(&kind, false), written(&at_s, false));
+                drawn.push((name("kind"), kind.clone()));
+                drawn.push((name("at_s"), at_s.clone()));
+                for (_, place) in draws {
+                    let key = place.key.rsplit('.').next().unwrap_or_default();
+                    let value = one(&name(key), place);
+                    event += &format!("{key} = {}\n", written(&value, place.whole));
+                    drawn.push((name(key), value));
+                }
+                all.push((at_s.number().unwrap_or_default(), event));
+            }
+            all.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
+            text.extend(all.into_iter().map(|(_, event)| event));
+        }
         let mut scene = scene::read(&self.file, &text, &metrics::names())?;
         scene.seed = stream(seed, "seed", number) >> 1;
         scene.name = format!("finger-{}", number + 1);

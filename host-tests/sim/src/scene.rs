@@ -10,6 +10,7 @@ pub mod text;
 pub use error::{SceneError, SceneErrors};
 pub use reader::read;
 
+use crate::events::Event;
 use crate::key::Values;
 use crate::registry::Named;
 
@@ -29,7 +30,9 @@ pub struct Scene {
     /// Those of [`tables::TABLES`], all of them.
     pub tables: Vec<(&'static str, Values)>,
     /// What the host asks for, in order of time.
-    pub script: Vec<Event>,
+    pub script: Vec<Goal>,
+    /// What happens to the finger, to its object and to its controller, in order of time.
+    pub events: Vec<Event>,
     /// The effects that it names, in the order of the registry.
     pub effects: Vec<Named>,
     /// What must hold.
@@ -45,11 +48,16 @@ impl Scene {
         let found = self.tables.iter().find(|(known, _)| *known == name);
         &found.unwrap_or_else(|| panic!("no table [{name}] is described")).1
     }
+
+    /// The same scene for a finger whose host is somebody else: nothing happens to it by time.
+    pub fn without_events(&self) -> Self {
+        Self { events: Vec::new(), ..self.clone() }
+    }
 }
 
-/// Something that the host does.
+/// A goal that the host sends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Event {
+pub struct Goal {
     /// When, from the start.
     pub at_s: f64,
     /// The force asked for from then on.

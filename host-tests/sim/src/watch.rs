@@ -71,6 +71,14 @@ pub struct Truth {
     pub slip_mm: f64,
     /// Place of the object along the fingers' motion and upwards.
     pub object_mm: [f64; 2],
+    /// Distance to which an event has taken the object away from the fingers.
+    pub object_away_mm: f64,
+    /// True while an event acts on the finger, its object or its controller.
+    pub disturbed: bool,
+    /// True while a defect of the events acts and for a second after it: it may be the cause of a fault.
+    pub defective: bool,
+    /// Force at the tip that dry friction and the gear hold without the motor; infinite where the gear locks itself.
+    pub friction_n: f64,
     /// Whether the object broke.
     pub broken: bool,
     /// Mean true pressure on each taxel, where somebody asked for it ([`Watch::wants_pressures`]); 0 else.

@@ -5,6 +5,7 @@ mod rows;
 use crate::effects::contact::Stages as _;
 use crate::effects::drive::Stages as _;
 use crate::effects::set::Set;
+use crate::events::Happened;
 use crate::mechanics::body::{Body, Surroundings, overlap_s};
 use crate::mechanics::contact::Contact;
 use crate::mechanics::finger::Finger;
@@ -41,6 +42,11 @@ pub enum WorldError {
 const ROUNDS: usize = 60;
 const ALIKE_MM: f64 = 1e-15;
 
+/// Distance of an object that was taken away, mm.
+const GONE_MM: f64 = 1e3;
+/// Speed at which an object is put back from where the tip stood in its way, mm/s.
+const PUT_BACK_MM_PER_S: f64 = 20.0;
+
 /// Fingers and the object between or before them.
 pub struct World<E: Set> {
     fingers: Vec<Finger<E::Drive, E::Contact>>,
@@ -50,6 +56,7 @@ pub struct World<E: Set> {
     body: Body,
     body_before: Body,
     dt_s: f64,
+    happened: Happened,
     /// Whether no contact holds an effect: then a step does without what only effects change.
     bare: bool,
 }
@@ -67,7 +74,16 @@ impl<E: Set> World<E> {
         let mass_kg = fingers[0].contact.effects.mass_kg().filter(|kg| *kg > 0.0);
         let body = Body::default();
         let bare = fingers.iter().all(|finger| finger.contact.effects.none());
-        Self { fingers, around: *around, mass_kg, body, body_before: body, dt_s: 0.0, bare }
+        Self {
+            fingers,
+            around: around.clone(),
+            mass_kg,
+            body,
+            body_before: body,
+            dt_s: 0.0,
+            happened: Happened::default(),
+            bare,
+        }
     }
 
     /// Refuses a step that is too long for the steepest contact.
@@ -111,6 +127,9 @@ impl<E: Set> World<E> {
         if !self.bare {
             self.relax(false);
         }
+        if !self.around.events.is_empty() {
+            self.happen(time_s + dt_s);
+        }
         for (finger, bridge) in self.fingers.iter_mut().zip(bridges) {
             finger.prepare(dt_s, *bridge);
         }
@@ -121,6 +140,31 @@ impl<E: Set> World<E> {
         if !self.bare {
             self.relax(true);
         }
+    }
+
+    /// Lets the events act that the scene has by a time. An object that is put back begins in front
+    /// of the tips.
+    #[inline(never)]
+    fn happen(&mut self, time_s: f64) {
+        let mut now = Happened::at(&self.around.events, time_s);
+        for finger in &mut self.fingers {
+            finger.happen(now.slipped_counts, now.supply_v);
+        }
+        if self.mass_kg.is_none() {
+            self.body.place_mm[0] = now.object_mm;
+            self.body.speed_mm_per_s[0] = now.object_mm_per_s;
+            let away_mm = if now.object_gone {
+                GONE_MM
+            } else if self.happened.object_gone {
+                self.body.away_mm = 0.0;
+                (0..self.fingers.len()).map(|index| self.overlap_mm(index)).fold(0.0, f64::max)
+            } else {
+                (self.body.away_mm - PUT_BACK_MM_PER_S * self.dt_s).max(0.0)
+            };
+            self.body.away_mm = away_mm;
+            now.disturbed |= away_mm > 0.0;
+        }
+        self.happened = now;
     }
 
     /// Lets the tips forget for half a step, and where it ends there, the object bear what it came to.
@@ -138,11 +182,10 @@ impl<E: Set> World<E> {
     /// Each against an object that stands fast.
     fn advance_fingers(&mut self, time_s: f64) {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
-            let surface_mm = surface_mm(finger.setup(), index, &self.body);
-            let end = finger.solve(|contact: &Contact<_>, from_mm, to_mm| {
-                contact.law().mean_n(from_mm - surface_mm, to_mm - surface_mm)
-            });
-            finger.finish(&end, surface_mm);
+            let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(finger.setup(), index, body));
+            let end =
+                finger.solve(|contact: &Contact<_>, from_mm, to_mm| contact.law().mean_n(from_mm - from, to_mm - to));
+            finger.finish(&end, to);
         }
         if !self.bare {
             self.draw(time_s);
@@ -267,6 +310,10 @@ impl<E: Set> World<E> {
             tangential_n: -finger.contact.n_per_mm_along * along.stretch_mm,
             slip_mm: along.slip_mm,
             object_mm: self.body.place_mm,
+            object_away_mm: self.body.away_mm,
+            disturbed: self.happened.disturbed,
+            defective: self.happened.defective,
+            friction_n: finger.friction_n(),
             ..Truth::default()
         };
         finger.drive.tell(&mut truth);
@@ -280,5 +327,5 @@ impl<E: Set> World<E> {
 
 /// The travel at which a finger's tip meets the object's surface.
 fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
-    setup.wall.distance_mm + side(finger) * body.place_mm[0]
+    setup.wall.distance_mm + side(finger) * body.place_mm[0] + body.away_mm
 }

@@ -70,7 +70,8 @@ impl Host {
     }
 
     fn hold(&mut self, force_mn: i32) {
-        assert_eq!(self.write(address::TARE, &[1]), 0);
+        // Whatever touches the tip, as after a reboot on a contact.
+        assert_eq!(self.write(address::TARE, &[2]), 0);
         self.wait(address::TARE_STATE, 2);
         assert_eq!(self.write(address::TORQUE_ENABLE, &[1]), 0);
         assert_eq!(self.write(address::GOAL_FORCE_MN, &force_mn.to_le_bytes()), 0);

@@ -69,12 +69,13 @@ fn the_creep_term_is_the_best_of_those_tried_on_other_arrays() {
 }
 
 #[test]
-fn calibration_and_the_creep_term_leave_a_fifth_of_a_worn_sensors_error() {
+fn calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
     for seed in 1..=SEEDS {
         let raw = error_mn(&scene(seed, OFF), &native::board);
         let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&scene(seed, creep)));
         println!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
-        assert!((150.0..400.0).contains(&raw) && plain < 0.75 * raw && (20.0..60.0).contains(&crept), "seed {seed}");
+        // Hysteresis is most of what is left: it has the other sign once a step came to rest from above.
+        assert!((150.0..400.0).contains(&raw) && plain < 0.65 * raw && (20.0..90.0).contains(&crept), "seed {seed}");
     }
 }
 

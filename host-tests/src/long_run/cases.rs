@@ -189,7 +189,7 @@ fn baselines() -> Vec<Machine<Array>> {
                 // Ten rows, one a frame: the shortest time after which the same row meets the same frame.
                 for frame in frames.iter().cycle().take(ROWS) {
                     array.read(frame, &config);
-                    array.follow_drift(false);
+                    array.follow_drift(64);
                 }
             }),
             outputs: vec![("sum of the tares", tare_sum, 0)],

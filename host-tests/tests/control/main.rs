@@ -2,11 +2,10 @@
 
 mod drive;
 mod gains;
-mod goal;
+mod grip;
 mod law;
 mod observer;
 mod pace;
-mod release;
 
 use fingertip::config::Config;
 use fingertip::params::Params;

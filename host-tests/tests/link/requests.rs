@@ -52,6 +52,36 @@ fn a_tare_with_or_after_the_clearing_of_a_fault_is_taken() {
     assert_eq!(bench.write(address::TARE, &[1]), RESULT);
 }
 
+/// Every force would read less by what pressed during the tare. The host may insist.
+#[test]
+fn torque_is_refused_after_a_tare_while_something_touched() {
+    let mut bench = Bench::new();
+    let tare = |bench: &mut Bench, value| {
+        let before = bench.server.command().tare_request;
+        assert_eq!(bench.write(address::TARE, &[value]), Ok(()));
+        assert_eq!(bench.server.command().tare_request, before + 1, "{value}");
+        bench.take_up();
+    };
+    bench.status.limits.set(Limits::TARED_TOUCHING);
+    tare(&mut bench, 1);
+    assert!(!bench.server.command().tare_forced);
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), RESULT);
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[0]), Ok(()));
+    // Another tare, which the loop has not begun yet, may be clean: the loop decides.
+    assert_eq!(bench.write(address::TARE, &[1]), Ok(()));
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
+    tare(&mut bench, 2);
+    assert_eq!(bench.write(address::TARE, &[0]), Ok(()), "0 asks for nothing");
+    assert!(bench.server.command().tare_forced);
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
+    assert_eq!(bench.write(address::TARE, &[2]), Err(7), "not while torque is on");
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
+    tare(&mut bench, 1);
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), RESULT, "the next tare is not forced");
+    assert_eq!(bench.write(address::TARE, &[3]), Err(4));
+}
+
 #[test]
 fn torque_and_goals_wait_until_the_fault_is_seen_to_be_cleared() {
     let mut bench = faulted();

@@ -120,6 +120,8 @@ impl Arguments {
         command.bus_watchdog_ms = input.bus_watchdog_ms;
         let [tare, clear, identify] = input.requests;
         command.tare_request = command.tare_request.wrapping_add(tare);
+        // One of four tares is forced.
+        command.tare_forced = command.tare_request.is_multiple_of(4);
         command.clear_request = command.clear_request.wrapping_add(clear);
         command.identify_request = command.identify_request.wrapping_add(identify);
         // Its lowest bits name a task.

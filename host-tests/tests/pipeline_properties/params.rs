@@ -40,6 +40,8 @@ pub fn placed(places: impl IntoIterator<Item = Place>) -> Params {
     apart(&mut params.force_max_mn, &mut params.force_fault_mn, 200_000);
     params.approach_um_per_s = params.approach_um_per_s.min(params.speed_max_um_per_s);
     apart(&mut params.supply_min_mv, &mut params.supply_max_mv, 60_000);
+    // The least supply gives a quarter of the largest voltage.
+    params.voltage_max_mv = params.voltage_max_mv.min(4 * params.supply_min_mv);
     // A curve leaves a code of a kPa at the full range.
     params.codes_per_kpa_milli = params.codes_per_kpa_milli.max(1_000 + params.curve_permille);
     params

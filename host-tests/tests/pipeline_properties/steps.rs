@@ -5,7 +5,7 @@ use crate::params::{any_params, config};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taring};
 use fingertip::shipped::{Pipeline, TARE_FRAMES};
-use fingertip::state::{Fault, Mode};
+use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Newtons};
 use images::record::Digest;
 use proptest::prelude::*;
@@ -22,6 +22,8 @@ struct Run {
     arguments: Arguments,
     before: Status,
     clear_seen: u8,
+    /// A force of at least a contact's was read since the last tare began.
+    touched: bool,
     digest: Digest,
     seen: Seen,
 }
@@ -38,6 +40,7 @@ impl Run {
             arguments: Arguments::new(),
             before: Status::default(),
             clear_seen: 0,
+            touched: false,
             digest: Digest::new(),
             seen: Seen::default(),
         };
@@ -63,6 +66,7 @@ impl Run {
         let clear_before = core::mem::replace(&mut self.clear_seen, self.arguments.command.clear_request);
         let tares = self.arguments.command.tare_request != self.before.taken.tare;
         let identifies = self.arguments.command.identify_request != self.before.taken.identify;
+        let commissions = self.arguments.command.commission_request != self.before.taken.commission;
         let Arguments { frame, sense, command } = &self.arguments;
         let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
@@ -78,28 +82,60 @@ impl Run {
         assert_eq!(status.mode == Mode::Fault, status.fault.is_some());
         if self.before.mode == Mode::Fault {
             let cleared = command.clear_request != clear_before && !command.torque;
-            let mode = if tares { Mode::Tare } else { Mode::Off };
-            let expected = if cleared { (mode, None) } else { (Mode::Fault, self.before.fault) };
-            assert_eq!((status.mode, status.fault), expected);
+            let sound = match status.mode {
+                // What is requested in the same frame may find the next fault.
+                Mode::Fault if cleared => tares || commissions,
+                Mode::Fault => status.fault == self.before.fault,
+                Mode::Tare => cleared && tares,
+                Mode::Commission => cleared && commissions,
+                Mode::Off => cleared && (!tares || status.tare == Taring::Refused),
+                _ => false,
+            };
+            assert!(sound, "{:?} {:?} after {:?}", status.mode, status.fault, self.before.fault);
         }
         // A tare begins or is refused, and a measurement that was asked for runs, waits or is refused: nothing is lost.
         assert_eq!((status.taken.tare, status.taken.clear), (command.tare_request, command.clear_request));
         if tares {
             let faulted = status.mode == Mode::Fault;
-            let expected = if faulted { (Mode::Fault, Taring::Refused) } else { (Mode::Tare, Taring::Running) };
-            assert_eq!((status.mode, status.tare), expected);
+            // What is pressed refuses a tare; the zero before remains.
+            let tared = !self.before.limits.has(Limits::NOT_TARED) && !status.limits.has(Limits::NOT_TARED);
+            let pressed = tared && self.touched && !command.tare_forced;
+            let expected = match status.mode {
+                Mode::Tare => Taring::Running,
+                _ => Taring::Refused,
+            };
+            assert_eq!(status.tare, expected, "{:?}", status.mode);
+            assert!(status.mode == Mode::Tare || faulted || pressed, "{:?} refuses a tare", status.mode);
+            if self.before.mode == Mode::Force && !command.tare_forced {
+                assert_eq!(status.tare, Taring::Refused, "a contact was held");
+            }
         }
+        let least = self.pipeline.config().contact_on;
+        self.touched = status.mode != Mode::Tare && (self.touched || status.contact.force >= least);
         assert_eq!(status.tare == Taring::Running, status.mode == Mode::Tare);
         if identifies && status.taken.identify != command.identify_request {
-            assert!(command.torque && status.mode != Mode::Fault, "waits in {:?}", status.mode);
+            let faulted = status.mode == Mode::Fault && self.before.mode == Mode::Fault;
+            assert!(command.torque && !faulted, "waits in {:?}", status.mode);
         } else if identifies {
             let number = status.identification.number();
-            assert!(if status.mode == Mode::Identify { number == 1 } else { number == 3 }, "{status:?}");
+            // A press that ends in this very frame has its answer; the grip comes with the next one.
+            assert!(if status.mode == Mode::Identify { number > 0 } else { number == 3 }, "{status:?}");
         }
-        // Enabling torque begins with an approach or a release, whatever was asked before.
+        if status.mode == Mode::Identify && !identifies && command.calibrate_request == 0 {
+            assert_eq!(self.before.identification.number(), 1, "a press goes on after its answer: {status:?}");
+        }
+        // Enabling torque begins with what the goal and the touch are, whatever was requested before; a measurement
+        // begins only with its request.
         if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Commission {
-            let wanted = if command.goal > Newtons::ZERO { Mode::Approach } else { Mode::Release };
-            assert_eq!(status.mode, wanted, "first after {:?}", self.before.mode);
+            let sound = match status.mode {
+                Mode::Approach | Mode::Force => command.goal > Newtons::ZERO,
+                // With a goal only where the array's signal vanished: that is released first.
+                Mode::Release => {
+                    command.goal <= Newtons::ZERO || status.contact.force < self.pipeline.config().contact_on
+                }
+                _ => identifies,
+            };
+            assert!(sound, "{:?} first after {:?}", status.mode, self.before.mode);
         }
         let contact = status.contact;
         let tip = self.pipeline.config().tip;

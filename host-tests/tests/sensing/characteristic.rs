@@ -1,6 +1,6 @@
 //! An array whose characteristic is no line: codes to force, drift, bad taxels, and what is refused.
 
-use super::Bench;
+use super::{Bench, drift_weight};
 use fingertip::params::Params;
 use fingertip::pressure::{GAIN_ONE, TARE_BITS};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, ROWS, TARE_FRAMES};
@@ -59,7 +59,7 @@ fn the_baseline_follows_drift_as_by_a_line() {
         }
         for _ in 0..30_000 {
             bench.array.read(&bench.frame, &bench.config);
-            bench.array.follow_drift(false);
+            bench.array.follow_drift(drift_weight());
         }
     }
     let tares = |bench: &Bench| -> Vec<i32> { bench.array.tare().flatten().copied().collect() };
@@ -81,7 +81,7 @@ fn bad_taxels_are_left_out_of_picture_sums_and_baseline() {
     let before: Vec<i32> = bench.array.tare().map(|row| row[4]).collect();
     for _ in 0..ROWS {
         bench.array.read(&bench.frame, &bench.config);
-        bench.array.follow_drift(true);
+        bench.array.follow_drift(1 << 14);
     }
     let after: Vec<i32> = bench.array.tare().map(|row| row[4]).collect();
     assert_eq!(before[4], after[4], "a dead taxel moves no baseline");

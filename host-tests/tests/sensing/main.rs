@@ -6,6 +6,8 @@ use fingertip::contact::Contact;
 use fingertip::contact::from_sums;
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::touch::Touch;
+use fingertip::units::Newtons;
 use sim::plant::{Plant, Setup};
 
 struct Bench {
@@ -44,6 +46,12 @@ impl Bench {
         self.world.place(self.world.setup().wall.distance_mm + indentation_mm);
         self.read()
     }
+}
+
+/// Weight with which the baseline learns a row while nothing touches.
+fn drift_weight() -> u32 {
+    let config = Config::shipped(&Params::DEFAULT).unwrap();
+    Touch::default().learns(Newtons::ZERO, ROWS as u32, &config).expect("it learns")
 }
 
 #[test]
@@ -142,7 +150,7 @@ fn the_baseline_follows_drift_only_when_told() {
     // One time constant of the baseline, 1024 visits to each row.
     for _ in 0..10_240 {
         bench.array.read(&bench.frame, &bench.config);
-        bench.array.follow_drift(false);
+        bench.array.follow_drift(drift_weight());
     }
     let left = f64::from(bench.array.read(&bench.frame, &bench.config).sum) / f64::from(drifted);
     assert!((0.33..0.42).contains(&left), "1/e is left, not {left}");
@@ -162,7 +170,7 @@ fn any_frame_is_taken() {
             let contact = from_sums(bench.array.read(&frame, &bench.config), &bench.config);
             assert!(contact.force.to_bits() >= 0);
             bench.array.continue_tare();
-            bench.array.follow_drift(false);
+            bench.array.follow_drift(drift_weight());
         }
     }
 }

@@ -135,7 +135,7 @@ fn survives<const ROWS: usize, const COLUMNS: usize>() {
                 array.judge_tare(&config);
                 let picture = *array.read(&frames[0], &config);
                 fits.iter_mut().for_each(|fit| _ = fit.read(&picture, &config));
-                array.follow_drift(true);
+                array.follow_drift(1 << 16);
             }
         }
     }

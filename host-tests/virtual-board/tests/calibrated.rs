@@ -4,7 +4,8 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
-    away, read_u8, read_u16, read_u32, reboot, refused, register, running, write_goal, write_u8, write_u16, write_u32,
+    away, let_go, read_u8, read_u16, read_u32, reboot, refused, register, running, write_goal, write_u8, write_u16,
+    write_u32,
 };
 use fingertip::shipped::address;
 use virtual_board::{Options, Rig};
@@ -115,7 +116,7 @@ fn what_is_interrupted_leaves_the_old_gains() {
     assert_eq!((read_u8(&mut rig, address::CALIBRATE_PRESSES), gains(&mut rig, address::GAINS)), (0, before));
     assert_ne!(refused(&mut rig, address::CALIBRATE, 3), 0, "there is nothing to accept");
     // The power goes in the middle of another one.
-    rig.run_ms(500).expect("it runs");
+    let_go(&mut rig);
     tare(&mut rig);
     write_u8(&mut rig, address::CALIBRATE, 1);
     rig.run_ms(600).expect("it runs");

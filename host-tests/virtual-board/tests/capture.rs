@@ -4,7 +4,8 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{
-    away, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8, write_u16,
+    away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8,
+    write_u16,
 };
 use fingertip::capture::{Ended, Replayed, replay};
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
@@ -90,7 +91,7 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     write_u8(&mut rig, address::TORQUE_ENABLE, 1);
     write_goal(&mut rig, 1_000);
     rig.run_ms(60).expect("it runs");
-    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
+    let_go(&mut rig);
     rig.run_ms(300).expect("it runs");
     let missed = read_u32(&mut rig, address::MISSED_FRAMES);
     let before_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
@@ -113,8 +114,7 @@ fn a_press_replays_to_the_bit_also_with_calibrated_gains() {
     println!("the longest loop time: {before_us} us before, {longest_us} us with the capture");
 
     // The same with gains that are not 1.
-    write_u8(&mut rig, address::TORQUE_ENABLE, 0);
-    rig.run_ms(300).expect("it runs");
+    let_go(&mut rig);
     let taxels = [(44, 20_480_u16), (35, 12_288), (0, 8_192), (99, 32_767)];
     for (taxel, gain) in taxels {
         write_u16(&mut rig, address::GAINS + 2 * taxel, gain);

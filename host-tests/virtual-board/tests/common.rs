@@ -46,6 +46,14 @@ pub fn write_goal(rig: &mut Rig, goal_mn: u32) {
     write_u32(rig, address::GOAL_FORCE_MN, goal_mn);
 }
 
+/// Moves back from what is touched, then turns torque off: a tare under load is refused.
+pub fn let_go(rig: &mut Rig) {
+    write_u8(rig, address::TORQUE_ENABLE, 1);
+    write_goal(rig, 0);
+    rig.run_ms(300).expect("it runs");
+    write_u8(rig, address::TORQUE_ENABLE, 0);
+}
+
 pub fn read_u8(rig: &mut Rig, register: u16) -> u8 {
     on_bus(rig, move |bus| bus.read_u8(1, register).map(|reply| reply.data))
 }

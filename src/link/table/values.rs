@@ -12,15 +12,16 @@ use super::Staged;
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Torque enable: refused while a fault or a tripped watchdog stands, and where nobody confirmed which way the motor
-/// goes; off takes the goal back.
+/// Torque enable: refused while a fault or a tripped watchdog stands, where nobody confirmed which way the motor goes,
+/// and after a tare while something touched the tip. Off takes the goal back.
 pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     value: i64,
 ) -> Result<(), StatusError> {
     let on = value != 0;
     let unconfirmed = staged.settings.record.params.direction_confirmed == 0;
-    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed) {
+    let touched = staged.stand.touched(&staged.settings.command);
+    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed || touched) {
         return Err(StatusError::Result);
     }
     let commissioning = staged.stand.commissioning(&staged.settings.command);
@@ -32,6 +33,16 @@ pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
             command.commission_request = Task::Stop.after(command.commission_request);
         }
     }
+    Ok(())
+}
+
+/// Tare: 2 forces torque to be allowed after it.
+pub(super) fn set_tare<const ROWS: usize, const COLUMNS: usize>(
+    staged: &mut Staged<ROWS, COLUMNS>,
+    value: i64,
+) -> Result<(), StatusError> {
+    bump(&mut staged.settings.command.tare_request, value);
+    staged.settings.command.tare_forced = value == 2 || value == 0 && staged.settings.command.tare_forced;
     Ok(())
 }
 

@@ -17,13 +17,14 @@ use cortex_m_semihosting::debug;
 use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
-use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
+use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
 use fingertip::state::{Limits, Mode};
+use fingertip::touch::{Felt, Touch};
 use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
 use images::CORRECTED;
@@ -50,7 +51,8 @@ struct Bench<'a> {
     fits: [Fit; 2],
     depth: Millimetres,
     motion: SpeedLoop,
-    goal: Goal,
+    grip: Grip,
+    touch: Touch,
     reference: Reference,
     limits: Limits,
     duty: Duty,
@@ -130,13 +132,25 @@ extern "C" fn observe(bench: &mut Bench) {
 }
 
 extern "C" fn reference(bench: &mut Bench) {
-    let Bench { config, record, contact, motion, goal, limits, .. } = bench;
-    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, config, limits);
+    let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    touch.observe(
+        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
+        || Millimetres::ZERO,
+        config,
+    );
+    bench.reference =
+        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, config, limits);
 }
 
 extern "C" fn creeping(bench: &mut Bench) {
-    let Bench { curved, record, contact, motion, goal, limits, .. } = bench;
-    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, curved, limits);
+    let Bench { curved, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    touch.observe(
+        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
+        || Millimetres::ZERO,
+        curved,
+    );
+    bench.reference =
+        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, curved, limits);
 }
 
 extern "C" fn follow(bench: &mut Bench) {
@@ -209,7 +223,8 @@ fn main() -> ! {
         fits: [Fit::default(), Fit::default()],
         depth: Millimetres::ZERO,
         motion: SpeedLoop::new(),
-        goal: Goal::default(),
+        grip: Grip::default(),
+        touch: Touch::default(),
         reference: Reference::default(),
         limits: Limits::default(),
         duty: Duty::ZERO,

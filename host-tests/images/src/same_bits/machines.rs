@@ -10,15 +10,16 @@ use fingertip::contact::Contact;
 use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
-use fingertip::control::goal::Goal;
 use fingertip::control::observer::Observer;
 use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
+use fingertip::grip::{Goal, Grip};
 use fingertip::identify::{DepthFit, TravelFit};
 use fingertip::model::{Relaxation, RelaxationState, Tip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
-use fingertip::state::{Limits, Mode};
+use fingertip::state::Limits;
+use fingertip::touch::{Felt, Touch};
 use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Row, Total};
 
@@ -39,7 +40,8 @@ pub struct Machines {
     winding: Winding,
     warmth: Warmth,
     motion: SpeedLoop,
-    goal: Goal,
+    grip: Grip,
+    touch: Touch,
     press: Press,
     pictures: Pictures,
     fit: Fit,
@@ -69,7 +71,8 @@ impl Machines {
             winding: Winding::new(),
             warmth: Warmth::default(),
             motion: SpeedLoop::new(),
-            goal: Goal::default(),
+            grip: Grip::default(),
+            touch: Touch::default(),
             press,
             pictures: Pictures::new(),
             fit: Fit::default(),
@@ -117,7 +120,7 @@ pub const FRAMES: [Step; 6] = [
         add_picture(mix, m.array.read(&m.frame, &m.config));
     }),
     ("Array::follow_drift", |m, s, mix| {
-        m.array.follow_drift(s.share_q32 & 1 == 0);
+        m.array.follow_drift(s.share_q32 & 0x1_ffff);
         if s.words[2] == 0 {
             m.array.continue_tare();
         }
@@ -227,15 +230,22 @@ pub const STEPS: [Step; 22] = [
         }
         mix.add(m.warmth.force(s.force, &m.config).to_bits());
     }),
-    ("Goal::reference", |m, s, mix| {
-        let mode = match s.share_q32 & 3 {
-            0 => Mode::Approach,
-            1 => Mode::Release,
-            _ => Mode::Force,
-        };
+    ("Touch::observe and Grip::reference", |m, s, mix| {
         let contact = Contact { force: s.force, indentation: s.d, ..Contact::default() };
         let (goal, mut limits) = (Newtons::from_bits(s.words[1]), Limits::default());
-        add_reference(mix, m.goal.reference(mode, goal, &contact, &mut m.motion, &m.config, &mut limits));
+        let goal = if s.share_q32 & 3 == 1 { Newtons::ZERO } else { goal };
+        let travel = m.motion.observer.travel;
+        m.touch.observe(
+            &Felt { contact: &contact, summed: Newtons::from_bits(s.words[2]), travel, presses: s.share_q32 & 4 == 0 },
+            || Millimetres::ZERO,
+            &m.config,
+        );
+        let Machines { grip, touch, motion, config, .. } = m;
+        add_reference(
+            mix,
+            grip.reference(&Goal { force: goal, drift: s.force }, &contact, touch, motion, config, &mut limits),
+        );
+        mix.add(m.grip.mode(&m.touch) as u8);
         mix.add(limits.0);
     }),
     ("SpeedLoop::follow", |m, s, mix| {

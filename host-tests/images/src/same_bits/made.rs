@@ -196,7 +196,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         &bounds.acceleration_per_n,
         &bounds.change_per_n,
         &bounds.change_least,
-        &bounds.change_unseen,
+        &bounds.change_free,
         &bounds.change_unsure,
     ] {
         mix.add(*number);

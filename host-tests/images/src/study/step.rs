@@ -7,16 +7,17 @@ use fingertip::command::Command;
 use fingertip::contact::Contact;
 use fingertip::contact::{self, FitLevel};
 use fingertip::control::SpeedLoop;
-use fingertip::control::goal::Goal;
 use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::frame::Sense;
+use fingertip::grip::{Goal, Grip};
 use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
-use fingertip::units::{Celsius, Duty, Newtons};
+use fingertip::touch::{Felt, Touch};
+use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use images::CORRECTED;
 use images::record::Record;
 use static_cell::StaticCell;
@@ -38,7 +39,8 @@ struct Bench<'a> {
     picture: Picture,
     contact: Contact,
     motion: SpeedLoop,
-    goal: Goal,
+    grip: Grip,
+    touch: Touch,
     guard: Guard,
     winding: Winding,
     warmth: Warmth,
@@ -95,8 +97,14 @@ extern "C" fn curved_read(bench: &mut Bench) {
 }
 
 extern "C" fn creeping(bench: &mut Bench) {
-    let Bench { corrected, record, contact, motion, goal, limits, .. } = bench;
-    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, corrected, limits);
+    let Bench { corrected, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    touch.observe(
+        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
+        || Millimetres::ZERO,
+        corrected,
+    );
+    bench.reference =
+        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, corrected, limits);
 }
 
 extern "C" fn warmth(bench: &mut Bench) {
@@ -117,8 +125,14 @@ extern "C" fn observe(bench: &mut Bench) {
 }
 
 extern "C" fn reference(bench: &mut Bench) {
-    let Bench { config, record, contact, motion, goal, limits, .. } = bench;
-    bench.reference = goal.reference(Mode::Force, record.command.goal, contact, motion, config, limits);
+    let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
+    touch.observe(
+        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
+        || Millimetres::ZERO,
+        config,
+    );
+    bench.reference =
+        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, config, limits);
 }
 
 extern "C" fn follow(bench: &mut Bench) {
@@ -137,7 +151,13 @@ extern "C" fn duty(bench: &mut Bench) {
 
 extern "C" fn guard(bench: &mut Bench) {
     let Sense { encoder, .. } = bench.record.sense;
-    let seen = Seen { encoder, force: bench.contact.force, pressing: true, voltage: bench.motion.drive.voltage() };
+    let seen = Seen {
+        encoder,
+        force: bench.contact.force,
+        pressing: true,
+        goal: bench.record.command.goal,
+        voltage: bench.motion.drive.voltage(),
+    };
     if bench.guard.check(&seen, bench.config).is_none() {
         bench.duty = bench.guard.allow(bench.duty, &mut bench.limits);
     }
@@ -157,8 +177,9 @@ impl<'a> Bench<'a> {
             picture: Picture::EMPTY,
             contact: Contact::default(),
             motion: SpeedLoop::new(),
-            goal: Goal::default(),
-            guard: Guard::start(0, config),
+            grip: Grip::default(),
+            touch: Touch::default(),
+            guard: Guard::default(),
             winding: Winding::new(),
             warmth: Warmth::default(),
             drift: Newtons::ZERO,
@@ -219,7 +240,8 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
                 }
             } else {
                 bench.motion = SpeedLoop::new();
-                bench.guard = Guard::start(bench.record.sense.encoder, config);
+                let encoder = bench.record.sense.encoder;
+                bench.guard.start(encoder, encoder, config);
             }
             if drives || !driving {
                 pass_on(*region, kernel, &mut bench);

@@ -19,7 +19,9 @@ mod since;
 mod temperature_drift;
 
 use super::{Metered, Part};
+use crate::events::ArrayEvents;
 use crate::registry::Description;
+use crate::scene::Scene;
 use crate::setup::Array;
 use crate::watch::Cost;
 use fingertip::shipped::{COLUMNS, ROWS};
@@ -137,6 +139,7 @@ pub struct Readout {
     volts_per_siemens: f64,
     codes_per_volt: f64,
     siemens: [Row; ROWS],
+    events: Option<Box<ArrayEvents>>,
 }
 
 impl Readout {
@@ -144,14 +147,28 @@ impl Readout {
     pub fn new(array: &Array) -> Self {
         let volts_per_siemens = array.feedback_ohm * array.drive_v;
         let codes_per_volt = Array::CODES / array.reference_v;
-        Self { array: *array, volts_per_siemens, codes_per_volt, siemens: [[array.preload_siemens; COLUMNS]; ROWS] }
+        let siemens = [[array.preload_siemens; COLUMNS]; ROWS];
+        Self { array: *array, volts_per_siemens, codes_per_volt, siemens, events: None }
+    }
+
+    /// The same with the events of a scene that change a finger's codes.
+    pub fn with_events(self, scene: &Scene, finger: usize) -> Self {
+        Self { events: ArrayEvents::of(scene, finger), ..self }
     }
 
     /// The codes of a slot sampled at a time, its row under these pressures (not looked at where no row is driven).
     #[inline]
     pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
         // A row that no effect may look at between the stages stays in registers all the way.
-        if stages.none() { self.through(&mut (), slot, time_s, kpa) } else { self.through(stages, slot, time_s, kpa) }
+        let mut codes = if stages.none() {
+            self.through(&mut (), slot, time_s, kpa)
+        } else {
+            self.through(stages, slot, time_s, kpa)
+        };
+        if let Some(events) = &mut self.events {
+            events.change(slot, time_s, &mut codes);
+        }
+        codes
     }
 
     #[inline(never)]

@@ -7,7 +7,7 @@
 //! s = centre - centre at rest        T = grip_n_per_mm |s|
 //! margin: the force asked for is at least T / grip_friction, 10 % more once it has to rise
 //! slip:   |s| falls by grip_drop_mm from its farthest while the force stands: the patch springs back as friction falls from
-//!         still to slipping; the force asked for rises by a quarter
+//!         still to slipping; the force asked for rises by a quarter. Only a contact that bears something can slip
 //! ```
 //!
 //! What was asked for is kept until the script lets go. A slip at which friction does not fall shows no drop: only the
@@ -26,6 +26,9 @@ const READ_S: f64 = 0.5e-3;
 const STANDS: f64 = 0.1;
 /// Readings under a standing force that make the centre at rest.
 const RESTS: u32 = 8;
+/// Share of the trusted friction that a contact must bear before a drop counts as a slip. The centre of a contact that
+/// bears less moves by noise alone, and a finger that then presses harder pushes a free object into the other one.
+const BEARS: f64 = 0.25;
 /// What is asked for beyond the margin, and after a slip.
 const AHEAD: f64 = 1.1;
 const AFTER_SLIP: f64 = 1.25;
@@ -128,7 +131,8 @@ impl Grip {
         self.on_mm = reading.travel_mm - self.rest_travel_mm;
         let [x, y] = [0, 1].map(|axis| reading.centre_mm[axis] - self.rest_mm[axis]);
         let shift_mm = (x * x + y * y).sqrt();
-        let dropped = stands && shift_mm < self.farthest_mm - self.drop_mm;
+        let bears = self.n_per_mm * self.farthest_mm >= BEARS * self.friction * goal_n;
+        let dropped = stands && bears && shift_mm < self.farthest_mm - self.drop_mm;
         self.farthest_mm = if dropped { shift_mm } else { self.farthest_mm.max(shift_mm) };
         let needed_n = self.n_per_mm * shift_mm / self.friction;
         let mut asked_n = goal_n;
@@ -189,6 +193,14 @@ mod tests {
         assert!(!grip.judge(1.0, &reading(1.3, 0.8)), "enough");
         assert!(grip.judge(1.0, &reading(1.3, 9.0)));
         assert_eq!(grip.goal_n(1.0), 4.0, "never more than the most");
+    }
+
+    #[test]
+    fn noise_of_a_contact_that_bears_nothing_is_no_slip() {
+        let mut grip = at_rest();
+        assert!(!grip.judge(1.0, &reading(1.0, 0.32)), "less than a quarter of what friction holds");
+        assert!(!grip.judge(1.0, &reading(1.0, 0.2)));
+        assert!(!grip.judge(1.0, &reading(1.0, 0.33)) && grip.judge(1.0, &reading(1.0, 0.2)));
     }
 
     #[test]

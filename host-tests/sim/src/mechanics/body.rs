@@ -1,5 +1,6 @@
 //! An object that can move, and what moves it beside the fingers: weight, a floor, a shaking, and the hand that lifts.
 
+use crate::events::Event;
 use crate::scene::Scene;
 
 /// Standard gravity, mm/s^2.
@@ -12,10 +13,12 @@ pub struct Body {
     pub place_mm: [f64; 2],
     /// mm/s.
     pub speed_mm_per_s: [f64; 2],
+    /// Distance by which events have moved the object's surface away from every finger, mm.
+    pub away_mm: f64,
 }
 
 /// What a scene does to its object.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surroundings {
     /// Until when a floor carries it.
     pub floor_until_s: f64,
@@ -27,6 +30,8 @@ pub struct Surroundings {
     pub lift_mm: f64,
     /// From when to when.
     pub lift_s: [f64; 2],
+    /// Events, in order of time.
+    pub events: Vec<Event>,
 }
 
 impl Surroundings {
@@ -40,6 +45,7 @@ impl Surroundings {
             shake_s: [shake_s, shake_s + object.number("shake_ms") * 1e-3],
             lift_mm: hand.number("lift_mm"),
             lift_s: [lift_s, lift_s + hand.number("lift_s")],
+            events: scene.events.clone(),
         }
     }
 

@@ -31,6 +31,8 @@ pub struct Finger<D, C> {
     circuit: Circuit,
     friction: Friction,
     dt_s: f64,
+    slipped_counts: i32,
+    fallen_v: Option<f64>,
 }
 
 /// What moves, with what holds through the last step: set up alike, a finger goes on from it to the bit.
@@ -81,6 +83,8 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             circuit: Circuit::of(setup, 0.0),
             friction: Friction::default(),
             dt_s: 0.0,
+            slipped_counts: 0,
+            fallen_v: None,
         }
     }
 
@@ -109,6 +113,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
             Bridge::Driven { duty } => duty.clamp(-1.0, 1.0),
         };
         self.circuit = Circuit::of(&self.setup, duty);
+        self.circuit.source_v = self.fallen_v.unwrap_or(self.circuit.source_v);
         self.friction = Friction::default();
         if !self.drive.none() {
             self.drive.circuit(&mut self.circuit);
@@ -188,6 +193,17 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.setup.wall.distance_mm = distance_mm;
     }
 
+    /// Takes in what events have done: counts that the encoder has gained, and the voltage to which the supply has fallen.
+    pub fn happen(&mut self, slipped_counts: i32, fallen_v: Option<f64>) {
+        (self.slipped_counts, self.fallen_v) = (slipped_counts, fallen_v);
+    }
+
+    /// Force at the tip that dry friction and the gear hold without the motor, N.
+    pub fn friction_n(&self) -> f64 {
+        let Friction { holding_nm, load_share, .. } = self.friction;
+        if load_share < 1.0 { holding_nm / (self.mm_per_rad * 1e-3 * (1.0 - load_share)) } else { f64::INFINITY }
+    }
+
     /// Sets its speed.
     pub fn launch(&mut self, mm_per_s: f64) {
         self.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
@@ -226,6 +242,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
         let turns = self.angle_ahead_rad(ahead_s) / TAU;
         let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        let count = count + self.slipped_counts;
         if self.drive.none() { count } else { self.drive.count(count) }
     }
 

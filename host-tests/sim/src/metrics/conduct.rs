@@ -12,9 +12,15 @@ use std::collections::VecDeque;
 const PUSHED_S: f64 = 0.02;
 /// A goal that is taken back counts for this long: so long may the tip need to come out of a thing that yields.
 const TAKEN_BACK_S: f64 = 0.2;
-/// The last part of a goal's time, and the time from which on a goal has one to judge.
+/// Time within which the force must be gone after a stop, where the motor can move, s.
+const STOP_S: f64 = 0.5;
+/// Way of the object between two steps, mm, that counts as a motion.
+const MOVES_MM: f64 = 1e-5;
+/// The last part of a goal's time, and the time from which on a goal has one to judge: since it was asked for, and since
+/// it first touched, as an approach is no hold.
 const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
+const JUDGED_TOUCH_S: f64 = 0.3;
 
 /// What is true at a step.
 #[derive(Clone, Copy, Debug)]
@@ -40,18 +46,39 @@ pub struct Hold {
     pub faulty: bool,
 }
 
-/// One finger's conduct so far.
-#[derive(Clone, Debug)]
-pub struct Conduct {
+/// What the controller's parameters allow.
+#[derive(Clone, Copy, Debug)]
+struct Allowed {
     approach_mm_per_s: f64,
     clearance_mm: f64,
-    travel_limit_mm: f64,
+    travel_mm: f64,
+}
+
+/// One finger's conduct so far.
+#[derive(Clone, Debug, Default)]
+pub struct Conduct {
+    allowed: Allowed,
     goal_n: f64,
+    /// Time since which the goal and an active motor are unchanged.
     since_s: f64,
+    /// Time since which the goal is unchanged and no event disturbed the finger, and that of the first touch since then.
+    quiet_s: f64,
+    touched_s: Option<f64>,
+    torque_off: bool,
     /// The goal that the true force is held against.
     counted_n: f64,
-    contact_s: f64,
+    /// Until then a contact that ended may drive the tip.
+    thrown_s: f64,
+    /// Travel at the first touch, less the object's place.
     touch_mm: Option<f64>,
+    place_mm: f64,
+    nearest_mm: f64,
+    /// Until then the object's push on a finger without a motor is not the controller's.
+    pushed_s: f64,
+    /// Until then a defect may be what presses.
+    defective_s: f64,
+    /// Time of the last stop; none before the first one, and once the object came nearer.
+    stop_s: Option<f64>,
     indentation_max_mm: f64,
     last: VecDeque<Sample>,
     faulty: bool,
@@ -60,6 +87,9 @@ pub struct Conduct {
     pub(super) runaway_mm: f64,
     air_mm_per_s: f64,
     over_force: Vec<AtGoal>,
+    over_force_defective: Vec<AtGoal>,
+    pub(super) stop_force_n: f64,
+    pub(super) disturbed: bool,
 }
 
 /// The goals that are over.
@@ -73,65 +103,100 @@ pub(super) struct Ended {
     pub duty: Option<f64>,
 }
 
-impl Default for Conduct {
+impl Default for Allowed {
     fn default() -> Self {
         Self::of(&Params::DEFAULT)
+    }
+}
+
+impl Allowed {
+    fn of(params: &Params) -> Self {
+        let [approach_mm_per_s, clearance_mm, travel_mm] =
+            [params.approach_um_per_s, params.clearance_um, params.travel_max_um].map(|um| f64::from(um) * 1e-3);
+        Self { approach_mm_per_s, clearance_mm, travel_mm }
     }
 }
 
 impl Conduct {
     /// With the limits that the controller is given.
     pub fn of(params: &Params) -> Self {
-        Self {
-            approach_mm_per_s: f64::from(params.approach_um_per_s) * 1e-3,
-            clearance_mm: f64::from(params.clearance_um) * 1e-3,
-            travel_limit_mm: f64::from(params.travel_max_um) * 1e-3,
-            goal_n: 0.0,
-            since_s: 0.0,
-            counted_n: 0.0,
-            contact_s: f64::NEG_INFINITY,
-            touch_mm: None,
-            indentation_max_mm: 0.0,
-            last: VecDeque::new(),
-            faulty: false,
-            ended: Ended::default(),
-            travel_min_mm: 0.0,
-            runaway_mm: 0.0,
-            air_mm_per_s: 0.0,
-            over_force: Vec::new(),
-        }
+        Self { allowed: Allowed::of(params), ..Self::default() }
     }
 
     /// A control step, from the scene's start on.
     pub(super) fn step(&mut self, step: &Step) {
-        let goal_n = newtons(step.command.goal);
-        if goal_n != self.goal_n {
-            if !trimmed(self.goal_n, goal_n) {
+        let Step { time_s, truth, command, status, .. } = *step;
+        let goal_n = newtons(command.goal);
+        let steps = goal_n != self.goal_n && !trimmed(self.goal_n, goal_n);
+        let restarts = steps || truth.disturbed || command.torque == self.torque_off;
+        if restarts {
+            if !self.last.is_empty() {
                 self.ended = self.ended();
-                self.since_s = step.time_s;
                 self.last.clear();
             }
-            self.goal_n = goal_n;
+            self.quiet_s = time_s;
+            self.touched_s = None;
         }
-        self.faulty |= step.status.fault.is_some();
-        self.press(step);
+        if truth.force_n > 0.0 {
+            self.touched_s.get_or_insert(time_s);
+        }
+        let passive = !command.torque || status.fault.is_some();
+        if steps || passive {
+            self.since_s = time_s;
+        }
+        self.goal_n = goal_n;
+        self.disturbed |= truth.disturbed;
+        self.faulty = status.fault.is_some() || self.faulty && !restarts;
+        let along_mm = if step.finger == 0 { truth.object_mm[0] } else { -truth.object_mm[0] };
+        let place_mm = along_mm + truth.object_away_mm;
+        let came = self.disturbed && place_mm < self.place_mm - MOVES_MM;
+        self.place_mm = place_mm;
+        self.press(step, passive, came);
+        self.stop(step, came);
+        self.torque_off = !command.torque;
         self.go(step);
-        let Step { time_s, truth, .. } = *step;
-        let sample =
-            Sample { time_s, force_n: truth.force_n, travel_mm: truth.travel_mm, duty: duty(step.status.duty) };
-        while self.last.pop_front_if(|first| first.time_s < time_s - LAST_S).is_some() {}
-        self.last.push_back(sample);
+        if !truth.disturbed {
+            let sample = Sample { time_s, force_n: truth.force_n, travel_mm: truth.travel_mm, duty: duty(status.duty) };
+            while self.last.pop_front_if(|first| first.time_s < time_s - LAST_S).is_some() {}
+            self.last.push_back(sample);
+        }
+    }
+
+    /// The true force after a stop: what is left of it though the motor could move, or though friction alone does not
+    /// hold it. A fault is a reason; an object that comes nearer ends the stop.
+    fn stop(&mut self, step: &Step, came: bool) {
+        let Step { time_s, truth, command, status, .. } = *step;
+        let acts_again = status.fault.is_some() || command.torque && self.torque_off;
+        if command.torque && self.goal_n > 0.0 {
+            self.stop_s = Some(time_s);
+        } else if came {
+            self.stop_s = None;
+        } else if acts_again {
+            self.stop_s = self.stop_s.map(|_| time_s);
+        } else if self.stop_s.is_some_and(|stop_s| time_s > stop_s + STOP_S) {
+            let held_n = if command.torque { 0.0 } else { truth.friction_n };
+            self.stop_force_n = self.stop_force_n.max(truth.force_n - held_n);
+        }
     }
 
     /// The true force against the goal. A fault leaves the goal that counted: what was pressed need not be let go
-    /// without a motor.
-    fn press(&mut self, step: &Step) {
-        let over = step.time_s >= self.since_s + TAKEN_BACK_S;
+    /// without a motor. What the object does to a finger without a motor does not count.
+    fn press(&mut self, step: &Step, passive: bool, came: bool) {
+        let Step { time_s, truth, .. } = *step;
+        if passive && (came || time_s < self.pushed_s) {
+            self.pushed_s = time_s + TAKEN_BACK_S;
+        }
+        if truth.defective || passive && time_s < self.defective_s {
+            self.defective_s = time_s + TAKEN_BACK_S;
+        }
+        let over = time_s >= self.since_s + TAKEN_BACK_S;
         if !self.faulty && (self.goal_n > self.counted_n || over) {
             self.counted_n = self.goal_n;
         }
-        if step.truth.force_n > 0.0 {
-            note(&mut self.over_force, AtGoal { goal_n: self.counted_n, value: step.truth.force_n - self.counted_n });
+        if truth.force_n > 0.0 && time_s >= self.pushed_s {
+            let defective = time_s < self.defective_s;
+            let kept = if defective { &mut self.over_force_defective } else { &mut self.over_force };
+            note(kept, AtGoal { goal_n: self.counted_n, value: truth.force_n - self.counted_n });
         }
     }
 
@@ -140,20 +205,24 @@ impl Conduct {
         self.travel_min_mm = self.travel_min_mm.min(truth.travel_mm);
         self.indentation_max_mm = self.indentation_max_mm.max(truth.indentation_mm);
         if truth.force_n > 0.0 {
-            self.contact_s = step.time_s;
-            self.touch_mm.get_or_insert(truth.travel_mm);
-        } else if step.time_s > self.contact_s + PUSHED_S {
+            self.thrown_s = step.time_s + PUSHED_S;
+            self.touch_mm.get_or_insert(truth.travel_mm - self.place_mm);
+        } else if step.time_s > self.thrown_s.max(self.pushed_s) {
             self.air_mm_per_s = self.air_mm_per_s.max(truth.speed_mm_per_s.abs());
         }
-        let rear_mm = self.touch_mm.map_or(0.0, |touch_mm| touch_mm - self.indentation_max_mm) - self.clearance_mm;
-        let beyond_mm = (rear_mm - truth.travel_mm).max(truth.travel_mm - self.travel_limit_mm);
+        self.nearest_mm = self.nearest_mm.min(self.place_mm);
+        let deepest_mm = self.nearest_mm - self.indentation_max_mm;
+        let rear_mm = self.touch_mm.map_or(0.0, |touch_mm| touch_mm + deepest_mm) - self.allowed.clearance_mm;
+        let beyond_mm = (rear_mm - truth.travel_mm).max(truth.travel_mm - self.allowed.travel_mm);
         self.runaway_mm = self.runaway_mm.max(beyond_mm);
     }
 
     /// All goals, the one under way included where it had its time.
     pub(super) fn ended(&self) -> Ended {
         let mut ended = self.ended.clone();
-        if self.last.back().is_none_or(|last| last.time_s < self.since_s + JUDGED_S) {
+        let touched_s = self.touched_s.filter(|_| self.goal_n > 0.0).unwrap_or(self.quiet_s);
+        let judged_s = (self.quiet_s + JUDGED_S).max(touched_s + JUDGED_TOUCH_S);
+        if self.last.back().is_none_or(|last| last.time_s < judged_s) {
             return ended;
         }
         let worse = |known: Option<f64>, value: f64| Some(known.map_or(value, |known| known.max(value)));
@@ -179,9 +248,14 @@ impl Conduct {
         &self.over_force
     }
 
+    /// The same while a defect acts.
+    pub(super) fn over_force_defective(&self) -> &[AtGoal] {
+        &self.over_force_defective
+    }
+
     /// Largest speed without a contact, of the approach speed.
     pub(super) fn air_share(&self) -> f64 {
-        self.air_mm_per_s / self.approach_mm_per_s
+        self.air_mm_per_s / self.allowed.approach_mm_per_s
     }
 }
 

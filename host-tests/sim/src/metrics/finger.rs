@@ -201,7 +201,7 @@ impl Finger {
             self.approach.push([step.time_s, step.truth.travel_mm]);
         }
         if let Some(fault) = status.fault.filter(|fault| self.fault != Some(*fault)) {
-            self.faults += 1;
+            self.faults += u32::from(!step.truth.defective);
             self.first_fault.get_or_insert((fault, step.time_s));
         }
         self.fault = status.fault;

@@ -38,7 +38,7 @@ pub const METRICS: &[Metric] = &[
     metric("travel_max_mm", Largest, "farthest way of the tip from its start", |f| Some(f.travel_max_mm)),
     metric("travel_min_mm", Least, "farthest way of the tip behind its start, below 0", |f| Some(f.conduct.travel_min_mm)),
     metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
-    metric("faults_count", Sum, "faults that stopped the motor", |f| Some(f64::from(f.faults))),
+    metric("faults_count", Sum, "faults that stopped the motor, without those that come while a defect of the events acts or within a second after it", |f| Some(f64::from(f.faults))),
     metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
     metric("fault_ms", FirstFault, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
     metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
@@ -68,23 +68,35 @@ pub const METRICS: &[Metric] = &[
     metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
     metric("runaway_mm", Largest, "farthest way of the tip behind the first touch, beyond the largest indentation and the clearance (before a touch: behind the start, beyond the clearance), or beyond the travel's end", |f| Some(f.conduct.runaway_mm)),
     metric("air_speed_percent", Largest, "largest speed of the tip without a contact, from 20 ms after one ended, of the approach speed", |f| Some(100.0 * f.conduct.air_share())),
-    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is taken back counts for 200 ms, and on behind a fault", |f| largest(&over_force(f)).or(Some(0.0))),
-    metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that was there for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm)),
-    metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that was there for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share)),
-    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that was there for 400 ms; the worst of all", |f| largest(&swings(f))),
-    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or((f.faults > 0).then_some(0.0))),
+    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is taken back counts for 200 ms, and on behind a fault or torque off; what an object does to a finger without a motor does not count", |f| largest(&over_force(f)).or(Some(0.0))),
+    metric("over_force_defective_mn", Largest, "the same while a defect of the events acts and for a second after it; `over_force_mn` leaves that time out", |f| largest(&over_force_defective(f)).or(Some(0.0))),
+    metric("stop_force_mn", Largest, "largest true force later than 0.5 s after a stop (goal 0, or torque off) while it lasts, without faults, and until the object comes nearer or is put back; with torque off less what dry friction and the gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
+    metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that was there for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
+    metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that was there for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
+    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that was there for 400 ms; the worst of all", |f| largest(&swings(f)).or(unjudged(f))),
+    metric("hold_error_mn", Largest, "what the mean of the true force is off the goal in the last 200 ms of one that was there for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
     metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
 ];
 
 /// Those that have a value for each goal.
 pub const BY_GOAL: &[ByGoal] = &[
     ByGoal { name: "over_force_mn", values: over_force },
+    ByGoal { name: "over_force_defective_mn", values: over_force_defective },
     ByGoal { name: "hold_swing_mn", values: swings },
     ByGoal { name: "hold_error_mn", values: errors },
 ];
 
 fn over_force(finger: &Finger) -> Vec<AtGoal> {
     finger.conduct.over_force().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn over_force_defective(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.over_force_defective().iter().map(|at| at.times(1e3)).collect()
+}
+
+/// 0 where events left nothing to judge.
+fn unjudged(finger: &Finger) -> Option<f64> {
+    finger.conduct.disturbed.then_some(0.0)
 }
 
 fn swings(finger: &Finger) -> Vec<AtGoal> {

@@ -30,7 +30,7 @@ impl<E: Set> Bench<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        Ok(Self { board: Board::new(scene, Begun::default())?, sense: Sense::default() })
+        Ok(Self { board: Board::new(&scene.without_events(), Begun::default())?, sense: Sense::default() })
     }
 
     /// Exchanges the world and the array's effects; the controller stays as it is.
@@ -38,11 +38,30 @@ impl<E: Set> Bench<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
-        let before = core::mem::replace(&mut self.board, Board::new(scene, Begun::default())?);
+        let before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
         if let (Some(now), Some(before)) = (self.board.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
         }
         Ok(())
+    }
+
+    /// Copies the bench, so that several futures can begin at one instant. `scene` is the scene of this bench. The copy
+    /// is exact where no effect of the scene has a memory: noise, hysteresis and creep begin again.
+    ///
+    /// # Errors
+    /// The scene cannot be simulated.
+    pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
+        let mut fork = Self::new(scene)?;
+        let (from, to) = (&self.board, &mut fork.board);
+        to.world.fingers_mut()[0].resume(&from.world.fingers()[0].motion());
+        to.world.fingers_mut()[0].place_object(from.world.fingers()[0].setup().wall.distance_mm);
+        let (before, now) = (&from.units[0], &mut to.units[0]);
+        now.pipeline = before.pipeline.clone();
+        (now.frame, now.command, now.next) = (before.frame, before.command, before.next);
+        to.bridges.clone_from(&from.bridges);
+        (to.clock, to.start) = (from.clock, from.start);
+        fork.sense = self.sense;
+        Ok(fork)
     }
 
     fn unit(&self) -> &Unit<E> {

@@ -65,7 +65,7 @@ impl<E: Set> Bus<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        let board = Board::<E>::new(scene, Begun::default())?;
+        let board = Board::<E>::new(&scene.without_events(), Begun::default())?;
         let device = |finger: usize| {
             let flash = Record { id: 1 + finger as u8, params: board.params, ..Record::DEFAULT };
             Device::new(flash, ResetCause::PowerOn, 0.0)

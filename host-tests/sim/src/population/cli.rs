@@ -31,7 +31,7 @@ use std::time::Instant;
 pub struct Args {
     #[command(subcommand)]
     merge: Option<Merge>,
-    /// The population: a file, or one of those that come with the project: careful, ordinary, rough
+    /// The population: a file, or one of those that come with the project: careful, handled, ordinary, rough
     #[arg(required = true)]
     population: Option<String>,
     /// How many fingers the whole has

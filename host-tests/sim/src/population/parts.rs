@@ -1,9 +1,10 @@
 //! From a population's text to what is drawn in it.
 
-use super::draw::Draw;
+use super::draw::{Draw, Drawn};
 use super::file::stem;
 use super::read::{DrawReader, Wrong, number};
-use super::{Counted, Place, Population};
+use super::{Counted, Events, Place, Population};
+use crate::events::{EVENT, KINDS, own_keys};
 use crate::key::{Key, Kind};
 use crate::metrics;
 use crate::registry;
@@ -14,7 +15,7 @@ use std::ops::Range;
 use toml_edit::{Document, Item, Table, TableLike};
 
 /// What a population's file has beside what a scene has, once it extends nothing any more.
-const OWN: [&str; 3] = ["magnitude", "draw", "count"];
+const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
 /// Reads a population that extends nothing any more.
 ///
@@ -40,6 +41,7 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let mut parts = Parts { magnitude: magnitude.unwrap_or(1.0), variables: Vec::new(), keys: Vec::new(), wrong };
     parts.variables(root);
     parts.keys("", root);
+    let events = parts.events(root);
     parts.unused(root);
     let counted = parts.counted(root);
     for name in OWN {
@@ -54,10 +56,20 @@ pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
         errors.sort_by_key(|error| (error.line, error.column));
         return Err(SceneErrors(errors));
     }
+    // Their draws stand in no scene as they are: each event has some of its own.
+    keys.retain(|place: &Place| !place.key.starts_with("events."));
     keys.sort_by_key(|place: &Place| place.at.start);
     let about = root.get("about").and_then(Item::as_str).unwrap_or_default().to_owned();
-    let population =
-        Population { name: stem(file), file: file.into(), about, text: text.into(), variables, places: keys, counted };
+    let population = Population {
+        name: stem(file),
+        file: file.into(),
+        about,
+        text: text.into(),
+        variables,
+        places: keys,
+        events,
+        counted,
+    };
     // What is wrong in it as a scene is told as it stands there: its lines are the same.
     population.finger(1, 0)?;
     Ok(population)
@@ -132,6 +144,57 @@ impl Parts {
         self.keys.push(Place { at, key, whole, draw: Some(draw) });
     }
 
+    /// What is drawn of events: `[events]` with `count` and `at_s`, `[events.KIND]` with `weight` and the kind's keys.
+    fn events(&mut self, root: &Table) -> Option<Events> {
+        let table = root.get("events")?.as_table()?;
+        let own = ["count", "at_s"];
+        let (mut kinds, mut all) = (Vec::new(), Vec::new());
+        for (name, item) in table.iter().filter(|(name, _)| !own.contains(name)) {
+            let known = KINDS.iter().find(|kind| kind.name == name);
+            let (Some(kind), Some(given)) = (known, item.as_table()) else {
+                let names = KINDS.iter().map(|kind| kind.name);
+                let meant =
+                    alike(name, names.clone()).map_or(String::new(), |name| format!("; did you mean `{name}`?"));
+                let allowed = format!("count, at_s, and a table for each of {}", names.collect::<Vec<_>>().join(", "));
+                self.wrong.push((key_span(table, name), format!("`{name}` is no kind of event{meant}"), allowed));
+                continue;
+            };
+            let keys = own_keys(kind);
+            for (name, _) in
+                given.iter().filter(|(name, _)| *name != "weight" && keys.iter().all(|key| key.name != *name))
+            {
+                let allowed = keys.iter().map(|key| key.name).chain(["weight"]).collect::<Vec<_>>().join(", ");
+                let message = format!("unknown key `{name}` in [events.{}]", kind.name);
+                self.wrong.push((key_span(given, name), message, allowed));
+            }
+            for key in keys {
+                let place = self.drawn(given, key.name, &format!("events.{}", kind.name));
+                all.extend(place.map(|place| (kind.name, place)));
+            }
+            let weight = given.get("weight").map_or(Some(1.0), |item| number(item.as_value()?));
+            kinds.push((weight.unwrap_or(0.0), Draw::Always(Drawn::Word(kind.name.into()))));
+        }
+        if kinds.is_empty() {
+            let at = table.span().unwrap_or(0..0);
+            self.wrong.push((at, "[events] names no kind".into(), "[events.tare] and the like".into()));
+        }
+        let [count, at_s] = own.map(|name| self.drawn(table, name, "events"));
+        let kind = Place { at: 0..0, key: "kind".into(), whole: false, draw: Some(Draw::Choice(kinds)) };
+        Some(Events { count: count?, at_s: at_s?, kind, keys: all })
+    }
+
+    /// The draw of a key that must be there.
+    fn drawn(&mut self, table: &Table, name: &str, path: &str) -> Option<Place> {
+        let Some(value) = table.get(name).and_then(Item::as_value) else {
+            let at = table.span().unwrap_or(0..0);
+            self.wrong.push((at, format!("[{path}] lacks `{name}`"), "a value or a draw".into()));
+            return None;
+        };
+        let known = self.keys.len();
+        self.key(format!("{path}.{name}"), value);
+        self.keys.get(known).cloned()
+    }
+
     /// A variable that nothing uses is a mistake.
     fn unused(&mut self, root: &Table) {
         let draws =
@@ -186,16 +249,22 @@ impl Parts {
 fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
     let whole = |table: &Table| {
         let head = table.span()?;
-        let ends = table.iter().filter_map(|(_, item)| Some(item.span()?.end));
+        let ends = table.iter().filter(|(_, item)| !item.is_table()).filter_map(|(_, item)| Some(item.span()?.end));
         Some(head.start..ends.fold(head.end, usize::max))
     };
     match root.get(name) {
-        Some(Item::Table(table)) => whole(table).into_iter().collect(),
+        Some(Item::Table(table)) => {
+            let inner = table.iter().filter_map(|(_, item)| item.as_table());
+            core::iter::once(table).chain(inner).filter_map(whole).collect()
+        }
         Some(Item::ArrayOfTables(tables)) => tables.iter().filter_map(whole).collect(),
         Some(Item::Value(value)) => value.span().map(|at| key_span(root, name).start..at.end).into_iter().collect(),
         _ => Vec::new(),
     }
 }
+
+/// How many events a finger has.
+const COUNT: Key = Key { name: "count", about: "", kind: Kind::Whole { min: 0, max: 100, default: None } };
 
 fn is_table(key: &str) -> bool {
     match key.split_once('.') {
@@ -207,12 +276,16 @@ fn is_table(key: &str) -> bool {
 /// What a key of a scene is, by its path.
 fn described(path: &str) -> Option<&'static Key> {
     let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
-    let table = table.split_once('.').map_or(table, |(first, second)| if first == "effects" { second } else { first });
+    let table = table
+        .split_once('.')
+        .map_or(table, |(first, second)| if ["effects", "events"].contains(&first) { second } else { first });
     let keys = match table {
         "" => ROOT.keys,
         "script" => SCRIPT.keys,
         "expect" => EXPECT.keys,
-        name => match TABLES.iter().find(|table| table.name == name) {
+        "events" if name == "count" => return Some(&COUNT),
+        "event" | "events" => EVENT.keys,
+        name => match TABLES.iter().chain(&KINDS).find(|table| table.name == name) {
             Some(table) => table.keys,
             None => registry::all().find(|effect| effect.name == name)?.keys,
         },

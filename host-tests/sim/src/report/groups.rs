@@ -4,7 +4,7 @@ use crate::metrics::{METRICS, Metric, Verdict};
 
 /// A group's title, and what the names of its metrics begin with.
 const GROUPS: [(&str, &[&str]); 6] = [
-    ("Force", &["peak_force", "overshoot", "rise", "settling", "steady_error", "over_force", "hold_"]),
+    ("Force", &["peak_force", "overshoot", "rise", "settling", "steady_error", "over_force", "stop_force", "hold_"]),
     ("Motion and touch", &["touch", "approach", "travel", "indentation", "runaway", "air_speed", "rest_travel"]),
     ("Faults and limits", &["fault", "limit_", "missed_frames"]),
     ("Sensing", &["force_error", "centre_error", "confidence"]),

@@ -4,8 +4,9 @@
 mod values;
 
 use super::error::{SceneError, SceneErrors, alike};
-use super::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
-use super::{Bound, Event, Scene, controller};
+use super::tables::{EXPECT, MANY, ROOT, SCRIPT, TABLES, Table};
+use super::{Bound, Goal, Scene, controller};
+use crate::events::{EVENT, Event, KINDS};
 use crate::key::Values;
 use crate::metrics;
 use crate::registry::{self, Named};
@@ -59,8 +60,7 @@ impl Reader<'_> {
 
     /// None where a part is missing without which there is no scene; the error is among the others.
     fn scene(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Option<Scene> {
-        let many = [SCRIPT.name, EXPECT.name];
-        let tables = || TABLES.iter().map(|table| table.name).chain(many).chain(["effects"]);
+        let tables = || TABLES.iter().map(|table| table.name).chain(MANY).chain(["effects"]);
         let known = |name: &str| ROOT.keys.iter().any(|key| key.name == name) || tables().any(|table| table == name);
         for (name, item) in root.iter().filter(|(name, _)| !known(name)) {
             let at = key_span(root, name);
@@ -71,8 +71,10 @@ impl Reader<'_> {
         }
         let head = self.values(&ROOT, root, 0..0, true);
         let tables = TABLES.iter().map(|table| (table.name, self.table(table, root))).collect();
-        let script = self.script(root, head.as_ref().map_or(f64::INFINITY, |head| head.number("duration_s")));
+        let duration_s = head.as_ref().map_or(f64::INFINITY, |head| head.number("duration_s"));
+        let script = self.script(root, duration_s);
         let effects = self.effects(root);
+        let events = self.events(root, duration_s, &effects);
         let bounds = self.bounds(root, metrics);
         let head = head?;
         let stem = Path::new(self.file).file_stem().map_or("".into(), |stem| stem.to_string_lossy());
@@ -84,6 +86,7 @@ impl Reader<'_> {
             duration_s: head.number("duration_s"),
             tables,
             script,
+            events,
             effects,
             bounds,
         };
@@ -130,23 +133,52 @@ impl Reader<'_> {
         })
     }
 
-    fn script(&mut self, root: &dyn TableLike, duration_s: f64) -> Vec<Event> {
-        let mut script: Vec<Event> = Vec::new();
+    /// Refuses a time that is not in order or beyond the scene's end.
+    fn time(&mut self, what: &str, given: &dyn TableLike, at_s: f64, before_s: Option<f64>, duration_s: f64) {
+        let at = || item_span(given, "at_s");
+        if let Some(before_s) = before_s.filter(|before_s| *before_s > at_s) {
+            let message = format!("{what} not in order of time: {at_s} s after {before_s} s");
+            self.error(at(), message, format!("at_s of {before_s} or later"));
+        }
+        if at_s > duration_s {
+            let message = format!("this never happens: the scene ends at {duration_s} s");
+            self.error(at(), message, format!("at_s of 0 to {duration_s}"));
+        }
+    }
+
+    fn script(&mut self, root: &dyn TableLike, duration_s: f64) -> Vec<Goal> {
+        let mut script: Vec<Goal> = Vec::new();
         for (given, at) in self.many(&SCRIPT, root) {
             let Some(values) = self.values(&SCRIPT, given, at, false) else { continue };
-            let event = Event { at_s: values.number("at_s"), goal_n: values.number("goal_n") };
-            let at = || item_span(given, "at_s");
-            if let Some(before) = script.last().filter(|before| before.at_s > event.at_s) {
-                let message = format!("the script is not in order of time: {} s after {} s", event.at_s, before.at_s);
-                self.error(at(), message, format!("at_s of {} or later", before.at_s));
-            }
-            if event.at_s > duration_s {
-                let message = format!("this never happens: the scene ends at {duration_s} s");
-                self.error(at(), message, format!("at_s of 0 to {duration_s}"));
-            }
-            script.push(event);
+            let goal = Goal { at_s: values.number("at_s"), goal_n: values.number("goal_n") };
+            self.time("the script is", given, goal.at_s, script.last().map(|before| before.at_s), duration_s);
+            script.push(goal);
         }
         script
+    }
+
+    fn events(&mut self, root: &dyn TableLike, duration_s: f64, effects: &[Named]) -> Vec<Event> {
+        let mut events: Vec<Event> = Vec::new();
+        let massive = |named: &Named| named.effect.name == "object_mass" && named.values.number("mass_g") > 0.0;
+        let movable = effects.iter().any(massive);
+        for (given, at) in self.many(&EVENT, root) {
+            let Some(head) = self.values(&EVENT, given, at.clone(), true) else { continue };
+            let name = head.text("kind");
+            let Some(kind) = KINDS.iter().find(|kind| kind.name == name) else {
+                let names = KINDS.iter().map(|kind| kind.name);
+                self.unknown(&format!("kind of event `{name}`"), name, item_span(given, "kind"), names);
+                continue;
+            };
+            let Some(values) = self.values(kind, given, at, false) else { continue };
+            let event = Event::new(kind, values);
+            self.time("the events are", given, event.at_s, events.last().map(|before| before.at_s), duration_s);
+            if movable && event.moves_object() {
+                let message = format!("`{}` cannot act on an object that the fingers move", kind.name);
+                self.error(item_span(given, "kind"), message, "without a mass in [effects.object_mass]".into());
+            }
+            events.push(event);
+        }
+        events
     }
 
     fn effects(&mut self, root: &dyn TableLike) -> Vec<Named> {

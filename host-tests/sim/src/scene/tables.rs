@@ -1,6 +1,7 @@
 //! The tables of a scene, beside those of the effects. The reader, the errors and the reference page all come from
 //! here.
 
+use crate::events::{EVENT, KINDS};
 use crate::key::{Key, Kind};
 use fingertip::params::Params;
 
@@ -20,12 +21,16 @@ impl Table {
     pub fn title(&self) -> String {
         match self.name {
             "" => "the scene".into(),
-            name if [SCRIPT.name, EXPECT.name].contains(&name) => format!("[[{name}]]"),
+            name if MANY.contains(&name) => format!("[[{name}]]"),
+            name if KINDS.iter().any(|kind| kind.name == name) => format!("[[event]] of kind `{name}`"),
             name if TABLES.iter().any(|table| table.name == name) => format!("[{name}]"),
             name => format!("[effects.{name}]"),
         }
     }
 }
+
+/// The tables that may stand many times.
+pub const MANY: [&str; 3] = [SCRIPT.name, EVENT.name, EXPECT.name];
 
 const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Key {
     Key::number(name, about, min, max, default)
@@ -70,7 +75,7 @@ pub const EXPECT: Table = Table {
         Key { name: "max", about: "The largest, in the metric's unit.", kind: ANY },
         Key {
             name: "max_per_goal_n",
-            about: "How much larger for each N of the goal, of a metric that has a value for each goal: over_force_mn, hold_swing_mn, hold_error_mn.",
+            about: "How much larger for each N of the goal, of a metric that has a value for each goal: over_force_mn, over_force_defective_mn, hold_swing_mn, hold_error_mn.",
             kind: Kind::Optional { min: 0.0, max: 1e6, whole: false },
         },
     ],

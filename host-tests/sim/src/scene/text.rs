@@ -53,9 +53,12 @@ pub fn write(scene: &Scene) -> String {
     for (name, values) in &scene.tables {
         section(&mut text, &format!("[{name}]"), values);
     }
-    for event in &scene.script {
-        let [at_s, goal_n] = [event.at_s, event.goal_n].map(Value::Number);
+    for goal in &scene.script {
+        let [at_s, goal_n] = [goal.at_s, goal.goal_n].map(Value::Number);
         text += &format!("\n[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n");
+    }
+    for event in &scene.events {
+        section(&mut text, "[[event]]", &event.values);
     }
     for named in &scene.effects {
         section(&mut text, &format!("[effects.{}]", named.effect.name), &named.values);

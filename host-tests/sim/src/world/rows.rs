@@ -14,6 +14,7 @@ impl<E: Set> World<E> {
         if since_s < self.dt_s {
             let (before, t) = (&self.body_before, since_s / self.dt_s);
             let (v0, v1) = (before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
+            body.away_mm += (before.away_mm - body.away_mm) * (1.0 - t);
             body.place_mm[0] = before.place_mm[0] + since_s * (v0 + 0.5 * (v1 - v0) * t);
         }
         let finger = &self.fingers[index];

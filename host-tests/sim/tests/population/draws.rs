@@ -118,6 +118,27 @@ fn one_more_draw_leaves_the_others_as_they_are() {
 }
 
 #[test]
+fn events_are_drawn_by_weight_in_order_and_leave_the_other_draws_as_they_are() {
+    let plain = "[object]\ndistance_mm = { uniform = [2, 10] }\n";
+    let few = population(plain);
+    let more = population(&format!(
+        "{plain}[events]\ncount = {{ uniform = [1, 4] }}\nat_s = {{ uniform = [0, 0.06] }}\n[events.tare]\nweight = 3\n\
+         [events.encoder_slip]\nby_counts = {{ uniform = [-9, 9] }}\n"
+    ));
+    let mut kinds = [0; 2];
+    for number in 0..500 {
+        let [few, more] = [&few, &more].map(|population| population.finger(5, number).unwrap());
+        assert_eq!((&few.drawn[0], few.scene.seed), (&more.drawn[0], more.scene.seed));
+        let events = &more.scene.events;
+        assert!((1..=4).contains(&events.len()) && events.is_sorted_by_key(|event| event.at_s));
+        let slips = events.iter().filter(|event| event.values.optional("by_counts").is_some()).count();
+        (kinds[0], kinds[1]) = (kinds[0] + events.len() - slips, kinds[1] + slips);
+    }
+    let share = kinds[1] as f64 / (kinds[0] + kinds[1]) as f64;
+    assert!((share - 0.25).abs() < 0.04, "{share}");
+}
+
+#[test]
 fn draws_are_the_same_for_ever() {
     let population = population(
         r#"
@@ -144,12 +165,14 @@ fn draws_are_the_same_for_ever() {
 
 #[test]
 fn every_finger_of_those_that_come_with_the_project_is_a_scene() {
-    for name in ["careful", "ordinary", "rough"] {
+    for (name, bounds) in [("careful", 9), ("handled", 11), ("ordinary", 9), ("rough", 9)] {
         let population = load(name).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(population.name, name);
         for number in 0..500 {
             let finger = population.finger(11, number).unwrap_or_else(|errors| panic!("{name}: {errors}"));
-            assert_eq!(finger.scene.bounds.len(), 9, "{name}");
+            assert_eq!(finger.scene.bounds.len(), bounds, "{name}");
+            let events = finger.scene.events.len();
+            assert!(if name == "handled" { (3..=8).contains(&events) } else { events == 0 }, "{events} events");
         }
     }
 }
@@ -188,6 +211,6 @@ fn the_pages_example_is_a_population() {
     let example = page.split("```toml\n").nth(1).and_then(|rest| rest.split("```").next()).unwrap();
     let population = sim::population::read("docs/population.md", example).unwrap_or_else(|errors| panic!("{errors}"));
     assert_eq!(population.finger(1, 0).unwrap().drawn.len(), 7);
-    let ordinary = load("ordinary").unwrap().finger(1, 0).unwrap().scene;
-    assert!(ordinary.bounds.iter().all(|bound| page.contains(&format!("| `{}` |", bound.metric))));
+    let handled = load("handled").unwrap().finger(1, 0).unwrap().scene;
+    assert!(handled.bounds.iter().all(|bound| page.contains(&format!("| `{}` |", bound.metric))));
 }

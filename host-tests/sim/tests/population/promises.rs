@@ -32,11 +32,15 @@ struct Made {
     speed_mm_per_s: f64,
     duty: f64,
     fault: Option<Fault>,
+    torque_off: bool,
+    friction_n: f64,
+    object_mm: f64,
+    disturbed: bool,
 }
 
 /// What a perfect finger does, and what is changed in it; the promises that this breaks.
 fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
-    let bounds = load("ordinary").unwrap().finger(1, 0).unwrap().scene.bounds;
+    let bounds = load("handled").unwrap().finger(1, 0).unwrap().scene.bounds;
     let mut meter = Meter::default();
     for steps in 0..=44_000 {
         let time_s = f64::from(steps) * 1e-4;
@@ -51,9 +55,12 @@ fn broken(change: impl Fn(&mut Made)) -> BTreeSet<String> {
             indentation_mm: MM_PER_N * made.force_n.min(made.goal_n),
             travel_mm: made.travel_mm,
             speed_mm_per_s: made.speed_mm_per_s,
+            friction_n: made.friction_n,
+            object_mm: [made.object_mm, 0.0],
+            disturbed: made.disturbed,
             ..Truth::default()
         };
-        let command = Command { goal: newtons((goal_n * 1e3) as i32), torque: true, ..Command::default() };
+        let command = Command { goal: newtons((goal_n * 1e3) as i32), torque: !made.torque_off, ..Command::default() };
         let duty = Duty((made.duty * f64::from(Duty::FULL)).round() as _);
         let status = Status { duty, fault: made.fault, ..Status::default() };
         let (frame, sense) = (&Frame::EMPTY, &Sense::default());
@@ -162,6 +169,35 @@ fn no_rest_after_letting_go() {
         }
     };
     two_sided(wanders, 0.0499, 0.0501, &["rest_travel_um"]);
+}
+
+#[test]
+fn a_stop_that_leaves_a_force() {
+    let stays = |made: &mut Made, until_s: f64| {
+        if made.goal_n == 0.0 && made.since_s < until_s {
+            made.force_n = 0.041;
+        }
+    };
+    two_sided(stays, 0.499, 0.501, &["stop_force_mn"]);
+    let remains = |made: &mut Made, force_n: f64| {
+        if made.goal_n == 0.0 {
+            made.force_n = force_n;
+        }
+    };
+    two_sided(remains, 0.0399, 0.0401, &["stop_force_mn"]);
+    // What friction holds while torque is off is no fault of the controller.
+    let held = |made: &mut Made, friction_n: f64| {
+        made.torque_off = made.time_s > 0.3;
+        (made.disturbed, made.friction_n, made.force_n) = (true, friction_n, made.force_n.min(1.0));
+    };
+    two_sided(held, 0.961, 0.959, &["stop_force_mn"]);
+    // An object that comes nearer ends the stop; a fault is a reason.
+    let pushed = |made: &mut Made, by_mm: f64| {
+        (made.disturbed, made.object_mm) = (made.time_s > 2.2, if made.time_s > 2.4 { by_mm } else { 0.0 });
+        remains(made, if (2.5..3.0).contains(&made.time_s) { 0.1 } else { 0.0 });
+    };
+    two_sided(pushed, -0.1, 0.1, &["stop_force_mn"]);
+    assert!(!broken(|made| (made.fault, made.force_n) = (Some(Fault::RowStuck), 1.0)).contains("stop_force_mn"));
 }
 
 #[test]

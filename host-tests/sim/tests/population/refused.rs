@@ -84,6 +84,20 @@ fn variables_that_are_not_there_not_used_or_of_another_kind() {
 }
 
 #[test]
+fn events_that_cannot_be_drawn() {
+    let events = "[events]\ncount = { uniform = [1, 4] }\nat_s = { uniform = [0, 0.06] }\n";
+    says(&format!("{events}[events.torqe_off]\n"), &["`torqe_off` is no kind of event; did you mean `torque_off`?"]);
+    says(&format!("{events}[events.torque_off]\n"), &["my.toml:6:1: [events.torque_off] lacks `for_s`"]);
+    says(&format!("{events}[events.tare]\nfor_s = 1\n"), &["unknown key `for_s` in [events.tare]", "allowed: weight"]);
+    says("[events]\nat_s = 0.1\n", &["my.toml:3:1: [events] lacks `count`", "[events] names no kind"]);
+    says(
+        &format!("{events}[events.object_move]\nby_mm = {{ uniform = [-99, 1] }}\nspeed_mm_per_s = 10\n"),
+        &["`events.object_move.by_mm` is drawn from -99 to 1", "allowed: number, -20 to 100"],
+    );
+    says("[events]\ncount = 1\nat_s = 7\n[events.tare]\n", &["this never happens: the scene ends at 0.06 s"]);
+}
+
+#[test]
 fn counts_and_bounds_of_metrics_that_are_not_there() {
     says(
         "[[count]]\nmetric = \"rest_duty\"\nabove = 2\n",
@@ -103,7 +117,10 @@ fn counts_and_bounds_of_metrics_that_are_not_there() {
 #[test]
 fn files_that_are_not_there() {
     let error = population::load("ordinry").unwrap_err();
-    assert!(error.contains("did you mean `ordinary`?") && error.contains("careful, ordinary, rough"), "{error}");
+    assert!(
+        error.contains("did you mean `ordinary`?") && error.contains("careful, handled, ordinary, rough"),
+        "{error}"
+    );
 }
 
 #[test]

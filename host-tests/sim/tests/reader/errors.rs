@@ -169,6 +169,30 @@ my.toml:4:8: this never happens: the scene ends at 1 s
 }
 
 #[test]
+fn events_that_cannot_be() {
+    let unknown = error("[[event]]\nat_s = 0.5\nkind = \"torqe_off\"");
+    assert!(unknown.starts_with("my.toml:5:8: unknown kind of event `torqe_off`\n"), "{unknown}");
+    assert!(unknown.contains("allowed: object_move, ") && unknown.ends_with("did you mean `torque_off`?"), "{unknown}");
+    says(
+        "[[event]]\nat_s = 0.5\nkind = \"object_move\"\nby = 1\nspeed_mm_per_s = 10",
+        "
+my.toml:6:1: `by` lacks its unit in [[event]] of kind `object_move`
+  6 | by = 1
+    | ^^
+  allowed: by_mm: number, -20 to 100, required
+  did you mean `by_mm`?",
+    );
+    let tare = |at_s: f64| format!("[[event]]\nat_s = {at_s}\nkind = \"tare\"\n");
+    let order = error(&(tare(0.5) + &tare(0.25)));
+    assert!(order.starts_with("my.toml:7:8: the events are not in order of time: 0.25 s after 0.5 s"), "{order}");
+    assert!(error(&tare(1.5)).starts_with("my.toml:4:8: this never happens: the scene ends at 1 s"));
+    assert!(error("[[event]]\nat_s = 0.5").starts_with("my.toml:3:1: [[event]] lacks `kind`"));
+    assert!(error(&(tare(0.5) + "for_s = 1")).contains("unknown key `for_s` in [[event]] of kind `tare`"));
+    let removed = "[[event]]\nat_s = 0.5\nkind = \"object_removed\"\nfor_s = 0.1\n[effects.object_mass]";
+    assert!(error(removed).starts_with("my.toml:5:8: `object_removed` cannot act on an object that the fingers move"));
+}
+
+#[test]
 fn a_missing_key() {
     says(
         "[[script]]\nat_s = 0.5",

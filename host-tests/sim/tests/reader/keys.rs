@@ -1,6 +1,7 @@
 //! What the keys of the tables and of the effects keep to.
 
 use crate::read_it;
+use sim::events::{EVENT, KINDS};
 use sim::key::{Key, Kind};
 use sim::registry;
 use sim::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES};
@@ -22,10 +23,14 @@ const PLAIN: &[&str] = &[
     "slipping",
     "teeth",
     "grip_friction",
+    "row",
+    "column",
+    "factor",
 ];
 
 fn described() -> Vec<(&'static str, &'static Key)> {
-    let tables = TABLES.iter().chain([&ROOT, &SCRIPT, &EXPECT]).map(|table| (table.name, table.keys));
+    let tables =
+        TABLES.iter().chain([&ROOT, &SCRIPT, &EVENT, &EXPECT]).chain(&KINDS).map(|table| (table.name, table.keys));
     let effects = registry::all().map(|effect| (effect.name, effect.keys));
     tables.chain(effects).flat_map(|(name, keys)| keys.iter().map(move |key| (name, key))).collect()
 }
@@ -54,10 +59,10 @@ fn the_unit_shown_is_the_one_that_the_name_ends_with() {
         ("%", "percent"),
         ("^", ""),
     ];
-    const SHORT: [&str; 33] = [
-        "at", "axis", "dead", "drop", "fast", "from", "gain", "gear", "goal", "grip", "hold", "inl", "lift", "lost",
-        "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag", "slew", "step", "tau",
-        "time", "x", "y", "zero",
+    const SHORT: [&str; 36] = [
+        "at", "axis", "by", "dead", "drop", "fast", "for", "from", "gain", "gear", "goal", "grip", "hold", "inl",
+        "lift", "lost", "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag",
+        "slew", "step", "tau", "time", "to", "x", "y", "zero",
     ];
     const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
     let mut compound = 0;

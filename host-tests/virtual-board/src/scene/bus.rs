@@ -1,5 +1,7 @@
 //! What the scene's host sends and reads: goals out, status registers in.
 
+use fingertip::command::Command;
+use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::link::Reply;
 use fingertip::link::packet::instruction;
@@ -9,12 +11,13 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond};
+use sim::events::Request;
 
 /// The board's address on the bus.
 pub const ID: u8 = 1;
 /// Time of a byte at 3 Mbaud, rounded up.
 pub const BYTE_NS: u64 = 3_334;
-/// Bytes of a goal's packet.
+/// Bytes of a goal's packet, the longest that is written.
 pub const GOAL_BYTES: u64 = 16;
 /// Bytes of a read's packet.
 pub const READ_BYTES: u64 = 14;
@@ -22,11 +25,34 @@ pub const READ_BYTES: u64 = 14;
 const FROM: u16 = address::PRESENT_MODE;
 const BYTES: u16 = address::SUPPLY_MV - FROM;
 
-/// A packet that asks for a force.
-pub fn goal(goal_mn: i32) -> Vec<u8> {
-    let [low, high] = address::GOAL_FORCE_MN.to_le_bytes();
-    let [a, b, c, d] = goal_mn.to_le_bytes();
-    packet(instruction::WRITE, &[low, high, a, b, c, d])
+/// What a packet writes into the board.
+#[derive(Clone, Copy, Debug)]
+pub enum Write {
+    /// A goal, mN.
+    Goal(i32),
+    /// A request of an event.
+    Request(Request),
+}
+
+impl Write {
+    /// The packet that writes it.
+    pub fn packet(self) -> Vec<u8> {
+        let (register, value) = match self {
+            Self::Goal(goal_mn) => (address::GOAL_FORCE_MN, goal_mn.to_le_bytes().to_vec()),
+            Self::Request(Request::Torque(on)) => (address::TORQUE_ENABLE, vec![on.into()]),
+            Self::Request(Request::Tare) => (address::TARE, vec![1]),
+            Self::Request(Request::Clear) => (address::CLEAR_FAULT, vec![1]),
+        };
+        packet(instruction::WRITE, &[&register.to_le_bytes()[..], &value].concat())
+    }
+
+    /// Puts it into the command that the board then has.
+    pub fn apply(self, command: &mut Command) {
+        match self {
+            Self::Goal(goal_mn) => command.goal = newtons(goal_mn),
+            Self::Request(request) => request.apply(command),
+        }
+    }
 }
 
 /// A packet that asks for the status registers.
@@ -76,7 +102,7 @@ fn status(bytes: &[u8]) -> Option<Status> {
         fault: fault(byte(address::FAULT)?),
         limits: Limits(half(address::LIMITS)?),
         contact: Contact {
-            force: fingertip::config::newtons(word(address::PRESENT_FORCE_MN)?),
+            force: newtons(word(address::PRESENT_FORCE_MN)?),
             indentation: mm(address::INDENTATION_UM)?,
             centre_x: mm(address::CENTRE_X_UM)?,
             centre_y: mm(address::CENTRE_Y_UM)?,

@@ -107,21 +107,21 @@ impl Finger {
         }
         let world = World::new(&setup, &Surroundings::of(scene), effects);
         let joints = Joint::all(scene, world, moves_from_s)?;
-        let finger = |(joint, sensor)| Self {
+        let finger = |(number, (joint, sensor))| Self {
             clock,
             wants_pressures: false,
             bridge: Bridge::Coast,
             from_s: moves_from_s,
             joint,
             sensor,
-            readout: Readout::new(&setup.array),
+            readout: Readout::new(&setup.array).with_events(scene, number),
             reference_v: setup.array.reference_v,
             expected: VecDeque::new(),
             sampled: VecDeque::new(),
             frame: Frame::EMPTY,
             seen: Vec::new(),
         };
-        Ok(joints.into_iter().zip(sensors).map(finger).collect())
+        Ok(joints.into_iter().zip(sensors).enumerate().map(finger).collect())
     }
 
     /// These slots are to come, with the rows driven in them. They may be asked for later than they begin, when the

@@ -6,11 +6,10 @@
 //! frame that it was made from.
 
 use super::MS;
-use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener, READ_BYTES};
+use super::bus::{self, BYTE_NS, GOAL_BYTES, Listener, READ_BYTES, Write};
 use super::finger::{Clock, Seen};
 use crate::wire::{TimedByte, Wire};
 use fingertip::command::Command;
-use fingertip::config::newtons;
 use fingertip::pipeline::Status;
 use fingertip::state::Limits;
 use sim::effects::link::Named;
@@ -39,12 +38,12 @@ const LOOKS: f64 = 4_000.0;
 /// Frames that are kept until an answer speaks of them.
 const FRAMES: usize = 128;
 
-/// A goal on its way.
+/// A goal or a request on its way.
 #[derive(Clone, Copy, Debug)]
-struct Goal {
+struct Sent {
     /// Its last byte arrives then.
     arrives_ns: u64,
-    goal_mn: i32,
+    write: Write,
 }
 
 /// A read that is not answered yet.
@@ -87,7 +86,7 @@ pub struct Host {
     start_ns: u64,
     watchdog_ns: u64,
     /// On their way or not yet taken by a step, in order.
-    goals: VecDeque<Goal>,
+    sent: VecDeque<Sent>,
     /// When the last of them is through.
     line_free_ns: u64,
     /// When requests of the grip are to arrive.
@@ -130,7 +129,7 @@ impl Host {
             clock: Clock::new(start_ns),
             start_ns,
             watchdog_ns: watchdog_ms * MS,
-            goals: VecDeque::new(),
+            sent: VecDeque::new(),
             line_free_ns: 0,
             asks_ns: VecDeque::new(),
             asked: None,
@@ -225,8 +224,8 @@ impl Host {
         }
         (self.newest, self.shown_ns) = (seen.number, now_ns);
         let at_ns = self.clock.at_ns(seen.time_s);
-        while let Some(goal) = self.goals.pop_front_if(|goal| goal.arrives_ns <= at_ns) {
-            self.command.goal = newtons(goal.goal_mn);
+        while let Some(sent) = self.sent.pop_front_if(|sent| sent.arrives_ns <= at_ns) {
+            sent.write.apply(&mut self.command);
         }
         self.shown.push(Shown { finger: self.finger, seen, command: self.command, status: self.status });
     }
@@ -234,12 +233,11 @@ impl Host {
     fn send(&mut self, now_ns: u64, next_ns: u64, wire: &mut Wire) {
         let until_s = self.clock.time_s(next_ns + GOAL_NS);
         while let Some((arrives_s, goal_n)) = self.host.arrival(until_s, &mut self.link) {
-            // Ends when it is to arrive; the line carries one packet after another.
-            let from_ns = self.clock.at_ns(arrives_s).saturating_sub(GOAL_NS).max(self.line_free_ns).max(now_ns);
             let goal_mn = (goal_n * 1e3 + 0.5).floor() as i32;
-            self.line_free_ns = from_ns + GOAL_NS + GAP_NS;
-            self.goals.push_back(Goal { arrives_ns: from_ns + GOAL_NS, goal_mn });
-            wire.send(from_ns, &bus::goal(goal_mn));
+            self.write(self.clock.at_ns(arrives_s), now_ns, Write::Goal(goal_mn), wire);
+        }
+        while let Some(request) = self.host.request(until_s) {
+            self.write(now_ns, now_ns, Write::Request(request), wire);
         }
         if now_ns >= self.start_ns {
             let (now_s, until_s) = (self.clock.time_s(now_ns), self.clock.time_s(next_ns));
@@ -254,6 +252,14 @@ impl Host {
                 self.line_free_ns = asked.at_ns + REQUEST_NS + GAP_NS;
             }
         }
+    }
+
+    /// Writes so that it arrives at an instant; the line carries one packet after another.
+    fn write(&mut self, at_ns: u64, now_ns: u64, write: Write, wire: &mut Wire) {
+        let from_ns = at_ns.saturating_sub(GOAL_NS).max(self.line_free_ns).max(now_ns);
+        self.line_free_ns = from_ns + GOAL_NS + GAP_NS;
+        self.sent.push_back(Sent { arrives_ns: from_ns + GOAL_NS, write });
+        wire.send(from_ns, &write.packet());
     }
 
     /// A read that goes out before the next turn, if one is due and the line is free for it.
@@ -274,7 +280,7 @@ impl Host {
 
     /// From when the line is free of goals for as long as a read takes.
     fn free_from_ns(&self, mut at_ns: u64) -> u64 {
-        for Goal { arrives_ns, .. } in &self.goals {
+        for Sent { arrives_ns, .. } in &self.sent {
             if at_ns < arrives_ns + GAP_NS && arrives_ns - GOAL_NS < at_ns + READ_NS {
                 at_ns = arrives_ns + GAP_NS;
             }
@@ -291,10 +297,10 @@ impl Host {
         if self.watchdog_ns == 0 || now_ns < self.start_ns {
             return due;
         }
-        let arrived = self.goals.iter().rfind(|goal| (now_ns..next_ns).contains(&goal.arrives_ns));
-        if let Some(goal) = arrived {
-            self.heard_ns = goal.arrives_ns;
-            return Some(goal.arrives_ns);
+        let arrived = self.sent.iter().rfind(|sent| (now_ns..next_ns).contains(&sent.arrives_ns));
+        if let Some(sent) = arrived {
+            self.heard_ns = sent.arrives_ns;
+            return Some(sent.arrives_ns);
         }
         if now_ns < self.heard_ns + 2 * self.watchdog_ns + 20 * MS {
             return None;

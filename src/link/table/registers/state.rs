@@ -10,12 +10,12 @@ macro_rules! state {
             256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
                 |view, _| goal_mn(view.settings().command.goal) as u32,
                 set_goal;
-            /// 1 measures the zero of every taxel; nothing may touch the tip: where something seems to, limit 10 says
-            /// so until the next tare. Refused with a result error in fault, but for one that is cleared in the same
-            /// write or was just before. Reads 0.
-            260 TARE: U8 TorqueOff, "" * 1, 0 to 1 = 0,
+            /// 1 measures the zero of every taxel; nothing may touch the tip: where something seems to, limit 10 is set
+            /// and torque is refused until the next tare. 2 does the same, and allows torque whatever touches. Refused
+            /// with a result error in fault, but for one that is cleared in the same write or was just before. Reads 0.
+            260 TARE: U8 TorqueOff, "" * 1, 0 to 2 = 0,
                 |_, _| 0,
-                |staged, value| { bump(&mut staged.settings.command.tare_request, value); Ok(()) };
+                set_tare;
             /// 1 clears the fault. Reads 0.
             261 CLEAR_FAULT: U8 ReadWrite, "" * 1, 0 to 1 = 0,
                 |_, _| 0,
@@ -70,7 +70,7 @@ macro_rules! state {
             /// Share of the supply at the motor; positive presses the tip into the object.
             294 DUTY_PERMILLE: I16 ReadOnly, "permille" * 1, -1000 to 1000,
                 |view, _| permille(view.snapshot.status.duty) as u32;
-            /// Tip travel since torque was enabled.
+            /// Tip travel from where torque was first enabled.
             296 TRAVEL_UM: I32 ReadOnly, "um" * 1, -128_000 to 128_000,
                 |view, _| thousandths(view.snapshot.status.travel.to_bits(), 24) as u32;
             /// Tip speed.

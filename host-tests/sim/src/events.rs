@@ -1,0 +1,305 @@
+//! Events of a scene: what happens to the finger, to its object and to what its controller is given.
+//!
+//! An event acts at one of three places, and both boards share all of them: the world moves the object, slips the
+//! encoder and lowers the supply; the readout changes the array's codes; the host sends requests or falls silent.
+//! Every event acts on all fingers of the scene.
+
+use crate::effects::stream;
+use crate::key::{Key, Kind, Values};
+use crate::scene::Scene;
+use crate::scene::tables::Table;
+use core::f64::consts::TAU;
+use fastrand::Rng;
+use fingertip::command::Command;
+use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
+
+/// Largest code of the converter.
+const CODE_MAX: i64 = 4095;
+/// Times of the requests for a tare and for a recovery after their event's start, s: torque off, the request itself, torque
+/// on. The controller accepts both requests with torque off only.
+const TARE_S: [f64; 3] = [0.0, 0.02, 0.1];
+const RECOVER_S: [f64; 3] = [0.0, 0.02, 0.04];
+/// Time that the controller needs afterwards, s: until then the finger is not judged as undisturbed.
+const REQUEST_S: f64 = 0.02;
+/// Time after a defect for which it may still be the cause of a fault, s.
+const AFTERMATH_S: f64 = 1.0;
+
+const fn number(name: &'static str, about: &'static str, min: f64, max: f64) -> Key {
+    Key { name, about, kind: Kind::Number { min, max, default: None } }
+}
+
+const fn whole(name: &'static str, about: &'static str, min: i64, max: i64) -> Key {
+    Key { name, about, kind: Kind::Whole { min, max, default: None } }
+}
+
+const AT: Key = number("at_s", "Time of the event, from the start.", 0.0, 1e6);
+const FOR: Key = number("for_s", "Duration of the event.", 0.0, 1e6);
+const KIND: Key = Key { name: "kind", about: "Kind of the event, one of those below.", kind: Kind::Text };
+const ROW: Key = whole("row", "Row of the array.", 0, ROWS as i64 - 1);
+const CODE: Key = whole("to_codes", "Code that is read instead.", 0, CODE_MAX);
+
+/// What every event has.
+pub const EVENT: Table = Table {
+    name: "event",
+    about: "What happens to the finger, to its object or to its controller, in order of time; may stand many times. Each kind has \
+            keys of its own.",
+    keys: &[AT, KIND],
+};
+
+/// The kinds of events with their keys. The kinds before `FIRST_DEFECT` are handling, which a sound finger must master.
+/// The others are defects: a fault is a legitimate answer to them.
+#[rustfmt::skip]
+pub const KINDS: [Table; 15] = [
+    Table { name: "object_move", about: "The object moves along the finger's motion and stays there.", keys: &[AT, KIND,
+        number("by_mm", "Way of the object. Negative moves it towards the (first) finger.", -20.0, 100.0),
+        number("speed_mm_per_s", "Speed of the object.", 0.1, 1000.0)] },
+    Table { name: "object_oscillate", about: "The object moves to and fro along the finger's motion, for as many whole periods as fit.", keys: &[AT, KIND,
+        number("amplitude_mm", "Amplitude of the sine.", 0.0, 5.0),
+        number("rate_hz", "Frequency.", 1.0, 10.0), FOR] },
+    Table { name: "object_removed", about: "The object is taken away, then put back. Where the tip stands in its way, it is pushed back at 20 mm/s.", keys: &[AT, KIND, FOR] },
+    Table { name: "torque_off", about: "The host disables torque, then enables it again.", keys: &[AT, KIND, FOR] },
+    Table { name: "tare", about: "The host tares: torque off, after 20 ms a tare, after 100 ms torque on.", keys: &[AT, KIND] },
+    Table { name: "recover", about: "The host clears a fault: torque off, after 20 ms clear, after 40 ms torque on.", keys: &[AT, KIND] },
+    Table { name: "encoder_slip", about: "The encoder loses or gains counts, for good.", keys: &[AT, KIND,
+        whole("by_counts", "Counts that are added.", -100_000, 100_000)] },
+    Table { name: "brown_out", about: "The supply falls to a voltage.", keys: &[AT, KIND,
+        number("to_v", "Voltage of the source.", 0.0, 60.0), FOR] },
+    Table { name: "taxel_stuck", about: "A taxel reads one code.", keys: &[AT, KIND, ROW,
+        whole("column", "Column of the array.", 0, COLUMNS as i64 - 1), CODE, FOR] },
+    Table { name: "row_stuck", about: "All taxels of a row read one code.", keys: &[AT, KIND, ROW, CODE, FOR] },
+    Table { name: "gain_change", about: "All taxels change their gain: what pressure adds to a code is multiplied.", keys: &[AT, KIND,
+        number("factor", "Factor of the gain.", 0.0, 10.0), FOR] },
+    Table { name: "array_blank", about: "The array reads as it did without contact, before the scene began.", keys: &[AT, KIND, FOR] },
+    Table { name: "array_frozen", about: "The array repeats its last codes.", keys: &[AT, KIND, FOR] },
+    Table { name: "interference", about: "All codes are random.", keys: &[AT, KIND, FOR] },
+    Table { name: "host_silent", about: "The host sends nothing.", keys: &[AT, KIND, FOR] },
+];
+const FIRST_DEFECT: usize = 6;
+
+/// The keys of a kind behind `at_s` and `kind`, which every event has.
+pub fn own_keys(kind: &Table) -> &'static [Key] {
+    &kind.keys[EVENT.keys.len()..]
+}
+
+/// An event.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// Start of the event, from the scene's start.
+    pub at_s: f64,
+    /// End of what it does.
+    pub until_s: f64,
+    /// Its values as the scene gives them.
+    pub values: Values,
+    defect: bool,
+    what: What,
+}
+
+/// What an event does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum What {
+    Move { by_mm: f64 },
+    Oscillate { amplitude_mm: f64, rate_hz: f64 },
+    Removed,
+    TorqueOff,
+    Tare,
+    Recover,
+    Slip { counts: i32 },
+    Supply { volts: f64 },
+    Array(Defect),
+    Silent,
+}
+
+/// What an event does to the array's codes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Defect {
+    Stuck { row: usize, column: Option<usize>, code: u16 },
+    Gain { factor: f64 },
+    Blank,
+    Frozen,
+    Random,
+}
+
+impl Event {
+    /// An event of a kind with the checked values of its table.
+    pub fn new(kind: &Table, values: Values) -> Self {
+        let (at_s, number) = (values.number("at_s"), |name: &str| values.number(name));
+        let stuck = |column| Defect::Stuck { row: number("row") as usize, column, code: number("to_codes") as u16 };
+        let for_s = values.optional("for_s").unwrap_or_default();
+        let (what, for_s) = match kind.name {
+            "object_move" => (What::Move { by_mm: number("by_mm") }, number("by_mm").abs() / number("speed_mm_per_s")),
+            "object_oscillate" => {
+                let rate_hz = number("rate_hz");
+                let periods = (for_s * rate_hz + 1e-9).floor();
+                (What::Oscillate { amplitude_mm: number("amplitude_mm"), rate_hz }, periods / rate_hz)
+            }
+            "object_removed" => (What::Removed, for_s),
+            "torque_off" => (What::TorqueOff, for_s),
+            "tare" => (What::Tare, TARE_S[2] + REQUEST_S),
+            "recover" => (What::Recover, RECOVER_S[2] + REQUEST_S),
+            "encoder_slip" => (What::Slip { counts: number("by_counts") as i32 }, 0.0),
+            "brown_out" => (What::Supply { volts: number("to_v") }, for_s),
+            "taxel_stuck" => (What::Array(stuck(Some(number("column") as usize))), for_s),
+            "row_stuck" => (What::Array(stuck(None)), for_s),
+            "gain_change" => (What::Array(Defect::Gain { factor: number("factor") }), for_s),
+            "array_blank" => (What::Array(Defect::Blank), for_s),
+            "array_frozen" => (What::Array(Defect::Frozen), for_s),
+            "interference" => (What::Array(Defect::Random), for_s),
+            _ => (What::Silent, for_s),
+        };
+        let defect = KINDS.iter().skip(FIRST_DEFECT).any(|table| table.name == kind.name);
+        Self { at_s, until_s: at_s + for_s, values, defect, what }
+    }
+
+    fn active(&self, time_s: f64) -> bool {
+        (self.at_s..self.until_s).contains(&time_s)
+    }
+
+    /// True for an event that moves or removes the object.
+    pub fn moves_object(&self) -> bool {
+        matches!(self.what, What::Move { .. } | What::Oscillate { .. } | What::Removed)
+    }
+}
+
+/// The world as its events leave it at a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Happened {
+    /// Place of an object that stands fast, along the first finger's motion.
+    pub object_mm: f64,
+    /// Its speed.
+    pub object_mm_per_s: f64,
+    /// True while the object is taken away.
+    pub object_gone: bool,
+    /// Counts that the encoder has gained.
+    pub slipped_counts: i32,
+    /// Voltage to which the supply has fallen.
+    pub supply_v: Option<f64>,
+    /// True while an event acts on the finger, its object or its controller.
+    pub disturbed: bool,
+    /// True while a defect acts and for a second after it.
+    pub defective: bool,
+}
+
+impl Happened {
+    /// What a scene's events have done to the world by a time.
+    pub fn at(events: &[Event], time_s: f64) -> Self {
+        let mut now = Self::default();
+        for event in events.iter().take_while(|event| event.at_s <= time_s) {
+            let (active, since_s) = (event.active(time_s), time_s - event.at_s);
+            match event.what {
+                What::Move { by_mm } if active => {
+                    let mm_per_s = by_mm / (event.until_s - event.at_s);
+                    now.object_mm += mm_per_s * since_s;
+                    now.object_mm_per_s += mm_per_s;
+                }
+                What::Move { by_mm } => now.object_mm += by_mm,
+                What::Oscillate { amplitude_mm, rate_hz } if active => {
+                    let (sin, cos) = (libm::sin(TAU * rate_hz * since_s), libm::cos(TAU * rate_hz * since_s));
+                    now.object_mm += amplitude_mm * sin;
+                    now.object_mm_per_s += amplitude_mm * TAU * rate_hz * cos;
+                }
+                What::Removed => now.object_gone |= active,
+                What::Slip { counts } => now.slipped_counts += counts,
+                What::Supply { volts } if active => now.supply_v = Some(volts),
+                _ => {}
+            }
+            now.disturbed |= active;
+            now.defective |= event.defect && time_s < event.until_s + AFTERMATH_S;
+        }
+        now
+    }
+}
+
+/// Defects of one finger's array. It keeps the codes that some of them repeat.
+#[derive(Clone, Debug)]
+pub struct ArrayEvents {
+    events: Vec<Event>,
+    untouched: [[u16; COLUMNS]; SLOTS],
+    last: [[u16; COLUMNS]; SLOTS],
+    rng: Rng,
+}
+
+impl ArrayEvents {
+    /// Those of a scene; `None` where it names none.
+    pub fn of(scene: &Scene, finger: usize) -> Option<Box<Self>> {
+        let events = scene.events.iter().filter(|event| matches!(event.what, What::Array(_)));
+        let events: Vec<Event> = events.cloned().collect();
+        let codes = [[0; COLUMNS]; SLOTS];
+        let rng = Rng::with_seed(stream(scene.seed, "interference", finger));
+        (!events.is_empty()).then(|| Box::new(Self { events, untouched: codes, last: codes, rng }))
+    }
+
+    /// Changes the codes of a slot that was sampled at a time.
+    pub fn change(&mut self, slot: usize, time_s: f64, codes: &mut [u16; COLUMNS]) {
+        if time_s < 0.0 {
+            self.untouched[slot] = *codes;
+        }
+        for event in self.events.iter().filter(|event| event.active(time_s)) {
+            match event.what {
+                What::Array(Defect::Stuck { row, column, code }) if row == slot => match column {
+                    Some(column) => codes[column] = code,
+                    None => codes.fill(code),
+                },
+                What::Array(Defect::Gain { factor }) => {
+                    for (code, untouched) in codes.iter_mut().zip(self.untouched[slot]) {
+                        let [code_now, rest] = [*code, untouched].map(f64::from);
+                        *code = (rest + factor * (code_now - rest)).clamp(0.0, CODE_MAX as f64) as u16;
+                    }
+                }
+                What::Array(Defect::Blank) => *codes = self.untouched[slot],
+                What::Array(Defect::Frozen) => *codes = self.last[slot],
+                What::Array(Defect::Random) => codes.fill_with(|| self.rng.u16(0..=CODE_MAX as u16)),
+                _ => {}
+            }
+        }
+        self.last[slot] = *codes;
+    }
+}
+
+/// A request of the host beside a goal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Enables or disables torque.
+    Torque(bool),
+    /// Requests a tare.
+    Tare,
+    /// Clears a fault.
+    Clear,
+}
+
+impl Request {
+    /// The requests of a scene's events, in order of time.
+    pub fn all(events: &[Event]) -> Vec<(f64, Self)> {
+        let asked = |at_s: f64, after_s: [f64; 3], request: Self| {
+            let requests = [Self::Torque(false), request, Self::Torque(true)];
+            after_s.map(|after_s| at_s + after_s).into_iter().zip(requests)
+        };
+        let mut all = Vec::new();
+        for event in events {
+            match event.what {
+                What::TorqueOff => {
+                    all.extend([(event.at_s, Self::Torque(false)), (event.until_s, Self::Torque(true))]);
+                }
+                What::Tare => all.extend(asked(event.at_s, TARE_S, Self::Tare)),
+                What::Recover => all.extend(asked(event.at_s, RECOVER_S, Self::Clear)),
+                _ => {}
+            }
+        }
+        all.sort_by(|(a_s, _), (b_s, _)| a_s.total_cmp(b_s));
+        all
+    }
+
+    /// Puts the request into a command.
+    pub fn apply(self, command: &mut Command) {
+        match self {
+            Self::Torque(on) => command.torque = on,
+            Self::Tare => command.tare_request = command.tare_request.wrapping_add(1),
+            Self::Clear => command.clear_request = command.clear_request.wrapping_add(1),
+        }
+    }
+}
+
+/// The times in which the host sends nothing.
+pub fn silences(events: &[Event]) -> Vec<[f64; 2]> {
+    let silent = events.iter().filter(|event| event.what == What::Silent);
+    silent.map(|event| [event.at_s, event.until_s]).collect()
+}

@@ -1,0 +1,121 @@
+//! One event at each of many instants of a press: torque off, goal 0, a fault of the bridge, a lost signal, a silent bus.
+//!
+//! Every 20th of the 2,000 instants is tried. `INSTANTS_STEP=1` tries all:
+//! `INSTANTS_STEP=1 cargo test -p sim --profile host --test corners instants -- --nocapture`
+
+use crate::{
+    Case, Finger, LOSSES, begun, force_n, judge, most_n, number, object, run_with, scene, set_goal, show, touch_s,
+};
+use fingertip::shipped::Frame;
+use sim::cores;
+use sim::scene::Scene;
+
+/// Instants of the press for each goal.
+const INSTANTS: u64 = 500;
+
+/// From the touch to the last instant, s.
+const AFTER_TOUCH_S: f64 = 0.3;
+
+/// Time watched after the event, s.
+const WATCHED_S: f64 = 0.5;
+
+const GOALS_N: [f64; 4] = [0.5, 1.0, 3.0, 7.0];
+
+/// Compliance of the objects, mm/N: a wall and a soft one.
+const OBJECTS_MM_PER_N: [f64; 2] = [0.0, 1.0];
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    TorqueOff,
+    GoalZero,
+    BridgeFault,
+    LostSignal,
+    SilentBus,
+}
+
+impl Event {
+    const ALL: [Self; 5] = [Self::TorqueOff, Self::GoalZero, Self::BridgeFault, Self::LostSignal, Self::SilentBus];
+
+    /// Lets it happen to a copy of the finger; returns the largest true force until the end, N.
+    fn happens(self, finger: &Finger, scene: &Scene, blank: &Frame) -> f64 {
+        let mut finger = finger.fork(scene).unwrap_or_else(|error| panic!("{error}"));
+        match self {
+            Self::TorqueOff => finger.command().torque = false,
+            Self::GoalZero => set_goal(&mut finger, 0.0),
+            Self::SilentBus => finger.command().bus_watchdog_ms = 100,
+            Self::BridgeFault | Self::LostSignal => {}
+        }
+        run_with(&mut finger, WATCHED_S, |record| match self {
+            Self::BridgeFault => record.sense.bridge_fault = true,
+            Self::LostSignal => show(record, blank),
+            Self::SilentBus => record.sense.bus_silent_ms = 200,
+            Self::TorqueOff | Self::GoalZero => {}
+        })
+    }
+}
+
+/// The largest force after each event in one press, with the time after the touch. `first` and `every` choose the
+/// instants.
+fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64); Event::ALL.len()] {
+    let tables = object(2.0, yield_mm_per_n) + LOSSES;
+    let (scene, approach_s) = (scene(&tables), touch_s(&tables, goal_n));
+    let mut finger = begun(&scene);
+    let (blank, begun_s) = (*finger.frame(), finger.time_s());
+    set_goal(&mut finger, goal_n);
+    let mut worst = [(0.0, 0.0); Event::ALL.len()];
+    for instant in (first..INSTANTS).step_by(every as usize) {
+        let at_s = (approach_s + AFTER_TOUCH_S) * instant as f64 / INSTANTS as f64;
+        while finger.time_s() < begun_s + at_s {
+            finger.step();
+        }
+        for (event, worst) in Event::ALL.into_iter().zip(&mut worst) {
+            let peak_n = event.happens(&finger, &scene, &blank).max(force_n(&mut finger));
+            if peak_n > worst.0 {
+                *worst = (peak_n, at_s - approach_s);
+            }
+        }
+    }
+    worst
+}
+
+#[test]
+fn an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
+    let every = number("INSTANTS_STEP", 20).clamp(1, INSTANTS);
+    let presses: Vec<_> =
+        GOALS_N.into_iter().flat_map(|goal_n| OBJECTS_MM_PER_N.map(|object| (goal_n, object))).collect();
+    // Each press tries other instants, so that few of them cover the time more densely.
+    let worst = cores::map(presses.iter().enumerate(), |(number, (goal_n, object))| {
+        press(*goal_n, *object, every * number as u64 / presses.len() as u64, every)
+    });
+    let mut cases = Vec::new();
+    println!("largest true force, N (time after the touch, s)");
+    for (index, event) in Event::ALL.into_iter().enumerate() {
+        for object in OBJECTS_MM_PER_N {
+            let mut line = format!("{:11} {object} mm/N", format!("{event:?}"));
+            for ((goal_n, _), worst) in presses.iter().zip(&worst).filter(|((_, yields), _)| *yields == object) {
+                let (peak_n, at_s) = worst[index];
+                line += &format!("  {goal_n} N: {peak_n:6.3} ({at_s:+.3})");
+                // The bridge is open after its fault: the motor coasts, and nothing can stop it.
+                let most_n = if event == Event::BridgeFault { f64::INFINITY } else { most_n(*goal_n) };
+                let what = format!("{event:?} {at_s:+.4} s from the touch, goal {goal_n} N, {object} mm/N");
+                cases.push(Case::new(what, peak_n, most_n));
+            }
+            println!("{line}");
+        }
+    }
+    judge("events at many instants", "N", &cases);
+}
+
+/// The copies above are exact.
+#[test]
+fn a_copy_of_a_finger_goes_on_to_the_bit() {
+    let scene = scene(&(object(2.0, 1.0) + LOSSES));
+    let mut finger = begun(&scene);
+    crate::press(&mut finger, 3.0, 0.09);
+    let mut copy = finger.fork(&scene).unwrap();
+    for frame in 0..3_000 {
+        assert_eq!(finger.step(), copy.step(), "frame {frame}");
+        assert!(finger.record() == copy.record() && finger.truth() == copy.truth(), "frame {frame}");
+    }
+    assert!(force_n(&mut finger) > 2.5);
+}

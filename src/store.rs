@@ -10,7 +10,7 @@
 //!
 //! All little-endian; FF up to the next multiple of 16. The number of a name is its CRC-32, so a firmware with other
 //! values takes those that it knows. Behind the parameters come the taxels' gains, two in a value, under the numbers from
-//! [`gains_number`] on; they are left out where all are 1. A record before these, "FTIP", is read too, where its values are this firmware's.
+//! [`gains_number`] on; they are left out where all are 1.
 //!
 //! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So
 //! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
@@ -19,7 +19,6 @@
 mod format;
 mod journal;
 mod names;
-mod old;
 mod taken;
 
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};

@@ -1,7 +1,7 @@
 //! A record's bytes.
 
 use super::names::{COUNT, NUMBERS, gains_number, gains_stand_apart};
-use super::{CRC, Record, old};
+use super::{CRC, Record};
 use crate::pressure::Gains;
 
 const MAGIC: [u8; 4] = *b"FTPR";
@@ -57,41 +57,19 @@ pub fn words<const ROWS: usize, const COLUMNS: usize>(
 /// A whole record in flash.
 #[derive(Clone, Copy)]
 pub struct Found<'a> {
-    /// None in an old record: any other is newer.
-    pub sequence: Option<u32>,
+    /// Number of the record: each is one more than the one before.
+    pub sequence: u32,
     /// From its start to where the next may begin.
     pub bytes: usize,
-    values: Values<'a>,
-}
-
-#[derive(Clone, Copy)]
-enum Values<'a> {
-    Named(&'a [[u8; 8]]),
-    Old(&'a [u8; 4], &'a [[u8; 4]]),
+    values: &'a [[u8; 8]],
 }
 
 impl Found<'_> {
     /// Numbers and values.
     pub fn values(&self) -> impl Iterator<Item = (u32, i32)> {
-        (0..).map_while(|place| self.values.get(place))
-    }
-}
-
-impl Values<'_> {
-    fn get(&self, place: usize) -> Option<(u32, i32)> {
-        match self {
-            Self::Named(pairs) => {
-                let [a, b, c, d, e, f, g, h] = *pairs.get(place)?;
-                Some((u32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h])))
-            }
-            Self::Old(head, params) => {
-                let value = match head.get(place) {
-                    Some(byte) => i32::from(*byte),
-                    None => i32::from_le_bytes(*params.get(place - head.len())?),
-                };
-                Some((*NUMBERS.get(place)?, value))
-            }
-        }
+        self.values
+            .iter()
+            .map(|&[a, b, c, d, e, f, g, h]| (u32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h])))
     }
 }
 
@@ -99,10 +77,6 @@ impl Values<'_> {
 pub fn read(bytes: &[u8]) -> Option<Found<'_>> {
     let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
     let [magic, sequence, count] = *header.as_chunks().0 else { return None };
-    if magic == old::MAGIC {
-        let (head, params) = old::read(bytes)?;
-        return Some(Found { sequence: None, bytes: old::BYTES, values: Values::Old(head, params) });
-    }
     let count = u32::from_le_bytes(count) as usize;
     if magic != MAGIC || count > VALUES_MAX {
         return None;
@@ -110,8 +84,8 @@ pub fn read(bytes: &[u8]) -> Option<Found<'_>> {
     let (values, check) = rest.split_at_checked(8 * count)?;
     let body = bytes.get(..HEADER_BYTES + values.len())?;
     let whole = check.first_chunk() == Some(&CRC.checksum(body).to_le_bytes());
-    let values = Values::Named(values.as_chunks().0);
-    whole.then_some(Found { sequence: Some(u32::from_le_bytes(sequence)), bytes: slot_bytes(count), values })
+    let values = values.as_chunks().0;
+    whole.then_some(Found { sequence: u32::from_le_bytes(sequence), bytes: slot_bytes(count), values })
 }
 
 /// Where the last thing in the sector ends: all behind it is blank.

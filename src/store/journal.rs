@@ -86,11 +86,11 @@ impl Journal {
     pub fn new(flash: &impl Flash) -> Self {
         let [a, b] = [Sector::A, Sector::B].map(|sector| Stand::of(flash.bytes(sector)));
         let b_is_newer = match (a.newest, b.newest) {
-            (Some(a), Some(b)) => newer(b.sequence, a.sequence),
+            (Some(a), Some(b)) => b.sequence.wrapping_sub(a.sequence).cast_signed() > 0,
             (a, b) => a.is_none() && b.is_some(),
         };
         let (current, stands) = if b_is_newer { (Sector::B, [b, a]) } else { (Sector::A, [a, b]) };
-        let sequence = stands[0].newest.and_then(|newest| newest.sequence).unwrap_or(0);
+        let sequence = stands[0].newest.map_or(0, |newest| newest.sequence);
         Self { current, sequence, stands }
     }
 
@@ -170,7 +170,7 @@ impl Journal {
         if written.is_ok() {
             let end = start + length;
             self.sequence = sequence;
-            self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence: Some(sequence) }) };
+            self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence }) };
         } else {
             // Whatever became of it, the next goes behind it.
             *self = Self::new(flash);
@@ -211,7 +211,7 @@ struct Stand {
 struct Whole {
     start: usize,
     end: usize,
-    sequence: Option<u32>,
+    sequence: u32,
 }
 
 impl Stand {
@@ -222,13 +222,5 @@ impl Stand {
             Some(Whole { start, end: start + bytes, sequence })
         });
         Self { end: newest.map_or(end, |newest| newest.end.max(end)), newest }
-    }
-}
-
-/// None is the sequence of an old record.
-fn newer(one: Option<u32>, other: Option<u32>) -> bool {
-    match (one, other) {
-        (Some(one), Some(other)) => one.wrapping_sub(other).cast_signed() > 0,
-        (one, other) => one.is_some() && other.is_none(),
     }
 }

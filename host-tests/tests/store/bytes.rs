@@ -1,6 +1,6 @@
 //! A record's bytes, and what is never taken for a record.
 
-use crate::fleet::{crc32, named, names, of_before, of_values};
+use crate::fleet::{crc32, named, names, of_values};
 use crate::nor::{Nor, bits, record};
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector};
@@ -100,32 +100,6 @@ fn the_sequence_tells_which_sector_is_newer_also_where_it_wraps() {
         assert_eq!(journal.save(&mut nor, &record(4), || ()), Ok(()));
         assert_eq!(nor.bytes(Sector::A)[SLOT_BYTES + 4..][..4], first.wrapping_add(3).to_le_bytes());
     }
-}
-
-#[test]
-fn the_format_before_is_read_and_is_older_than_any() {
-    let old = of_before(&record(5));
-    assert_eq!(start(&old), Loaded { record: record(5), sound: true });
-    // Its fingerprint: of another firmware's parameters it is not taken.
-    for place in 0..old.len() {
-        let mut other = old.clone();
-        other[place] ^= 1;
-        assert_eq!(start(&other).sound, place >= 136, "byte {place}");
-    }
-    let mut nor = Nor::blank(SIZE);
-    nor.sector(Sector::A)[..old.len()].copy_from_slice(&old);
-    nor.sector(Sector::B)[..SLOT_BYTES].copy_from_slice(&encode(&record(6), u32::MAX));
-    assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(6), sound: true });
-    let mut journal = Journal::new(&nor);
-    assert_eq!(journal.save(&mut nor, &record(7), || ()), Ok(()));
-    assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(7), sound: true });
-}
-
-/// Where this fails, the parameters have changed: then no firmware of that format has records that can be read any
-/// more, and its reader can go.
-#[test]
-fn the_fingerprint_of_the_format_before_is_the_one_that_boards_have() {
-    assert_eq!(of_before(&record(5))[4..8], 0x794F_976C_u32.to_le_bytes());
 }
 
 #[test]

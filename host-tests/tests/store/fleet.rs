@@ -1,4 +1,4 @@
-//! What other firmware left in the flash: the format before this one, and other parameters.
+//! What firmware with other parameters left in the flash.
 
 use crate::nor::record;
 use fingertip::params::Params;
@@ -49,28 +49,11 @@ pub fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
     finish(bytes)
 }
 
-/// Parameters of the format before this one: the first so many.
-pub const BEFORE: usize = 30;
-
-/// A record of the format before this one.
-pub fn of_before(record: &Record) -> Vec<u8> {
-    // The fit level had another name.
-    let names: String = names().iter().take(4 + BEFORE).map(|name| format!("{name}\n")).collect();
-    let names = names.replace("fit_level", "effort");
-    let mut bytes = b"FTIP".to_vec();
-    bytes.extend(crc32(names.as_bytes()).to_le_bytes());
-    bytes.extend([record.id, record.baud_code, record.return_delay_2us, record.fit_level as u8]);
-    bytes.extend(record.params.to_array().into_iter().take(BEFORE).flat_map(i32::to_le_bytes));
-    finish(bytes)
-}
-
 /// How another firmware's records differ.
 #[derive(Clone, Copy, Debug)]
 pub enum Other {
     /// Nothing: they are this one's.
     None,
-    /// The format before.
-    Before,
     /// It has one parameter more.
     More,
     /// It has one fewer.
@@ -79,7 +62,7 @@ pub enum Other {
     Renamed,
 }
 
-pub const OTHERS: [Other; 5] = [Other::None, Other::Before, Other::More, Other::Fewer, Other::Renamed];
+pub const OTHERS: [Other; 4] = [Other::None, Other::More, Other::Fewer, Other::Renamed];
 
 /// The parameter that others lack.
 pub const LACKED: &str = "clearance_um";
@@ -95,7 +78,6 @@ impl Other {
         let place = values.iter().position(|(name, _)| *name == LACKED).expect("there is such a parameter");
         match self {
             Self::None => (of_values(&values, sequence), whole),
-            Self::Before => (of_before(&whole), whole),
             Self::More => {
                 values.insert(place, ("one_more", -5));
                 (of_values(&values, sequence), whole)

@@ -1,6 +1,6 @@
 //! What a firmware takes of another firmware's values, and what it says of the rest.
 
-use crate::fleet::{BEFORE, LACKED, OTHERS, Other, crc32, named, of_values};
+use crate::fleet::{LACKED, OTHERS, Other, crc32, named, of_values};
 use crate::nor::{Nor, record, with_gains};
 use fingertip::params::{ParamError, Params};
 use fingertip::shipped::{Config, Gains, Loaded, Record};
@@ -22,7 +22,6 @@ fn a_changed_layout_is_no_fault_and_every_known_value_is_taken() {
         assert_eq!(loaded, Loaded { record: expected, sound: true }, "{other:?}");
         let expected = match other {
             Other::None => vec![],
-            Other::Before => Params::RANGES[BEFORE..].iter().map(|(name, ..)| Remark::New(name)).collect(),
             Other::More => vec![Remark::Unknown { number: number("one_more"), value: -5 }],
             Other::Fewer => vec![Remark::New(LACKED)],
             Other::Renamed => {

@@ -131,20 +131,18 @@ fn a_changed_layout_torn_twice_leaves_the_old_or_the_new_values() {
             let board = Board::new(Nor::new([a, vec![0xFF; SIZE]]), newest);
             cases_of += tear_twice(&board, SIZE / 4, 12)[0];
         }
-        // Both sectors full: only firmware with this format has that.
-        if !matches!(other, Other::Before) {
-            let (a, _) = sector(SIZE, 2 * SLOTS, 1, other);
-            let (b, newest) = sector(SIZE, 2 * SLOTS, 50, other);
-            let mut board = Board::new(Nor::new([a, b]), newest);
-            for cut in cuts(&ops(&board), SIZE / 4, 1, true) {
-                let mut torn = board.clone();
-                go(&mut torn, Some(cut), 100);
-                torn.start(None);
-                cases_of += 1;
-            }
-            go(&mut board, None, 100);
-            assert_eq!(board.kept, Some(record(100)));
+        // Both sectors full.
+        let (a, _) = sector(SIZE, 2 * SLOTS, 1, other);
+        let (b, newest) = sector(SIZE, 2 * SLOTS, 50, other);
+        let mut board = Board::new(Nor::new([a, b]), newest);
+        for cut in cuts(&ops(&board), SIZE / 4, 1, true) {
+            let mut torn = board.clone();
+            go(&mut torn, Some(cut), 100);
+            torn.start(None);
+            cases_of += 1;
         }
+        go(&mut board, None, 100);
+        assert_eq!(board.kept, Some(record(100)));
         println!("{cases_of} cases of {other:?}");
         sum += cases_of;
     }

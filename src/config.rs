@@ -130,6 +130,8 @@ pub struct Config {
     pub speed_max: MillimetresPerSecond,
     /// See [`Params::approach_um_per_s`].
     pub approach: MillimetresPerSecond,
+    /// Distance to the goal from which on the profile is not faster than that.
+    pub near: Millimetres,
     /// See [`Params::travel_max_um`].
     pub travel_max: Millimetres,
     /// See [`Params::clearance_um`].
@@ -260,6 +262,9 @@ impl Config {
             duty_gain: wide(duty_gain).min(u32::MAX.into()) as u32,
             speed_max: speed(p.speed_max_um_per_s),
             approach: speed(p.approach_um_per_s),
+            near: Millimetres(I8F24::from_bits(narrow(
+                p.approach_um_per_s as f32 * 1e-3 / paces[0].slope_per_s as f32 * exp2(24),
+            ))),
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,

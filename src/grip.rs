@@ -148,6 +148,8 @@ impl Grip {
                 MillimetresPerSecond(config.approach.0 + config.approach.0 / 4)
             }
             (true, true) => config.speed_max,
+            // So near the goal the profile is slower than an approach.
+            (true, false) if distance <= config.near => config.speed_max,
             (true, false) => stopping_speed(held, sensed, config).min(config.speed_max).max(config.approach),
         };
         // An approach must come to the contact, however little is left.

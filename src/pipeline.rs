@@ -167,9 +167,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             goal: command.goal,
             voltage: self.motion.drive.voltage(),
         };
-        if !drives && self.tared {
-            self.guard.observe(&seen, &self.config);
-        }
+        let unsafe_motion = if drives || self.tared { self.guard.check(&seen, drives, &self.config) } else { None };
         if !drives && !matches!(self.activity, Activity::Tare { .. }) {
             return None;
         }
@@ -179,7 +177,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if let Some(fault) = monitor::array_broken(picture, &self.config) {
             return Some(fault);
         }
-        let unsafe_motion = if drives { self.guard.check(&seen, &self.config) } else { None };
         let pressed = self.guard.presses_in();
         let view = View { picture, contact, pressed, sense, motion: &self.motion, command };
         self.monitor.check(&view, drives, &self.config).or(unsafe_motion)

@@ -114,7 +114,7 @@ fn no_input_opens_an_end() {
                 goal: newtons(rng.i32(-1..8_000)),
                 voltage: rng.i32(..) >> rng.u32(0..8),
             };
-            let fault = guard.check(&seen, &config);
+            let fault = guard.check(&seen, true, &config);
             let [forward, backward] = lets_through(&guard);
             let travel = travel_mm(&guard);
             rear.frame(travel, seen.force, &config);
@@ -144,7 +144,7 @@ fn only_a_push_takes_the_rear_end_along() {
             let force = newtons(force_mn);
             let encoder = counts(travel_mm, &config);
             let fault =
-                guard.check(&Seen { encoder, force, pressing: false, goal: Newtons::ZERO, voltage: 0 }, &config);
+                guard.check(&Seen { encoder, force, pressing: false, goal: Newtons::ZERO, voltage: 0 }, true, &config);
             (fault, lets_through(&guard)[1])
         };
         // The tip goes back slowly. The force comes when the tip is back, or is constant from the start.
@@ -212,7 +212,7 @@ fn no_duty_makes_it_fast_in_the_air() {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let force = newtons(offset_mn).max(newtons(rng.i32(-20..20)));
             let seen = Seen { encoder, force, pressing: rng.bool(), goal: Newtons::ZERO, voltage };
-            if guard.check(&seen, &config).is_some() {
+            if guard.check(&seen, true, &config).is_some() {
                 stopped += 1;
                 break;
             }
@@ -255,7 +255,7 @@ fn a_sound_finger_is_never_stopped_for_its_direction() {
             let encoder = (finger.travel_mm / count_mm(&config)).floor() as i32;
             let seen =
                 Seen { encoder, force: newtons((1e3 * sensed) as i32), pressing: true, goal: Newtons::ZERO, voltage };
-            match guard.check(&seen, &config) {
+            match guard.check(&seen, true, &config) {
                 Some(Fault::Runaway) => break,
                 None => {}
                 fault => panic!("{fault:?} at {} mm, {} mm/s", finger.travel_mm, finger.speed_mm_per_s),
@@ -281,6 +281,7 @@ fn the_wrong_way_ends_within_half_a_millimetre() {
                 let encoder = (turns * finger.travel_mm / count_mm(&config)).floor() as i32;
                 let fault = guard.check(
                     &Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage },
+                    true,
                     &config,
                 );
                 voltage = finger.frame(&guard, &config, 1.0, 0.0, &mut rng);
@@ -308,7 +309,7 @@ fn a_touch_bounds_the_retreat() {
         let mut guard = started(0, &config);
         let at = |travel_mm: f64, force: Newtons, guard: &mut Guard| {
             let seen = Seen { encoder: counts(travel_mm, &config), force, pressing, goal: Newtons::ZERO, voltage: 0 };
-            guard.check(&seen, &config)
+            guard.check(&seen, true, &config)
         };
         // Forward slowly, then 1 N at 10 mm and its indentation, then back into the air.
         let depth_mm: f64 = config.tip.indentation(newtons(1_000)).0.to_num();

@@ -39,7 +39,7 @@ impl Finger {
         let voltage = (damping * self.speed_mm_per_s * 256.0) as i32 + beyond;
         let encoder = (self.travel_mm / count_mm).round() as i32;
         let seen = Seen { encoder, force: self.force, pressing: self.pressing, goal: Newtons::ZERO, voltage };
-        self.guard.check(&seen, &self.config)
+        self.guard.check(&seen, true, &self.config)
     }
 
     fn frame(&mut self) -> Option<Fault> {
@@ -272,7 +272,7 @@ fn a_jump_before_torque_is_forgotten() {
         let seen = Seen { encoder, force: Newtons::ZERO, pressing: true, goal: Newtons::ZERO, voltage: 0 };
         // 1 ms at rest.
         for _ in 0..10 {
-            finger.guard.observe(&seen, &finger.config);
+            finger.guard.check(&seen, false, &finger.config);
         }
         finger.guard.start(encoder, encoder, &finger.config);
         // 40 m/s^2 up to 160 mm/s.

@@ -84,8 +84,9 @@ pub struct Guard {
     /// Whether this touch has its surface.
     placed: bool,
     presses: bool,
-    /// Mean force, Q16 N.
+    /// Mean force, Q16 N, and the indentation that it means.
     force: i32,
+    depth: Millimetres,
     /// Speeds by the encoder, quick and slow, Q16 mm/s.
     speed: i32,
     slow_speed: i32,
@@ -134,21 +135,18 @@ impl Guard {
         };
     }
 
-    /// Takes a frame while the motor is not driven.
-    #[inline(never)]
-    pub fn observe(&mut self, seen: &Seen, config: &Config) {
+    /// Takes a frame: what is to stop the motor, where it is driven.
+    #[inline(always)]
+    pub fn check(&mut self, seen: &Seen, driven: bool, config: &Config) -> Option<Fault> {
         self.measure(seen, config);
-        self.touch(true, config.tip.indentation(Newtons::from_bits(self.force)), config);
-    }
-
-    /// Takes a frame: what is to stop the motor.
-    pub fn check(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
-        self.measure(seen, config);
+        self.depth = config.tip.indentation(Newtons::from_bits(self.force));
+        self.touch(seen.pressing, config);
+        if !driven {
+            return None;
+        }
         let frame_ns = config.timing.frame_ns;
-        // As the mean force means; what is pressed is where it touched, or deeper, and the deeper the more force.
-        let depth = config.tip.indentation(Newtons::from_bits(self.force));
-        self.touch(seen.pressing, depth, config);
-        let pressed = [self.pressed(DEEPER, depth), self.pressed(DEEPER_BACK, depth)];
+        // What is pressed is where it touched, or deeper, and the deeper the more force.
+        let pressed = [self.pressed(DEEPER), self.pressed(DEEPER_BACK)];
         self.presses = pressed[1];
         for (loose_ns, pressed) in self.loose_ns.iter_mut().zip(pressed) {
             *loose_ns = if pressed { 0 } else { loose_ns.saturating_add(frame_ns) };
@@ -191,11 +189,11 @@ impl Guard {
         Millimetres::from_bits(self.travel)
     }
 
-    fn pressed(&self, deeper: i32, depth: Millimetres) -> bool {
+    fn pressed(&self, deeper: i32) -> bool {
         self.touching
             && self.surface.is_some_and(|surface| {
                 let deep = self.travel.saturating_sub(surface);
-                deep >= -YIELDING && deep <= depth.to_bits().saturating_mul(deeper).saturating_add(YIELDING)
+                deep >= -YIELDING && deep <= self.depth.to_bits().saturating_mul(deeper).saturating_add(YIELDING)
             })
     }
 
@@ -206,7 +204,7 @@ impl Guard {
     }
 
     /// Travel, force, and the two changes of speed.
-    #[inline(never)]
+    #[inline(always)]
     fn measure(&mut self, seen: &Seen, config: &Config) {
         let before = self.travel;
         self.travel = config.travel(seen.encoder.wrapping_sub(self.origin)).to_bits();
@@ -229,14 +227,14 @@ impl Guard {
     }
 
     /// Where a touch begins and how far back it lets the tip go.
-    #[inline(never)]
-    fn touch(&mut self, pressing: bool, depth: Millimetres, config: &Config) {
+    #[inline(always)]
+    fn touch(&mut self, pressing: bool, config: &Config) {
         if self.force < config.contact_off.to_bits() {
             (self.touching, self.inherited) = (false, false);
         } else if self.force >= config.contact_on.to_bits() {
             let begins = !self.touching;
             self.touching = true;
-            let surface = self.travel.saturating_sub(depth.to_bits());
+            let surface = self.travel.saturating_sub(self.depth.to_bits());
             let back = behind(surface, config);
             let [travel, force] = self.from;
             let falls = travel.saturating_sub(self.travel) > RETREAT && {

@@ -120,6 +120,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         duty_gain,
         speed_max,
         approach,
+        near,
         travel_max,
         clearance,
         bounds,
@@ -181,6 +182,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
             mix.add(*number);
         }
     }
+    mix.add(near.to_bits());
     for speed in [speed_max, approach, &bounds.speed_loose, &bounds.speed_any] {
         mix.add(speed.to_bits());
     }

@@ -158,7 +158,7 @@ extern "C" fn guard(bench: &mut Bench) {
         goal: bench.record.command.goal,
         voltage: bench.motion.drive.voltage(),
     };
-    if bench.guard.check(&seen, bench.config).is_none() {
+    if bench.guard.check(&seen, true, bench.config).is_none() {
         bench.duty = bench.guard.allow(bench.duty, &mut bench.limits);
     }
 }

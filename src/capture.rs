@@ -4,7 +4,7 @@
 //! ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that all that the loop knows is known outside as well.
 //! From then on each step's frame, sense, command, duty, mode and fault are kept, with a digest of everything else that
 //! the step reported, until the memory is full, the host stops it, or something acts on the loop that is no step.
-//! [`replay()`] feeds them through the core again.
+//! The host reads a capture and feeds its frames through the core again (`tool/replay`).
 //!
 //! The layout, little-endian; bits fill a byte from its lowest one on:
 //!
@@ -24,15 +24,12 @@
 //! width that follows their noise.
 
 mod bits;
-mod digest;
+pub mod digest;
 mod head;
-mod read;
-mod replay;
 mod write;
 
-pub use head::Head;
-pub use read::{Frames, Refusal, Taken};
-pub use replay::{Difference, Field, Replayed, replay};
+pub use bits::ESCAPE;
+pub use head::{Head, LAYOUT, MAGIC};
 pub use write::Capture;
 
 use crate::command::Command;
@@ -105,23 +102,30 @@ pub struct Standing {
     pub bytes: u32,
 }
 
-/// What the next frame's differences are to.
+/// The step to which the next frame's differences are written.
 #[derive(Clone, Copy, Debug)]
-struct Last<const ROWS: usize, const COLUMNS: usize> {
-    frame: Frame<ROWS, COLUMNS>,
-    sense: Sense,
-    command: Command,
-    duty: i16,
-    mode: u8,
-    fault: u8,
-    /// How far its codes were from those before, folded, in all: their width follows this.
-    spread: u32,
-    digest: u32,
+pub struct Last<const ROWS: usize, const COLUMNS: usize> {
+    /// The step's frame.
+    pub frame: Frame<ROWS, COLUMNS>,
+    /// What was sensed beside the frame.
+    pub sense: Sense,
+    /// What the host asked for.
+    pub command: Command,
+    /// The duty that the step returned, Q15.
+    pub duty: i16,
+    /// The mode's number after the step.
+    pub mode: u8,
+    /// The fault's number after the step; 0 without one.
+    pub fault: u8,
+    /// Sum of the folded differences of the frame's codes: the width of the next frame's codes follows it.
+    pub spread: u32,
+    /// The digest of all steps so far.
+    pub digest: u32,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
-    /// Before the first frame.
-    const NONE: Self = Self {
+    /// Before the first frame: all zeros.
+    pub const NONE: Self = Self {
         frame: Frame::EMPTY,
         sense: Sense {
             encoder: 0,
@@ -154,7 +158,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
     };
 
     /// Low bits that a code's folded difference is likely to need.
-    fn width(&self) -> u32 {
+    pub fn width(&self) -> u32 {
         let codes = (COLUMNS * (ROWS + 1)) as u32;
         let mut width = 0;
         while width < bits::WIDTH_MAX && codes << width < self.spread {
@@ -165,12 +169,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
 }
 
 /// Low bits of what is coded beside the codes: chosen by what each does from frame to frame.
-mod width {
+pub mod width {
+    /// Of the frame's number.
     pub const SEQUENCE: u32 = 0;
+    /// Of the encoder's count.
     pub const ENCODER: u32 = 1;
+    /// Of the bridge's supply, mV.
     pub const SUPPLY: u32 = 2;
+    /// Of the time since the bus's last packet, ms.
     pub const SILENT: u32 = 0;
+    /// Of the time from the frame's end to its duty, core cycles.
     pub const ANSWER: u32 = 6;
+    /// Of the microcontroller's temperature.
     pub const CHIP: u32 = 0;
+    /// Of the duty, Q15.
     pub const DUTY: u32 = 6;
 }

@@ -127,8 +127,8 @@ impl Taken {
         [[tare, clear, identify, calibrate], [forget, shown, commission, 0]].map(u32::from_le_bytes)
     }
 
-    /// The inverse; `None` where that byte is not 0.
-    pub(crate) fn from_words(words: [u32; 2]) -> Option<Self> {
+    /// Reads the two words that a capture has of the numbers; `None` where the last one's upper byte is not 0.
+    pub fn from_words(words: [u32; 2]) -> Option<Self> {
         let [[tare, clear, identify, calibrate], [forget, shown, commission, none]] = words.map(u32::to_le_bytes);
         (none == 0).then_some(Self { tare, clear, identify, calibrate, forget, shown, commission })
     }

@@ -4,8 +4,8 @@
 //! many low bits as the width says (a Rice code). What would take [`ESCAPE`] ones or more is written as these ones and
 //! all its bits.
 
-/// So many ones say that all bits follow.
-const ESCAPE: u32 = 12;
+/// Count of ones after which a number follows with all its bits.
+pub const ESCAPE: u32 = 12;
 /// The largest width.
 pub(super) const WIDTH_MAX: u32 = 16;
 
@@ -136,65 +136,6 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Reads what [`Writer`] wrote.
-#[derive(Clone, Debug)]
-pub(super) struct Reader<'a> {
-    bytes: &'a [u8],
-    at: u32,
-    /// How many bits there are.
-    end: u32,
-}
-
-impl<'a> Reader<'a> {
-    pub fn new(bytes: &'a [u8], bits: u32) -> Self {
-        Self { bytes, at: 0, end: bits }
-    }
-
-    /// Whether all was read.
-    pub fn is_empty(&self) -> bool {
-        self.at == self.end
-    }
-
-    /// A number of so many bits, at most 32; none where they are not there.
-    pub fn get(&mut self, count: u32) -> Option<u32> {
-        let end = self.at.checked_add(count).filter(|&end| end <= self.end)?;
-        let mut value = 0;
-        for (place, bit) in (self.at..end).enumerate() {
-            let byte = self.bytes.get((bit / 8) as usize)?;
-            value |= u32::from(byte >> (bit % 8) & 1) << place;
-        }
-        self.at = end;
-        Some(value)
-    }
-
-    /// A folded number of at most `all` bits.
-    pub fn folded(&mut self, width: u32, all: u32) -> Option<u32> {
-        let mut ones = 0;
-        while ones < ESCAPE && self.get(1)? == 1 {
-            ones += 1;
-        }
-        if ones == ESCAPE { self.get(all) } else { Some(ones << width | self.get(width)?) }
-    }
-
-    /// A difference of 32 bits.
-    pub fn signed(&mut self, width: u32) -> Option<i32> {
-        let folded = self.folded(width, 32)?;
-        Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
-    }
-}
-
-/// The check sum of so many bits as [`Writer::finish`] tells it.
-pub(super) fn check(bytes: &[u8], bits: u32) -> u32 {
-    let mut sum = 0;
-    for place in 0..=bits / 32 {
-        let rest = bytes.get(4 * place as usize..).unwrap_or_default();
-        let mut word = [0; 4];
-        word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
-        sum = mix(sum, u32::from_le_bytes(word));
-    }
-    sum
-}
-
 /// Turned, mixed, multiplied by an odd number (2^32 over the golden ratio): no word that differs is lost.
 #[inline(always)]
 pub(super) const fn mix(sum: u32, word: u32) -> u32 {
@@ -206,10 +147,4 @@ pub(super) const fn mix(sum: u32, word: u32) -> u32 {
 pub(super) fn fold(value: u16, last: u16) -> u32 {
     let difference = value.wrapping_sub(last).cast_signed();
     (difference << 1 ^ difference >> 15).cast_unsigned().into()
-}
-
-/// The inverse of [`fold`].
-pub(super) fn unfold(folded: u32, last: u16) -> u16 {
-    let difference = (folded >> 1) as u16 ^ ((folded & 1) as u16).wrapping_neg();
-    last.wrapping_add(difference)
 }

@@ -1,6 +1,5 @@
 //! A capture's beginning: what the loop knew before its first frame.
 
-use super::read::Refusal;
 use super::{Ended, VERSION, digest};
 use crate::control::winding;
 use crate::params::Params;
@@ -34,12 +33,13 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     pub gains: Gains<ROWS, COLUMNS>,
 }
 
-const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
+/// First bytes of a capture.
+pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
 /// Bytes before the parameters.
 const FIXED: usize = 44 + 4 * winding::WORDS;
 
 /// A number for the names and the order of the parameters (FNV-1a of 32 bits).
-const LAYOUT: u32 = {
+pub const LAYOUT: u32 = {
     let (mut hash, mut place) = (0x811C_9DC5_u32, 0);
     while place < Params::COUNT {
         let name = Params::RANGES[place].0.as_bytes();
@@ -59,7 +59,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
     pub const BYTES: usize = FIXED + 4 * Params::COUNT + 4 * Gains::<ROWS, COLUMNS>::WORDS;
 
     /// What the digest of the steps goes on from: all that is known before the first one.
-    pub(super) fn seed(&self) -> u32 {
+    pub fn seed(&self) -> u32 {
         let [taken, more_taken] = self.taken.words();
         let first = [self.missed_frames, taken, more_taken, self.frame_ns];
         let params = self.params.to_array().map(i32::cast_unsigned);
@@ -95,51 +95,5 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         for (place, word) in bytes.get_mut(12..28).unwrap_or_default().as_chunks_mut::<4>().0.iter_mut().zip(words) {
             *place = word.to_le_bytes();
         }
-    }
-
-    /// The head of a capture.
-    ///
-    /// # Errors
-    /// These are no capture's bytes, or one of another array, layout or version.
-    pub fn read(bytes: &[u8]) -> Result<Self, Refusal> {
-        let mut words = bytes.as_chunks::<4>().0.iter().copied();
-        let mut next = || words.next().ok_or(Refusal::Cut);
-        let [f, t, c, version] = next()?;
-        if [f, t, c] != *b"FTC" {
-            return Err(Refusal::NoCapture);
-        }
-        if version != VERSION {
-            return Err(Refusal::Version(version));
-        }
-        let [rows, columns, ended, zero] = next()?;
-        if [usize::from(rows), usize::from(columns)] != [ROWS, COLUMNS] {
-            return Err(Refusal::Shape { rows, columns });
-        }
-        if u32::from_le_bytes(next()?) != LAYOUT {
-            return Err(Refusal::Layout);
-        }
-        let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(Refusal::Unfinished)?;
-        let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
-        let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
-        let missed_frames = u32::from_le_bytes(next()?);
-        let taken = Taken::from_words([next()?, next()?].map(u32::from_le_bytes)).filter(|_| zero == 0);
-        let taken = taken.ok_or(Refusal::Damaged)?;
-        let frame_ns = u32::from_le_bytes(next()?);
-        let mut winding = [0; winding::WORDS];
-        for word in &mut winding {
-            *word = u32::from_le_bytes(next()?);
-        }
-        let mut values = [0; Params::COUNT];
-        for value in &mut values {
-            *value = i32::from_le_bytes(next()?);
-        }
-        let mut gains = Gains::ONE;
-        for word in 0..Gains::<ROWS, COLUMNS>::WORDS {
-            if !gains.set_word(word, u32::from_le_bytes(next()?)) {
-                return Err(Refusal::Damaged);
-            }
-        }
-        let params = Params::from_array(&values);
-        Ok(Self { ended, frames, bits, digest, check, missed_frames, taken, winding, frame_ns, params, gains })
     }
 }

@@ -12,9 +12,9 @@ mod write;
 pub use read::{Kept, of_bytes, open};
 pub use write::{FRAME_SCHEMA, write};
 
-use fingertip::capture::{Refusal, Replayed, Taken, replay};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
+use replay::{Refusal, Replayed, Taken, replay};
 
 /// The attachment's name, and the metadata record's.
 const ATTACHED: &str = "capture.bin";

@@ -1,7 +1,7 @@
 //! Whatever frames hold, they come back.
 
 use super::burst::Burst;
-use fingertip::capture::{Ended, Frames, State};
+use fingertip::capture::{Ended, State};
 use fingertip::command::Command;
 use fingertip::contact::FitLevel;
 use fingertip::frame::Sense;
@@ -11,6 +11,7 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 use host_tests::finger::config;
 use proptest::prelude::*;
+use replay::Frames;
 
 const BYTES: usize = 8 << 10;
 

@@ -1,9 +1,10 @@
 //! A capture that is not as the board wrote it: refused, or found to differ; never taken.
 
 use super::burst::Finger;
-use fingertip::capture::{Ended, Refusal, replay};
+use fingertip::capture::Ended;
 use fingertip::scan::Clocks;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
+use replay::{Refusal, replay};
 
 const BYTES: usize = 1 << 10;
 

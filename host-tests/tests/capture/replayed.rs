@@ -1,13 +1,14 @@
 //! A replay from the parameters, the gains and the frames alone.
 
 use super::burst::{Finger, gains};
-use fingertip::capture::{Ended, Field, State, replay};
+use fingertip::capture::{Ended, State};
 use fingertip::command::Command;
 use fingertip::config::newtons;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, TARE_FRAMES};
 use fingertip::state::{Fault, Mode};
+use replay::{Field, replay};
 
 const BYTES: usize = 44 << 10;
 

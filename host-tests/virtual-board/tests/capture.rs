@@ -7,9 +7,10 @@ use crate::common::{
     away, let_go, on_bus, read_u8, read_u16, read_u32, reboot, refused, running, write_goal, write_param, write_u8,
     write_u16,
 };
-use fingertip::capture::{Ended, Replayed, replay};
+use fingertip::capture::Ended;
 use fingertip::shipped::{CAPTURE_BYTES, CLOCKS, COLUMNS, ROWS, address};
 use fingertip::state::Mode;
+use replay::{Replayed, replay};
 use virtual_board::{Options, Rig};
 
 const NONE: u8 = 0;

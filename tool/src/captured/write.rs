@@ -3,12 +3,13 @@
 use super::{ABOUT, ATTACHED, About, through_the_core};
 use crate::messages::Topic;
 use crate::state::State;
-use fingertip::capture::{Head, Taken};
+use fingertip::capture::Head;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, McapError, WriteOptions, Writer};
+use replay::Taken;
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 use std::collections::BTreeMap;

@@ -1,11 +1,18 @@
-//! A capture through the core again: its answers must be the same to the bit.
+//! Captures on the host: reads their bytes ([`fingertip::capture`] has the layout), and feeds the frames through the core
+//! again, whose answers must be the same to the bit.
 
-use super::{Frames, Head, Refusal, Taken, digest};
-use crate::config::Shaped;
-use crate::control::winding::Winding;
-use crate::pipeline::{Pipeline, Status};
-use crate::pressure::Calibration;
-use crate::scan::Clocks;
+mod bits;
+mod frames;
+mod head;
+
+pub use frames::{Frames, Refusal, Taken};
+
+use fingertip::capture::{Head, digest};
+use fingertip::config::Shaped;
+use fingertip::control::winding::Winding;
+use fingertip::pipeline::{Pipeline, Status};
+use fingertip::pressure::Calibration;
+use fingertip::scan::Clocks;
 
 /// A capture that was fed through the core again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +61,8 @@ impl Field {
     }
 }
 
-impl core::fmt::Display for Difference {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl std::fmt::Display for Difference {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { frame, field, captured, replayed } = self;
         write!(f, "differs first at frame {frame}: {} captured {captured}, replayed {replayed}", field.name())
     }
@@ -96,7 +103,7 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
             difference.or(first.map(|(field, captured, replayed)| Difference { frame, field, captured, replayed }));
         each(&taken, status);
     }
-    let running = digest::words(running, core::iter::once(head.ended as u32));
+    let running = digest::words(running, std::iter::once(head.ended as u32));
     if running != head.digest && difference.is_none() {
         let frame = head.frames.saturating_sub(1);
         let [captured, replayed] = [head.digest, running].map(i64::from);

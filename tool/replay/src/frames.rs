@@ -1,13 +1,14 @@
-//! The host's side: bytes in, frames out.
+//! The frames of a capture, read.
 
-use super::bits::{self, Reader, unfold};
-use super::{Head, Last, VERSION, width};
-use crate::command::Command;
-use crate::config::ConfigError;
-use crate::contact::FitLevel;
-use crate::frame::{Frame, Sense};
-use crate::params::Params;
-use crate::units::{Celsius, CoreCycles, Duty, Newtons};
+use crate::bits::{self, Reader, unfold};
+use crate::head;
+use fingertip::capture::{Head, Last, VERSION, width};
+use fingertip::command::Command;
+use fingertip::config::ConfigError;
+use fingertip::contact::FitLevel;
+use fingertip::frame::{Frame, Sense};
+use fingertip::params::Params;
+use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 
 /// Why bytes are no capture that this version replays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,8 +47,8 @@ pub enum Refusal {
     Frame(u32),
 }
 
-impl core::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::NoCapture => f.write_str("no capture: it does not begin as one"),
             Self::Version(version) => write!(f, "a capture of layout {version}; this firmware's is layout {VERSION}"),
@@ -72,7 +73,7 @@ impl core::fmt::Display for Refusal {
     }
 }
 
-impl core::error::Error for Refusal {}
+impl std::error::Error for Refusal {}
 
 /// A frame as the board took it, and what it answered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,9 +107,10 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
     /// Of a capture, and its beginning.
     ///
     /// # Errors
-    /// See [`Head::read`]; or it is shorter or longer than it says.
+    /// The bytes are no capture, or one of another array, layout or version; or the capture is damaged, shorter or longer
+    /// than it says.
     pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), Refusal> {
-        let head = Head::read(bytes)?;
+        let head = head::read(bytes)?;
         let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(Refusal::Cut)?;
         let need = head.bits.div_ceil(8) as usize;
         if body.len() < need {

@@ -1,4 +1,4 @@
-//! The soft fingertip's model, whole, in fixed point.
+//! The soft fingertip's model in fixed point.
 //!
 //! A hemisphere of radius `a` and Young's modulus `Y` is pressed by `d` (the paper's `d0`) against a rigid plane. Park,
 //! Kim and Hirai, "Development of a soft-fingertip and its modeling based on force distribution", ICRA 2003, see it as
@@ -18,19 +18,9 @@
 //! assert_eq!(tip.contact_radius(Millimetres::from_bits(2 << 24)), Millimetres::from_bits(6 << 24));
 //! ```
 
-mod angle;
 mod arith;
-mod friction;
 mod geometry;
-mod particle;
 mod pressure;
-mod relaxation;
-mod tilt;
-
-pub use friction::LimitSurface;
-pub use particle::{force_on, pressure_of, strain_of};
-pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
-pub use tilt::{Displacement, Load};
 
 use crate::root::{nearest_root, root_below};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
@@ -195,6 +185,14 @@ impl Tip {
     /// `d` counts as within 0 to [`Tip::depth_max`].
     pub fn stiffness(&self, d: Millimetres) -> NewtonsPerMillimetre {
         NewtonsPerMillimetre::from_bits(self.stiffness_gain.round(u64::from(self.depth(d))) as i32)
+    }
+
+    /// `pi Y` times a number with 48 bits after the point, rounded once, to nearest.
+    ///
+    /// A squared length in mm^2 gives a force in N, a cubed length in mm^3 a moment in N mm. The result has `16 - drop` bits
+    /// after the point. The number counts as at most 2^15, `drop` as at most 16.
+    pub fn pi_y_times(&self, number_q48: u64, drop: u32) -> u64 {
+        self.force_gain.round_short(number_q48.min(1 << 63), drop.min(16))
     }
 
     /// `pi Y` times a squared length in Q48.

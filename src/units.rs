@@ -3,7 +3,7 @@
 //! The inner value is public: arithmetic happens on `.0`, and the wrapper says what the number means where it
 //! crosses a function's border.
 
-use fixed::types::{I2F30, I8F24, I16F16, I18F14, I24F8};
+use fixed::types::{I2F30, I8F24, I16F16, I24F8};
 
 macro_rules! quantities {
     ($($(#[$doc:meta])* $name:ident($inner:ty);)*) => { $(
@@ -37,18 +37,8 @@ quantities! {
     Newtons(I16F16);
     /// A stiffness in N/mm (Q16.16), resolution 15 mN/m.
     NewtonsPerMillimetre(I16F16);
-    /// An angle in rad (Q8.24), resolution 60 nrad.
-    Radians(I8F24);
-    /// An area in mm^2 (Q16.16): to 32768 mm^2, resolution 15 um^2.
-    SquareMillimetres(I16F16);
-    /// A length for each rad in mm/rad (Q16.16), resolution 15 nm/rad.
-    MillimetresPerRadian(I16F16);
-    /// A moment in N mm, or an energy in mJ (Q18.14): to 131072 N mm, resolution 61 nN m.
-    NewtonMillimetres(I18F14);
     /// A strain, compression positive (Q2.30): -2 to 2, resolution 1e-9.
     Strain(I2F30);
-    /// A coefficient or a share (Q16.16): 1 is all of it, resolution 15e-6.
-    Ratio(I16F16);
     /// A speed in mm/s (Q16.16): to 32 m/s, resolution 15 nm/s.
     MillimetresPerSecond(I16F16);
     /// An acceleration in mm/s^2 (Q24.8): to 8388 m/s^2, resolution 4 um/s^2.

@@ -1,11 +1,13 @@
 //! What constructors refuse: each error names the parameter, its value and its range.
 
 use fingertip::config::ConfigError;
-use fingertip::model::{Relaxation, RelaxationError, RelaxationTerm, Tip};
+use fingertip::model::Tip;
 use fingertip::params::{ParamError, Params};
 use fingertip::scan::{ScanError, ScanTiming};
 use fingertip::shipped::{CLOCKS, Config};
-use fingertip::units::{Kilopascals, Millimetres, Ratio};
+use fingertip::units::{Kilopascals, Millimetres};
+use paper::units::Ratio;
+use paper::{Relaxation, RelaxationError, RelaxationTerm};
 
 fn refused(params: &Params) -> ConfigError {
     Config::shipped(params).map(drop).expect_err("refused")

@@ -2,12 +2,11 @@
 
 use core::num::NonZeroU16;
 
-use fingertip::model::{
-    Displacement, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Relaxation, RelaxationState, RelaxationTerm, Tip,
-    force_on, pressure_of, strain_of,
-};
-use fingertip::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
+use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip};
+use fingertip::units::{Kilopascals, Millimetres, Newtons};
 use host_tests::prove::domain::{mm, newtons, reference_tip};
+use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
+use paper::{Displacement, Relaxation, RelaxationState, RelaxationTerm, force_on, pressure_of, strain_of};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -87,17 +86,17 @@ proptest! {
     #[test]
     fn geometry_closes((tip, d) in tip_and_depth(), share in 0.0..=1.0_f64) {
         let d = mm(d);
-        let theta = Radians::from_bits((number(tip.touching_angle_max(d).to_bits(), 0) * share) as i32);
-        let r = tip.distance_at(theta, d);
+        let theta = Radians::from_bits((number(paper::touching_angle_max(&tip, d).to_bits(), 0) * share) as i32);
+        let r = paper::distance_at(&tip, theta, d);
         // There and back: the distance's unit in angle, and the two roundings.
-        let slope = number(tip.distance_slope(theta, d).to_bits(), 16);
-        let back = tip.touching_angle(r, d);
+        let slope = number(paper::distance_slope(&tip, theta, d).to_bits(), 16);
+        let back = paper::touching_angle(&tip, r, d);
         prop_assert!(number((back.to_bits() - theta.to_bits()).abs(), 0) <= 1.2 + 0.7 / slope.min(1e9));
         // x^2 + z^2 = a^2 (eq. 1), and QC = Q_z - (a - d) (eq. 4).
-        let (x, z) = (number(r.to_bits(), 24), number(tip.height_at(theta, d).to_bits(), 24));
+        let (x, z) = (number(r.to_bits(), 24), number(paper::height_at(&tip, theta, d).to_bits(), 24));
         let a = number(tip.radius().to_bits(), 24);
         prop_assert!((x * x + z * z - a * a).abs() <= 2.0 * a * number(1, 24));
-        let compression = number(tip.compression_at(theta, d).to_bits(), 24);
+        let compression = number(paper::compression_at(&tip, theta, d).to_bits(), 24);
         prop_assert!((compression - (z - (a - number(d.to_bits(), 24))).max(0.0)).abs() < 1e-12);
     }
 
@@ -111,7 +110,7 @@ proptest! {
         let bound = number(1, 24) / number(length.to_bits(), 24) + number(2, 30);
         prop_assert!((number(strain.to_bits(), 30) - number(direct.to_bits(), 30)).abs() <= bound);
         // F = Y e S (11) is F = P S (13).
-        let (by_strain, by_pressure) = (tip.particle_force(compression, length, area), force_on(tip.pressure(r, mm(d)), area));
+        let (by_strain, by_pressure) = (paper::particle_force(&tip, compression, length, area), force_on(tip.pressure(r, mm(d)), area));
         let y_s = number(tip.modulus().to_bits(), 16) / 1000.0 * number(area.to_bits(), 16);
         let bound = y_s * bound + number(area.to_bits(), 16) / 1000.0 * number(1, 17) + number(1, 16);
         prop_assert!((number(by_strain.to_bits(), 16) - number(by_pressure.to_bits(), 16)).abs() <= bound);
@@ -126,14 +125,14 @@ proptest! {
     fn the_force_is_the_slope_of_the_energy((tip, d) in tip_and_depth(), step in 0.0..=1.0_f64) {
         let half = (number(d.min(tip.depth_max().to_bits() - d), 0) * step) as i32;
         let at = |d: i32| Displacement { normal: mm(d), ..Displacement::default() };
-        let gained = number(tip.energy(at(d + half)).to_bits() - tip.energy(at(d - half)).to_bits(), 14);
+        let gained = number(paper::energy(&tip, at(d + half)).to_bits() - paper::energy(&tip, at(d - half)).to_bits(), 14);
         let forces = [d - half, d, d + half].map(|d| number(tip.force(mm(d)).to_bits(), 16));
         let width = number(half, 24);
         let work = width / 3.0 * (forces[0] + 4.0 * forces[1] + forces[2]);
         prop_assert!((gained - work).abs() <= number(1, 14) + number(1, 16) * width, "{gained}, {work}");
-        prop_assert_eq!(tip.load(at(d)).normal, tip.force(mm(d)));
-        prop_assert_eq!(tip.load(at(d)).tangential.to_bits(), 0);
-        prop_assert_eq!(tip.load(at(d)).moment.to_bits(), 0);
+        prop_assert_eq!(paper::load(&tip, at(d)).normal, tip.force(mm(d)));
+        prop_assert_eq!(paper::load(&tip, at(d)).tangential.to_bits(), 0);
+        prop_assert_eq!(paper::load(&tip, at(d)).moment.to_bits(), 0);
     }
 
     #[test]
@@ -141,13 +140,13 @@ proptest! {
         let shift = (number(tip.radius().to_bits(), 0) * s) as i32;
         let tilt = (t * number(1 << 24, 0)) as i32;
         let at = |shift: i32, tilt: i32| Displacement { normal: mm(d), shift: mm(shift), tilt: Radians::from_bits(tilt) };
-        let load = tip.load(at(shift, tilt));
+        let load = paper::load(&tip, at(shift, tilt));
         let h = 1 << 18; // 1/64 mm or rad
         // The energy is a quadratic of the shift: the central difference is exact.
-        let by_shift = number(tip.energy(at(shift + h, tilt)).to_bits() - tip.energy(at(shift - h, tilt)).to_bits(), 14) * 32.0;
+        let by_shift = number(paper::energy(&tip, at(shift + h, tilt)).to_bits() - paper::energy(&tip, at(shift - h, tilt)).to_bits(), 14) * 32.0;
         prop_assert!((by_shift - number(load.tangential.to_bits(), 16)).abs() <= number(1, 14) * 35.0);
         // Of the tilt it is not: the third derivative is below 60 pi Y (d^3 + d^2 |s|) for these tilts.
-        let by_tilt = number(tip.energy(at(shift, tilt + h)).to_bits() - tip.energy(at(shift, tilt - h)).to_bits(), 14) * 32.0;
+        let by_tilt = number(paper::energy(&tip, at(shift, tilt + h)).to_bits() - paper::energy(&tip, at(shift, tilt - h)).to_bits(), 14) * 32.0;
         let (depth, y) = (number(d, 24), number(tip.modulus().to_bits(), 16) / 1000.0);
         let third = 60.0 * std::f64::consts::PI * y * depth * depth * (depth + number(shift.abs(), 24));
         prop_assert!((by_tilt - number(load.moment.to_bits(), 14)).abs() <= number(1, 14) * 35.0 + third / 6.0 / 64.0 / 64.0);
@@ -156,17 +155,17 @@ proptest! {
     #[test]
     fn a_free_tip_slides_to_where_nothing_pulls((tip, d) in tip_and_depth(), t in -1.0..=1.0_f64) {
         let tilt = Radians::from_bits((t * number(1 << 24, 0)) as i32);
-        let shift = tip.free_shift(mm(d), tilt);
+        let shift = paper::free_shift(&tip, mm(d), tilt);
         // Further than that the shift itself is outside the domain.
         prop_assume!(shift.to_bits().abs() < tip.radius().to_bits() / 2 - (1 << 20));
         let displacement = Displacement { normal: mm(d), shift, tilt };
         // Half a unit of shift at the lateral stiffness 2 pi Y d.
         let bound = number(tip.stiffness(mm(d)).to_bits() + 1, 16) * number(1, 25) + number(1, 16);
-        prop_assert!(number(tip.load(displacement).tangential.to_bits().abs(), 16) <= bound);
-        let there = tip.energy(displacement).to_bits();
+        prop_assert!(number(paper::load(&tip, displacement).tangential.to_bits().abs(), 16) <= bound);
+        let there = paper::energy(&tip, displacement).to_bits();
         for off in [-1 << 20, 1 << 20] {
             let beside = Displacement { shift: mm(shift.to_bits() + off), ..displacement };
-            prop_assert!(tip.energy(beside).to_bits() >= there);
+            prop_assert!(paper::energy(&tip, beside).to_bits() >= there);
         }
     }
 
@@ -175,7 +174,7 @@ proptest! {
         tip in any_tip(), depth in 0.05..1.0_f64, mu in 0.1..4.0_f64, angle in 0.0..1.57_f64,
     ) {
         let d = (number(tip.depth_max().to_bits(), 0) * depth) as i32;
-        let limit = tip.limit_surface(mm(d), Ratio::from_bits((mu * 65_536.0) as i32));
+        let limit = paper::limit_surface(&tip, mm(d), Ratio::from_bits((mu * 65_536.0) as i32));
         // So that a share of the limit can be told to a part in a thousand.
         prop_assume!(limit.force.to_bits() > 1 << 10 && limit.moment.to_bits() > 1 << 10);
         for share in [0.0, 0.3, 0.9, 1.0, 2.0, 5.0] {
@@ -198,18 +197,18 @@ proptest! {
         for depth in depths {
             prop_assert!(depth >= mm(0) && depth <= tip.depth_max());
         }
-        let _ = (tip.force(d), tip.contact_radius(d), tip.stiffness(d), tip.touching_angle_max(d), tip.mean_pressure(d));
-        let _ = (tip.pressure(r, d), tip.strain(r, d), tip.compression(r, d), tip.touching_angle(r, d), tip.peak_pressure(d));
-        let _ = (tip.distance_at(theta, d), tip.height_at(theta, d), tip.compression_at(theta, d));
-        let _ = (tip.distance_slope(theta, d), tip.area_density(theta, d), tip.stiffness_at_force(newtons(x)));
+        let _ = (tip.force(d), tip.contact_radius(d), tip.stiffness(d), paper::touching_angle_max(&tip, d), tip.mean_pressure(d));
+        let _ = (tip.pressure(r, d), tip.strain(r, d), tip.compression(r, d), paper::touching_angle(&tip, r, d), tip.peak_pressure(d));
+        let _ = (paper::distance_at(&tip, theta, d), paper::height_at(&tip, theta, d), paper::compression_at(&tip, theta, d));
+        let _ = (paper::distance_slope(&tip, theta, d), paper::area_density(&tip, theta, d), tip.stiffness_at_force(newtons(x)));
         let _ = tip.force_by_rings(d, NonZeroU16::new(rings.get() % 64 + 1).unwrap());
         let displacement = Displacement { normal: d, shift: r, tilt: theta };
-        let _ = (tip.load(displacement), tip.free_shift(d, theta));
-        prop_assert!(tip.energy(displacement).to_bits() >= 0);
+        let _ = (paper::load(&tip, displacement), paper::free_shift(&tip, d, theta));
+        prop_assert!(paper::energy(&tip, displacement).to_bits() >= 0);
         let area = SquareMillimetres::from_bits(z);
         let _ = (pressure_of(newtons(x), area), strain_of(d, r), force_on(Kilopascals::from_bits(x), area));
-        let _ = tip.particle_force(d, r, area);
-        let limit = tip.limit_surface(d, Ratio::from_bits(y));
+        let _ = paper::particle_force(&tip, d, r, area);
+        let limit = paper::limit_surface(&tip, d, Ratio::from_bits(y));
         prop_assert!(limit.margin(newtons(z), NewtonMillimetres::from_bits(x)).to_bits() <= 1 << 16);
         let term = RelaxationTerm { share: Ratio::from_bits(y), time_constant_us: x.unsigned_abs() };
         if let Ok(filter) = Relaxation::new(z.unsigned_abs(), &[term]) {
@@ -247,10 +246,10 @@ fn the_quadrature_converges_with_the_square_of_the_rings_down_to_the_formats_flo
 fn the_friction_shape_is_that_of_the_pressure_profile() {
     let tip = reference_tip();
     for (d_mm, shape) in [(1, 0.541_284), (2, 0.549_963), (3, 0.559_480)] {
-        let ours = number(tip.friction_shape(mm(d_mm << 24)).to_bits(), 16);
+        let ours = number(paper::friction_shape(&tip, mm(d_mm << 24)).to_bits(), 16);
         assert!((ours - shape).abs() < 1.6e-5, "{ours}");
     }
-    let shallow = number(tip.friction_shape(mm(1)).to_bits(), 16);
+    let shallow = number(paper::friction_shape(&tip, mm(1)).to_bits(), 16);
     assert!((shallow - 8.0 / 15.0).abs() < 1e-5, "{shallow}");
 }
 

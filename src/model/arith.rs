@@ -62,14 +62,6 @@ pub(super) const fn nearest_quotient(numerator: u64, denominator: u64) -> u64 {
     quotient(numerator + denominator / 2, denominator)
 }
 
-/// A long quotient rounded to nearest; 0 when the denominator is. Costs about as much as ten short ones.
-pub(super) const fn nearest_long_quotient(numerator: u128, denominator: u64) -> u64 {
-    match (numerator + (denominator / 2) as u128).checked_div(denominator as u128) {
-        Some(quotient) => quotient as u64,
-        None => 0,
-    }
-}
-
 /// The square of a length in Q24, in Q48.
 pub(super) const fn square(x: u32) -> u64 {
     x as u64 * x as u64

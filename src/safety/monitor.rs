@@ -143,9 +143,8 @@ impl Monitor {
         self.before = (last.max(sum), sum, bad_count);
         let least = (most.max(0) >> MORE_BITS).saturating_add(config.touch_line.saturating_mul(MORE));
         let up = sum.saturating_sub(most);
-        // Taxels that recover bring their share of the sum; in a slow frame, and to a released tip, an object can come.
-        let comparable =
-            bad == bad_count && view.command.goal > Newtons::ZERO && config.timing.frame_ns <= FRAME_NS_MAX;
+        // Taxels that recover bring their share of the sum; in a slow frame an object can come.
+        let comparable = bad == bad_count && config.timing.frame_ns <= FRAME_NS_MAX;
         if self.step_ns.is_none() && up > least && comparable {
             (self.step, self.step_ns) = (sum.saturating_sub(up / 2), Some(0));
         }

@@ -101,7 +101,7 @@ fn answer(cells: [&str; 4]) -> Result<[String; 6], Refusal> {
     let force = tip.force(depth);
     Ok([
         tip.contact_radius(depth).0.to_string(),
-        tip.touching_angle_max(depth).0.to_string(),
+        paper::touching_angle_max(&tip, depth).0.to_string(),
         tip.pressure(distance, depth).0.to_string(),
         force.0.to_string(),
         tip.stiffness(depth).0.to_string(),

@@ -64,13 +64,9 @@ fn main() -> ExitCode {
         all.extend(beyond::relaxation(0..1_000_000 / share / 1_000, progress));
         all
     });
-    println!(
-        "the relaxation filter over and over, terms of 1 to {} periods",
-        fingertip::model::PERIODS_MAX / share as u32
-    );
+    println!("the relaxation filter over and over, terms of 1 to {} periods", paper::PERIODS_MAX / share as u32);
     for (name, pattern) in [("constant extreme", [i32::MAX; 2]), ("alternating extremes", [i32::MAX, 0])] {
-        let beyond::LongRun { steps, low, high } =
-            beyond::long_run(&pattern, fingertip::model::PERIODS_MAX / share as u32);
+        let beyond::LongRun { steps, low, high } = beyond::long_run(&pattern, paper::PERIODS_MAX / share as u32);
         println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
     }
     match oracle::check() {

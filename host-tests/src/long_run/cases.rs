@@ -9,11 +9,12 @@ use fingertip::control::drive::Drive;
 use fingertip::control::observer::Observer;
 use fingertip::control::winding::Winding;
 use fingertip::frame::SATURATED;
-use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
-use fingertip::units::{Millimetres, Newtons, Ratio};
+use fingertip::units::{Millimetres, Newtons};
+use paper::units::Ratio;
+use paper::{Relaxation, RelaxationState, RelaxationTerm};
 use sim::cores;
 
 /// Steps within which a machine must come to its cycle.
@@ -226,7 +227,7 @@ fn tares() -> Vec<Machine<Array>> {
 /// Three terms from the shortest to the longest time constant.
 fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
     let period_us = 94;
-    let periods = if longest { fingertip::model::PERIODS_MAX } else { 1 << 14 };
+    let periods = if longest { paper::PERIODS_MAX } else { 1 << 14 };
     let terms = [(20_000, 1), (20_000, 1_000), (25_536, periods)];
     let terms = terms.map(|(share, periods)| RelaxationTerm {
         share: Ratio::from_bits(share),

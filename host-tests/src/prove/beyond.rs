@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use fastrand::Rng;
-use fingertip::model::{Displacement, PERIODS_MAX, Relaxation, RelaxationState, RelaxationTerm};
-use fingertip::units::{Radians, Ratio};
+use paper::units::{Radians, Ratio};
+use paper::{Displacement, PERIODS_MAX, Relaxation, RelaxationState, RelaxationTerm};
 
 use super::domain::{Point, at, mm, newtons};
 use super::exhaustive::Progress;
@@ -33,7 +33,7 @@ pub fn geometry(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
             let inside = r.min(tip.contact_radius(mm(d)).to_bits());
             judge(
                 angle,
-                tip.touching_angle(mm(inside), mm(d)).to_bits(),
+                paper::touching_angle(&tip, mm(inside), mm(d)).to_bits(),
                 24,
                 &reference.touching_angle(&real(inside, 24), &exact_d),
                 at(&tip, d, inside),
@@ -45,27 +45,27 @@ pub fn geometry(range: Range<u64>, progress: Progress<'_>) -> [Tally; 6] {
                 &reference.strain(&real(r, 24), &exact_d),
                 at(&tip, d, r),
             );
-            let theta = rng.i32(0..=tip.touching_angle_max(mm(d)).to_bits());
+            let theta = rng.i32(0..=paper::touching_angle_max(&tip, mm(d)).to_bits());
             let exact_theta = real(theta, 24);
             let at = at(&tip, d, theta);
             let radians = Radians::from_bits(theta);
             judge(
                 distance,
-                tip.distance_at(radians, mm(d)).to_bits(),
+                paper::distance_at(&tip, radians, mm(d)).to_bits(),
                 24,
                 &reference.distance_at(&exact_theta, &exact_d),
                 at,
             );
             judge(
                 slope,
-                tip.distance_slope(radians, mm(d)).to_bits(),
+                paper::distance_slope(&tip, radians, mm(d)).to_bits(),
                 16,
                 &reference.distance_slope(&exact_theta, &exact_d),
                 at,
             );
             judge(
                 area,
-                tip.area_density(radians, mm(d)).to_bits(),
+                paper::area_density(&tip, radians, mm(d)).to_bits(),
                 16,
                 &reference.area_density(&exact_theta, &exact_d),
                 at,
@@ -88,13 +88,13 @@ pub fn tilt(range: Range<u64>, progress: Progress<'_>) -> [Tally; 4] {
             let shift = rng.i32(-reach..=reach);
             let angle = rng.i32(-(1 << 24)..=1 << 24);
             let displacement = Displacement { normal: mm(d), shift: mm(shift), tilt: Radians::from_bits(angle) };
-            let load = tip.load(displacement);
+            let load = paper::load(&tip, displacement);
             let exact = Reference::new(&tip).load(&real(d, 24), &real(shift, 24), &real(angle, 24));
             let at = [tip.modulus().to_bits().into(), d.into(), shift.into(), angle.into()];
             judge(normal, load.normal.to_bits(), 16, &exact[0], at);
             judge(tangential, load.tangential.to_bits(), 16, &exact[1], at);
             judge(moment, load.moment.to_bits(), 14, &exact[2], at);
-            judge(energy, tip.energy(displacement).to_bits(), 14, &exact[3], at);
+            judge(energy, paper::energy(&tip, displacement).to_bits(), 14, &exact[3], at);
         }
     })
 }
@@ -112,11 +112,11 @@ pub fn friction(range: Range<u64>, progress: Progress<'_>) -> [Tally; 3] {
             let reference = Reference::new(&tip);
             let exact_d = real(d, 24);
             let (exact_shape, exact_mu) = (reference.friction_shape(&exact_d), real(mu, 16));
-            let limit = tip.limit_surface(mm(d), Ratio::from_bits(mu));
+            let limit = paper::limit_surface(&tip, mm(d), Ratio::from_bits(mu));
             let at = at(&tip, d, mu);
             let exact_force = reference.force(&exact_d) * exact_mu;
             let exact_moment = &exact_force * reference.contact_radius(&exact_d) * &exact_shape;
-            judge(shape, tip.friction_shape(mm(d)).to_bits(), 16, &exact_shape, at);
+            judge(shape, paper::friction_shape(&tip, mm(d)).to_bits(), 16, &exact_shape, at);
             judge(force, limit.force.to_bits(), 16, &exact_force, at);
             judge(moment, limit.moment.to_bits(), 14, &exact_moment, at);
         }

@@ -42,7 +42,7 @@ pub fn check() -> Result<[Tally; 5], Box<dyn Error>> {
         let tip = Tip::new(Millimetres::from_bits(a), Kilopascals::from_bits(y))?;
         let results = [
             (tip.contact_radius(mm(d)).to_bits(), 24, "rc_mm"),
-            (tip.touching_angle_max(mm(d)).to_bits(), 24, "theta_max_rad"),
+            (paper::touching_angle_max(&tip, mm(d)).to_bits(), 24, "theta_max_rad"),
             (tip.pressure(mm(r), mm(d)).to_bits(), 16, "p_kPa"),
             (tip.force(mm(d)).to_bits(), 16, "F_N"),
             (tip.stiffness(mm(d)).to_bits(), 16, "k_N_per_mm"),

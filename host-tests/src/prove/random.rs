@@ -120,7 +120,7 @@ fn pressure(tip: &Tip, reference: &Reference, r: i32, d: i32, tally: &mut Tally)
 }
 
 fn touching_angle_max(tip: &Tip, reference: &Reference, d: i32, tally: &mut Tally) {
-    let angle = tip.touching_angle_max(mm(d)).to_bits();
+    let angle = paper::touching_angle_max(tip, mm(d)).to_bits();
     let by_reference = error_ulp(angle, 24, &reference.touching_angle_max(&real(d, 24)));
     tally.add(Judged::by_error(by_reference, tally.bound_ulp), at(tip, d, 0));
 }

@@ -16,12 +16,13 @@ use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::grip::{Goal, Grip};
 use fingertip::identify::{DepthFit, TravelFit};
-use fingertip::model::{Relaxation, RelaxationState, Tip};
+use fingertip::model::Tip;
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
 use fingertip::touch::{Felt, Touch};
 use fingertip::units::{Celsius, CoreCycles, Millimetres, MillimetresPerSecond, MillimetresPerSecond2, Newtons};
 use lanes::{Codes, Common, Row, Total};
+use paper::{Relaxation, RelaxationState};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));

@@ -8,12 +8,13 @@ use fingertip::config::heat::{Heat, Lag};
 use fingertip::config::motions::Motions;
 use fingertip::config::warm::Warm;
 use fingertip::config::{self, ConfigError};
-use fingertip::model::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 use fingertip::params::Params;
 use fingertip::pressure::CalibrationError;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::Config;
-use fingertip::units::{Newtons, Ratio};
+use fingertip::units::Newtons;
+use paper::units::Ratio;
+use paper::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 
 /// A constructor's name, and one call of it with what that adds to its digest.
 pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));

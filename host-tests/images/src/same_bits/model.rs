@@ -3,12 +3,11 @@
 use core::num::NonZeroU16;
 
 use super::{Mix, Source};
-use fingertip::model::{
-    Displacement, LimitSurface, MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError, force_on, pressure_of,
-    strain_of,
-};
+use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
 use fingertip::root::floor_sqrt;
-use fingertip::units::{Kilopascals, Millimetres, NewtonMillimetres, Newtons, Radians, Ratio, SquareMillimetres};
+use fingertip::units::{Kilopascals, Millimetres, Newtons};
+use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
+use paper::{Displacement, LimitSurface, force_on, pressure_of, strain_of};
 
 /// A function's name and what it adds to its digest.
 pub type Function = (&'static str, fn(&Sample, &mut Mix));
@@ -85,7 +84,7 @@ impl Sample {
             _ => source.around(0, rim),
         };
         self.r = Millimetres::from_bits(r);
-        self.theta = Radians::from_bits(source.around(0, tip.touching_angle_max(self.d).to_bits()));
+        self.theta = Radians::from_bits(source.around(0, paper::touching_angle_max(tip, self.d).to_bits()));
         self.radius = Millimetres::from_bits(source.around(0, tip.radius().to_bits()));
         self.force = Newtons::from_bits(source.around(0, tip.force_max().to_bits()));
         self.peak = Kilopascals::from_bits(source.around(0, tip.modulus().to_bits()));
@@ -105,7 +104,7 @@ impl Sample {
 }
 
 /// Every public function of the model that computes.
-pub const FUNCTIONS: [Function; 34] = [
+pub const FUNCTIONS: [Function; 35] = [
     ("Tip::new", |s, mix| match s.made {
         Ok(tip) => {
             mix.add(tip.depth_max().to_bits());
@@ -115,6 +114,10 @@ pub const FUNCTIONS: [Function; 34] = [
         Err(TipError::Modulus(modulus)) => mix.add(modulus.to_bits()),
     }),
     ("force", |s, mix| mix.add(s.tip.force(s.d).to_bits())),
+    ("pi_y_times", |s, mix| {
+        let [high, low, drop, ..] = s.words.map(i32::cast_unsigned);
+        mix.add(s.tip.pi_y_times(u64::from(high) << 32 | u64::from(low), drop).cast_signed());
+    }),
     ("force_by_rings", |s, mix| mix.add(s.tip.force_by_rings(s.d, s.rings).to_bits())),
     ("indentation", |s, mix| mix.add(s.tip.indentation(s.force).to_bits())),
     ("indentation_from_peak", |s, mix| mix.add(s.tip.indentation_from_peak(s.peak).to_bits())),
@@ -122,13 +125,13 @@ pub const FUNCTIONS: [Function; 34] = [
     ("stiffness", |s, mix| mix.add(s.tip.stiffness(s.d).to_bits())),
     ("stiffness_at_force", |s, mix| mix.add(s.tip.stiffness_at_force(s.force).to_bits())),
     ("contact_radius", |s, mix| mix.add(s.tip.contact_radius(s.d).to_bits())),
-    ("touching_angle_max", |s, mix| mix.add(s.tip.touching_angle_max(s.d).to_bits())),
-    ("touching_angle", |s, mix| mix.add(s.tip.touching_angle(s.r, s.d).to_bits())),
-    ("distance_at", |s, mix| mix.add(s.tip.distance_at(s.theta, s.d).to_bits())),
-    ("distance_slope", |s, mix| mix.add(s.tip.distance_slope(s.theta, s.d).to_bits())),
-    ("area_density", |s, mix| mix.add(s.tip.area_density(s.theta, s.d).to_bits())),
-    ("height_at", |s, mix| mix.add(s.tip.height_at(s.theta, s.d).to_bits())),
-    ("compression_at", |s, mix| mix.add(s.tip.compression_at(s.theta, s.d).to_bits())),
+    ("touching_angle_max", |s, mix| mix.add(paper::touching_angle_max(&s.tip, s.d).to_bits())),
+    ("touching_angle", |s, mix| mix.add(paper::touching_angle(&s.tip, s.r, s.d).to_bits())),
+    ("distance_at", |s, mix| mix.add(paper::distance_at(&s.tip, s.theta, s.d).to_bits())),
+    ("distance_slope", |s, mix| mix.add(paper::distance_slope(&s.tip, s.theta, s.d).to_bits())),
+    ("area_density", |s, mix| mix.add(paper::area_density(&s.tip, s.theta, s.d).to_bits())),
+    ("height_at", |s, mix| mix.add(paper::height_at(&s.tip, s.theta, s.d).to_bits())),
+    ("compression_at", |s, mix| mix.add(paper::compression_at(&s.tip, s.theta, s.d).to_bits())),
     ("particle_length", |s, mix| mix.add(s.tip.particle_length(s.r).to_bits())),
     ("compression", |s, mix| mix.add(s.tip.compression(s.r, s.d).to_bits())),
     ("strain", |s, mix| mix.add(s.tip.strain(s.r, s.d).to_bits())),
@@ -138,18 +141,18 @@ pub const FUNCTIONS: [Function; 34] = [
     ("pressure_of", |s, mix| mix.add(pressure_of(s.force, s.area).to_bits())),
     ("strain_of", |s, mix| mix.add(strain_of(s.d, s.radius).to_bits())),
     ("force_on", |s, mix| mix.add(force_on(s.peak, s.area).to_bits())),
-    ("particle_force", |s, mix| mix.add(s.tip.particle_force(s.d, s.radius, s.area).to_bits())),
+    ("particle_force", |s, mix| mix.add(paper::particle_force(&s.tip, s.d, s.radius, s.area).to_bits())),
     ("load", |s, mix| {
-        let load = s.tip.load(s.displacement);
+        let load = paper::load(&s.tip, s.displacement);
         mix.add(load.normal.to_bits());
         mix.add(load.tangential.to_bits());
         mix.add(load.moment.to_bits());
     }),
-    ("energy", |s, mix| mix.add(s.tip.energy(s.displacement).to_bits())),
-    ("free_shift", |s, mix| mix.add(s.tip.free_shift(s.d, s.displacement.tilt).to_bits())),
-    ("friction_shape", |s, mix| mix.add(s.tip.friction_shape(s.d).to_bits())),
+    ("energy", |s, mix| mix.add(paper::energy(&s.tip, s.displacement).to_bits())),
+    ("free_shift", |s, mix| mix.add(paper::free_shift(&s.tip, s.d, s.displacement.tilt).to_bits())),
+    ("friction_shape", |s, mix| mix.add(paper::friction_shape(&s.tip, s.d).to_bits())),
     ("limit_surface", |s, mix| {
-        let LimitSurface { force, moment } = s.tip.limit_surface(s.d, s.mu);
+        let LimitSurface { force, moment } = paper::limit_surface(&s.tip, s.d, s.mu);
         mix.add(force.to_bits());
         mix.add(moment.to_bits());
     }),

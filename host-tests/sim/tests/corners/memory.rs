@@ -19,7 +19,7 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
             press(&mut finger, 7.0, 1.0);
             press(&mut finger, 0.0, wait_s);
             let travel_mm = finger.truth().travel_mm;
-            finger.place_object((travel_mm - depth_mm).min(5.0));
+            carry(&mut finger, 5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
             finger.run(1.0);
             let pushed_n = force_n(&mut finger);
             finger.place_object(8.0);

@@ -17,7 +17,7 @@ pub const EFFECT: Description = Description {
         "where F_e < share q the tip is not yet back in shape and does not touch; then tau_s dq/dt = (share - 1) q",
     ],
     state: "the force remembered, N",
-    reference: "Fung, Biomechanics, 1993, 7.6; Park, Kim, Hirai 2003 leave it out; the core's model is fingertip::model::relaxation",
+    reference: "Fung, Biomechanics, 1993, 7.6; Park, Kim, Hirai 2003 leave it out; in fixed point it is paper::Relaxation",
     keys: &[
         Key::number("share", "Share of the force that is forgotten in the end.", 0.0, 0.95, 0.15),
         Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),

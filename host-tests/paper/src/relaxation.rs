@@ -18,7 +18,9 @@
 //! The memory has 48 bits after the point. A constant force is reached to within `2^-48 N / A`, below 2^-27 N for the
 //! slowest term allowed, and stays there: the output then neither drifts nor cycles.
 
-use crate::units::{Newtons, Ratio};
+use crate::arith::mul_high;
+use crate::units::Ratio;
+use fingertip::units::Newtons;
 
 /// The longest time constant, in periods.
 pub const PERIODS_MAX: u32 = 1 << 20;
@@ -91,8 +93,9 @@ struct Coefficients {
 /// What the tip remembers of its load; see [`Relaxation::step`].
 ///
 /// ```
-/// use fingertip::model::{Relaxation, RelaxationState, RelaxationTerm};
-/// use fingertip::units::{Newtons, Ratio};
+/// use fingertip::units::Newtons;
+/// use paper::units::Ratio;
+/// use paper::{Relaxation, RelaxationState, RelaxationTerm};
 ///
 /// // A fifth of the force creeps away with a time constant of 0.3 s; frames of 100 us.
 /// let term = RelaxationTerm { share: Ratio::from_bits(13_107), time_constant_us: 300_000 };
@@ -189,6 +192,6 @@ fn widen(force: Newtons) -> i64 {
 
 /// A Q64 share of a number, rounded towards 0.
 fn share_of(number: i64, share_q64: u64) -> i64 {
-    let magnitude = super::arith::mul_high(number.unsigned_abs(), share_q64) as i64;
+    let magnitude = mul_high(number.unsigned_abs(), share_q64) as i64;
     if number < 0 { -magnitude } else { magnitude }
 }

@@ -3,8 +3,9 @@
 //! Each is a ratio or a product, rounded once; what does not fit the result's range stops at its end. Compression
 //! counts as positive, the other way round than in the paper's equation 10.
 
-use super::Tip;
-use crate::units::{Kilopascals, Millimetres, Newtons, SquareMillimetres, Strain};
+use crate::units::SquareMillimetres;
+use fingertip::model::Tip;
+use fingertip::units::{Kilopascals, Millimetres, Newtons, Strain};
 
 /// The stress of a column, `sigma = F/S` (eq. 9), which is also the pressure on it, `P = F/S` (eq. 12).
 ///
@@ -29,15 +30,13 @@ pub fn force_on(pressure: Kilopascals, area: SquareMillimetres) -> Newtons {
     Newtons::from_bits(saturate(divide(product.into(), 1000 << 16)))
 }
 
-impl Tip {
-    /// The force on a column compressed by `dL` from its length `L`, `F = Y (dL/L) S` (eq. 11, 13).
-    ///
-    /// Without a length it is 0.
-    pub fn particle_force(&self, compression: Millimetres, length: Millimetres, area: SquareMillimetres) -> Newtons {
-        let pull = i64::from(self.modulus().to_bits()) * i64::from(area.to_bits());
-        let numerator = i128::from(pull) * i128::from(compression.to_bits());
-        Newtons::from_bits(saturate(divide(numerator, (i128::from(length.to_bits()) * 1000) << 16)))
-    }
+/// The force on a column compressed by `dL` from its length `L`, `F = Y (dL/L) S` (eq. 11, 13).
+///
+/// Without a length it is 0.
+pub fn particle_force(tip: &Tip, compression: Millimetres, length: Millimetres, area: SquareMillimetres) -> Newtons {
+    let pull = i64::from(tip.modulus().to_bits()) * i64::from(area.to_bits());
+    let numerator = i128::from(pull) * i128::from(compression.to_bits());
+    Newtons::from_bits(saturate(divide(numerator, (i128::from(length.to_bits()) * 1000) << 16)))
 }
 
 /// A quotient rounded to nearest, halves away from zero; 0 when the denominator is.

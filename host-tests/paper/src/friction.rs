@@ -10,9 +10,10 @@
 //!
 //! which goes from 8/15 for a shallow contact to 0.655 at 0.95 a (a uniform pressure has 2/3, Hertz 0.589).
 
-use super::Tip;
-use super::arith::{quotient, square};
-use crate::units::{Millimetres, NewtonMillimetres, Newtons, Ratio};
+use crate::arith::{depth, quotient, radius, square};
+use crate::units::{NewtonMillimetres, Ratio};
+use fingertip::model::Tip;
+use fingertip::units::{Millimetres, Newtons};
 
 /// `g` in powers of `d/a`, Q48: Chebyshev fit on 0 to 0.951, off by less than 2e-12. The formula itself cancels at
 /// small `d`: three leading terms of its numerator vanish.
@@ -45,37 +46,35 @@ pub struct LimitSurface {
     pub moment: NewtonMillimetres,
 }
 
-impl Tip {
-    /// The limit surface at an indentation for a coefficient of friction `mu`, which counts as within 0 to 4.
-    pub fn limit_surface(&self, d: Millimetres, mu: Ratio) -> LimitSurface {
-        let depth = self.depth(d);
-        let mu = u64::from(mu.to_bits().clamp(0, 4 << 16).unsigned_abs());
-        let area = scale(square(depth), mu, 16);
-        let arm = scale(self.long_radius(depth), self.shape(depth), 48);
-        LimitSurface {
-            force: self.force_of_area(area),
-            moment: NewtonMillimetres::from_bits(self.force_gain.round_short(scale(area, arm, 40), 2) as i32),
-        }
+/// The limit surface at an indentation for a coefficient of friction `mu`, which counts as within 0 to 4.
+pub fn limit_surface(tip: &Tip, d: Millimetres, mu: Ratio) -> LimitSurface {
+    let depth = depth(tip, d);
+    let mu = u64::from(mu.to_bits().clamp(0, 4 << 16).unsigned_abs());
+    let area = scale(square(depth), mu, 16);
+    let arm = scale(long_radius(tip, depth), shape(tip, depth), 48);
+    LimitSurface {
+        force: Newtons::from_bits(tip.pi_y_times(area, 0) as i32),
+        moment: NewtonMillimetres::from_bits(tip.pi_y_times(scale(area, arm, 40), 2) as i32),
     }
+}
 
-    /// The shape factor `g = m_max / (mu N r_c)`.
-    pub fn friction_shape(&self, d: Millimetres) -> Ratio {
-        Ratio::from_bits((self.shape(self.depth(d)) >> 31).div_ceil(2) as i32)
-    }
+/// The shape factor `g = m_max / (mu N r_c)`.
+pub fn friction_shape(tip: &Tip, d: Millimetres) -> Ratio {
+    Ratio::from_bits((shape(tip, depth(tip, d)) >> 31).div_ceil(2) as i32)
+}
 
-    /// The contact radius in Q40: the root in Q27, and what its remainder is worth.
-    fn long_radius(&self, depth: u32) -> u64 {
-        let square_q54 = self.contact_square(depth) << 6;
-        let root = square_q54.isqrt();
-        (root << 13) + quotient((square_q54 - root * root) << 13, 2 * root)
-    }
+/// The contact radius in Q40: the root in Q27, and what its remainder is worth.
+fn long_radius(tip: &Tip, depth: u32) -> u64 {
+    let square_q54 = (u64::from(depth) * u64::from(2 * radius(tip) - depth)) << 6;
+    let root = square_q54.isqrt();
+    (root << 13) + quotient((square_q54 - root * root) << 13, 2 * root)
+}
 
-    /// The shape factor in Q48.
-    fn shape(&self, depth: u32) -> u64 {
-        let share_q32 = i128::from(quotient(u64::from(depth) << 32, self.radius_bits().into()));
-        let nested = |sum: i64, coefficient: &i64| coefficient + ((i128::from(sum) * share_q32) >> 32) as i64;
-        SHAPE.iter().rev().fold(0, nested).unsigned_abs()
-    }
+/// The shape factor in Q48.
+fn shape(tip: &Tip, depth: u32) -> u64 {
+    let share_q32 = i128::from(quotient(u64::from(depth) << 32, radius(tip).into()));
+    let nested = |sum: i64, coefficient: &i64| coefficient + ((i128::from(sum) * share_q32) >> 32) as i64;
+    SHAPE.iter().rev().fold(0, nested).unsigned_abs()
 }
 
 impl LimitSurface {

@@ -3,7 +3,7 @@
 //! Each series alternates in sign with falling coefficients, so that every intermediate value of its nested form is
 //! positive and below 1: one multiply and one subtraction a term.
 
-use super::arith::{mul_high, quotient};
+use crate::arith::{mul_high, quotient};
 
 /// pi/2 in Q1.31.
 const HALF_PI_Q31: u64 = 3_373_259_426;
@@ -59,7 +59,7 @@ fn alternating(coefficients: &[u32], z: u32) -> u32 {
 }
 
 /// The arc tangent of a Q0.32 number below 1, in Q0.32; off by less than 2^-30.
-pub(super) fn arc_tangent(t: u32) -> u32 {
+pub(crate) fn arc_tangent(t: u32) -> u32 {
     let z = mul(t, t);
     t - mul(t, mul(z, alternating(&ARC_TANGENT, z)))
 }
@@ -67,7 +67,7 @@ pub(super) fn arc_tangent(t: u32) -> u32 {
 /// The angle of the point (x, y) above the x axis, `atan(y/x)`, in Q2.30: the two lengths are not negative.
 ///
 /// The quotient is formed the way that makes it at most 1, so the tangent near pi/2 is never needed.
-pub(super) fn angle_of(y: u32, x: u32) -> u32 {
+pub(crate) fn angle_of(y: u32, x: u32) -> u32 {
     if y == 0 {
         return 0;
     }
@@ -87,7 +87,7 @@ fn alternating_long(coefficients: &[u64], z: u64) -> u64 {
 ///
 /// From the half angle `h`: `sin = 2 sin(h) cos(h)`, `cos = 1 - 2 sin(h)^2`. What is divided by the cosine, near 1/20
 /// for a deep contact, has it to 45 bits.
-pub(super) fn sine_cosine(angle_q24: u32) -> (u64, u64) {
+pub(crate) fn sine_cosine(angle_q24: u32) -> (u64, u64) {
     // Half of an angle in Q24 is 2^39 times it in Q64; pi/2 leaves it below 1.
     let half = u64::from(angle_q24) << 39;
     let z = mul_high(half, half);

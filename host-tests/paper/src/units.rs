@@ -1,0 +1,39 @@
+//! Quantities that this crate adds to [`fingertip::units`], in the same form.
+
+use fingertip::fixed::types::{I8F24, I16F16, I18F14};
+
+macro_rules! quantities {
+    ($($(#[$doc:meta])* $name:ident($inner:ty);)*) => { $(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+        pub struct $name(pub $inner);
+
+        impl $name {
+            /// Nothing of it.
+            pub const ZERO: Self = Self(<$inner>::ZERO);
+
+            /// From the raw integer: the value in units of the last place.
+            pub const fn from_bits(bits: i32) -> Self {
+                Self(<$inner>::from_bits(bits))
+            }
+
+            /// The raw integer: the value in units of the last place.
+            pub const fn to_bits(self) -> i32 {
+                self.0.to_bits()
+            }
+        }
+    )* };
+}
+
+quantities! {
+    /// An angle in rad (Q8.24), resolution 60 nrad.
+    Radians(I8F24);
+    /// An area in mm^2 (Q16.16): to 32768 mm^2, resolution 15 um^2.
+    SquareMillimetres(I16F16);
+    /// A length for each rad in mm/rad (Q16.16), resolution 15 nm/rad.
+    MillimetresPerRadian(I16F16);
+    /// A moment in N mm, or an energy in mJ (Q18.14): to 131072 N mm, resolution 61 nN m.
+    NewtonMillimetres(I18F14);
+    /// A coefficient or a share (Q16.16): 1 is all of it, resolution 15e-6.
+    Ratio(I16F16);
+}

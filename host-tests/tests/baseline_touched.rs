@@ -19,7 +19,7 @@ fn next_press(torque: bool, after_s: f64, depth_mm: f64) -> [f64; 3] {
     board.run(after_s);
     board.command().torque = torque;
     let travel = board.truth().travel_mm;
-    board.place_object(travel - depth_mm);
+    board.carry_object(setup.wall.distance_mm, travel - depth_mm, 100.0, |_| {});
     board.run(5.0);
     let touch = [board.status().contact.force.0.to_num(), board.truth().force_n];
     board.place_object(setup.wall.distance_mm);

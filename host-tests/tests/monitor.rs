@@ -198,7 +198,9 @@ fn an_array_that_reads_less_than_at_its_tare_is_broken() {
     let of_contacts = f64::from(least) * config.newtons_per_sum_q48 as f64 / 2_f64.powi(48);
     assert!((-0.121..-0.119).contains(&of_contacts), "{of_contacts} N are not three times 40 mN");
     for sum in [least, 0, 1_000_000] {
-        let mut monitor = restarted(sum);
+        let mut monitor = Monitor::default();
+        let Shown { picture, motion, .. } = with(sum);
+        monitor.restart(&picture, &motion);
         for _ in 0..100 {
             assert_eq!(monitor.check(&with(sum).view(), true, &config), None, "{sum}");
         }

@@ -9,7 +9,7 @@ use crate::frame::{Sense, Shape};
 use crate::pressure::Picture;
 use crate::state::Fault;
 use crate::touch::FRAME_NS_MAX;
-use crate::units::{Millimetres, MillimetresPerSecond2, Newtons};
+use crate::units::{Millimetres, MillimetresPerSecond2};
 
 /// Travel forward that must not leave the picture of a contact unchanged to the last bit, where the motor pushes more
 /// than before (0.2 mm), and in any case (4 mm: what holds an object may move that far).

@@ -165,6 +165,18 @@ impl<E: Set> Bench<E> {
         self.finger_mut().place_object(distance_mm);
     }
 
+    /// Moves the object's surface at a constant speed, and calls `each` after every frame.
+    pub fn carry_object(&mut self, from_mm: f64, to_mm: f64, mm_per_s: f64, mut each: impl FnMut(&mut Self)) {
+        let (begun_s, duration_s) = (self.time_s(), (to_mm - from_mm).abs() / mm_per_s);
+        while self.time_s() < begun_s + duration_s {
+            let share = (self.time_s() - begun_s) / duration_s;
+            self.place_object(from_mm + share * (to_mm - from_mm));
+            self.step();
+            each(self);
+        }
+        self.place_object(to_mm);
+    }
+
     /// What each taxel makes of 100 kPa, as a share of it: its own gain, where no effect remembers what was before.
     pub fn sensitivities(&mut self) -> [[f64; COLUMNS]; ROWS] {
         let unit = &mut self.board.units[0];

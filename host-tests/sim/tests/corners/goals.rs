@@ -1,8 +1,8 @@
 //! A goal of 0 releases the object, whatever was requested just before.
 
 use crate::{
-    CONTACT_ON_N, Case, Finger, LOSSES, carry, fault, finger, interrupt_torque, judge, log_uniform, mode, object,
-    press, uniform,
+    CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, interrupt_torque, judge, log_uniform, mode, object, press,
+    uniform,
 };
 use fastrand::Rng;
 use fingertip::state::Mode;
@@ -131,7 +131,7 @@ fn goal_zero_releases_a_soft_object_that_moved_while_it_was_held() {
     let cases = cores::map(tasks, |(yield_mm_per_n, by_mm)| {
         let mut finger = finger(&(object(5.0, yield_mm_per_n) + LOSSES));
         press(&mut finger, 3.0, 1.0);
-        carry(&mut finger, 5.0, 5.0 + by_mm, 40.0, |_| {});
+        finger.carry_object(5.0, 5.0 + by_mm, 40.0, |_| {});
         finger.run(0.3);
         let what = format!("{yield_mm_per_n} mm/N, moved by {by_mm} mm, {:?}", fault(&finger));
         case(&mut finger, yield_mm_per_n, what)

@@ -129,18 +129,6 @@ fn touch_s(tables: &str, goal_n: f64) -> f64 {
     finger.time_s() - begun_s
 }
 
-/// Moves the object's surface at a constant speed, and calls `each` after every frame.
-fn carry<E: Set>(finger: &mut Bench<E>, from_mm: f64, to_mm: f64, mm_per_s: f64, mut each: impl FnMut(&mut Bench<E>)) {
-    let (begun_s, duration_s) = (finger.time_s(), (to_mm - from_mm).abs() / mm_per_s);
-    while finger.time_s() < begun_s + duration_s {
-        let share = (finger.time_s() - begun_s) / duration_s;
-        finger.place_object(from_mm + share * (to_mm - from_mm));
-        finger.step();
-        each(finger);
-    }
-    finger.place_object(to_mm);
-}
-
 /// A value of one case and the largest one allowed.
 struct Case {
     what: String,

@@ -1,8 +1,8 @@
 //! What was pressed before does not change what comes next: residual readings, pushes, tares while something presses.
 
 use crate::{
-    APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, carry, fault, finger, force_n, judge, mode, object, press,
-    scene, set_goal, uniform,
+    APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, force_n, judge, mode, object, press, scene,
+    set_goal, uniform,
 };
 use fastrand::Rng;
 use fingertip::state::{Fault, Mode};
@@ -19,7 +19,7 @@ fn a_push_against_a_released_tip_does_not_change_the_next_goal() {
             press(&mut finger, 7.0, 1.0);
             press(&mut finger, 0.0, wait_s);
             let travel_mm = finger.truth().travel_mm;
-            carry(&mut finger, 5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
+            finger.carry_object(5.0, (travel_mm - depth_mm).min(5.0), 100.0, |_| {});
             finger.run(1.0);
             let pushed_n = force_n(&mut finger);
             finger.place_object(8.0);
@@ -122,7 +122,7 @@ fn hysteresis_on_a_moving_object_is_no_frozen_array() {
         let mut stopped = None;
         let mut place_mm = 6.0;
         for to_mm in [6.0 + way_mm, 6.0, 6.0 - way_mm, 6.0] {
-            carry(&mut finger, place_mm, to_mm, mm_per_s, |finger| stopped = stopped.or(fault(finger)));
+            finger.carry_object(place_mm, to_mm, mm_per_s, |finger| stopped = stopped.or(fault(finger)));
             place_mm = to_mm;
         }
         let what =

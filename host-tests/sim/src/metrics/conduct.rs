@@ -20,7 +20,7 @@ const MOVES_MM: f64 = 1e-5;
 /// it first touched, as an approach is no hold.
 const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
-const JUDGED_TOUCH_S: f64 = 0.3;
+const JUDGED_TOUCH_S: f64 = 0.22;
 
 /// What is true at a step.
 #[derive(Clone, Copy, Debug)]

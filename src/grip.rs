@@ -89,7 +89,8 @@ impl Grip {
         let holds = goal.force > Newtons::ZERO && touch.stage() != Stage::Doubtful;
         self.creep.observe(holds && touch.held(), contact.force, config);
         let (distance, limit, slack) = if holds {
-            if self.release.take().is_some() {
+            if self.release.is_some() {
+                self.release = None;
                 touch.seek();
             }
             self.press(goal, contact, touch, motion, config, limits)

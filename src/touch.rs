@@ -126,10 +126,10 @@ impl Touch {
             Stage::Lost => {
                 // Nothing is pressed deeper than the largest force presses: the object left.
                 if self.deep(felt.travel) > config.bounds.back {
-                    *self = Self::default();
+                    *self = Self { shown, ..Self::default() };
                 }
             }
-            Stage::Doubtful if self.away_ns > GIVEN_UP_NS => *self = Self::default(),
+            Stage::Doubtful if self.away_ns > GIVEN_UP_NS => *self = Self { shown, ..Self::default() },
             Stage::Doubtful | Stage::Clear => {
                 self.away_ns = self.away_ns.saturating_add(config.timing.frame_ns);
                 self.least = self.least.min(shown);
@@ -139,7 +139,6 @@ impl Touch {
                 }
             }
         }
-        self.shown = shown;
         self.lesser = (force.min(self.before.0), felt.summed.min(self.before.1));
         self.before = (force, felt.summed, felt.contact.bad_taxels);
     }
@@ -150,7 +149,9 @@ impl Touch {
         let kept = self.stage != Stage::None && self.place != Place::Here;
         let (place, surface, peak) =
             if kept { (Place::Before, self.surface, self.peak) } else { (Place::Here, place(felt, by_motor), force) };
-        *self = Self { stage: Stage::Held, place, surface, felt: by_motor, peak, least: self.shown, ..Self::default() };
+        let shown = self.shown;
+        *self =
+            Self { stage: Stage::Held, place, surface, felt: by_motor, peak, least: shown, shown, ..Self::default() };
     }
 
     fn hold(&mut self, felt: &Felt, config: &Config) {

@@ -233,6 +233,16 @@ impl Client {
         self.ask(&doing, instruction::WRITE, &[&register.address.to_le_bytes()[..], &data].concat(), 0).map(drop)
     }
 
+    /// Writes a register of one number of all devices on the bus. None of them answers.
+    ///
+    /// # Errors
+    /// The port is lost.
+    pub fn set_all(&mut self, address: u16, value: i64) -> Result<(), Error> {
+        let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
+        let data = table::encode(register, value);
+        self.send(BROADCAST, instruction::WRITE, &[&address.to_le_bytes()[..], &data].concat())
+    }
+
     /// Sends an instruction and waits for its answer: `length` bytes behind the error.
     fn ask(&mut self, doing: &str, instruction: u8, params: &[u8], length: usize) -> Result<Vec<u8>, Error> {
         self.send(self.id, instruction, params)?;

@@ -5,12 +5,14 @@ pub mod capture;
 pub mod commission;
 pub mod info;
 pub mod latency;
+pub mod moving;
 pub mod params;
 pub mod press;
 pub mod record;
 pub mod recover;
 pub mod replay;
 pub mod scan;
+pub mod stop;
 pub mod stream;
 pub mod tare;
 pub mod view;
@@ -63,7 +65,7 @@ fn say_json(value: &Value) {
 /// How long Ctrl-C may go unseen in a pause.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(50);
 
-/// Set by Ctrl-C and by the end of a terminal.
+/// Set by Ctrl-C, SIGTERM and SIGHUP (the end of a terminal).
 #[derive(Clone, Debug)]
 pub struct Interrupt(Arc<AtomicBool>);
 
@@ -85,6 +87,14 @@ impl Interrupt {
         self.0.load(Ordering::Relaxed)
     }
 
+    /// Fails once a signal came: for commands that a signal cuts short.
+    ///
+    /// # Errors
+    /// A signal came.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.came() { Err(Error::Interrupted) } else { Ok(()) }
+    }
+
     /// Waits until then, or until it is time to end.
     pub fn pause(&self, until: Instant) {
         while !self.came()
@@ -99,7 +109,7 @@ impl Interrupt {
 fn wait_for(client: &mut Client, address: u16, within: Duration, wanted: impl Fn(i64) -> bool) -> Result<i64, Error> {
     let until = Instant::now() + within;
     loop {
-        let number = client.number(address)?;
+        let number = client.again(|client| client.number(address))?;
         if wanted(number) || Instant::now() >= until {
             return Ok(number);
         }

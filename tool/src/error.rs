@@ -64,12 +64,28 @@ pub enum Error {
         /// Its number.
         number: u8,
     },
+    /// The command line asks for something that does not exist; nothing was sent.
+    #[error("{0}")]
+    NotUnderstood(String),
+    /// A signal ended a command that moves the finger.
+    #[error("interrupted before its end; torque is off")]
+    Interrupted,
     /// Something else; the text says it all.
     #[error("{0}")]
     Other(String),
 }
 
 impl Error {
+    /// The exit code of the program, as docs/host.md lists them.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::NotUnderstood(_) => 2,
+            // As a shell has it for Ctrl-C.
+            Self::Interrupted => 130,
+            _ => 1,
+        }
+    }
+
     /// Whether the controller refused with this number.
     pub fn refused_with(&self, wanted: u8) -> bool {
         matches!(self, Self::Refused { number, .. } if *number == wanted)

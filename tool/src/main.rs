@@ -4,7 +4,8 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
-    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, stream, tare, view,
+    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, stop, stream, tare,
+    view,
 };
 use fingertip_cli::{Client, Error};
 use std::io::{self, Write as _};
@@ -13,7 +14,7 @@ use std::process::ExitCode;
 /// Finds, watches, records, sets up and moves a fingertip controller on its bus.
 ///
 /// Names carry their units: force_mn is in mN. Exit code 0: done; 1: refused, or it did not come about; 2: not
-/// understood.
+/// understood; 130: a signal ended a command that moves the finger, which was stopped.
 #[derive(Parser)]
 #[command(
     name = "fingertip",
@@ -24,6 +25,7 @@ use std::process::ExitCode;
         fingertip --port /dev/ttyACM0 info\n  \
         export FINGERTIP_PORT=/tmp/finger    (a simulated one: cargo xtask serve --pty /tmp/finger)\n  \
         fingertip tare && fingertip press 1.5\n  \
+        fingertip stop\n  \
         fingertip view\n  \
         fingertip record --seconds 10 --rate-hz 200 force.csv"
 )]
@@ -63,6 +65,8 @@ enum Command {
     Commission(commission::Command),
     /// Touch, hold a force for a while, let go
     Press(press::Args),
+    /// Stop the finger in any mode: release, torque off, measurements aborted, bus watchdog off
+    Stop(stop::Args),
     /// Find the taxels' gains by presses onto a hard flat plate, and the scale of forces by a kitchen scale
     #[command(subcommand)]
     Calibrate(calibrate::Command),
@@ -86,7 +90,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             let _ = writeln!(io::stderr(), "fingertip: {why}");
-            ExitCode::FAILURE
+            why.exit_code().into()
         }
     }
 }
@@ -98,13 +102,14 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Info => info::run(&mut connect()?, cli.json),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
-        Command::Record(args) => record::run(args, &mut connect()?, cli.json),
-        Command::Capture(args) => capture::run(args, &mut connect()?, cli.json),
+        Command::Record(args) => record::run(args, record::format(args)?, &mut connect()?, cli.json),
+        Command::Capture(args) => args.check().and_then(|()| capture::run(args, &mut connect()?, cli.json)),
         Command::Replay(args) => replay::run(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
         Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
         Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
+        Command::Stop(args) => stop::run(args, &cli.reach, cli.json),
         Command::Calibrate(command) => calibrate::run(command, &mut connect()?, cli.json),
         Command::Recover => recover::run(&mut connect()?, cli.json),
         Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),

@@ -32,12 +32,20 @@ pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
     if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
 }
 
-/// A force in N; which ones the controller takes is its own affair.
+/// Goal force in mN of a number in N. The controller has a narrower limit, `force_max_mn`.
 ///
 /// # Errors
-/// It is none.
-pub fn newtons(text: &str) -> Result<f64, String> {
-    within(text, &(0.0..=1e6))
+/// No force that the register of the goal can hold.
+pub fn goal_mn(text: &str) -> Result<i64, String> {
+    within(text, &(0.001..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
+}
+
+/// Force in mN that a scale shows, of a number in N.
+///
+/// # Errors
+/// No force that the register can hold.
+pub fn shown_mn(text: &str) -> Result<i64, String> {
+    within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }
 
 fn within(text: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {

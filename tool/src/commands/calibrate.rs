@@ -1,12 +1,11 @@
 //! `fingertip calibrate`.
 
-use super::{no_fault, say, say_json, wait_for};
-use crate::state::State;
-use crate::{Client, Error, table};
+use super::moving::Moving;
+use super::{Interrupt, no_fault, say, say_json, wait_for};
+use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
-use fingertip::state::Mode;
 use serde_json::json;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Of `CALIBRATE` and `SCALE`.
 const PRESS: i64 = 1;
@@ -20,7 +19,6 @@ const WAITS: i64 = 255;
 /// Of a proposed gain.
 const ONE: f64 = 16_384.0;
 const UNKNOWN: i64 = 255;
-const LOOK: Duration = Duration::from_millis(10);
 
 /// What to do.
 #[derive(Debug, clap::Subcommand)]
@@ -31,7 +29,7 @@ pub enum Command {
     /// Press once onto a hard flat plate, and take it into the proposal
     Press {
         /// How long it may take
-        #[arg(long, default_value_t = 30.0)]
+        #[arg(long, default_value_t = 30.0, value_parser = numbers::seconds)]
         within_s: f64,
     },
     /// Show the gains that the presses propose
@@ -41,7 +39,8 @@ pub enum Command {
     /// Hold a force in another terminal, and tell what a scale under the plate shows
     Scale {
         /// What it shows, N; a gram is 0.00981
-        newtons: f64,
+        #[arg(value_name = "NEWTONS", value_parser = numbers::shown_mn)]
+        shown_mn: i64,
     },
     /// Multiply forces by the factor that the scale's numbers make
     AcceptScale,
@@ -57,33 +56,35 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
     match command {
         Command::Press { within_s } => press(*within_s, client, json),
         Command::Show => show(client, json),
-        Command::Accept => client.set(address::CALIBRATE, ACCEPT),
-        Command::Scale { newtons } => scale(*newtons, client, json),
-        Command::AcceptScale => client.set(address::SCALE, ACCEPT),
-        Command::Forget => client.set(address::CALIBRATE, FORGET),
+        Command::Accept => set(address::CALIBRATE, ACCEPT, "the proposed gains are in force; tare now", client, json),
+        Command::Scale { shown_mn } => scale(*shown_mn, client, json),
+        Command::AcceptScale => set(address::SCALE, ACCEPT, "forces are multiplied by the factor", client, json),
+        Command::Forget => set(address::CALIBRATE, FORGET, "all presses and numbers are forgotten", client, json),
     }
+}
+
+/// Sets a register and says what that did.
+fn set(register: u16, value: i64, done: &str, client: &mut Client, json: bool) -> Result<(), Error> {
+    client.set(register, value)?;
+    if json {
+        say_json(&json!({ (table::place(register)): value }));
+    } else if value == ACCEPT {
+        say(format_args!("{done}; `fingertip params save` keeps them over a reset"));
+    } else {
+        say(done);
+    }
+    Ok(())
 }
 
 fn press(within_s: f64, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
-    client.set(address::TORQUE_ENABLE, 1)?;
-    let pressed = client.set(address::CALIBRATE, PRESS).and_then(|()| {
-        let within = Duration::from_secs_f64(within_s.clamp(0.0, 1e6));
-        wait_for(client, address::CALIBRATE_STATE, within, |state| state != RUNNING)
-    });
-    // Whatever came of it: clear of the plate, then off.
-    let begun = Instant::now();
-    loop {
-        let state = State::read(client)?;
-        let clear = state.mode == Mode::Release as i64 && state.speed_um_per_s.abs() < 1_000 && state.force_mn < 10;
-        if state.fault != 0 || clear || begun.elapsed() > Duration::from_secs(10) {
-            break;
-        }
-        std::thread::sleep(LOOK);
-    }
-    client.set(address::TORQUE_ENABLE, 0)?;
+    let interrupt = Interrupt::catch()?;
+    let moving = Moving::begin(client, &interrupt)?;
+    let state = press_once(within_s, moving.client, &interrupt);
+    let state = moving.finish(state)?;
+    interrupt.check()?;
     no_fault(client)?;
-    if pressed? != DONE {
+    if state != DONE {
         let refusal = client.number(address::CALIBRATE_REFUSAL)?;
         let why = table::meaning(address::CALIBRATE_REFUSAL, refusal);
         return Err(format!("the press was not taken: {why} (docs/commissioning.md says what to do)").into());
@@ -95,6 +96,15 @@ fn press(within_s: f64, client: &mut Client, json: bool) -> Result<(), Error> {
         say(format_args!("{presses} presses reached {taxels} taxels"));
     }
     Ok(())
+}
+
+/// Begins a press and waits for its end, for a signal, or until the time is over: the last state.
+fn press_once(within_s: f64, client: &mut Client, interrupt: &Interrupt) -> Result<i64, Error> {
+    if let Err(why) = client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::CALIBRATE, PRESS)) {
+        return no_fault(client).and(Err(why));
+    }
+    let ended = |state| state != RUNNING || interrupt.came();
+    wait_for(client, address::CALIBRATE_STATE, Duration::from_secs_f64(within_s), ended)
 }
 
 fn show(client: &mut Client, json: bool) -> Result<(), Error> {
@@ -121,17 +131,13 @@ fn show(client: &mut Client, json: bool) -> Result<(), Error> {
     Ok(())
 }
 
-fn scale(newtons: f64, client: &mut Client, json: bool) -> Result<(), Error> {
-    let shown_mn = (newtons * 1e3).round();
-    if !(0.0..=150_000.0).contains(&shown_mn) {
-        return Err(format!("{newtons} N: 0 to 150 N are asked for").into());
-    }
-    client.set(address::SCALE_SHOWS_MN, shown_mn as i64)?;
+fn scale(shown_mn: i64, client: &mut Client, json: bool) -> Result<(), Error> {
+    client.set(address::SCALE_SHOWS_MN, shown_mn)?;
     let points = wait_for(client, address::SCALE_POINTS, Duration::from_secs(5), |points| points != WAITS)?;
     let refusal = client.number(address::SCALE_REFUSAL)?;
     if refusal != 0 {
         let why = table::meaning(address::SCALE_REFUSAL, refusal);
-        return Err(format!("{newtons} N was not taken: {why} (docs/commissioning.md says what to do)").into());
+        return Err(format!("{shown_mn} mN was not taken: {why} (docs/commissioning.md says what to do)").into());
     }
     let [factor, sigma] = [
         client.number(address::SCALE_FACTOR_PPM)? as f64 * 1e-6,

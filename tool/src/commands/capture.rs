@@ -1,5 +1,6 @@
 //! `fingertip capture`.
 
+use super::moving::Moving;
 use super::{Interrupt, TOUCHED, aside, no_fault, press, say, say_json, stopped, wait_for};
 use crate::captured::{self, About};
 use crate::whole::Part;
@@ -31,8 +32,8 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// Touch and hold so many newtons from the tare on, until the memory is full; then let go
-    #[arg(long, value_parser = numbers::newtons)]
-    press: Option<f64>,
+    #[arg(long, value_name = "NEWTONS", value_parser = numbers::goal_mn)]
+    press: Option<i64>,
     /// End after so many frames; without it, when the memory is full
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
@@ -53,18 +54,24 @@ pub struct Args {
     within_s: f64,
 }
 
+impl Args {
+    /// Judges the file's name.
+    ///
+    /// # Errors
+    /// It does not end with `.mcap`.
+    pub fn check(&self) -> Result<(), Error> {
+        if self.out.extension().is_some_and(|ending| ending == "mcap") {
+            return Ok(());
+        }
+        Err(Error::NotUnderstood(format!("{}: a name that ends with .mcap is asked for", self.out.display())))
+    }
+}
+
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
 ///
 /// # Errors
 /// A fault stands or comes, torque is on, the capture does not come about, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
-    if args.out.extension().is_none_or(|ending| ending != "mcap") {
-        return Err(format!("{}: a name that ends with .mcap is asked for", args.out.display()).into());
-    }
-    let goal_mn = args.press.map(|newtons| (newtons * 1e3).round() as i64);
-    if goal_mn.is_some_and(|goal_mn| !(1..=150_000).contains(&goal_mn)) {
-        return Err("--press: a force from 0.001 to 150 N is asked for".into());
-    }
     no_fault(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
@@ -72,7 +79,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if client.number(address::CAPTURE_STATE)? == State::Recording as i64 {
         client.set(address::CAPTURE, 0)?;
     }
-    if goal_mn.is_some() {
+    if args.press.is_some() {
         press::direction_confirmed(client)?;
     }
     let part = Part::begin(&args.out)?;
@@ -82,15 +89,13 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
             aside(text);
         }
     };
-    let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
-    let kept = keep(args, goal_mn, client, &interrupt, &say_on);
-    if goal_mn.is_some() {
-        let let_go = press::let_go(args.within_s, watchdog, client);
-        // What went wrong first is what to tell.
-        kept.as_ref().map_err(|why| Error::from(why.to_string()))?;
-        let_go?;
-    }
-    let count = kept?;
+    let count = if args.press.is_some() {
+        let moving = Moving::begin(client, &interrupt)?;
+        let kept = keep(args, moving.client, &interrupt, &say_on);
+        moving.finish(kept)?
+    } else {
+        keep(args, client, &interrupt, &say_on)?
+    };
     let bytes = fetch(client, count, &say_on)?;
     let mut touched = false;
     let replayed = captured::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
@@ -115,6 +120,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     // The file is what shows it, so it is kept.
     match difference {
         None if touched => Err(TOUCHED.into()),
+        None if args.press.is_some() => interrupt.check(),
         None => Ok(()),
         Some(at) => {
             Err(format!("the core of this version does not answer as the board did: it {at}. Are both of one version?")
@@ -126,7 +132,6 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
 /// Has the board keep frames: the number of the capture.
 fn keep(
     args: &Args,
-    goal_mn: Option<i64>,
     client: &mut Client,
     interrupt: &Interrupt,
     say_on: &dyn Fn(&dyn std::fmt::Display),
@@ -139,11 +144,9 @@ fn keep(
     }
     say_on(&"armed; taring, nothing may touch the tip");
     client.set(address::TARE, 1)?;
-    if let Some(goal_mn) = goal_mn {
+    if let Some(goal_mn) = args.press {
         // During the tare, so that the approach begins right after it.
-        client.set(address::BUS_WATCHDOG, press::WATCHDOG)?;
-        client.set(address::TORQUE_ENABLE, 1)?;
-        client.set(address::GOAL_FORCE_MN, goal_mn)?;
+        press::begin(goal_mn, client)?;
     }
     let until = Instant::now() + within;
     loop {
@@ -157,7 +160,7 @@ fn keep(
             return Err("the capture is gone: the controller started anew, or another host called it off".into());
         }
         // Zeros that hide a touch would let it press harder than it was asked to.
-        if goal_mn.is_some() && state == RECORDING {
+        if args.press.is_some() && state == RECORDING {
             let limits = client.again(|client| client.number(address::LIMITS))?;
             if Limits(limits as u16).has(Limits::TARED_TOUCHING) {
                 client.again(|client| client.set(address::CAPTURE, 0))?;

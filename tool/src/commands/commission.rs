@@ -1,12 +1,13 @@
 //! `fingertip commission`.
 
-use super::{Interrupt, no_fault, say, say_json};
+use super::moving::Moving;
+use super::{Interrupt, no_fault, say, say_json, wait_for};
 use crate::state::ANEW;
 use crate::{Client, Error, numbers, table};
 use fingertip::params::Params;
 use fingertip::shipped::address;
 use serde_json::json;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Of `COMMISSION`.
 const STOP: i64 = 0;
@@ -20,6 +21,8 @@ const REFUSED: i64 = 4;
 /// Why nothing else goes while the tip moves, whoever asked for it.
 const UNDER_WAY: &str =
     "the tip is moving for a jog or a measurement: wait until it ends, or `fingertip commission stop`";
+/// Longest wait until a motion that was stopped has come to rest.
+const STOPS_WITHIN: Duration = Duration::from_secs(10);
 /// Of `COMMISSION_ACCEPT`.
 const DIRECTION: i64 = 1;
 const DRIVE: i64 = 2;
@@ -77,28 +80,20 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
         }
         Command::Confirm => accept(DIRECTION, "the direction is confirmed", "there is no jog to confirm", client, json),
         Command::Accept => accept(DRIVE, "the parameters are set", "there is no measurement to accept", client, json),
-        Command::Stop => client.set(address::COMMISSION, STOP),
+        Command::Stop => stop(client, json),
     }
 }
 
 fn carry_out(task: i64, done: i64, within: &Within, client: &mut Client) -> Result<(), Error> {
     free(client)?;
     let interrupt = Interrupt::catch()?;
-    client.set(address::COMMISSION, task).map_err(|why| {
-        Error::from(format!("{why}: tare first (`fingertip tare`), with torque off and nothing at the tip"))
-    })?;
-    let until = Instant::now() + Duration::from_secs_f64(within.within_s);
-    let state = loop {
-        let state = client.number(address::COMMISSION_STATE)?;
-        if state != RUNNING {
-            break state;
-        }
-        if interrupt.came() || Instant::now() >= until {
-            client.set(address::COMMISSION, STOP)?;
-            return Err("stopped before its end; the parameters are as they were".into());
-        }
-        std::thread::sleep(Duration::from_millis(20));
-    };
+    let moving = Moving::begin(client, &interrupt)?;
+    let state = strokes(task, within, moving.client, &interrupt);
+    let state = moving.finish(state)?;
+    interrupt.check()?;
+    if state == RUNNING {
+        return Err("stopped before its end; the parameters are as they were".into());
+    }
     if state == REFUSED {
         let refusal = client.number(address::COMMISSION_REFUSAL)?;
         no_fault(client)?;
@@ -106,6 +101,41 @@ fn carry_out(task: i64, done: i64, within: &Within, client: &mut Client) -> Resu
     }
     // Only what came to its end counts: a controller that started anew knows of no task.
     if state == done { Ok(()) } else { Err(format!("it came to no end: {ANEW}, or its parameters were set").into()) }
+}
+
+/// Begins a task and waits for its end, for a signal, or until the time is over: the last state.
+fn strokes(task: i64, within: &Within, client: &mut Client, interrupt: &Interrupt) -> Result<i64, Error> {
+    client.set(address::COMMISSION, task).map_err(|why| {
+        Error::from(format!("{why}: tare first (`fingertip tare`), with torque off and nothing at the tip"))
+    })?;
+    let ended = |state| state != RUNNING || interrupt.came();
+    wait_for(client, address::COMMISSION_STATE, Duration::from_secs_f64(within.within_s), ended)
+}
+
+/// Stops a jog or a measurement, and nothing else.
+fn stop(client: &mut Client, json: bool) -> Result<(), Error> {
+    let runs = client.number(address::COMMISSION_STATE)? == RUNNING;
+    client.set(address::COMMISSION, STOP)?;
+    if runs && wait_for(client, address::COMMISSION_STATE, STOPS_WITHIN, |state| state != RUNNING)? == RUNNING {
+        return Err("the tip does not come to rest: `fingertip stop` turns torque off".into());
+    }
+    let mode = client.number(address::PRESENT_MODE)?;
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        let mode = table::meaning(address::PRESENT_MODE, mode);
+        return Err(format!(
+            "no jog and no measurement of the drive was under way, so nothing was stopped; torque is on, mode {mode}: \
+             `fingertip stop` stops the finger"
+        )
+        .into());
+    }
+    if json {
+        say_json(&json!({ "stopped": runs }));
+    } else if runs {
+        say("the motion is stopped; the parameters are as they were");
+    } else {
+        say("no jog and no measurement of the drive was under way; torque is off (`fingertip stop` stops all else)");
+    }
+    Ok(())
 }
 
 /// Fails where the motor is stopped, or the tip is moving already.

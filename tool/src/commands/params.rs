@@ -34,13 +34,14 @@ pub enum Command {
     /// Show them, with range and meaning
     Get {
         /// Which; all without a name
-        names: Vec<String>,
+        #[arg(value_name = "NAME", value_parser = table::find)]
+        names: Vec<&'static Register>,
     },
     /// Change some, all of them or none
     Set {
         /// Which, and to what
-        #[arg(required = true, value_name = "NAME=VALUE")]
-        values: Vec<String>,
+        #[arg(required = true, value_name = "NAME=VALUE", value_parser = assignment)]
+        values: Vec<Value>,
         /// Keep them over a reset
         #[arg(long)]
         save: bool,
@@ -80,10 +81,7 @@ pub type Value = (&'static Register, i64);
 pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
     match command {
         Command::Get { names } => get(names, client, json),
-        Command::Set { values, save } => {
-            let values = values.iter().map(|text| assignment(text)).collect::<Result<Vec<_>, _>>()?;
-            change(&values, *save, client, json)
-        }
+        Command::Set { values, save } => change(values, *save, client, json),
         Command::Save => {
             save(client, json)?;
             if json {
@@ -108,15 +106,11 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
     }
 }
 
-fn get(names: &[String], client: &mut Client, json: bool) -> Result<(), Error> {
-    let wanted = names.iter().map(|name| table::find(name)).collect::<Result<Vec<_>, _>>()?;
+fn get(wanted: &[&'static Register], client: &mut Client, json: bool) -> Result<(), Error> {
     let values = if wanted.is_empty() {
         read_all(client)?
     } else {
-        wanted
-            .into_iter()
-            .map(|register| Ok((register, client.number(register.address)?)))
-            .collect::<Result<_, Error>>()?
+        wanted.iter().map(|register| Ok((*register, client.number(register.address)?))).collect::<Result<_, Error>>()?
     };
     if json {
         say_json(&as_json(&values));
@@ -251,7 +245,7 @@ fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Resu
 }
 
 /// `NAME=VALUE`.
-fn assignment(text: &str) -> Result<Value, Error> {
+fn assignment(text: &str) -> Result<Value, String> {
     let (wanted, value) = text.split_once('=').ok_or_else(|| format!("`{text}`: NAME=VALUE is asked for"))?;
     let register = table::find(wanted.trim())?;
     let value = value.trim().parse().map_err(|_| {

@@ -1,5 +1,6 @@
 //! `fingertip press`.
 
+use super::moving::Moving;
 use super::{Interrupt, aside, no_fault, say, say_json, stopped};
 use crate::state::{ANEW, Clock, State};
 use crate::{Client, Error, numbers, table};
@@ -14,18 +15,16 @@ const SAY: Duration = Duration::from_millis(500);
 /// Held once the force is within this share of the goal, or this much.
 const NEAR: f64 = 0.02;
 const NEAR_MN: f64 = 10.0;
-/// The motor stops where this program falls silent for longer.
-const WATCHDOG_MS: i64 = 500;
-/// The same as `BUS_WATCHDOG` has it, in 20 ms.
-pub(super) const WATCHDOG: i64 = WATCHDOG_MS / 20;
+/// A status packet's error for a value beyond what other registers allow.
+const BEYOND: u8 = 6;
 
 /// What to press, and for how long.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10")]
 pub struct Args {
     /// Force to hold, N
-    #[arg(value_parser = numbers::newtons)]
-    newtons: f64,
+    #[arg(value_name = "NEWTONS", value_parser = numbers::goal_mn)]
+    goal_mn: i64,
     /// How long to hold it
     #[arg(long, default_value_t = 2.0, value_parser = numbers::seconds)]
     seconds: f64,
@@ -50,37 +49,19 @@ struct Held {
 /// # Errors
 /// A fault stands or comes, the tip is not tared, or nothing is touched in time.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
-    let goal_mn = (args.newtons * 1e3).round();
-    if !(1.0..=150_000.0).contains(&goal_mn) {
-        return Err(format!("{} N: a force from 0.001 to 150 N is asked for", args.newtons).into());
-    }
     no_fault(client)?;
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {
         return Err("the tip is not tared since the controller started: free it, then `fingertip tare`".into());
     }
     let interrupt = Interrupt::catch()?;
-    let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
-    client.set(address::BUS_WATCHDOG, WATCHDOG)?;
-    let pressed = press(args, goal_mn as i64, client, json, &interrupt);
-    // Whatever came of it, and first of all.
-    let let_go = let_go(args.within_s, watchdog, client);
-    let held = match (pressed, let_go) {
-        (Ok(held), Ok(())) => held,
-        (Err(why), Ok(())) => return Err(why),
-        (pressed, Err(second)) => {
-            let why = pressed.err().map_or(String::new(), |why| format!("{why}; "));
-            return Err(format!(
-                "{why}letting go failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of silence, \
-                 with fault 7; `fingertip recover` turns torque off"
-            )
-            .into());
-        }
-    };
+    let moving = Moving::begin(client, &interrupt)?;
+    let pressed = press(args, moving.client, json, &interrupt);
+    let held = moving.finish(pressed)?;
     let mean_mn = held.sum_mn / f64::from(held.count.max(1));
     let held_s = held.to_s - held.from_s;
     if json {
         say_json(&json!({
-            "goal_mn": goal_mn, "held_s": held_s, "states": held.count, "mean_mn": mean_mn,
+            "goal_mn": args.goal_mn, "held_s": held_s, "states": held.count, "mean_mn": mean_mn,
             "least_mn": held.least_mn, "most_mn": held.most_mn, "interrupted": interrupt.came(),
         }));
     } else {
@@ -90,7 +71,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
             held.count
         ));
     }
-    Ok(())
+    interrupt.check()
 }
 
 /// The controller refuses torque before.
@@ -101,12 +82,25 @@ pub(super) fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
     Err("nobody confirmed yet which way the motor goes: `fingertip commission jog`, and watch the tip".into())
 }
 
-fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
-    direction_confirmed(client)?;
+/// Turns torque on and sets the goal.
+pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
+    let why = match client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, goal_mn)) {
+        Err(why) => why,
+        done => return done,
+    };
     // Some faults show only once torque is on: then it is not the goal that is wrong.
-    if let Err(why) = client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::GOAL_FORCE_MN, goal_mn)) {
-        return no_fault(client).and(Err(why));
+    no_fault(client)?;
+    if !why.refused_with(BEYOND) {
+        return Err(why);
     }
+    let most_mn = client.number(table::find("force_max_mn")?.address)?;
+    Err(format!("{why}: the parameter force_max_mn is {most_mn}").into())
+}
+
+fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
+    let goal_mn = args.goal_mn;
+    direction_confirmed(client)?;
+    begin(goal_mn, client)?;
     let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), None::<Held>);
     loop {
         let state = client.again(State::read)?;
@@ -148,23 +142,4 @@ fn press(args: &Args, goal_mn: i64, client: &mut Client, json: bool, interrupt: 
             _ => std::thread::sleep(LOOK),
         }
     }
-}
-
-/// Lets go, and turns torque off once nothing is touched: the tip is then clear of the object. The bus watchdog is then
-/// what it was.
-pub(super) fn let_go(within_s: f64, watchdog: i64, client: &mut Client) -> Result<(), Error> {
-    client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
-    let begun = Instant::now();
-    loop {
-        let state = client.again(State::read)?;
-        let clear = state.mode == Mode::Release as i64 && state.speed_um_per_s.abs() < 1_000 && state.force_mn < 10;
-        let off = state.mode == Mode::Off as i64;
-        if state.fault != 0 || clear || off || begun.elapsed().as_secs_f64() > within_s {
-            break;
-        }
-        std::thread::sleep(LOOK);
-    }
-    client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
-    // While torque may be on, nothing but the watchdog stops the motor once this program has ended.
-    client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))
 }

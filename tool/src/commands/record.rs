@@ -10,7 +10,7 @@ use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
 use std::io::{self, BufWriter};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// So many reads in a row that fail end it.
@@ -43,8 +43,10 @@ pub struct Args {
 
 /// How a recording is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Format {
+pub enum Format {
+    /// A row for each state.
     Csv,
+    /// A message for each state.
     Mcap,
 }
 
@@ -60,10 +62,9 @@ trait Sink {
 ///
 /// # Errors
 /// The file cannot be written, or the line was lost.
-pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
+pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
-    let format = args.format.map_or_else(|| of_name(&args.file), Ok)?;
     let part = whole.then(|| Part::begin(&args.file)).transpose()?;
     let to = part.as_ref().map(Part::file).transpose();
     let file = |why: io::Error| Error::file("write", &args.file, why);
@@ -71,7 +72,10 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         (Format::Csv, Some(to)) => csv::Csv::new(BufWriter::new(to), args.pressures).map(|sink| Box::new(sink) as _),
         (Format::Csv, None) => csv::Csv::new(io::stdout().lock(), args.pressures).map(|sink| Box::new(sink) as _),
         (Format::Mcap, Some(to)) => mcap::Mcap::new(to, client.id, args.pressures).map(|sink| Box::new(sink) as _),
-        (Format::Mcap, None) => return Err("MCAP needs a file: it is finished at its beginning and its end".into()),
+        (Format::Mcap, None) => {
+            let why = "MCAP needs a file: it is finished at its beginning and its end";
+            return Err(Error::NotUnderstood(why.into()));
+        }
     };
     let mut sink = match sink {
         // Who closed the pipe wanted nothing at all.
@@ -159,11 +163,20 @@ fn take(
     Ok((counts, None))
 }
 
-fn of_name(file: &Path) -> Result<Format, String> {
-    match file.extension().and_then(|extension| extension.to_str()) {
+/// The format: the one requested, else that of the file's name.
+///
+/// # Errors
+/// The name has no known ending.
+pub fn format(args: &Args) -> Result<Format, Error> {
+    let file = &args.file;
+    match (args.format, file.extension().and_then(|extension| extension.to_str())) {
+        (Some(format), _) => Ok(format),
         _ if file.as_os_str() == "-" => Ok(Format::Csv),
-        Some("csv") => Ok(Format::Csv),
-        Some("mcap") => Ok(Format::Mcap),
-        _ => Err(format!("{}: a name that ends with .csv or .mcap is asked for, or --format", file.display())),
+        (None, Some("csv")) => Ok(Format::Csv),
+        (None, Some("mcap")) => Ok(Format::Mcap),
+        _ => Err(Error::NotUnderstood(format!(
+            "{}: a name that ends with .csv or .mcap is asked for, or --format",
+            file.display()
+        ))),
     }
 }

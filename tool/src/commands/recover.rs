@@ -44,7 +44,7 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
         Some(words) => say(format_args!("fault {fault} ({words}) is cleared; torque is off, the goal is 0")),
         None if tripped => say("the bus watchdog had tripped: it is reset, torque is off, the goal is 0"),
         None if on => {
-            say("there was nothing to recover from; torque is on, and stays so");
+            say("there was nothing to recover from; torque is on, and stays so: `fingertip stop` turns it off");
             return Ok(());
         }
         None => say("there was nothing to recover from; torque is off, the goal is 0"),

@@ -27,10 +27,7 @@ pub struct Args {
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
-        return Err(
-            "torque is on: the tip may be pressing on something. Turn it off first (`fingertip press` does in the end)"
-                .into(),
-        );
+        return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }
     client.set(address::TARE, 1)?;
     let within = Duration::from_secs_f64(args.within_s);

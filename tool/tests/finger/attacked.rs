@@ -24,6 +24,12 @@ fn numbers_that_are_none_are_not_understood() {
         &["tare", "--within-s", "nan"],
         &["tare", "--within-s", "1e300"],
         &["press", "nan"],
+        &["press", "0"],
+        &["press", "151"],
+        &["capture", "--press", "0", "--out", "a.mcap"],
+        &["calibrate", "press", "--within-s", "nan"],
+        &["calibrate", "scale", "200"],
+        &["params", "get", "nonsense"],
         &["press", "1", "--seconds", "nan"],
         &["press", "1", "--within-s", "nan"],
         &["press", "1", "--seconds=-1"],
@@ -148,6 +154,9 @@ fn recover_says_torque_is_off_only_where_it_is() {
     drop(client);
     let said = finger.done(&["recover"]);
     assert!(said.starts_with("there was nothing to recover from; torque is on"), "{said}");
+    assert!(said.contains("`fingertip stop`"), "{said}");
+    let why = finger.refused(&["tare"]);
+    assert!(why.contains("torque is on") && why.contains("`fingertip stop`"), "{why}");
     assert_eq!(finger.json(&["info"])["torque_enable"], 1);
 }
 

@@ -1,7 +1,9 @@
 //! What a killed command leaves behind: KILL after each of its packets, or after some of them where there are hundreds.
 
 use crate::served::Served;
+use crate::stopped::client;
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip::shipped::address;
 use std::fs;
 
 #[test]
@@ -128,15 +130,15 @@ fn a_controller_that_starts_anew_was_not_commissioned() {
 fn a_motion_that_somebody_else_began_is_told() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    // Killed once the tip moves, which it goes on with by itself.
-    assert!(finger.killed_after(6, &["commission", "measure"]));
-    assert!(finger.command("state").contains("Commission"));
+    client(&finger).set(address::COMMISSION, 2).expect("it obeys");
+    finger.until_alone("Commission");
     for command in ["jog", "measure", "confirm", "accept"] {
         let why = finger.refused(&["commission", command]);
         assert!(why.contains("the tip is moving") && why.contains("`fingertip commission stop`"), "{command}: {why}");
     }
     assert!(finger.command("state").contains("Commission"), "it was left alone");
-    finger.done(&["commission", "stop"]);
+    let said = finger.done(&["commission", "stop"]);
+    assert!(said.contains("the motion is stopped"), "{said}");
     finger.command("fault supply-low");
     for command in ["jog", "measure", "confirm", "accept"] {
         let why = finger.refused(&["commission", command]);

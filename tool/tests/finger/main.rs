@@ -6,6 +6,7 @@ mod captured;
 mod killed;
 #[path = "../served/mod.rs"]
 mod served;
+mod stopped;
 
 use fingertip::params::Params;
 use served::Served;
@@ -96,8 +97,7 @@ fn it_tares_presses_and_lets_go() {
     assert_eq!((&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"]), (&0.into(), &0.into(), &0.into()));
     let why = finger.refused(&["press", "9"]);
     assert!(why.contains("goal_force_mn to 9000") && why.contains("error 6"), "{why}");
-    let why = finger.refused(&["press", "0"]);
-    assert!(why.contains("0.001 to 150 N"), "{why}");
+    assert!(why.contains("force_max_mn is 7000"), "{why}");
     finger.command("remove");
     let why = finger.refused(&["press", "1", "--within-s", "0.5"]);
     assert!(why.contains("not reached") && why.contains("mode approach"), "{why}");
@@ -140,11 +140,16 @@ fn parameters_are_set_all_or_none_and_saved() {
         (&["tip_radius_um=9000", "modulus_pa=4"][..], "modulus_pa of 4: 20000 to 2000000"),
         (&["tip_radius_um=9000", "contact_on_mn=10"], "contact_off_mn of 15"),
         (&["tip_radius_um=9000", "goal_force_mn=5"], "goal_force_mn is no parameter"),
-        (&["tip_radius_um=9000", "radius=5"], "no register `radius`; did you mean tip_radius_um?"),
+    ] {
+        let said = finger.refused(&[&["params", "set"], values].concat());
+        assert!(said.contains(why), "{said}");
+    }
+    for (values, why) in [
+        (&["tip_radius_um=9000", "radius=5"][..], "no register `radius`; did you mean tip_radius_um?"),
         (&["tip_radius_um=9000", "modulus_pa=soft"], "`soft` is no whole number"),
         (&["tip_radius_um"], "NAME=VALUE is asked for"),
     ] {
-        let said = finger.refused(&[&["params", "set"], values].concat());
+        let said = Served::not_understood(&[&["params", "set"], values].concat());
         assert!(said.contains(why), "{said}");
     }
     assert_eq!(get(&["tip_radius_um"]), serde_json::json!({ "tip_radius_um": 10_000 }));
@@ -245,7 +250,7 @@ fn states_are_recorded_with_the_controllers_times() {
     assert_eq!(messages[0].channel.topic, "/finger0/scalars");
     assert_eq!(messages[0].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("fingertip.Scalars"));
     assert_eq!(messages[1].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("foxglove.RawImage"));
-    assert!(finger.refused(&["record", "force.txt"]).contains(".csv or .mcap"));
+    assert!(Served::not_understood(&["record", "force.txt"]).contains(".csv or .mcap"));
     assert!(finger.refused(&["record", "/nowhere/force.csv"]).contains("cannot write /nowhere/force.csv"));
 }
 

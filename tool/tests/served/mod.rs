@@ -5,6 +5,7 @@ use fingertip::link::Reply;
 use fingertip::link::packet::BROADCAST;
 use fingertip::link::packet::instruction::REBOOT;
 use fingertip::link::sender;
+use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
 use sim::effects::set::Named;
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Patience on the slowest machine, where an answer is expected.
 const PATIENCE: &str = "600000";
@@ -37,7 +38,15 @@ struct Told {
     trap: Option<(String, u8)>,
     /// How many more packets it hears before it starts anew.
     restart: Option<u64>,
+    /// Its clock waits for the host: it goes on for `PATIENT_S` after a packet. On a loaded machine the bus watchdog must not
+    /// outrun the program under test.
+    patient: bool,
+    /// Time of the last packet, s.
+    heard_s: f64,
 }
+
+/// Simulated time that a patient finger goes on after a packet, s.
+const PATIENT_S: f64 = 0.1;
 
 impl Told {
     /// What is no command of a served finger.
@@ -56,6 +65,10 @@ impl Told {
             }
             ["restart", "after", packets] => {
                 self.restart = Some(number(packets));
+                Some(Ok(String::new()))
+            }
+            ["patient", patient] => {
+                self.patient = patient == "on";
                 Some(Ok(String::new()))
             }
             ["restarted"] => Some(Ok(self.restart.is_none().to_string())),
@@ -82,6 +95,11 @@ impl serve::Finger for Told {
 
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
+            // A look leaves the finger's clock alone.
+            if command == "look" {
+                answer.send(self.native.command("state")).expect("somebody waits for it");
+                continue;
+            }
             let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
             // What was broken or mended acts on the next frames; whoever asks then finds it so.
             (0..20).for_each(|_| self.native.0.frame());
@@ -92,10 +110,12 @@ impl serve::Finger for Told {
         {
             self.native.0.hear(&instruction(number));
         }
-        self.native.run_until(time_s)
+        let last_s = if self.patient { self.heard_s + PATIENT_S } else { time_s };
+        self.native.run_until(time_s.min(last_s))
     }
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.heard_s = self.native.now_s();
         if let Some((left, lost, unheard)) = &mut self.ears {
             if *left > 0 {
                 *left -= 1;
@@ -130,6 +150,9 @@ impl serve::Finger for Told {
 }
 
 impl Served {
+    /// Pause between two looks at a finger that a program moves.
+    pub const LOOK: Duration = Duration::from_millis(2);
+
     pub fn begin(scene: &str) -> Self {
         let scene = sim::cli::load(scene, &[], None).expect("a scene");
         let mut port = Port::open(&Place::Pty(None)).expect("a pseudo-terminal");
@@ -137,7 +160,15 @@ impl Served {
         let (commands, commanded) = channel();
         let thread = std::thread::spawn(move || {
             let native = Native(Bus::new(&scene).expect("a world"));
-            let mut told = Told { native, commands: commanded, ears: None, trap: None, restart: None };
+            let mut told = Told {
+                native,
+                commands: commanded,
+                ears: None,
+                trap: None,
+                restart: None,
+                patient: false,
+                heard_s: 0.0,
+            };
             let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
             served.map(drop).unwrap_or_else(|never| match never {});
         });
@@ -241,9 +272,38 @@ impl Served {
 
     /// Ctrl-C.
     pub fn interrupt(child: &Child) {
+        Self::signal(child, Signal::INT);
+    }
+
+    pub fn signal(child: &Child, signal: Signal) {
         let pid = i32::try_from(child.id()).expect("a process number");
         let pid = rustix::process::Pid::from_raw(pid).expect("a process number");
-        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+        rustix::process::kill_process(pid, signal).expect("it runs");
+    }
+
+    /// Waits until the finger's state has this word, its mode for example. The finger's clock goes by itself.
+    pub fn until(&self, word: &str) {
+        self.until_by("look", word);
+    }
+
+    /// The same where nobody asks a patient finger anything: each look moves its clock on.
+    pub fn until_alone(&self, word: &str) {
+        self.until_by("state", word);
+    }
+
+    fn until_by(&self, look: &str, word: &str) {
+        let begun = Instant::now();
+        while !self.command(look).contains(word) {
+            assert!(begun.elapsed() < Duration::from_secs(60), "no {word} in {}", self.command(look));
+            std::thread::sleep(Self::LOOK);
+        }
+    }
+
+    /// Force at the first finger's tip, N: the truth, not what the controller senses.
+    pub fn true_force_n(&self) -> f64 {
+        let state = self.command("look");
+        let force = state.split("true force ").nth(1).and_then(|rest| rest.split(' ').next());
+        force.and_then(|force| force.parse().ok()).unwrap_or_else(|| panic!("no force in {state}"))
     }
 }
 

@@ -1,0 +1,121 @@
+//! Commands that move the finger: whatever ends one of them, the finger is at rest afterwards.
+
+use super::{Interrupt, aside, wait_for};
+use crate::state::{Clock, State};
+use crate::{Client, Error};
+use fingertip::shipped::address;
+use fingertip::state::Mode;
+use std::time::{Duration, Instant};
+
+/// Bus watchdog while a command moves the finger: the controller stops the motor after this silence.
+const WATCHDOG_MS: i64 = 500;
+/// The same in steps of the register `bus_watchdog`.
+const WATCHDOG: i64 = WATCHDOG_MS / 20;
+/// Longest release at the end of a command, in seconds of the controller's clock.
+const RELEASE_S: f64 = 10.0;
+/// Longest wait for the controller, for example where no frames come and its clock stands still.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Time between two reads of the state.
+const LOOK: Duration = Duration::from_millis(10);
+/// A released tip below this speed and this force is clear of the object.
+const REST_UM_PER_S: i64 = 1_000;
+const CLEAR_MN: i64 = 10;
+
+/// A finger that this program moves. The bus watchdog runs from the beginning on, and the reads of the command feed it:
+/// a killed program or a lost cable ends in fault 7. Every other end releases the object and turns torque off.
+#[derive(Debug)]
+pub struct Moving<'a> {
+    /// The controller.
+    pub client: &'a mut Client,
+    /// Watchdog to put back at the end; none once the finger was stopped.
+    watchdog: Option<i64>,
+}
+
+impl<'a> Moving<'a> {
+    /// Sets the bus watchdog. `_interrupt` proves that a signal no longer ends the program on the spot.
+    ///
+    /// # Errors
+    /// The controller does not answer, or its watchdog has tripped.
+    pub fn begin(client: &'a mut Client, _interrupt: &Interrupt) -> Result<Self, Error> {
+        let watchdog = client.number(address::BUS_WATCHDOG)?.max(0);
+        client.set(address::BUS_WATCHDOG, WATCHDOG)?;
+        Ok(Self { client, watchdog: Some(watchdog) })
+    }
+
+    /// Stops the finger, whatever the command came to, and puts the watchdog back.
+    ///
+    /// # Errors
+    /// The command's own, and what failed on the way to rest.
+    pub fn finish<T>(mut self, done: Result<T, Error>) -> Result<T, Error> {
+        let Err(second) = self.stop() else { return done };
+        let why = done.err().map_or(String::new(), |why| format!("{why}; "));
+        Err(format!(
+            "{why}stopping the finger failed: {second}. The controller stops the motor after {WATCHDOG_MS} ms of \
+             silence, with fault 7; `fingertip stop` turns torque off"
+        )
+        .into())
+    }
+
+    fn stop(&mut self) -> Result<(), Error> {
+        let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
+        let released = self.release();
+        halt(self.client)?;
+        // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
+        // has tripped stays so, for `fingertip recover`.
+        if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
+            self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))?;
+        }
+        released
+    }
+
+    /// Takes the tip off the object. Only torque off ends a press that measures; friction would keep most of its force,
+    /// so torque goes on once more, with the goal of 0 that torque off leaves.
+    fn release(&mut self) -> Result<(), Error> {
+        if release(RELEASE_S, self.client)?.mode == Mode::Identify as i64 {
+            halt(self.client)?;
+            self.client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
+            wait_for(self.client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;
+            release(RELEASE_S, self.client)?;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Moving<'_> {
+    fn drop(&mut self) {
+        if let Err(why) = self.stop() {
+            aside(format_args!("fingertip: stopping the finger failed: {why}"));
+        }
+    }
+}
+
+/// Ends a grip by the goal 0 and waits until the tip is clear of the object, at most for this time. Returns the last
+/// state, which in other modes is the first.
+pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error> {
+    let (begun, mut clock) = (Instant::now(), Clock::default());
+    loop {
+        let state = client.again(State::read)?;
+        let grips = [Mode::Approach, Mode::Force, Mode::Release].iter().any(|mode| *mode as i64 == state.mode);
+        let rests = state.speed_um_per_s.abs() < REST_UM_PER_S && state.force_mn < CLEAR_MN;
+        let late = clock.time_s(&state).is_none_or(|time_s| time_s > within_s) || begun.elapsed() > PATIENCE;
+        if !grips || late || state.mode == Mode::Release as i64 && rests {
+            return Ok(state);
+        }
+        if state.goal_mn != 0 {
+            client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Turns torque off, which also aborts measurements, and waits until the motor is no longer driven.
+pub(super) fn halt(client: &mut Client) -> Result<(), Error> {
+    client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+    let mode = wait_for(client, address::PRESENT_MODE, PATIENCE, is_idle)?;
+    if is_idle(mode) { Ok(()) } else { Err(format!("the controller is still in mode {mode}").into()) }
+}
+
+/// True for the modes in which the motor is not driven.
+fn is_idle(mode: i64) -> bool {
+    [Mode::Off, Mode::Tare, Mode::Fault].iter().any(|idle| *idle as i64 == mode)
+}

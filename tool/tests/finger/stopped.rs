@@ -1,0 +1,206 @@
+//! A signal, a kill or `fingertip stop` in the middle of each motion: the finger is at rest afterwards.
+
+use crate::served::Served;
+use fingertip::shipped::address;
+use fingertip_cli::Client;
+use fingertip_cli::client::Reach;
+use rustix::process::Signal;
+use std::process::Child;
+
+/// A force that a stopped finger may still show, N.
+const RESIDUAL_N: f64 = 0.05;
+
+/// A calibration press ends by itself at 7 N: below this something else ended it.
+const CUT_SHORT_N: f64 = 4.0;
+
+/// The commands that move the finger, each with the mode in which it is caught. A jog takes the way of a measurement, and
+/// is too short to be caught.
+const MOTIONS: [(&[&str], &str); 4] = [
+    (&["press", "1", "--seconds", "1000000", "--within-s", "3600"], "Force:"),
+    (&["calibrate", "press", "--within-s", "3600"], "Identify:"),
+    (&["commission", "measure"], "Commission:"),
+    (&["capture", "--press", "1", "--within-s", "3600", "--out"], "Force:"),
+];
+
+pub fn client(finger: &Served) -> Client {
+    let port = Some(finger.port.clone());
+    Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
+}
+
+/// Starts a command and waits until it is in the middle of its motion: a press until it presses.
+fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
+    finger.done(&["tare"]);
+    let file = finger.file("caught.mcap");
+    let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
+    let child = finger.start(&[arguments, out].concat());
+    finger.until(mode);
+    while mode == "Identify:" && finger.true_force_n() < 0.5 {
+        std::thread::sleep(Served::LOOK);
+    }
+    child
+}
+
+/// A finger that does not outrun its host on a loaded machine.
+fn patient(scene: &str) -> Served {
+    let finger = Served::begin(scene);
+    finger.command("patient on");
+    finger
+}
+
+fn is_at_rest(finger: &Served, what: &str) {
+    let info = finger.json(&["info"]);
+    let now = (&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"], info["mode_name"].as_str());
+    assert_eq!(now, (&0.into(), &0.into(), &0.into(), Some("off")), "{what}");
+}
+
+#[test]
+fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
+    let finger = patient("wall");
+    for (arguments, mode) in MOTIONS {
+        for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
+            let what = format!("{arguments:?} {signal:?}");
+            let mut child = caught(&finger, arguments, mode);
+            Served::signal(&child, signal);
+            let mut most_n = 0.0_f64;
+            while child.try_wait().expect("it was started").is_none() {
+                most_n = most_n.max(finger.true_force_n());
+                std::thread::sleep(Served::LOOK);
+            }
+            let output = child.wait_with_output().expect("it ends");
+            let said = String::from_utf8_lossy(&output.stderr).into_owned();
+            assert_eq!(output.status.code(), Some(130), "{what}: {said}");
+            assert!(said.contains("interrupted before its end; torque is off"), "{what}: {said}");
+            assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
+            is_at_rest(&finger, &what);
+            assert!(most_n < CUT_SHORT_N, "{what}: {most_n} N after the signal");
+            let refused = match mode {
+                "Identify:" => Some((address::CALIBRATE_REFUSAL, 9)),
+                "Commission:" => Some((address::COMMISSION_REFUSAL, 1)),
+                _ => None,
+            };
+            if let Some((register, interrupted)) = refused {
+                assert_eq!(client(&finger).number(register).expect("it answers"), interrupted, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_killed_command_ends_in_the_fault_of_the_watchdog() {
+    let finger = patient("wall");
+    for (arguments, mode) in MOTIONS {
+        let mut child = caught(&finger, arguments, mode);
+        child.kill().expect("it runs");
+        child.wait().expect("it ends");
+        finger.until_alone("BusSilent");
+        // The shorted motor: friction may keep the force, but nothing adds to it.
+        let stopped_n = finger.true_force_n();
+        for _ in 0..100 {
+            finger.command("state");
+        }
+        assert!(finger.true_force_n() <= stopped_n + 0.01, "{arguments:?}: {}", finger.command("state"));
+        let stopped = finger.json(&["stop"]);
+        assert_eq!((&stopped["mode"], &stopped["fault"]), (&"fault".into(), &7.into()), "{arguments:?}: {stopped}");
+        finger.done(&["recover"]);
+        finger.done(&["press", "0.1", "--seconds", "0.1", "--within-s", "3600"]);
+        is_at_rest(&finger, "recovered");
+    }
+}
+
+#[test]
+fn stop_stops_every_mode() {
+    let finger = patient("wall");
+    let press: &[(u16, i64)] = &[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)];
+    for (writes, mode, releases) in [
+        (&[][..], "Off:", true),
+        (press, "Approach:", true),
+        (press, "Force:", true),
+        (&[(address::TORQUE_ENABLE, 1), (address::IDENTIFY, 1)], "Identify:", false),
+        (&[(address::TORQUE_ENABLE, 1), (address::CALIBRATE, 1)], "Identify:", false),
+        (&[(address::COMMISSION, 2)], "Commission:", true),
+    ] {
+        finger.done(&["tare"]);
+        let mut bus = client(&finger);
+        bus.set(address::BUS_WATCHDOG, 100).expect("it obeys");
+        for (register, value) in writes {
+            bus.set(*register, *value).expect("it obeys");
+        }
+        drop(bus);
+        finger.until_alone(mode);
+        let stopped = finger.json(&["stop"]);
+        assert_eq!((&stopped["mode"], &stopped["at_rest"]), (&"off".into(), &true.into()), "{mode} {stopped}");
+        assert!(!stopped["mode_before"].is_null() && !stopped["force_before_mn"].is_null(), "{stopped}");
+        assert!(!releases || finger.true_force_n() < RESIDUAL_N, "{mode} {}", finger.command("state"));
+        is_at_rest(&finger, mode);
+    }
+}
+
+#[test]
+fn stop_works_in_a_fault_and_on_a_line_that_loses_packets() {
+    let finger = patient("wall");
+    finger.done(&["tare"]);
+    let mut bus = client(&finger);
+    bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    bus.set(address::GOAL_FORCE_MN, 1_000).expect("it obeys");
+    drop(bus);
+    finger.until_alone("Force:");
+    finger.command("deaf after 0 for 2");
+    let said = finger.done(&["--timeout-ms", "1000", "stop"]);
+    assert!(said.contains("ID 1: mode force, ") && said.contains(" -> mode off, "), "{said}");
+    is_at_rest(&finger, "lost packets");
+
+    finger.command("fault supply-low");
+    client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    finger.until_alone("SupplyLow");
+    let said = finger.done(&["stop"]);
+    assert!(said.contains("fault 9 (supply low) remains: `fingertip recover`"), "{said}");
+}
+
+#[test]
+fn one_packet_stops_all_fingers() {
+    let finger = patient("grasp");
+    let both = |word: &str| finger.command("state").matches(word).count() == 2;
+    let press = || {
+        for id in [1, 2] {
+            let mut bus = client(&finger);
+            bus.id = id;
+            bus.set(address::TARE, 1).expect("it obeys");
+            while bus.number(address::TARE_STATE).expect("it answers") != 2 {}
+            bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+        }
+        while !both("Release:") {}
+    };
+    press();
+    let stopped = finger.json(&["--timeout-ms", "1000", "stop", "--all"]);
+    let ids: Vec<_> = stopped.as_array().expect("a list").iter().map(|one| one["id"].as_u64()).collect();
+    assert_eq!(ids, [Some(1), Some(2)], "{stopped}");
+    assert!(both("Off:"), "{}", finger.command("state"));
+    // The first packet is enough. What comes in with it is heard as well, nothing after that.
+    press();
+    finger.command(&format!("deaf after 1 for {}", u64::MAX));
+    let why = finger.refused(&["--timeout-ms", "50", "stop", "--all"]);
+    assert!(both("Off:"), "{why} {}", finger.command("state"));
+}
+
+#[test]
+fn commands_say_what_they_did_and_did_not_do() {
+    let finger = patient("wall");
+    let said = finger.done(&["commission", "stop"]);
+    assert!(said.contains("no jog and no measurement") && said.contains("`fingertip stop`"), "{said}");
+    assert!(finger.done(&["calibrate", "forget"]).contains("all presses and numbers are forgotten"));
+    finger.done(&["tare"]);
+    for (register, mode) in [(address::CALIBRATE, "mode identify"), (address::CLEAR_FAULT, "torque is on")] {
+        let mut bus = client(&finger);
+        bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+        bus.set(register, 1).expect("it obeys");
+        drop(bus);
+        finger.until_alone(if register == address::CALIBRATE { "Identify:" } else { "Release:" });
+        let why = finger.refused(&["commission", "stop"]);
+        assert!(why.contains("nothing was stopped") && why.contains(mode) && why.contains("`fingertip stop`"), "{why}");
+        finger.done(&["stop"]);
+    }
+    finger.done(&["tare"]);
+    finger.done(&["calibrate", "press", "--within-s", "3600"]);
+    let said = finger.done(&["calibrate", "accept"]);
+    assert!(said.contains("the proposed gains are in force") && said.contains("`fingertip params save`"), "{said}");
+}

@@ -53,7 +53,7 @@ def main() -> None:
         for newtons in given.holds:
             wait(f"{newtons} N: free the tip over the plate on the scale", not given.no_wait)
             finger.tare()
-            finger.press(newtons)
+            finger.press(newtons, silence_s=2.0)
             until = time.monotonic() + 10.0 + 1e-3 * given.timeout_ms
             while abs(finger.state().force_n - newtons) > 0.1 and time.monotonic() < until:
                 time.sleep(0.05)

@@ -26,24 +26,20 @@ def main() -> None:
             finger.recover()
         finger.tare()
         finger.press(arguments.newtons, silence_s=2.0)
-        try:
-            while time.monotonic() < until:
-                state = finger.state()
-                if state.fault:
-                    print(f"stopped by {state.fault.name}")
-                    try:
-                        finger.recover()
-                        # A fault lets go and the tare stays: nothing else is to be set up anew.
-                        finger.press(arguments.newtons, silence_s=2.0)
-                        recovered += 1
-                    except FingertipError as why:
-                        # What causes it is still there: later perhaps.
-                        print(why)
-                        time.sleep(0.5)
-                time.sleep(0.05)
-        finally:
-            if not finger.state().fault:
-                finger.release()
+        while time.monotonic() < until:
+            state = finger.state()
+            if state.fault:
+                print(f"stopped by {state.fault.name}")
+                try:
+                    finger.recover()
+                    # The tare outlives a fault: a new goal is all that is needed.
+                    finger.press(arguments.newtons, silence_s=2.0)
+                    recovered += 1
+                except FingertipError as why:
+                    # The cause may still be there: try again later.
+                    print(why)
+                    time.sleep(0.5)
+            time.sleep(0.05)
     print(f"recovered {recovered} times")
 
 

@@ -28,20 +28,15 @@ def main() -> None:
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:
         if arguments.press:
             finger.tare()
-            # Should this program be killed, the motor stops; slower streams would stop it themselves.
-            finger.press(arguments.press, silence_s=None if 0 < arguments.rate_hz < 2 else 1.0)
-        try:
-            with open(arguments.file, "w", newline="") as file:
-                table = csv.writer(file)
-                table.writerow(COLUMNS)
-                for state in finger.stream(arguments.rate_hz, arguments.seconds, pressures=False):
-                    row = [getattr(state, name) for name in COLUMNS]
-                    row[0] = f"{state.time_s:.6f}"
-                    table.writerow([int(cell) if isinstance(cell, int) else cell for cell in row])
-                    rows.append((state.time_s, state.force_n, state.goal_n))
-        finally:
-            if arguments.press:
-                finger.release()
+            finger.press(arguments.press, silence_s=2.0)
+        with open(arguments.file, "w", newline="") as file:
+            table = csv.writer(file)
+            table.writerow(COLUMNS)
+            for state in finger.stream(arguments.rate_hz, arguments.seconds, pressures=False):
+                row = [getattr(state, name) for name in COLUMNS]
+                row[0] = f"{state.time_s:.6f}"
+                table.writerow([int(cell) if isinstance(cell, int) else cell for cell in row])
+                rows.append((state.time_s, state.force_n, state.goal_n))
     span_s = rows[-1][0] - rows[0][0]
     print(f"{len(rows)} states over {span_s:.3f} s of the controller's time in {arguments.file}")
 

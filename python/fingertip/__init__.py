@@ -9,15 +9,15 @@
             print(state.time_s, state.force_n)
         finger.release()                 # lets go, torque off
 
-Times are the controller's own; registers and their units are in `fingertip.registers`.
+The end of the `with`, an exception and the end of the program let go too. Times are the controller's own; registers and their units are in `fingertip.registers`.
 """
 
 from . import registers
-from .bus import Bus, FingertipError, NoAnswer, Refused
+from .bus import Bus, FingertipError, NoAnswer, PortLost, Refused
 from .calibration import ArrayCalibration, Gain, Scale
 from .drive import Drive
 from .finger import Fingertip
-from .state import Fault, Mode, Restarted, State
+from .state import Fault, Limits, Mode, Restarted, State
 
 __all__ = [
     "ArrayCalibration",
@@ -27,8 +27,10 @@ __all__ = [
     "Fingertip",
     "FingertipError",
     "Gain",
+    "Limits",
     "Mode",
     "NoAnswer",
+    "PortLost",
     "Refused",
     "Restarted",
     "Scale",

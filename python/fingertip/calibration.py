@@ -11,6 +11,7 @@ from . import registers as reg
 from .bus import FingertipError
 from .finger import Fingertip
 
+_SILENCE_S = 2.0  # bus watchdog of a calibration: the controller ends its motions by itself
 ONE = 16384  # a gain of 1 on the bus
 _RUNNING, _DONE = 1, 2
 _PRESS, _FORGET, _ACCEPT = 1, 2, 3
@@ -64,7 +65,7 @@ class ArrayCalibration:
     def modulus(self) -> float:
         """Measures Young's modulus by a press onto a hard flat plate and sets it; kPa."""
         finger = self.finger
-        finger.write(reg.TORQUE_ENABLE, 1)
+        finger.enable_torque(_SILENCE_S)
         try:
             finger.write(reg.IDENTIFY, 1)
             until = time.monotonic() + self.patience_s
@@ -82,7 +83,7 @@ class ArrayCalibration:
     def press(self, progress: Optional[Callable[[int], None]] = None) -> int:
         """Presses once onto a hard flat plate and lets go; how many taxels have a proposal by now."""
         finger = self.finger
-        finger.write(reg.TORQUE_ENABLE, 1)
+        finger.enable_torque(_SILENCE_S)
         try:
             finger.write(reg.CALIBRATE, _PRESS)
             until = time.monotonic() + self.patience_s

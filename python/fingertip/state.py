@@ -1,24 +1,55 @@
 """What the controller says of itself."""
 
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import List
+from enum import IntEnum, IntFlag
+from typing import Optional, Tuple
 
 from .bus import FingertipError
 
 
-class Mode(IntEnum):
+class _Open(IntEnum):
+    """Numbers with names. A number of a newer firmware has the name `UNKNOWN_` and itself."""
+
+    @classmethod
+    def _missing_(cls, value: object) -> "Optional[_Open]":
+        if not isinstance(value, int):
+            return None
+        member = int.__new__(cls, value)
+        member._name_, member._value_ = f"UNKNOWN_{value}", value
+        return member
+
+
+class Mode(_Open):
     """What the controller is doing."""
 
     OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY, COMMISSION = range(8)
 
 
-class Fault(IntEnum):
+class Fault(_Open):
     """Why the motor was stopped."""
 
     NONE, LOST_FRAMES, ARRAY_BROKEN, ROW_STUCK, ARRAY_FROZEN, ENCODER_FROZEN, OVER_FORCE, BUS_SILENT = range(8)
     BROKEN_PARAMETERS, SUPPLY_LOW, SUPPLY_HIGH, BRIDGE, MISSED_DEADLINE, CRASH, RUNAWAY, REVERSED, UNSEEN = range(8, 17)
     NO_CLOCK, BROWN_OUT_LEVEL = 17, 18
+
+
+class Limits(IntFlag):
+    """What holds the loop back. Bits of a newer firmware are kept."""
+
+    VOLTAGE = 1 << 0
+    CURRENT = 1 << 1
+    SPEED = 1 << 2
+    GOAL = 1 << 3
+    TRAVEL = 1 << 4
+    TAXELS = 1 << 5
+    NOT_TARED = 1 << 6
+    FRAME_MISSED = 1 << 7
+    SLEW = 1 << 8
+    FIT_LEVEL = 1 << 9
+    TARED_TOUCHING = 1 << 10
+    FROM_BELOW = 1 << 11
+    GUARD = 1 << 12
+    WINDING = 1 << 13
 
 
 class Restarted(FingertipError):
@@ -41,5 +72,5 @@ class State:
     duty: float  # share of the supply, -1 to 1
     mode: Mode
     fault: Fault
-    limits: int  # a bit each
-    pressures_kpa: List[List[float]]  # row by row; none where they were not read
+    limits: Limits
+    pressures_kpa: Tuple[Tuple[float, ...], ...]  # row by row; none where they were not read

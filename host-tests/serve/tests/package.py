@@ -1,6 +1,9 @@
 """What the package makes of wrong numbers, of what ends it, and of a controller that starts anew: package.py PORT TIMEOUT_MS."""
 
+import os
 import sys
+import unittest
+from pathlib import Path
 
 from fingertip import Fault, Fingertip, FingertipError, Mode, Restarted, registers
 
@@ -16,7 +19,7 @@ def refused(doing, error):
 def restart(finger):
     """A broadcast, which nobody answers."""
     finger._packets.txPacket(finger._port, [0xFF, 0xFF, 0xFD, 0, 254, 3, 0, 8, 0, 0])
-    finger._port.is_using = False
+    finger._port.is_using = finger._port.owed = False
 
 
 for number in range(registers.FAULT.largest + 1):
@@ -82,3 +85,7 @@ except KeyboardInterrupt:
     pass
 with Fingertip(sys.argv[1], timeout_ms=float(sys.argv[2])) as finger:
     assert finger.read(registers.TORQUE_ENABLE) == 0
+
+os.environ.update(FINGERTIP_PORT=sys.argv[1], FINGERTIP_TIMEOUT_MS=sys.argv[2])
+tests = unittest.defaultTestLoader.discover(str(Path(__file__).resolve().parents[3] / "python/tests"))
+sys.exit(not unittest.TextTestRunner().run(tests).wasSuccessful())

@@ -20,6 +20,8 @@ const DONE: u8 = 3;
 /// Errors of a status packet.
 const RESULT: u8 = 1;
 const ACCESS: u8 = 7;
+/// Virtual time that an answer may take while frames are kept: the loop then leaves little of the core to the bus.
+const WAIT_NS: u64 = 20_000_000;
 /// Bytes of a read.
 const WINDOW: u16 = 248;
 
@@ -42,7 +44,8 @@ fn press(rig: &mut Rig) {
 fn until_done(rig: &mut Rig) {
     for _ in 0..100 {
         rig.run_ms(5).expect("it runs");
-        if read_u8(rig, address::CAPTURE_STATE) == DONE {
+        let state = rig.client(WAIT_NS, |bus| bus.read_u8(1, address::CAPTURE_STATE).map(|reply| reply.data));
+        if state.expect("the client runs").expect("the image answers") == DONE {
             return;
         }
     }

@@ -88,7 +88,7 @@ pub struct Status {
     pub taken: Taken,
 }
 
-/// What the bridge is to do.
+/// A state of the H-bridge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bridge {
     /// Its driver sleeps: it reported a fault.
@@ -102,7 +102,7 @@ pub enum Bridge {
 }
 
 impl Status {
-    /// What the bridge is to do.
+    /// The state of the H-bridge that the board sets after this frame.
     ///
     /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many millimetres
     /// if the motor coasted. Shorted, the motor is pushed back slowly. So does a finger whose torque is turned off, until

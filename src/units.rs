@@ -5,6 +5,8 @@
 
 use fixed::types::{I2F30, I8F24, I16F16, I24F8};
 
+/// Makes one type for each quantity: a wrapper of the fixed-point type, public inside, with its bits as an integer.
+#[macro_export]
 macro_rules! quantities {
     ($($(#[$doc:meta])* $name:ident($inner:ty);)*) => { $(
         $(#[$doc])*

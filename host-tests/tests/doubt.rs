@@ -249,7 +249,7 @@ fn a_fit_is_doubted_by_what_is_hidden_and_how_unlike_it_is() {
 fn doubt_comes_in_some_eight_frames_and_goes_in_some_sixty() {
     let config = config();
     let mut rng = Rng::with_seed(3);
-    // Until the first refinement it goes by the sums: of these, bad taxels hide a part, or as good as all.
+    // Before the first refinement the doubt follows from the sums. Bad taxels hide a part of the contact, or nearly all of it.
     let (mut part, mut hidden) = (NONE, NONE);
     part[4..6].fill(0b11_1111);
     hidden[3..7].fill(0b111_1000);

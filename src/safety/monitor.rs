@@ -28,15 +28,15 @@ const HOLDS_BITS: u32 = 3;
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
 const SUPPLY_FRAMES: u8 = 5;
 
-/// All taxels together read less than at the tare by three times the least contact, in halves of it,
+/// Fault where all taxels together read less than at the tare by three times the least contact (in halves of it)
 const LESS: i32 = 6;
 /// for this many frames: interference changes one.
 const LESS_FRAMES: u8 = 3;
-/// Largest growth of the sum of all taxels in one frame that a contact can cause, as a part of the sum: 1/4,
+/// A contact raises the sum of all taxels in one frame by no more than this part of the sum, 1/4, and
 const MORE_BITS: u32 = 2;
-/// plus twice the least contact, in halves of the least contact.
+/// twice the least contact (this number counts halves of it).
 const MORE: i32 = 4;
-/// Time for which a larger growth must remain before it counts as a fault, ns: longer than a burst of interference.
+/// A larger jump is a fault once it has lasted longer than a burst of interference, ns.
 const MORE_NS: u32 = 8_000_000;
 
 /// What a frame shows, for judgement.
@@ -64,7 +64,7 @@ pub struct Monitor {
     mean: MillimetresPerSecond2,
     /// Larger sum of the last two frames; sum and number of bad taxels of the last frame.
     before: (i32, i32, u16),
-    /// Sum in the middle of the step; time since the step, ns, while the sum stays above that.
+    /// Sum halfway up the last jump, and the time for which the sum has stayed above it, ns.
     step: i32,
     step_ns: Option<u32>,
     supply_frames: u8,

@@ -6,7 +6,15 @@
 #[cfg(test)]
 extern crate std;
 
+use fingertip::config::Config;
+use fingertip::contact::Contact;
+use fingertip::control::SpeedLoop;
+use fingertip::control::profile::Reference;
+use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
+use fingertip::state::Limits;
+use fingertip::touch::{Felt, Touch};
+use fingertip::units::Millimetres;
 
 pub mod record;
 
@@ -18,3 +26,19 @@ pub mod single;
 /// temperature. The images that count cycles measure what it costs by these.
 pub const CORRECTED: Params =
     Params { curve_permille: 3_300, creep_permille: 66, array_gain_ppm_per_k: 3_600, ..Params::DEFAULT };
+
+/// A frame of the touch and of the grip in an approach or a hold, where the motor felt nothing before the array did.
+#[inline(always)]
+pub fn reference(
+    grip: &mut Grip,
+    goal: Goal,
+    contact: &Contact,
+    touch: &mut Touch,
+    motion: &mut SpeedLoop,
+    config: &Config,
+    limits: &mut Limits,
+) -> Reference {
+    let felt = Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true };
+    touch.observe(&felt, || Millimetres::ZERO, config);
+    grip.reference(&goal, contact, touch, motion, config, limits)
+}

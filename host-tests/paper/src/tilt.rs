@@ -82,7 +82,7 @@ pub fn energy(tip: &Tip, displacement: Displacement) -> NewtonMillimetres {
 
 /// The shift at which a tip that slides freely rests, `s = -(d tan t)/2`: there the energy is least and `F_t` is 0.
 ///
-/// It may be beyond the -a/2 to a/2 that [`Displacement`] covers.
+/// The result may exceed the range of -a/2 to a/2 of [`Displacement::shift`].
 pub fn free_shift(tip: &Tip, normal: Millimetres, tilt: Radians) -> Millimetres {
     let pose = pose(tip, Displacement { normal, shift: Millimetres::ZERO, tilt });
     Millimetres::from_bits(-shift_product(pose.normal, pose.tangent, TANGENT_BITS + 1) as i32)

@@ -2,30 +2,7 @@
 
 use fingertip::fixed::types::{I8F24, I16F16, I18F14};
 
-macro_rules! quantities {
-    ($($(#[$doc:meta])* $name:ident($inner:ty);)*) => { $(
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-        pub struct $name(pub $inner);
-
-        impl $name {
-            /// Nothing of it.
-            pub const ZERO: Self = Self(<$inner>::ZERO);
-
-            /// From the raw integer: the value in units of the last place.
-            pub const fn from_bits(bits: i32) -> Self {
-                Self(<$inner>::from_bits(bits))
-            }
-
-            /// The raw integer: the value in units of the last place.
-            pub const fn to_bits(self) -> i32 {
-                self.0.to_bits()
-            }
-        }
-    )* };
-}
-
-quantities! {
+fingertip::quantities! {
     /// An angle in rad (Q8.24), resolution 60 nrad.
     Radians(I8F24);
     /// An area in mm^2 (Q16.16): to 32768 mm^2, resolution 15 um^2.

@@ -267,7 +267,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// The requests of a scene's events, in order of time.
+    /// Requests that a scene's events make, sorted by time.
     pub fn all(events: &[Event]) -> Vec<(f64, Self)> {
         let asked = |at_s: f64, after_s: [f64; 3], request: Self| {
             let requests = [Self::Torque(false), request, Self::Torque(true)];

@@ -18,7 +18,7 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Time between two reads of the state.
 const LOOK: Duration = Duration::from_millis(10);
 /// A released tip below this speed and this force is clear of the object.
-const REST_UM_PER_S: i64 = 1_000;
+pub(super) const REST_UM_PER_S: i64 = 1_000;
 const CLEAR_MN: i64 = 10;
 
 /// A finger that this program moves. The bus watchdog runs from the beginning on, and the reads of the command feed it:

@@ -1,6 +1,7 @@
 //! `fingertip stop`.
 
-use super::{moving, say, say_json, wait_for};
+use super::moving::{self, REST_UM_PER_S};
+use super::{say, say_json, wait_for};
 use crate::client::Reach;
 use crate::state::State;
 use crate::{Client, Error, table};
@@ -12,8 +13,6 @@ use std::time::Duration;
 const RELEASE_S: f64 = 0.5;
 /// Longest wait for a tip that rolls out behind the shorted motor.
 const ROLL_OUT: Duration = Duration::from_secs(2);
-/// A tip below this speed is at rest.
-const REST_UM_PER_S: i64 = 1_000;
 /// A tip that still presses with more force gets a hint.
 const RESIDUAL_MN: i64 = 50;
 

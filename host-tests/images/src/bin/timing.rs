@@ -24,7 +24,7 @@ use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
 use fingertip::state::{Limits, Mode};
-use fingertip::touch::{Felt, Touch};
+use fingertip::touch::Touch;
 use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
 use host::{File, command_line, fail, say};
 use images::CORRECTED;
@@ -133,24 +133,14 @@ extern "C" fn observe(bench: &mut Bench) {
 
 extern "C" fn reference(bench: &mut Bench) {
     let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    touch.observe(
-        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
-        || Millimetres::ZERO,
-        config,
-    );
-    bench.reference =
-        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, config, limits);
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, config, limits);
 }
 
 extern "C" fn creeping(bench: &mut Bench) {
     let Bench { curved, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    touch.observe(
-        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
-        || Millimetres::ZERO,
-        curved,
-    );
-    bench.reference =
-        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, curved, limits);
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, curved, limits);
 }
 
 extern "C" fn follow(bench: &mut Bench) {

@@ -16,8 +16,8 @@ use fingertip::pipeline::Taken;
 use fingertip::safety::guard::{Guard, Seen};
 use fingertip::shipped::{Array, Config, Picture, Pipeline};
 use fingertip::state::{Limits, Mode};
-use fingertip::touch::{Felt, Touch};
-use fingertip::units::{Celsius, Duty, Millimetres, Newtons};
+use fingertip::touch::Touch;
+use fingertip::units::{Celsius, Duty, Newtons};
 use images::CORRECTED;
 use images::record::Record;
 use static_cell::StaticCell;
@@ -98,13 +98,8 @@ extern "C" fn curved_read(bench: &mut Bench) {
 
 extern "C" fn creeping(bench: &mut Bench) {
     let Bench { corrected, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    touch.observe(
-        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
-        || Millimetres::ZERO,
-        corrected,
-    );
-    bench.reference =
-        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, corrected, limits);
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, corrected, limits);
 }
 
 extern "C" fn warmth(bench: &mut Bench) {
@@ -126,13 +121,8 @@ extern "C" fn observe(bench: &mut Bench) {
 
 extern "C" fn reference(bench: &mut Bench) {
     let Bench { config, record, contact, touch, drift, motion, grip, limits, .. } = bench;
-    touch.observe(
-        &Felt { contact, summed: contact.force, travel: motion.observer.travel, presses: true },
-        || Millimetres::ZERO,
-        config,
-    );
-    bench.reference =
-        grip.reference(&Goal { force: record.command.goal, drift: *drift }, contact, touch, motion, config, limits);
+    let goal = Goal { force: record.command.goal, drift: *drift };
+    bench.reference = images::reference(grip, goal, contact, touch, motion, config, limits);
 }
 
 extern "C" fn follow(bench: &mut Bench) {

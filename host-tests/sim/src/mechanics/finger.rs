@@ -193,7 +193,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.setup.wall.distance_mm = distance_mm;
     }
 
-    /// Takes in what events have done: counts that the encoder has gained, and the voltage to which the supply has fallen.
+    /// Sets the effect of events: counts that the encoder has slipped by, and the voltage to which the supply has dropped.
     pub fn happen(&mut self, slipped_counts: i32, fallen_v: Option<f64>) {
         (self.slipped_counts, self.fallen_v) = (slipped_counts, fallen_v);
     }

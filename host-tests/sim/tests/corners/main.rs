@@ -1,7 +1,7 @@
 //! Unusual orders of events at exact times: interrupted goals, torque off in motion, lost signals, memory of the array.
 //!
-//! Every test is judged by what is true of the simulated finger, never by what the controller reports, except for the
-//! mode and the fault. These two are read by [`mode`] and [`fault`] alone.
+//! Every test judges the true state of the simulated finger. Of the controller it reads only the mode and the fault, by
+//! [`mode`] and [`fault`].
 //!
 //! `cargo test -p sim --profile host --test corners -- --nocapture` prints the largest value of each group of cases.
 
@@ -161,7 +161,7 @@ fn judge(name: &str, unit: &str, cases: &[Case]) {
     );
 }
 
-/// Draws a number whose logarithm is uniform.
+/// Draws a number from a log-uniform distribution.
 fn log_uniform(rng: &mut Rng, least: f64, most: f64) -> f64 {
     least * (most / least).powf(rng.f64())
 }

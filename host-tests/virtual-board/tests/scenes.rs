@@ -64,6 +64,16 @@ fn compared(first: &Scene, second: &Scene) -> Agreement {
     agreement
 }
 
+/// A tare that an event asks for is not the tare before the scene's start.
+#[test]
+fn a_scene_may_ask_for_a_tare() {
+    let released = WALL.replace("duration_s = 0.3", "duration_s = 0.6");
+    let text = format!("{released}[[script]]\nat_s = 0.3\ngoal_n = 0.0\n[[event]]\nkind = \"tare\"\nat_s = 0.5\n");
+    let mut kept = Kept::default();
+    run(&scene(&text), &mut kept);
+    assert!(kept.force_n == 0.0 && kept.times_s.last().is_some_and(|time_s| *time_s > 0.59), "{kept:?}");
+}
+
 #[test]
 fn both_boards_do_the_same() {
     for text in [WALL, STEPS] {

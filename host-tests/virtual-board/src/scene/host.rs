@@ -98,6 +98,8 @@ pub struct Host {
     command: Command,
     listener: Listener,
     status: Status,
+    /// Whether the tare before the start was seen to end: a scene may ask for another one.
+    ready: bool,
     /// From the converters' number of a frame to the board's own.
     offset: u32,
     frames: VecDeque<Seen>,
@@ -138,6 +140,7 @@ impl Host {
             command: Command { torque: true, tare_request: 1, ..Command::default() },
             listener: Listener::default(),
             status: Status::default(),
+            ready: false,
             offset,
             frames: VecDeque::new(),
             shown: Vec::new(),
@@ -170,7 +173,7 @@ impl Host {
 
     /// Why the board is not fit for the scene, if so.
     pub fn trouble(&self, now_ns: u64) -> Option<&'static str> {
-        if now_ns <= self.start_ns + self.look_every_ns {
+        if self.ready || now_ns <= self.start_ns + self.look_every_ns {
             None
         } else if self.status.limits.has(Limits::NOT_TARED) {
             Some("the tare has not ended before the scene's start")
@@ -209,6 +212,7 @@ impl Host {
 
     fn answered(&mut self, status: Status, at_ns: u64) {
         self.status = status;
+        self.ready |= !status.limits.has(Limits::NOT_TARED);
         if self.asked.take().is_some_and(|asked| asked.for_grip) {
             self.host.hear(self.clock.time_s(at_ns), Reading::of(&status));
         }

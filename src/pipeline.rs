@@ -16,7 +16,7 @@ use crate::control::SpeedLoop;
 use crate::control::warmth::Warmth;
 use crate::control::winding::Winding;
 use crate::frame::{Frame, Sense, Shape};
-use crate::grip::Goal;
+use crate::grip::{Goal, Grip};
 use crate::identify::PressView;
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
@@ -155,8 +155,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         contact
     }
 
-    /// The first reason to stop, the most direct evidence first. While the motor is not driven there is none, but for a
-    /// tare, which a broken array, a silent bus and the bridge end.
+    /// The first reason to stop, the most direct evidence first. While the motor is not driven, only a tare has reasons:
+    /// a broken array, a silent bus and the bridge end it.
     fn judge(&mut self, contact: &Contact, sound: bool, sense: &Sense, command: &Command) -> Option<Fault> {
         let drives = self.activity.drives();
         let picture = self.array.picture();
@@ -179,7 +179,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         let pressed = self.guard.presses_in();
         let view = View { picture, contact, pressed, sense, motion: &self.motion, command };
-        self.monitor.check(&view, drives, &self.config).or(unsafe_motion)
+        let fault = if drives { self.monitor.check(&view, &self.config) } else { None };
+        fault.or(unsafe_motion).or_else(|| self.judge_bus(sense, command))
+    }
+
+    /// A host that fell silent cannot end a press: the finger releases the object by itself, then stops.
+    fn judge_bus(&mut self, sense: &Sense, command: &Command) -> Option<Fault> {
+        let silent = command.bus_watchdog_ms != 0 && sense.bus_silent_ms >= command.bus_watchdog_ms;
+        if silent && matches!(self.activity, Activity::Press(_)) {
+            self.leave(Halt::BRAKES);
+            self.activity = Activity::Grip(Grip::default());
+        }
+        let ends = match &mut self.activity {
+            Activity::Grip(grip) => grip.ends(silent, &self.touch, &self.motion, &self.config),
+            _ => silent,
+        };
+        ends.then_some(Fault::BusSilent)
     }
 
     /// Lets the baseline learn what the array reads without a contact.

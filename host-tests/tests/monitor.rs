@@ -67,26 +67,7 @@ fn a_force_above_the_limit_stops_at_once() {
     let limit = config.force_fault.to_bits();
     for (bits, fault) in [(limit, None), (limit + 1, Some(Fault::OverForce))] {
         shown.contact.force = Newtons::from_bits(bits);
-        assert_eq!(Monitor::default().check(&shown.view(), true, &config), fault);
-        assert_eq!(Monitor::default().check(&shown.view(), false, &config), None, "nothing is driven");
-    }
-}
-
-#[test]
-fn a_silent_bus_stops_after_the_watchdogs_time() {
-    let config = config();
-    for (watchdog_ms, silent_ms, fault) in [
-        (0, u16::MAX, None),
-        (20, 19, None),
-        (20, 20, Some(Fault::BusSilent)),
-        (20, 21, Some(Fault::BusSilent)),
-        (1, 0, None),
-    ] {
-        let mut shown = Shown::sound();
-        (shown.command.bus_watchdog_ms, shown.sense.bus_silent_ms) = (watchdog_ms, silent_ms);
-        for driven in [false, true] {
-            assert_eq!(Monitor::default().check(&shown.view(), driven, &config), fault, "{silent_ms} ms");
-        }
+        assert_eq!(Monitor::default().check(&shown.view(), &config), fault);
     }
 }
 
@@ -103,18 +84,18 @@ fn a_supply_outside_its_window_for_five_frames_stops() {
     for inside in [low, high] {
         let mut monitor = Monitor::default();
         for _ in 0..100 {
-            assert_eq!(monitor.check(&with(inside).view(), true, &config), None, "{inside} mV");
+            assert_eq!(monitor.check(&with(inside).view(), &config), None, "{inside} mV");
         }
     }
     for (outside, fault) in [(low - 1, Fault::SupplyLow), (0, Fault::SupplyLow), (high + 1, Fault::SupplyHigh)] {
         let mut monitor = Monitor::default();
         for _ in 0..3 {
             for _ in 0..4 {
-                assert_eq!(monitor.check(&with(outside).view(), true, &config), None);
+                assert_eq!(monitor.check(&with(outside).view(), &config), None);
             }
-            assert_eq!(monitor.check(&with(low).view(), true, &config), None, "one good frame is enough");
+            assert_eq!(monitor.check(&with(low).view(), &config), None, "one good frame is enough");
         }
-        let faults = [(); 6].map(|()| monitor.check(&with(outside).view(), true, &config));
+        let faults = [(); 6].map(|()| monitor.check(&with(outside).view(), &config));
         assert_eq!(faults, [None, None, None, None, Some(fault), Some(fault)]);
     }
 }
@@ -132,7 +113,7 @@ fn stopped_um(um_per_frame: i32, load_mn: i32, force_mn: i32, goal_mn: i32) -> O
     (1..=6_000 / um_per_frame).map(|frame| frame * um_per_frame).find(|um| {
         let mut shown = Shown::sound().at(5_000 + um).loaded(load_mn * (um - 100).clamp(0, 100) / 100);
         (shown.contact.force, shown.command.goal) = (newtons(force_mn), newtons(goal_mn));
-        monitor.check(&shown.view(), true, &config) == Some(Fault::ArrayFrozen)
+        monitor.check(&shown.view(), &config) == Some(Fault::ArrayFrozen)
     })
 }
 
@@ -179,7 +160,7 @@ fn an_array_that_shows_any_change_or_no_contact_does_not() {
         for frame in 1..5_000 {
             let mut shown = Shown::sound().at(5_000 + frame).loaded(frame);
             change(&mut shown, frame);
-            assert_eq!(monitor.check(&shown.view(), true, &config), None, "{number}");
+            assert_eq!(monitor.check(&shown.view(), &config), None, "{number}");
         }
     }
 }
@@ -202,26 +183,23 @@ fn an_array_that_reads_less_than_at_its_tare_is_broken() {
         let Shown { picture, motion, .. } = with(sum);
         monitor.restart(&picture, &motion);
         for _ in 0..100 {
-            assert_eq!(monitor.check(&with(sum).view(), true, &config), None, "{sum}");
+            assert_eq!(monitor.check(&with(sum).view(), &config), None, "{sum}");
         }
     }
     let broken = Some(Fault::ArrayBroken);
     for sum in [least - 1, 10 * least, i32::MIN] {
         let mut monitor = Monitor::default();
         for _ in 0..3 {
-            let faults = [sum, sum, least].map(|sum| monitor.check(&with(sum).view(), true, &config));
+            let faults = [sum, sum, least].map(|sum| monitor.check(&with(sum).view(), &config));
             assert_eq!(faults, [None; 3], "{sum}: one good frame is enough");
         }
-        let faults = [(); 5].map(|()| monitor.check(&with(sum).view(), true, &config));
+        let faults = [(); 5].map(|()| monitor.check(&with(sum).view(), &config));
         assert_eq!(faults, [None, None, broken, broken, broken], "{sum}");
         // A new start forgets the frames before.
         let Shown { picture, motion, .. } = with(sum);
         monitor.restart(&picture, &motion);
-        let faults = [(); 3].map(|()| monitor.check(&with(sum).view(), true, &config));
+        let faults = [(); 3].map(|()| monitor.check(&with(sum).view(), &config));
         assert_eq!(faults, [None, None, broken], "{sum}");
-        let mut monitor = Monitor::default();
-        let faults = [(); 5].map(|()| monitor.check(&with(sum).view(), false, &config));
-        assert_eq!(faults, [None; 5], "{sum}: nothing is driven");
     }
 }
 
@@ -235,7 +213,7 @@ fn stopped_by_sums(goal_mn: i32, sums: impl Iterator<Item = (i32, u16)>) -> Opti
     let mut monitor = restarted(0);
     let mut fault = |(sum, bad_count)| {
         shown.picture = Picture { sum, bad_count, moment_x: sum, ..shown.picture };
-        let fault = monitor.check(&shown.view(), true, &config);
+        let fault = monitor.check(&shown.view(), &config);
         assert!(matches!(fault, None | Some(Fault::ArrayBroken)), "{fault:?}");
         fault
     };
@@ -282,7 +260,7 @@ fn an_array_without_some_of_its_taxels_does_not_read_less() {
             for _ in 0..10 {
                 shown.picture = *array.read(&frame, &config);
                 let sum = shown.picture.sum;
-                assert_eq!(monitor.check(&shown.view(), true, &config), None, "{masked} rows, {dead} dead: {sum}");
+                assert_eq!(monitor.check(&shown.view(), &config), None, "{masked} rows, {dead} dead: {sum}");
             }
         }
     }
@@ -294,7 +272,7 @@ fn an_array_without_some_of_its_taxels_does_not_read_less() {
     }
     let shown = Shown { picture: *array.read(&frame, &config), ..Shown::sound() };
     let mut monitor = Monitor::default();
-    let faults = [(); 3].map(|()| monitor.check(&shown.view(), true, &config));
+    let faults = [(); 3].map(|()| monitor.check(&shown.view(), &config));
     assert_eq!(faults, [None, None, Some(Fault::ArrayBroken)], "a sum of {}", shown.picture.sum);
 }
 

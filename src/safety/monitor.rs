@@ -47,7 +47,7 @@ pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
     pub contact: &'a Contact,
     /// Whether the tip surely presses into something, by the guard.
     pub pressed: bool,
-    /// Encoder, supply, bus and bridge.
+    /// Encoder, supply and bridge.
     pub sense: &'a Sense,
     /// The motion estimated.
     pub motion: &'a SpeedLoop,
@@ -83,22 +83,14 @@ impl Monitor {
         *self = Self { sums: sums(picture), travel, disturbance, mean: disturbance, before, ..Self::default() };
     }
 
-    /// The first fault that the contact and the motion show, the most direct evidence first. While the bridge is off
-    /// for a tare, only the bus counts.
+    /// The first fault that the contact and the motion show, the most direct evidence first.
     pub fn check<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
-        driven: bool,
         config: &Config,
     ) -> Option<Fault> {
-        if driven && view.contact.force > config.force_fault {
+        if view.contact.force > config.force_fault {
             return Some(Fault::OverForce);
-        }
-        if bus_silent(view) {
-            return Some(Fault::BusSilent);
-        }
-        if !driven {
-            return None;
         }
         self.supply(view, config)
             .or_else(|| self.less(view, config))
@@ -208,10 +200,6 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
 pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>, config: &Config) -> bool {
     let p = &config.params;
     i32::from(picture.undriven_max) <= p.undriven_max_codes && i32::from(picture.bad_count) <= p.bad_taxels_max
-}
-
-fn bus_silent<const ROWS: usize, const COLUMNS: usize>(view: &View<ROWS, COLUMNS>) -> bool {
-    view.command.bus_watchdog_ms != 0 && view.sense.bus_silent_ms >= view.command.bus_watchdog_ms
 }
 
 fn sums<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>) -> [i32; 3] {

@@ -179,7 +179,9 @@ fn a_silent_host_trips_the_watchdog() {
     host.frames(350);
     assert_eq!(host.read(address::FAULT, 1), [0], "heard 35 ms ago");
     host.frames(450);
-    assert_eq!(host.read(address::FAULT, 1), [Fault::BusSilent as u8]);
+    assert_eq!((host.read(address::FAULT, 1), host.read(MODE, 1)), (vec![0], vec![Mode::Release as u8]));
+    host.frames(5_000);
+    assert_eq!(host.read(address::FAULT, 1), [Fault::BusSilent as u8], "that read came too late");
 }
 
 #[test]

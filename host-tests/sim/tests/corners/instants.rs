@@ -4,7 +4,8 @@
 //! `INSTANTS_STEP=1 cargo test -p sim --profile host --test corners instants -- --nocapture`
 
 use crate::{
-    Case, Finger, LOSSES, begun, force_n, judge, most_n, number, object, run_with, scene, set_goal, show, touch_s,
+    CONTACT_ON_N, Case, Finger, LOSSES, begun, force_n, judge, most_n, number, object, run_with, scene, set_goal, show,
+    touch_s,
 };
 use fingertip::shipped::Frame;
 use sim::cores;
@@ -24,6 +25,9 @@ const GOALS_N: [f64; 4] = [0.5, 1.0, 3.0, 7.0];
 /// Compliance of the objects, mm/N: a wall and a soft one.
 const OBJECTS_MM_PER_N: [f64; 2] = [0.0, 1.0];
 
+/// Largest force that a release may leave, N. A touch that just fails to read `contact_on_mn` is no touch to release.
+const LEFT_N: f64 = CONTACT_ON_N + 0.005;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Event {
     TorqueOff,
@@ -36,8 +40,13 @@ enum Event {
 impl Event {
     const ALL: [Self; 5] = [Self::TorqueOff, Self::GoalZero, Self::BridgeFault, Self::LostSignal, Self::SilentBus];
 
-    /// Lets it happen to a copy of the finger; returns the largest true force until the end, N.
-    fn happens(self, finger: &Finger, scene: &Scene, blank: &Frame) -> f64 {
+    /// Whether the motor takes the tip off the object, so that friction holds no force.
+    fn releases(self) -> bool {
+        matches!(self, Self::GoalZero | Self::SilentBus)
+    }
+
+    /// Lets it happen to a copy of the finger; returns the largest true force until the end, and the last one, N.
+    fn happens(self, finger: &Finger, scene: &Scene, blank: &Frame) -> (f64, f64) {
         let mut finger = finger.fork(scene).unwrap_or_else(|error| panic!("{error}"));
         match self {
             Self::TorqueOff => finger.command().torque = false,
@@ -45,33 +54,39 @@ impl Event {
             Self::SilentBus => finger.command().bus_watchdog_ms = 100,
             Self::BridgeFault | Self::LostSignal => {}
         }
-        run_with(&mut finger, WATCHED_S, |record| match self {
+        let peak_n = run_with(&mut finger, WATCHED_S, |record| match self {
             Self::BridgeFault => record.sense.bridge_fault = true,
             Self::LostSignal => show(record, blank),
             Self::SilentBus => record.sense.bus_silent_ms = 200,
             Self::TorqueOff | Self::GoalZero => {}
-        })
+        });
+        if self == Self::SilentBus {
+            assert_eq!(finger.status().fault, Some(fingertip::state::Fault::BusSilent));
+        }
+        (peak_n, force_n(&mut finger))
     }
 }
 
-/// The largest force after each event in one press, with the time after the touch. `first` and `every` choose the
-/// instants.
-fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64); Event::ALL.len()] {
+/// The largest force after each event in one press, with the time after the touch, and the largest that is left 0.5 s
+/// later. `first` and `every` choose the instants.
+fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64, f64); Event::ALL.len()] {
     let tables = object(2.0, yield_mm_per_n) + LOSSES;
     let (scene, approach_s) = (scene(&tables), touch_s(&tables, goal_n));
     let mut finger = begun(&scene);
     let (blank, begun_s) = (*finger.frame(), finger.time_s());
     set_goal(&mut finger, goal_n);
-    let mut worst = [(0.0, 0.0); Event::ALL.len()];
+    let mut worst = [(0.0, 0.0, 0.0_f64); Event::ALL.len()];
     for instant in (first..INSTANTS).step_by(every as usize) {
         let at_s = (approach_s + AFTER_TOUCH_S) * instant as f64 / INSTANTS as f64;
         while finger.time_s() < begun_s + at_s {
             finger.step();
         }
         for (event, worst) in Event::ALL.into_iter().zip(&mut worst) {
-            let peak_n = event.happens(&finger, &scene, &blank).max(force_n(&mut finger));
+            let (peak_n, left_n) = event.happens(&finger, &scene, &blank);
+            let peak_n = peak_n.max(force_n(&mut finger));
+            worst.2 = worst.2.max(left_n);
             if peak_n > worst.0 {
-                *worst = (peak_n, at_s - approach_s);
+                (worst.0, worst.1) = (peak_n, at_s - approach_s);
             }
         }
     }
@@ -87,23 +102,27 @@ fn an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
     let worst = cores::map(presses.iter().enumerate(), |(number, (goal_n, object))| {
         press(*goal_n, *object, every * number as u64 / presses.len() as u64, every)
     });
-    let mut cases = Vec::new();
+    let (mut cases, mut released) = (Vec::new(), Vec::new());
     println!("largest true force, N (time after the touch, s)");
     for (index, event) in Event::ALL.into_iter().enumerate() {
         for object in OBJECTS_MM_PER_N {
             let mut line = format!("{:11} {object} mm/N", format!("{event:?}"));
             for ((goal_n, _), worst) in presses.iter().zip(&worst).filter(|((_, yields), _)| *yields == object) {
-                let (peak_n, at_s) = worst[index];
+                let (peak_n, at_s, left_n) = worst[index];
                 line += &format!("  {goal_n} N: {peak_n:6.3} ({at_s:+.3})");
                 // The bridge is open after its fault: the motor coasts, and nothing can stop it.
                 let most_n = if event == Event::BridgeFault { f64::INFINITY } else { most_n(*goal_n) };
                 let what = format!("{event:?} {at_s:+.4} s from the touch, goal {goal_n} N, {object} mm/N");
+                if event.releases() {
+                    released.push(Case::new(what.clone(), left_n, LEFT_N));
+                }
                 cases.push(Case::new(what, peak_n, most_n));
             }
             println!("{line}");
         }
     }
     judge("events at many instants", "N", &cases);
+    judge("what is left 0.5 s after a release", "N", &released);
 }
 
 /// The copies above are exact.

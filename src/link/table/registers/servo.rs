@@ -46,9 +46,9 @@ macro_rules! servo {
             /// bus; the number is in fault.
             70 HARDWARE_ERROR_STATUS: U8 ReadOnly, "" * 1, 0 to 255,
                 |view, _| u32::from(hardware_error(view.snapshot.status.fault));
-            /// The motor is stopped when the bus is silent for longer; 0 is off. Reads -1 once it tripped, until 0 is
-            /// written; until then goals are refused with a range error, as X-series servos do, and torque enable with
-            /// a result error.
+            /// When the bus is silent for longer, the finger releases the object (0.5 s at most, whatever arrives then)
+            /// and stops with fault 7; 0 is off. Reads -1 once it tripped, until 0 is written; until then goals are
+            /// refused with a range error, as X-series servos do, and torque enable with a result error.
             98 BUS_WATCHDOG: I8 ReadWrite, "ms" * 20, 0 to 127 = 0,
                 |view, _| watchdog(view.settings()) as u32,
                 set_watchdog;

@@ -48,7 +48,7 @@ fn a_pause_between_states_ends_at_once() {
     let file = finger.file("slow.csv");
     // A state in a quarter of an hour.
     let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
-    while fs::read_to_string(format!("{file}.new")).is_err() {
+    while fs::read_to_string(format!("{file}.part")).is_err() {
         std::thread::yield_now();
     }
     Served::interrupt(&child);
@@ -62,7 +62,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     finger.done(&["tare"]);
     let file = finger.file("again.csv");
     let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
-    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
         std::thread::yield_now();
     }
     finger.command(&format!("raw {REBOOT}"));
@@ -182,7 +182,7 @@ fn only_files_are_written_in_place_and_by_one_at_a_time() {
     let other = Served::begin("wall");
     let file = finger.file("both.csv");
     let child = finger.start(&["record", &file]);
-    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
         std::thread::yield_now();
     }
     let why = other.refused(&["record", "--seconds", "0", &file]);

@@ -19,7 +19,7 @@ const MOTIONS: [(&[&str], &str); 4] = [
     (&["press", "1", "--seconds", "1000000", "--within-s", "3600"], "Force:"),
     (&["calibrate", "press", "--within-s", "3600"], "Identify:"),
     (&["commission", "measure"], "Commission:"),
-    (&["capture", "--press", "1", "--within-s", "3600", "--out"], "Force:"),
+    (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
 pub fn client(finger: &Served) -> Client {

@@ -3,6 +3,7 @@
 
 mod attacked;
 mod captured;
+mod exits;
 mod killed;
 mod recorded;
 #[path = "../served/mod.rs"]

@@ -200,6 +200,10 @@ fn commands_say_what_they_did_and_did_not_do() {
         finger.done(&["stop"]);
     }
     finger.done(&["tare"]);
+    for (command, hint) in [("accept", "`calibrate press`"), ("accept-scale", "`calibrate scale`")] {
+        let why = finger.refused(&["calibrate", command]);
+        assert!(why.contains(hint), "{why}");
+    }
     finger.done(&["calibrate", "press", "--within-s", "3600"]);
     let said = finger.done(&["calibrate", "accept"]);
     assert!(said.contains("the proposed gains are in force") && said.contains("`fingertip params save`"), "{said}");

@@ -135,7 +135,7 @@ params! {
     clearance_um = 1_000 in 0..=20_000;
     /// Over-force: above this the motor is stopped. Must be above force_max_mn.
     force_fault_mn = 9_000 in 100..=200_000;
-    /// Goals are cut to this. Must be above contact_on_mn and below force_fault_mn.
+    /// Largest goal; a higher one is refused. Must be above contact_on_mn and below force_fault_mn.
     force_max_mn = 7_000 in 50..=150_000;
     /// Below this supply the motor is stopped. Must be below supply_max_mv.
     supply_min_mv = 5_000 in 1_000..=48_000;

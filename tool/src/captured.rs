@@ -4,13 +4,13 @@
 //! | --- | --- |
 //! | attachment `capture.bin` | the capture, byte for byte (`fingertip::capture`): all that a replay needs |
 //! | metadata `fingertip.capture` | whose it is: board, firmware, image, notes, licence; and for people parameters, gains, frame time |
-//! | `/finger0/scalars`, `/finger0/frame` | as in a scene's recording: what the core on this machine makes of the frames |
+//! | `/fingerN/scalars`, `/fingerN/frame`, N the ID less one | as in a scene's recording: what the core on this machine makes of the frames |
 
 mod read;
 mod write;
 
 pub use read::{Kept, of_bytes, open};
-pub use write::{FRAME_SCHEMA, write};
+pub use write::write;
 
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
@@ -19,6 +19,8 @@ use replay::{Refusal, Replayed, Taken, replay};
 /// The attachment's name, and the metadata record's.
 const ATTACHED: &str = "capture.bin";
 const ABOUT: &str = "fingertip.capture";
+/// Entry of the metadata: host's time of the last frame, ns since 1970.
+pub const ENDED: &str = "ended_unix_ns";
 
 /// What is known of a capture beside its bytes, by name.
 pub type About = std::collections::BTreeMap<String, String>;

@@ -67,6 +67,9 @@ pub enum Error {
     /// The command line asks for something that does not exist; nothing was sent.
     #[error("{0}")]
     NotUnderstood(String),
+    /// A force was reached, but did not stay within its tolerance.
+    #[error("{0}")]
+    NotHeld(String),
     /// A signal ended a command that moves the finger.
     #[error("interrupted before its end; torque is off")]
     Interrupted,
@@ -80,6 +83,7 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::NotUnderstood(_) => 2,
+            Self::NotHeld(_) => 3,
             // As a shell has it for Ctrl-C.
             Self::Interrupted => 130,
             _ => 1,

@@ -1,6 +1,6 @@
 //! `fingertip`: a fingertip controller from the host's side.
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
@@ -8,13 +8,15 @@ use fingertip_cli::commands::{
     view,
 };
 use fingertip_cli::{Client, Error};
+use serde_json::json;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 /// Finds, watches, records, sets up and moves a fingertip controller on its bus.
 ///
-/// Names carry their units: force_mn is in mN. Exit code 0: done; 1: refused, or it did not come about; 2: not
-/// understood; 130: a signal ended a command that moves the finger, which was stopped.
+/// Names carry their units: force_mn is in mN. Exit code 0: done; 1: refused or not reached; 2: not understood, and
+/// nothing was sent; 3: a force was reached, but not held; 130: a signal ended a command that moves the finger, which was
+/// stopped.
 #[derive(Parser)]
 #[command(
     name = "fingertip",
@@ -32,7 +34,7 @@ use std::process::ExitCode;
 struct Cli {
     #[command(flatten)]
     reach: Reach,
-    /// Answer in JSON, for scripts
+    /// Answer in JSON, for scripts; an error is the last line of standard error: {"error": TEXT, "exit_code": CODE}
     #[arg(long, global = true)]
     json: bool,
     #[command(subcommand)]
@@ -44,10 +46,12 @@ enum Command {
     /// Look for controllers: on all ports or the one named, at all speeds
     Scan(scan::Args),
     /// Tell what the controller is and how it stands
+    #[command(after_help = "Examples:\n  fingertip info\n  fingertip info --json")]
     Info,
     /// Watch map, force, goal, mode and faults live
     View(view::Args),
     /// Stream states live to Foxglove, over a WebSocket
+    #[cfg_attr(not(feature = "foxglove"), command(hide = true))]
     Stream(stream::Args),
     /// Record states with the controller's own times, as CSV or MCAP
     Record(record::Args),
@@ -71,12 +75,13 @@ enum Command {
     #[command(subcommand)]
     Calibrate(calibrate::Command),
     /// Clear what stopped the motor, and say what stands in the way
+    #[command(after_help = "Examples:\n  fingertip recover")]
     Recover,
     /// Measure how long answers take: reads without a pause
     Latency(latency::Args),
     /// Print a shell's completions
     #[command(
-        after_help = "Example:\n  fingertip completions bash > ~/.local/share/bash-completion/completions/fingertip"
+        after_help = "Examples:\n  fingertip completions bash > ~/.local/share/bash-completion/completions/fingertip"
     )]
     Completions {
         /// Which shell
@@ -85,14 +90,41 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = with_examples(Cli::command()).try_get_matches().and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = match cli {
+        Ok(cli) => cli,
+        Err(why) if why.use_stderr() && std::env::args_os().any(|argument| argument == "--json") => {
+            let text = why.to_string();
+            return failed(text.strip_prefix("error: ").unwrap_or(&text).trim_end(), 2, true);
+        }
+        Err(why) => why.exit(),
+    };
     match run(&cli).and_then(|()| fingertip_cli::commands::said()) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(why) => {
-            let _ = writeln!(io::stderr(), "fingertip: {why}");
-            why.exit_code().into()
-        }
+        Err(why) => failed(&why.to_string(), why.exit_code(), cli.json),
     }
+}
+
+/// Reports an error; JSON in one line, so that it is found behind what else is on standard error.
+fn failed(why: &str, code: u8, as_json: bool) -> ExitCode {
+    let _ = if as_json {
+        writeln!(io::stderr(), "{}", json!({ "error": why, "exit_code": code }))
+    } else {
+        writeln!(io::stderr(), "fingertip: {why}")
+    };
+    code.into()
+}
+
+/// Gives each subcommand without examples those of its parent's that name it.
+fn with_examples(command: clap::Command) -> clap::Command {
+    let parent = command.get_name().to_owned();
+    let all = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+    command.mut_subcommands(|command| {
+        let name = format!(" {parent} {} ", command.get_name());
+        let own: Vec<&str> = all.lines().filter(|line| format!("{line} ").contains(&name)).collect();
+        let stays = own.is_empty() || command.get_after_help().is_some();
+        with_examples(if stays { command } else { command.after_help(format!("Examples:\n{}", own.join("\n"))) })
+    })
 }
 
 fn run(cli: &Cli) -> Result<(), Error> {

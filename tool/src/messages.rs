@@ -1,9 +1,12 @@
 //! A state as messages for what shows recordings: the topics and the names of the scenes', so that what shows those
 //! shows these (`tests/messages.rs`). The numbers are `fingertip.Scalars`, the pressures a picture in grey.
 
-use crate::state::{SHAPE, State};
+use crate::state::{SHAPE, Stamp, State};
+use crate::{Client, Error};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
+use fingertip::shipped::address;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 
 /// The names of a scene's scalars that a controller knows, and what they are.
 const SCALARS: [(&str, &str); 13] = [
@@ -21,6 +24,8 @@ const SCALARS: [(&str, &str); 13] = [
     ("fault", "Fault, by its number on the bus; 0 is none"),
     ("limits", "Limits, a bit each as on the bus"),
 ];
+/// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it; the scenes' recordings include the same file.
+const IMAGE_SCHEMA: &str = include_str!("messages/raw_image.json");
 /// Pa for a grey level: that of the scenes, 8 codes at 24 codes for a kPa.
 const PA_PER_GREY: i64 = 333;
 
@@ -40,7 +45,7 @@ impl Topic {
             Self::Scalars => "scalars",
             Self::Image => "image",
         };
-        format!("/finger{}/{kind}", id.saturating_sub(1))
+        topic(id, kind)
     }
 
     /// Its schema's name.
@@ -53,21 +58,41 @@ impl Topic {
 
     /// Its schema, as JSON Schema.
     pub fn schema(self) -> Vec<u8> {
-        let schema = match self {
-            Self::Scalars => scalars_schema(),
-            Self::Image => image_schema(),
-        };
-        schema.to_string().into_bytes()
+        match self {
+            Self::Scalars => scalars_schema().to_string().into_bytes(),
+            Self::Image => IMAGE_SCHEMA.into(),
+        }
     }
 
     /// A state's message, in JSON.
-    pub fn message(self, time_s: f64, state: &State) -> Vec<u8> {
+    pub fn message(self, stamp: &Stamp, state: &State) -> Vec<u8> {
         let message = match self {
-            Self::Scalars => scalars(time_s, state),
-            Self::Image => image(time_s, state),
+            Self::Scalars => scalars(stamp.time_s, state),
+            Self::Image => image(stamp.frame_ns, state),
         };
         message.to_string().into_bytes()
     }
+}
+
+/// A topic of a controller: as the scenes have it, fingers count from 0 and IDs from 1.
+pub fn topic(id: u8, kind: &str) -> String {
+    format!("/finger{}/{kind}", id.saturating_sub(1))
+}
+
+/// What a controller is, for the metadata of a recording and of its channels.
+///
+/// # Errors
+/// See [`Error`].
+pub fn device(client: &mut Client) -> Result<BTreeMap<String, String>, Error> {
+    let (pong, information) = (client.ping()?, client.number(address::MODEL_INFORMATION)?);
+    let entries = [
+        ("model_number", pong.model.to_string()),
+        ("id", pong.id.to_string()),
+        ("firmware", format!("{}.{}", pong.firmware / 10, pong.firmware % 10)),
+        ("control_table", (information >> 16).to_string()),
+        ("tool", env!("CARGO_PKG_VERSION").to_owned()),
+    ];
+    Ok(entries.map(|(name, value)| (name.to_owned(), value)).into())
 }
 
 fn scalars(time_s: f64, state: &State) -> Value {
@@ -91,13 +116,13 @@ fn scalars(time_s: f64, state: &State) -> Value {
     Value::Object(names.zip(values).collect::<Map<_, _>>())
 }
 
-fn image(time_s: f64, state: &State) -> Value {
+fn image(time_ns: u64, state: &State) -> Value {
     let [rows, columns] = SHAPE;
     let grey = |pa: &i64| (pa / PA_PER_GREY).clamp(0, 255) as u8;
     // The last row on top.
     let data: Vec<u8> = state.pressures_pa.chunks(columns).rev().flatten().map(grey).collect();
     json!({
-        "timestamp": { "sec": time_s as u64, "nsec": (time_s.fract() * 1e9) as u32 },
+        "timestamp": { "sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000 },
         "frame_id": "array", "width": columns, "height": rows, "encoding": "mono8", "step": columns,
         "data": BASE64_STANDARD.encode(data),
     })
@@ -107,23 +132,4 @@ fn scalars_schema() -> Value {
     let number = |about: &str| json!({ "type": "number", "description": about });
     let properties: Map<_, _> = SCALARS.iter().map(|(name, about)| ((*name).to_owned(), number(about))).collect();
     json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
-}
-
-/// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it.
-fn image_schema() -> Value {
-    let count = json!({ "type": "integer", "minimum": 0 });
-    let nsec = json!({ "type": "integer", "minimum": 0, "maximum": 999_999_999 });
-    json!({
-        "title": "foxglove.RawImage",
-        "type": "object",
-        "properties": {
-            "timestamp": { "type": "object", "title": "time", "properties": { "sec": count, "nsec": nsec } },
-            "frame_id": { "type": "string" },
-            "width": count,
-            "height": count,
-            "encoding": { "type": "string" },
-            "step": count,
-            "data": { "type": "string", "contentEncoding": "base64" },
-        },
-    })
 }

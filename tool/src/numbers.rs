@@ -32,6 +32,14 @@ pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
     if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
 }
 
+/// A share in percent.
+///
+/// # Errors
+/// It is none.
+pub fn percent(text: &str) -> Result<f64, String> {
+    within(text, &(0.0..=100.0))
+}
+
 /// Goal force in mN of a number in N. The controller has a narrower limit, `force_max_mn`.
 ///
 /// # Errors

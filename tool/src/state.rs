@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::table::{self, Block};
 use fingertip::shipped::{COLUMNS, ROWS, address};
 use serde_json::{Map, Value, json};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// The registers of the state, side by side: with the goal, and without the pressures.
 const FIRST: u16 = address::GOAL_FORCE_MN;
@@ -179,6 +180,43 @@ impl Clock {
             None
         }
     }
+}
+
+/// Time of a state, by both clocks.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stamp {
+    /// Controller's time from the first state on, s.
+    pub time_s: f64,
+    /// Host's time when the state was read, ns since 1970.
+    pub read_ns: u64,
+    /// Host's time of the first state plus `time_s`, ns since 1970: as even as the controller's clock.
+    pub frame_ns: u64,
+}
+
+/// Stamps states with both clocks. The host's time is taken once and goes on evenly, whatever sets the clock meanwhile.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stamps {
+    clock: Clock,
+    begun: Option<(Instant, u64)>,
+}
+
+impl Stamps {
+    /// Stamps a state that was just read. None where the controller started anew, as of [`Clock::time_s`].
+    pub fn stamp(&mut self, state: &State) -> Option<Stamp> {
+        let Some(time_s) = self.clock.time_s(state) else {
+            self.begun = None;
+            return None;
+        };
+        let now = Instant::now();
+        let (begun, first_ns) = *self.begun.get_or_insert_with(|| (now, unix_ns()));
+        let after = |time: Duration| first_ns + time.as_nanos() as u64;
+        Some(Stamp { time_s, read_ns: after(now - begun), frame_ns: after(Duration::from_secs_f64(time_s)) })
+    }
+}
+
+/// Host's time, ns since 1970.
+pub fn unix_ns() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos() as u64
 }
 
 /// Rows and columns that this program knows.

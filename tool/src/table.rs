@@ -81,6 +81,19 @@ pub fn find(wanted: &str) -> Result<&'static Register, String> {
     })
 }
 
+/// A register of one number by its name.
+///
+/// # Errors
+/// As [`find`], or it has several numbers.
+pub fn find_number(wanted: &str) -> Result<&'static Register, String> {
+    let register = find(wanted)?;
+    if register.count == 1 {
+        return Ok(register);
+    }
+    let (name, count) = (name(register), register.count);
+    Err(format!("{name} has {count} numbers (`fingertip record --pressures` and `params backup` write maps to a file)"))
+}
+
 fn begins_alike(a: &str, b: &str) -> bool {
     let same = a.bytes().zip(b.bytes()).take_while(|(a, b)| a == b).count();
     same >= 4

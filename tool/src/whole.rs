@@ -1,4 +1,5 @@
-//! Files that are in their place once they are whole: written beside it, by one program at a time.
+//! Files that are in their place once they are whole: written beside it as `FILE.part`, by one program at a time. What is
+//! there already, as a file or as what a killed program left of one, is written over only by force.
 
 use crate::Error;
 use rustix::fs::{FlockOperation, flock};
@@ -17,21 +18,23 @@ pub struct Part {
     file: File,
     part: PathBuf,
     place: PathBuf,
+    force: bool,
 }
 
 impl Part {
-    /// Begins it: `FILE.new`, empty. What is at the place stays as it is until [`Self::place`].
+    /// Begins it: `FILE.part`, empty. What is at the place stays as it is until [`Self::place`].
     ///
     /// # Errors
-    /// What is at the place is no file, as a device or a pipe; it cannot be written; or another program is at it.
-    pub fn begin(place: &Path) -> Result<Self, Error> {
+    /// Something is there and `force` is not set; it is no file, as a device or a pipe; it cannot be written; or another
+    /// program is at it.
+    pub fn begin(place: &Path, force: bool) -> Result<Self, Error> {
         let failed = |why: io::Error| Error::file("write", place, why);
         let is_file = fs::metadata(place).map_or(true, |there| there.is_file());
         let (Some(name), true) = (place.file_name(), is_file) else {
             return Err(Error::file("write", place, "it is no file"));
         };
         let mut part = name.to_owned();
-        part.push(".new");
+        part.push(".part");
         let part = place.with_file_name(part);
         let file = OpenOptions::new().create(true).truncate(false).write(true).open(&part).map_err(failed)?;
         let locked = flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok();
@@ -39,8 +42,18 @@ impl Part {
         if !locked || !fs::metadata(&part).is_ok_and(|there| is_same(&there, &file)) {
             return Err(Error::file("write", place, format_args!("another program is writing {}", part.display())));
         }
-        file.set_len(0).map_err(failed)?;
-        Ok(Self { file, part, place: place.into() })
+        let begun = Self { file, part, place: place.into(), force };
+        if !force {
+            free(place)?;
+            if begun.file.metadata().map_err(failed)?.len() > 0 {
+                let part = begun.part.display();
+                return Err(
+                    format!("an earlier command left {part} unfinished: rename it, or --force writes over it").into()
+                );
+            }
+        }
+        begun.file.set_len(0).map_err(failed)?;
+        Ok(begun)
     }
 
     /// What is written to.
@@ -54,9 +67,30 @@ impl Part {
     /// It is whole: puts it in its place.
     ///
     /// # Errors
-    /// It cannot be moved there.
-    pub fn place(self) -> io::Result<()> {
-        self.file.sync_all()?;
-        fs::rename(&self.part, &self.place)
+    /// It cannot be moved there, or something came to be there meanwhile: then it stays beside it.
+    pub fn place(self) -> Result<(), Error> {
+        let failed = |why: io::Error| Error::file("write", &self.place, why);
+        self.file.sync_all().map_err(failed)?;
+        if !self.force {
+            free(&self.place).map_err(|why| format!("{why}; what was to be written is in {}", self.part.display()))?;
+        }
+        fs::rename(&self.part, &self.place).map_err(failed)
     }
+}
+
+impl Drop for Part {
+    fn drop(&mut self) {
+        // Nothing was written: a command failed before. After a rename the name is free, or another's.
+        if fs::metadata(&self.part).is_ok_and(|there| there.len() == 0 && is_same(&there, &self.file)) {
+            let _ = fs::remove_file(&self.part);
+        }
+    }
+}
+
+/// Fails where a file is there.
+fn free(place: &Path) -> Result<(), Error> {
+    if fs::symlink_metadata(place).is_err() {
+        return Ok(());
+    }
+    Err(format!("{} is there already: --force writes over it", place.display()).into())
 }

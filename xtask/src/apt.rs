@@ -32,9 +32,9 @@ pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
     }
     console.say(&format!("Installing the Debian packages `{list}`: {why} needs them."));
     let apt = Apt::new(None)?;
-    console.run(&mut apt.command("update"))?;
+    console.prepare(&mut apt.command("update"))?;
     console
-        .run(apt.command("install").args(&missing))
+        .prepare(apt.command("install").args(&missing))
         .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
 }
 
@@ -65,9 +65,9 @@ pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
          Apt's sources stay as they are."
     ));
     let apt = Apt::new(Some(&suite))?;
-    console.run(&mut apt.command("update"))?;
+    console.prepare(&mut apt.command("update"))?;
     console
-        .run(apt.command("install").args(["-t", &suite]).args(packages))
+        .prepare(apt.command("install").args(["-t", &suite]).args(packages))
         .with_context(|| format!("apt-get cannot install `{list}` from {suite}, which {why} needs"))
 }
 

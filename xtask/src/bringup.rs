@@ -65,6 +65,9 @@ enum Board {
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     // First, as it takes no time: where there is no board nobody waits for a build.
     let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
+    if port.is_some() && !args.flashed {
+        flash::need_probe_rs()?;
+    }
     let toolchain = toolchain::ensure(choice, console)?;
     let image = image::checking(toolchain, NAME, console)?;
     console.say(&image.summary());

@@ -35,12 +35,30 @@ impl Console {
         Self { captured: Some(String::new()), built_s: 0.0 }
     }
 
-    /// A line for the user.
+    /// Reports progress on standard error: standard output is for results, which may go to a file.
     pub fn say(&self, text: &str) {
+        self.lines(io::stderr(), text);
+    }
+
+    /// Writes a result to standard output.
+    pub fn print(&self, text: &str) {
+        self.lines(io::stdout(), text);
+    }
+
+    /// A reader that went away (`| head`) does not end the command.
+    fn lines(&self, mut to: impl io::Write, text: &str) {
         clear_line();
         for line in text.lines() {
-            say_line(format_args!("{}{line}", if self.captured.is_some() { "    " } else { "" }));
+            let _ = writeln!(to, "{}{line}", if self.captured.is_some() { "    " } else { "" });
         }
+    }
+
+    /// Runs a program that prepares a command, an installer for example: what it writes is progress.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn prepare(&mut self, command: &mut Command) -> Result<()> {
+        self.run(command.stdout(io::stderr()))
     }
 
     /// Runs a program to its end.
@@ -209,22 +227,23 @@ fn missing(command: &Command) -> String {
 }
 
 fn show_line(line: &str) {
-    if io::stdout().is_terminal() {
-        let short: String = line.chars().filter(|letter| !letter.is_control()).take(76).collect();
-        print!("\r\x1b[2K    {short}");
-        let _ = io::stdout().flush();
-    }
+    let short: String = line.chars().filter(|letter| !letter.is_control()).take(76).collect();
+    show_short(format_args!("    {short}"));
 }
 
-/// A line of output. Where its reader went away (`| head`), what is asked for is done all the same.
+/// Writes a line of progress. A reader that went away does not end the command.
 pub fn say_line(line: Arguments) {
-    let _ = writeln!(io::stdout(), "{line}");
+    let _ = writeln!(io::stderr(), "{line}");
+}
+
+/// Shows a line of progress that the next one replaces, in a terminal only.
+pub fn show_short(line: Arguments) {
+    if io::stderr().is_terminal() {
+        let _ = write!(io::stderr(), "\r\x1b[2K{line}");
+    }
 }
 
 /// Takes the line of progress away.
 pub fn clear_line() {
-    if io::stdout().is_terminal() {
-        print!("\r\x1b[2K");
-        let _ = io::stdout().flush();
-    }
+    show_short(format_args!(""));
 }

@@ -89,13 +89,13 @@ fn print(example: &str, argument: Option<&Path>) -> Result<String> {
 fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
     let file = paths::root().join(path);
     if fs::read_to_string(&file).is_ok_and(|present| present == text) {
-        console.say(&format!("fresh    {path}"));
+        console.print(&format!("fresh    {path}"));
     } else if check {
-        console.say(&format!("stale    {path}"));
+        console.print(&format!("stale    {path}"));
         stale.push(path.into());
     } else {
         fs::write(&file, text).with_context(|| format!("cannot write {path}"))?;
-        console.say(&format!("written  {path}"));
+        console.print(&format!("written  {path}"));
     }
     Ok(())
 }

@@ -35,27 +35,34 @@ const BOR_LEV: u32 = 0b11 << 2;
 /// # Errors
 /// The image does not build, probe-rs is missing, or there is no board.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
+    need_probe_rs()?;
     let image = image::firmware(choice, console)?;
-    console.say(&image.summary());
+    console.print(&image.summary());
     put(&image, args.probe.as_deref(), console)?;
     console.say("The board runs the image.");
     Ok(())
 }
 
+/// Looks for probe-rs before a build, so that nobody waits for an image that cannot be written.
+///
+/// # Errors
+/// probe-rs is not in PATH.
+pub fn need_probe_rs() -> Result<()> {
+    if paths::find_program("probe-rs").is_some() {
+        return Ok(());
+    }
+    bail!(
+        "probe-rs writes the image to the board, and is not in PATH.\n\
+         Install it (`cargo install probe-rs-tools --locked`, or a package from https://probe.rs), or let any \
+         other tool write the .bin file beside the image that `cargo xtask build` names, to the address printed there."
+    );
+}
+
 /// Writes and verifies an image, sees to the option bytes, and starts it.
 ///
 /// # Errors
-/// probe-rs is missing, or there is no board.
+/// There is no board.
 pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<()> {
-    if paths::find_program("probe-rs").is_none() {
-        bail!(
-            "probe-rs writes the image to the board, and is not in PATH.\n\
-             Install it (`cargo install probe-rs-tools --locked`, or a package from https://probe.rs), or write \
-             {} to address {:#010x} with any other tool.",
-            paths::shown(&image.bin),
-            image.base
-        );
-    }
     let probe = Probe(probe);
     let mut download = probe.command("download");
     download.args(["--verify", "--binary-format", "bin", "--base-address"]);

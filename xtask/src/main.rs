@@ -86,16 +86,13 @@ enum Command {
     )]
     Sensor(sim::Args),
     /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
-    #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  cargo xtask serve --board virtual --pty /tmp/finger    (the flash image on the emulated board)\n  cargo xtask serve --help    (all that it takes)"
-    )]
-    Serve(sim::Args),
+    Serve(serve::Args),
     /// Feed captures of boards through the core on this machine: it must answer as they did, to the bit
     Replay(replay::Args),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
+    #[command(after_help = "Examples:\n  cargo xtask build")]
     Build,
     /// Build the flash image and write it to a board with probe-rs
     Flash(flash::Args),
@@ -108,9 +105,10 @@ enum Command {
     /// Measure what accuracy costs in time: every way to work out every kernel, with tables and pictures
     Study(study::Args),
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
+    #[command(after_help = "Examples:\n  cargo xtask size")]
     Size,
     /// Answer rows of CSV (a_mm, Y_kPa, d_mm, r_mm) on standard input by the contact model, in the core's fixed point
-    #[command(after_help = "Example:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
+    #[command(after_help = "Examples:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
     Model,
     /// Prove the contact model's error bounds over whole input ranges
     Prove(model::Args),
@@ -119,16 +117,21 @@ enum Command {
     /// Draw the paper's figures 7, 10 and 11 from the contact model, in the core's fixed point
     Figures(figures::Args),
     /// Prove the control step free of panics and of floating-point calls
+    #[command(after_help = "Examples:\n  cargo xtask panic-free")]
     PanicFree,
     /// Check format, lints, documentation and licences
+    #[command(after_help = "Examples:\n  cargo xtask lint")]
     Lint,
     /// Write the generated files anew, or check that they are fresh
     Docs(docs::Args),
     /// Make the packages that others take, and test them from a project outside of this workspace
+    #[command(after_help = "Examples:\n  cargo xtask package")]
     Package,
     /// Try the examples for clusters here: Slurm with one node, GNU parallel, the Kubernetes job's shell, DuckDB
+    #[command(after_help = "Examples:\n  cargo xtask cluster")]
     Cluster,
     /// Install everything that the other commands need, for use offline
+    #[command(after_help = "Examples:\n  cargo xtask setup")]
     Setup,
 }
 
@@ -155,7 +158,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Serve(args) => serve::run(args, toolchain, console),
         Command::Replay(args) => replay::run(args, console),
         Command::Test(args) => test::run(args, toolchain),
-        Command::Build => image::firmware(toolchain, console).map(|image| console.say(&image.summary())),
+        Command::Build => image::firmware(toolchain, console).map(|image| console.print(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Bringup(args) => bringup::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),

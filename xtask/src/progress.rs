@@ -1,10 +1,10 @@
 //! How far a build is: crates done, and about how many minutes are left. In a terminal one line that changes; in a log
 //! a line a minute.
 
-use crate::console::say_line;
+use crate::console::{say_line, show_short};
 use std::{
     collections::BTreeMap,
-    io::{self, IsTerminal, Write as _},
+    io::{self, IsTerminal as _},
     time::{Duration, Instant},
 };
 
@@ -46,7 +46,7 @@ impl Progress {
     pub fn new(what: &str, slow: Slow) -> Self {
         let now = Instant::now();
         let slow = slow.iter().map(|(name, seconds)| (*name, (*seconds, None))).collect();
-        let terminal = io::stdout().is_terminal();
+        let terminal = io::stderr().is_terminal();
         Self { what: what.into(), terminal, begun: now, said: now, done: 0, total: 0, compiled: 0.0, slow }
     }
 
@@ -89,8 +89,7 @@ impl Progress {
     fn show(&mut self) {
         let line = format!("{}: {} of {} crates{}", self.what, self.done, self.total, self.left());
         if self.terminal {
-            print!("\r\x1b[2K    building {line:.100}");
-            let _ = io::stdout().flush();
+            show_short(format_args!("    building {line:.100}"));
         } else if self.said.elapsed() >= LOG_EVERY {
             self.said = Instant::now();
             say_line(format_args!("building {line}"));

@@ -21,14 +21,14 @@ const UNDEFINED: &str = "fingertip_step_can_panic";
 pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
     let elf = link(toolchain, console)?;
-    console.say("The control step links without a panic handler: no panic is reachable.");
+    console.print("The control step links without a panic handler: no panic is reachable.");
     let calls = float_calls(&elf)?;
     if !calls.is_empty() {
         bail!("the control step calls floating-point routines: {}", calls.join(", "));
     }
-    console.say("It calls no floating-point routine.");
+    console.print("It calls no floating-point routine.");
     controls(toolchain, console)?;
-    console.say("The controls, a step that can panic and one that computes in f64, are caught.");
+    console.print("The controls, a step that can panic and one that computes in f64, are caught.");
     Ok(())
 }
 

@@ -56,7 +56,9 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
     }
     let mut install = Command::new(&python);
     install.args(["-m", "pip", "install", "--quiet", "--no-cache-dir", "--disable-pip-version-check"]).args(*packages);
-    console.run(&mut install).with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
+    console
+        .prepare(&mut install)
+        .with_context(|| format!("pip cannot install {list}: is a package index in reach?"))?;
     ensure!(has(&python, imports), "{list} is installed in {}, but does not import", paths::shown(&folder));
     Ok(python)
 }

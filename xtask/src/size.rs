@@ -39,7 +39,7 @@ pub struct Sizes {
 pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::firmware(choice, console)?;
     let sizes = Sizes::of(&image)?;
-    console.say(&format!("{}\n\n{}\n{}", image.summary(), sizes.table(), sizes.verdict()));
+    console.print(&format!("{}\n\n{}\n{}", image.summary(), sizes.table(), sizes.verdict()));
     sizes.check()
 }
 

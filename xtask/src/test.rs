@@ -24,13 +24,13 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     let image = stages.stage("flash image", |console| {
         let image = image::firmware(choice, console)?;
-        console.say(&image.summary());
+        console.print(&image.summary());
         Ok(image)
     });
     let image = || image.as_ref().context("the flash image did not build; see above");
     stages.stage("size of the flash image", |console| {
         let sizes = Sizes::of(image()?)?;
-        console.say(&sizes.verdict());
+        console.print(&sizes.verdict());
         sizes.check()
     });
     stages.stage("panic-free proof", |console| proof::run(choice, console));

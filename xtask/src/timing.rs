@@ -83,7 +83,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         }
         None => kernels(choice, console)?,
     };
-    console.say(&table(&run));
+    console.print(&table(&run));
     match &args.json {
         Some(path) => fs::write(path, run.json_lines()).with_context(|| format!("cannot write {}", paths::shown(path))),
         None => Ok(()),

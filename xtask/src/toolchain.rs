@@ -131,7 +131,7 @@ fn add_target(console: &mut Console) -> Result<()> {
         bail!("there is no rustup in PATH");
     }
     console.say(&format!("Adding rustup's target {TARGET}: the firmware is compiled for it."));
-    let added = console.run(Command::new("rustup").args(["target", "add", TARGET]));
+    let added = console.prepare(Command::new("rustup").args(["target", "add", TARGET]));
     added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
     if !has_target() {
         bail!("rustup added {TARGET} to another toolchain than the one that cargo takes");

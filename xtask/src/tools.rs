@@ -35,7 +35,7 @@ impl Tool {
             // Unoptimised: it compiles in a third of the time, and runs for seconds.
             let mut install = console::cargo("install");
             install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
-            let installed = console.run(install.arg(&folder));
+            let installed = console.prepare(install.arg(&folder));
             installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
         }
         Ok(program)

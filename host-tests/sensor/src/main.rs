@@ -11,7 +11,12 @@ use std::process::ExitCode;
 
 /// Fits a sensor's characteristic and creep to recordings.
 #[derive(Parser)]
-#[command(name = "sensor", version, arg_required_else_help = true)]
+#[command(
+    name = "sensor",
+    version,
+    arg_required_else_help = true,
+    after_help = "Examples:\n  cargo xtask sensor fit cycles.csv --judge others.csv\n  cargo xtask sensor gains --help"
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

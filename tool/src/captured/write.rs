@@ -1,8 +1,8 @@
 //! A capture's file, written.
 
-use super::{ABOUT, ATTACHED, About, through_the_core};
-use crate::messages::Topic;
-use crate::state::State;
+use super::{ABOUT, ATTACHED, About, ENDED, through_the_core};
+use crate::messages::{Topic, topic};
+use crate::state::{Stamp, State};
 use fingertip::capture::Head;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
@@ -12,14 +12,13 @@ use mcap::{Attachment, McapError, WriteOptions, Writer};
 use replay::Taken;
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 /// Frames from one message of scalars to the next, and from one of codes to the next.
 const SCALARS_EVERY: u32 = 5;
 const CODES_EVERY: u32 = 50;
-/// As a scene's recording has it.
-pub const FRAME_SCHEMA: &str = "fingertip.Frame";
+/// As a scene's recording has it: that includes the same file.
+const FRAME_SCHEMA: [&str; 2] = ["fingertip.Frame", include_str!("../messages/frame.json")];
 
 type Captured<'a> = (&'a Taken<ROWS, COLUMNS>, &'a Status);
 
@@ -48,9 +47,10 @@ fn put(
     head: &Head<ROWS, COLUMNS>,
     shown: &[(Taken<ROWS, COLUMNS>, Status)],
 ) -> mcap::McapResult<()> {
+    let ended_ns = about.get(ENDED).and_then(|ended| ended.parse().ok()).unwrap_or(0_u64);
     let attached = Attachment {
-        log_time: 0,
-        create_time: 0,
+        log_time: ended_ns,
+        create_time: ended_ns,
         name: ATTACHED.into(),
         media_type: "application/octet-stream".into(),
         data: Cow::Borrowed(bytes),
@@ -70,20 +70,26 @@ fn put(
     let metadata = more.into_iter().map(|(name, value)| (name.to_owned(), value));
     let metadata = about.clone().into_iter().chain(metadata).collect();
     out.write_metadata(&Metadata { name: ABOUT.into(), metadata })?;
+    let id = about.get("id").and_then(|id| id.parse().ok()).unwrap_or(1);
     let scalars = out.add_schema(Topic::Scalars.schema_name(), "jsonschema", &Topic::Scalars.schema())?;
-    let scalars = out.add_channel(scalars, &Topic::Scalars.name(1), "json", &BTreeMap::new())?;
-    let codes = out.add_schema(FRAME_SCHEMA, "jsonschema", frame_schema().to_string().as_bytes())?;
-    let codes = out.add_channel(codes, "/finger0/frame", "json", &BTreeMap::new())?;
-    let first = shown.first().map_or(0, |(taken, _)| taken.frame.sequence);
+    let scalars = out.add_channel(scalars, &Topic::Scalars.name(id), "json", about)?;
+    let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
+    let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
+    let sequence = |shown: Option<&(Taken<ROWS, COLUMNS>, Status)>| shown.map_or(0, |(taken, _)| taken.frame.sequence);
+    let (first, frame_ns) = (sequence(shown.first()), u64::from(head.frame_ns));
+    let since_ns = |sequence: u32| u64::from(sequence.wrapping_sub(first)) * frame_ns;
+    let begun_ns = ended_ns.saturating_sub(since_ns(sequence(shown.last())));
     for (frame, captured) in (0..).zip(shown) {
-        let log_time = u64::from(captured.0.frame.sequence.wrapping_sub(first)) * u64::from(head.frame_ns);
+        let since_ns = since_ns(captured.0.frame.sequence);
+        let log_time = begun_ns + since_ns;
         let mut message = |channel_id, message: &[u8]| {
             let header = MessageHeader { channel_id, sequence: frame, log_time, publish_time: log_time };
             out.write_to_known_channel(&header, message)
         };
         if frame % SCALARS_EVERY == 0 {
             let state = state((&captured.0, &captured.1), head.frame_ns);
-            message(scalars, &Topic::Scalars.message(log_time as f64 * 1e-9, &state))?;
+            let stamp = Stamp { time_s: since_ns as f64 * 1e-9, read_ns: log_time, frame_ns: log_time };
+            message(scalars, &Topic::Scalars.message(&stamp, &state))?;
         }
         if frame % CODES_EVERY == 0 {
             message(codes, codes_of(&captured.0).to_string().as_bytes())?;
@@ -118,15 +124,4 @@ fn codes_of(taken: &Taken<ROWS, COLUMNS>) -> Value {
     let codes: Vec<Vec<u16>> =
         (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect()).collect();
     json!({ "sequence": taken.frame.sequence, "codes": codes })
-}
-
-/// The schema of [`FRAME_SCHEMA`].
-fn frame_schema() -> Value {
-    let codes = json!({
-        "type": "array",
-        "description": "Converter codes by slot and column; the last slot has no row driven",
-        "items": { "type": "array", "items": { "type": "integer", "minimum": 0, "maximum": 4095 } },
-    });
-    let sequence = json!({ "type": "integer", "description": "Counts frames" });
-    json!({ "title": FRAME_SCHEMA, "type": "object", "properties": { "sequence": sequence, "codes": codes } })
 }

@@ -11,6 +11,8 @@ use std::time::Duration;
 const PRESS: i64 = 1;
 const FORGET: i64 = 2;
 const ACCEPT: i64 = 3;
+/// A status packet's error where something stands in the way.
+const RESULT: u8 = 1;
 /// Of `CALIBRATE_STATE`.
 const RUNNING: i64 = 1;
 const DONE: i64 = 2;
@@ -22,9 +24,13 @@ const UNKNOWN: i64 = 255;
 
 /// What to do.
 #[derive(Debug, clap::Subcommand)]
-#[command(after_help = "Example, with a plate under the finger; docs/commissioning.md has all of it:\n  \
+#[command(after_help = "Examples, with a plate under the finger; docs/commissioning.md has all of it:\n  \
         fingertip tare && fingertip calibrate press    (three times; move finger or plate between)\n  \
-        fingertip calibrate accept && fingertip params save")]
+        fingertip calibrate show\n  \
+        fingertip calibrate accept && fingertip params save\n  \
+        fingertip calibrate scale 1.47          (while `fingertip press` holds the force: the scale shows 150 g)\n  \
+        fingertip calibrate accept-scale && fingertip params save\n  \
+        fingertip calibrate forget")]
 pub enum Command {
     /// Press once onto a hard flat plate, and take it into the proposal
     Press {
@@ -65,9 +71,15 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
 
 /// Sets a register and says what that did.
 fn set(register: u16, value: i64, done: &str, client: &mut Client, json: bool) -> Result<(), Error> {
-    client.set(register, value)?;
+    client.set(register, value).map_err(|why| match why.refused_with(RESULT) {
+        true if register == address::CALIBRATE => {
+            format!("{why}: is torque off, and was there a `calibrate press`?").into()
+        }
+        true => format!("{why}: is torque off, and was there a `calibrate scale`?").into(),
+        false => why,
+    })?;
     if json {
-        say_json(&json!({ (table::place(register)): value }));
+        say_json(&json!({ (table::place(register)): value, "done": done }));
     } else if value == ACCEPT {
         say(format_args!("{done}; `fingertip params save` keeps them over a reset"));
     } else {

@@ -2,7 +2,9 @@
 
 use super::moving::Moving;
 use super::{Interrupt, TOUCHED, aside, no_fault, press, say, say_json, stopped, wait_for};
-use crate::captured::{self, About};
+use crate::captured::{self, About, ENDED};
+use crate::messages::device;
+use crate::state::unix_ns;
 use crate::whole::Part;
 use crate::{Client, Error, numbers, table};
 use fingertip::capture::State;
@@ -31,6 +33,9 @@ pub struct Args {
     /// The file, `.mcap`
     #[arg(long)]
     out: PathBuf,
+    /// Write over a file that is there
+    #[arg(long)]
+    force: bool,
     /// Touch and hold so many newtons from the tare on, until the memory is full; then let go
     #[arg(long, value_name = "NEWTONS", value_parser = numbers::goal_mn)]
     press: Option<i64>,
@@ -82,7 +87,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if args.press.is_some() {
         press::direction_confirmed(client)?;
     }
-    let part = Part::begin(&args.out)?;
+    let part = Part::begin(&args.out, args.force)?;
     let interrupt = Interrupt::catch()?;
     let say_on = |text: &dyn std::fmt::Display| {
         if !json {
@@ -96,14 +101,15 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     } else {
         keep(args, client, &interrupt, &say_on)?
     };
+    let ended_ns = unix_ns();
     let bytes = fetch(client, count, &say_on)?;
     let mut touched = false;
     let replayed = captured::through_the_core(&bytes, |_, status| touched |= status.limits.has(Limits::TARED_TOUCHING))
         .map_err(|why| format!("what the board kept is of no use here: {why}"))?;
-    let about = about(args, client)?;
+    let about = about(args, ended_ns, client)?;
     let file = |why: &dyn std::fmt::Display| Error::file("write", &args.out, why);
     captured::write(part.file().map_err(|why| file(&why))?, &bytes, &about).map_err(|why| file(&why))?;
-    part.place().map_err(|why| file(&why))?;
+    part.place()?;
     let ended = table::meaning(address::CAPTURE_ENDED, replayed.head.ended as i64);
     let (frames, seconds) =
         (replayed.head.frames, f64::from(replayed.head.frames) * f64::from(replayed.head.frame_ns) * 1e-9);
@@ -205,18 +211,16 @@ fn fetch(client: &mut Client, count: i64, say_on: &dyn Fn(&dyn std::fmt::Display
     Ok(bytes)
 }
 
-fn about(args: &Args, client: &mut Client) -> Result<About, Error> {
-    let firmware = client.number(address::FIRMWARE_VERSION)?;
-    let table_version = client.number(address::MODEL_INFORMATION)? >> 16;
+fn about(args: &Args, ended_ns: u64, client: &mut Client) -> Result<About, Error> {
     let licence = if args.contribute { LICENCE } else { "not contributed: ask who captured it" };
     let entries = [
         ("board", args.board.clone()),
-        ("firmware", format!("{}.{}", firmware / 10, firmware % 10)),
-        ("control_table", table_version.to_string()),
-        ("tool", env!("CARGO_PKG_VERSION").to_owned()),
         ("image", args.image.clone()),
         ("notes", args.notes.clone()),
         ("licence", licence.to_owned()),
+        (ENDED, ended_ns.to_string()),
     ];
-    Ok(entries.map(|(name, value)| (name.to_owned(), value)).into())
+    let mut about = device(client)?;
+    about.extend(entries.map(|(name, value)| (name.to_owned(), value)));
+    Ok(about)
 }

@@ -35,7 +35,8 @@ const DRIVE: i64 = 2;
     fingertip commission confirm         (it did: torque may be enabled from now on)\n  \
     fingertip commission measure\n  \
     fingertip commission accept\n  \
-    fingertip params save")]
+    fingertip params save\n  \
+    fingertip commission stop            (ends a jog or a measurement that another host began)")]
 pub enum Command {
     /// Move the tip a little, at 5 % of duty and for 100 ms at most, towards the object first: proves the direction
     Jog(Within),
@@ -203,7 +204,7 @@ fn accept(what: i64, done: &str, nothing: &str, client: &mut Client, json: bool)
     free(client)?;
     client.set(address::COMMISSION_ACCEPT, what).map_err(|why| Error::from(format!("{nothing}: {why}")))?;
     if json {
-        say_json(&json!({ "accepted": what }));
+        say_json(&json!({ "accepted": what, "done": done }));
     } else {
         say(format_args!("{done} until the next reset; `fingertip params save` keeps it"));
     }

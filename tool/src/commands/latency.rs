@@ -12,7 +12,7 @@ const LENGTH: u16 = 54;
 
 /// What to measure.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  fingertip latency --seconds 10")]
+#[command(after_help = "Examples:\n  fingertip latency --seconds 10")]
 pub struct Args {
     /// For how long
     #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]

@@ -27,6 +27,7 @@ const SAVE_WITHIN: Duration = Duration::from_secs(5);
 #[command(after_help = "Examples:\n  \
     fingertip params get modulus_pa force_max_mn\n  \
     fingertip params set modulus_pa=300000 --save\n  \
+    fingertip params save\n  \
     fingertip params backup left-index.toml\n  \
     fingertip params diff left-index.toml\n  \
     fingertip params restore left-index.toml --save")]
@@ -34,7 +35,7 @@ pub enum Command {
     /// Show them, with range and meaning
     Get {
         /// Which; all without a name
-        #[arg(value_name = "NAME", value_parser = table::find)]
+        #[arg(value_name = "NAME", value_parser = table::find_number)]
         names: Vec<&'static Register>,
     },
     /// Change some, all of them or none
@@ -50,9 +51,9 @@ pub enum Command {
     Save,
     /// Write all to a file
     Backup {
-        /// Which file; it must not be there yet
+        /// Which file
         file: PathBuf,
-        /// Even where it is there
+        /// Write over a file that is there
         #[arg(long)]
         force: bool,
     },

@@ -12,42 +12,54 @@ use std::time::{Duration, Instant};
 /// How often it looks, and how often it says what it sees.
 const LOOK: Duration = Duration::from_millis(10);
 const SAY: Duration = Duration::from_millis(500);
-/// Held once the force is within this share of the goal, or this much.
-const NEAR: f64 = 0.02;
-const NEAR_MN: f64 = 10.0;
+/// Least tolerance of a held force, for small goals: the resolution of a usual array, mN.
+const TOLERANCE_MN: f64 = 20.0;
+/// Time within the tolerance after which a force counts as reached, s of the controller's clock: an overshoot passes
+/// through faster.
+const SETTLED_S: f64 = 0.1;
 /// A status packet's error for a value beyond what other registers allow.
 const BEYOND: u8 = 6;
 
 /// What to press, and for how long.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10")]
+#[command(
+    after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10 --tolerance-percent 2\n\n\
+    The force is reached once it has been within the tolerance for 0.1 s; from then on it is held. Exit code 1: it was not \
+    reached; 3: it was reached, but a state was outside the tolerance while it was held."
+)]
 pub struct Args {
     /// Force to hold, N
-    #[arg(value_name = "NEWTONS", value_parser = numbers::goal_mn)]
+    #[arg(value_name = "NEWTONS", allow_negative_numbers = true, value_parser = numbers::goal_mn)]
     goal_mn: i64,
     /// How long to hold it
     #[arg(long, default_value_t = 2.0, value_parser = numbers::seconds)]
     seconds: f64,
-    /// How long the approach may take until the force is held
+    /// Tolerance of the held force as the controller senses it, in percent of the goal; 20 mN at least
+    #[arg(long, default_value_t = 5.0, value_parser = numbers::percent)]
+    tolerance_percent: f64,
+    /// How long it may take until the force is reached
     #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
-/// What was held.
+/// What was held, and the last state.
 #[derive(Default)]
 struct Held {
+    /// States while the force was held; none where it was not reached.
     count: u32,
+    outside: u32,
     sum_mn: f64,
     least_mn: i64,
     most_mn: i64,
     from_s: f64,
-    to_s: f64,
+    held_s: f64,
+    last: State,
 }
 
-/// Touches, holds, lets go, turns torque off. Whatever ends it, it lets go before.
+/// Touches, holds, releases, turns torque off. Whatever ends it, it releases before.
 ///
 /// # Errors
-/// A fault stands or comes, the tip is not tared, or nothing is touched in time.
+/// A fault stands or comes, the tip is not tared, or the force is not reached or not held.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {
@@ -57,21 +69,46 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let moving = Moving::begin(client, &interrupt)?;
     let pressed = press(args, moving.client, json, &interrupt);
     let held = moving.finish(pressed)?;
-    let mean_mn = held.sum_mn / f64::from(held.count.max(1));
-    let held_s = held.to_s - held.from_s;
+    let Held { count, outside, least_mn, most_mn, held_s, .. } = held;
+    let (goal_mn, tolerance_mn, reached) = (args.goal_mn, tolerance_mn(args), count > 0);
+    let mean_mn = reached.then(|| held.sum_mn / f64::from(count));
     if json {
         say_json(&json!({
-            "goal_mn": args.goal_mn, "held_s": held_s, "states": held.count, "mean_mn": mean_mn,
-            "least_mn": held.least_mn, "most_mn": held.most_mn, "interrupted": interrupt.came(),
+            "goal_mn": goal_mn, "tolerance_mn": tolerance_mn, "reached": reached, "held": reached && outside == 0,
+            "held_s": held_s, "states": count, "states_outside": outside, "mean_mn": mean_mn,
+            "least_mn": reached.then_some(least_mn), "most_mn": reached.then_some(most_mn),
+            "interrupted": interrupt.came(),
         }));
-    } else {
-        let (least, most) = (held.least_mn, held.most_mn);
+    } else if let Some(mean_mn) = mean_mn {
         say(format_args!(
-            "held {mean_mn:.1} mN for {held_s:.2} s, {least} to {most} mN in {} states; let go",
-            held.count
+            "reached; mean {mean_mn:.1} mN over {held_s:.2} s, {least_mn} to {most_mn} mN in {count} states; released"
         ));
     }
-    interrupt.check()
+    interrupt.check()?;
+    if !reached {
+        let (mode, force_mn, travel_mm) =
+            (held.last.mode_name(), held.last.force_mn, held.last.travel_um as f64 * 1e-3);
+        let limits = held.last.limit_names();
+        let limits = if limits.is_empty() { "none".into() } else { limits.join(", ") };
+        return Err(format!(
+            "{goal_mn} mN are not reached within {} s: mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, \
+             limits: {limits}. Is there something to press on?",
+            args.within_s
+        )
+        .into());
+    }
+    if outside > 0 {
+        return Err(Error::NotHeld(format!(
+            "{goal_mn} mN were reached, but not held: {outside} of {count} states are outside {goal_mn} +- \
+             {tolerance_mn:.0} mN (--tolerance-percent)"
+        )));
+    }
+    Ok(())
+}
+
+/// Tolerance of the held force, mN.
+fn tolerance_mn(args: &Args) -> f64 {
+    (args.tolerance_percent * 1e-2 * args.goal_mn as f64).max(TOLERANCE_MN)
 }
 
 /// The controller refuses torque before.
@@ -101,45 +138,43 @@ fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) ->
     let goal_mn = args.goal_mn;
     direction_confirmed(client)?;
     begin(goal_mn, client)?;
-    let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), None::<Held>);
+    let (begun, mut said, mut clock, mut held) = (Instant::now(), Instant::now(), Clock::default(), Held::default());
+    // Controller's time since when the force is within its tolerance.
+    let mut near_s = None;
     loop {
         let state = client.again(State::read)?;
         let time_s = clock.time_s(&state).ok_or(ANEW)?;
         if state.fault != 0 {
             return Err(stopped(state.fault));
         }
-        let near_mn = (NEAR * goal_mn as f64).max(NEAR_MN);
-        let near = state.mode == Mode::Force as i64 && ((state.force_mn - goal_mn) as f64).abs() <= near_mn;
-        if let Some(held) = &mut held {
+        let force_mn = state.force_mn;
+        let near = state.mode == Mode::Force as i64 && ((force_mn - goal_mn) as f64).abs() <= tolerance_mn(args);
+        near_s = if near { near_s.or(Some(time_s)) } else { None };
+        let settled = near_s.is_some_and(|near_s| time_s - near_s >= SETTLED_S);
+        if held.count == 0 && settled {
+            held = Held { from_s: time_s, least_mn: force_mn, most_mn: force_mn, ..held };
+            if !json {
+                aside(format_args!("reached after {time_s:.2} s"));
+            }
+        }
+        if held.count > 0 || settled {
             held.count += 1;
-            held.sum_mn += state.force_mn as f64;
-            held.least_mn = held.least_mn.min(state.force_mn);
-            held.most_mn = held.most_mn.max(state.force_mn);
-            held.to_s = time_s;
-        } else if near {
-            let force_mn = state.force_mn;
-            held =
-                Some(Held { least_mn: force_mn, most_mn: force_mn, from_s: time_s, to_s: time_s, ..Held::default() });
-        } else if begun.elapsed().as_secs_f64() > args.within_s {
-            let (mode, force_mn, travel_mm) = (state.mode_name(), state.force_mn, state.travel_um as f64 * 1e-3);
-            let limits = state.limit_names().join(", ");
-            return Err(format!(
-                "{goal_mn} mN are not reached within {} s: mode {mode}, {force_mn} mN, travel {travel_mm:.2} mm, \
-                 limits: {limits}. Is there something to press on?",
-                args.within_s
-            )
-            .into());
+            held.outside += u32::from(!near);
+            held.sum_mn += force_mn as f64;
+            held.least_mn = held.least_mn.min(force_mn);
+            held.most_mn = held.most_mn.max(force_mn);
+            held.held_s = time_s - held.from_s;
         }
         if !json && said.elapsed() >= SAY {
             said = Instant::now();
-            aside(format_args!("{:10} {:6} mN of {goal_mn} mN", state.mode_name(), state.force_mn));
+            aside(format_args!("{:10} {force_mn:6} mN of {goal_mn} mN", state.mode_name()));
         }
-        match held {
-            Some(held) if held.count > 0 && held.to_s - held.from_s >= args.seconds || interrupt.came() => {
-                return Ok(held);
-            }
-            None if interrupt.came() => return Ok(Held::default()),
-            _ => std::thread::sleep(LOOK),
+        let late = held.count == 0 && begun.elapsed().as_secs_f64() > args.within_s;
+        let done = held.count > 1 && held.held_s >= args.seconds;
+        held.last = state;
+        if late || done || interrupt.came() {
+            return Ok(held);
         }
+        std::thread::sleep(LOOK);
     }
 }

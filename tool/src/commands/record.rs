@@ -4,12 +4,13 @@ mod csv;
 mod mcap;
 
 use super::{Interrupt, aside, say_json};
-use crate::state::{ANEW, Clock, State};
+use crate::messages::device;
+use crate::state::{ANEW, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
 use serde_json::json;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -17,6 +18,10 @@ use std::time::{Duration, Instant};
 const LOST_MAX: u64 = 20;
 /// What is later is not made up for.
 const LATE_MAX: Duration = Duration::from_millis(100);
+/// Time after which what was recorded goes to the file: a killed program loses no more.
+const FLUSH_EVERY: Duration = Duration::from_millis(200);
+/// Buffer that holds more than that, so that the file gets whole lines, each time by one call of the system.
+const BUFFER: usize = 1 << 20;
 
 /// What to record.
 #[derive(Debug, clap::Args)]
@@ -25,7 +30,7 @@ const LATE_MAX: Duration = Duration::from_millis(100);
     fingertip record --pressures --seconds 60 grip.mcap    (opens in Foxglove)\n  \
     fingertip record --seconds 1 - | head")]
 pub struct Args {
-    /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV
+    /// The file, `.csv` or `.mcap`; `-` is the standard output, as CSV without --format
     file: PathBuf,
     /// For how long; without it, until Ctrl-C
     #[arg(long, value_parser = numbers::seconds)]
@@ -36,6 +41,9 @@ pub struct Args {
     /// With the pressure of each taxel
     #[arg(long)]
     pressures: bool,
+    /// Write over a file that is there
+    #[arg(long)]
+    force: bool,
     /// In place of what the file's name ends with
     #[arg(long, value_enum)]
     format: Option<Format>,
@@ -52,8 +60,10 @@ pub enum Format {
 
 /// Takes states in turn.
 trait Sink {
-    /// One more, so long after the first.
-    fn put(&mut self, time_s: f64, state: &State) -> io::Result<()>;
+    /// One more, with its times.
+    fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()>;
+    /// Hands on what was put, readable as it is.
+    fn flush(&mut self) -> io::Result<()>;
     /// There are no more.
     fn finish(self: Box<Self>) -> io::Result<()>;
 }
@@ -65,30 +75,24 @@ trait Sink {
 pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let whole = args.file.as_os_str() != "-";
-    let part = whole.then(|| Part::begin(&args.file)).transpose()?;
-    let to = part.as_ref().map(Part::file).transpose();
+    let part = whole.then(|| Part::begin(&args.file, args.force)).transpose()?;
     let file = |why: io::Error| Error::file("write", &args.file, why);
-    let sink: io::Result<Box<dyn Sink>> = match (format, to.map_err(file)?) {
-        (Format::Csv, Some(to)) => csv::Csv::new(BufWriter::new(to), args.pressures).map(|sink| Box::new(sink) as _),
-        (Format::Csv, None) => csv::Csv::new(io::stdout().lock(), args.pressures).map(|sink| Box::new(sink) as _),
-        (Format::Mcap, Some(to)) => mcap::Mcap::new(to, client.id, args.pressures).map(|sink| Box::new(sink) as _),
-        (Format::Mcap, None) => {
-            let why = "MCAP needs a file: it is finished at its beginning and its end";
-            return Err(Error::NotUnderstood(why.into()));
+    let device = device(client)?;
+    let to = part.as_ref().map(Part::file).transpose().map_err(file)?;
+    let mut sink: Box<dyn Sink> = match format {
+        Format::Csv => {
+            let to: Box<dyn Write> = to.map_or_else(|| Box::new(io::stdout()) as _, |file| Box::new(file) as _);
+            let to = BufWriter::with_capacity(BUFFER, to);
+            Box::new(csv::Csv::new(to, args.pressures).map_err(file)?)
         }
-    };
-    let mut sink = match sink {
-        // Who closed the pipe wanted nothing at all.
-        Err(why) if why.kind() == io::ErrorKind::BrokenPipe => return Ok(()),
-        other => other.map_err(file)?,
+        Format::Mcap => Box::new(mcap::Mcap::new(to, client.id, device, args.pressures).map_err(file)?),
     };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
     let wall_s = begun.elapsed().as_secs_f64();
-    sink.finish().map_err(file)?;
-    if let Some(part) = part {
-        part.place().map_err(file)?;
-    }
+    // Who closed the pipe wanted no more.
+    sink.finish().or_else(ended).map_err(file)?;
+    part.map_or(Ok(()), Part::place)?;
     let (counts, lost) = taken?;
     let Counts { states, repeated, missed, .. } = counts;
     let rate_hz = states as f64 / wall_s;
@@ -107,6 +111,11 @@ pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Resu
     lost.map_or(Ok(()), |why| Err(Error::Other(format!("the recording ends after {:.3} s: {why}", counts.last_s))))
 }
 
+/// A pipe that its reader closed is no error.
+fn ended(why: io::Error) -> io::Result<()> {
+    if why.kind() == io::ErrorKind::BrokenPipe { Ok(()) } else { Err(why) }
+}
+
 #[derive(Default)]
 struct Counts {
     states: u64,
@@ -123,25 +132,29 @@ fn take(
     sink: &mut dyn Sink,
 ) -> Result<(Counts, Option<Error>), Error> {
     let period = if args.rate_hz > 0.0 { Duration::from_secs_f64(1.0 / args.rate_hz) } else { Duration::ZERO };
-    let (mut counts, mut clock, mut frame, mut row) = (Counts::default(), Clock::default(), None, 0);
-    let mut due = Instant::now();
+    let (mut counts, mut stamps, mut frame, mut row) = (Counts::default(), Stamps::default(), None, 0);
+    let (mut due, mut flushed) = (Instant::now(), Instant::now());
     while !interrupt.came() {
         let read = if args.pressures { State::read_picture(client) } else { State::read(client) };
         match read {
             Ok(state) => {
                 row = 0;
-                let Some(time_s) = clock.time_s(&state) else { return Ok((counts, Some(ANEW.into()))) };
-                if args.seconds.is_some_and(|seconds| time_s > seconds) {
+                let Some(stamp) = stamps.stamp(&state) else { return Ok((counts, Some(ANEW.into()))) };
+                if args.seconds.is_some_and(|seconds| stamp.time_s > seconds) {
                     break;
                 }
-                counts.last_s = time_s;
+                counts.last_s = stamp.time_s;
                 if frame.replace(state.frame) == Some(state.frame) {
                     counts.repeated += 1;
                 } else {
                     counts.states += 1;
-                    match sink.put(time_s, &state) {
+                    let mut put = sink.put(&stamp, &state);
+                    if flushed.elapsed() >= FLUSH_EVERY {
+                        flushed = Instant::now();
+                        put = put.and_then(|()| sink.flush());
+                    }
+                    match put {
                         Ok(()) => {}
-                        // Who closed the pipe wanted no more.
                         Err(why) if why.kind() == io::ErrorKind::BrokenPipe => break,
                         Err(why) => return Err(Error::file("write", &args.file, why)),
                     }

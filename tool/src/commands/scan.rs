@@ -26,15 +26,18 @@ pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
     }
     let speeds = if args.speeds.is_empty() { BAUD_RATES.to_vec() } else { args.speeds.clone() };
     let mut found = Vec::new();
-    for port in &ports {
+    'ports: for port in &ports {
         for &baud in &speeds {
             let there = Client::open(&Reach { port: Some(port.clone()), baud, ..reach.clone() })
                 .and_then(|mut client| client.ping_all());
             match there {
                 Ok(pongs) => found.extend(pongs.into_iter().map(|pong| (port, baud, pong))),
                 Err(why) if reach.port.is_some() => return Err(why),
-                // Of all ports of a machine some are another's.
-                Err(why) => aside(format_args!("passed over: {why}")),
+                // Of all ports of a machine some are another's, at every speed.
+                Err(why) => {
+                    aside(format_args!("passed over: {why}"));
+                    continue 'ports;
+                }
             }
         }
     }

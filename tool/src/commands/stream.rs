@@ -7,7 +7,7 @@ use crate::{Client, Error, numbers};
 
 /// Where to stream to.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  \
+#[command(after_help = "Examples:\n  \
     fingertip stream    (in Foxglove: Open connection, Foxglove WebSocket, ws://localhost:8765)")]
 pub struct Args {
     /// Address to listen on; 0.0.0.0 lets other machines in

@@ -13,7 +13,7 @@ const DONE: i64 = 2;
 
 /// How to tare.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  fingertip tare")]
+#[command(after_help = "Examples:\n  fingertip tare")]
 pub struct Args {
     /// How long it may take; a real controller needs 20 ms
     #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]

@@ -25,11 +25,13 @@ fn numbers_that_are_none_are_not_understood() {
         &["tare", "--within-s", "1e300"],
         &["press", "nan"],
         &["press", "0"],
+        &["press", "-1"],
         &["press", "151"],
         &["capture", "--press", "0", "--out", "a.mcap"],
         &["calibrate", "press", "--within-s", "nan"],
         &["calibrate", "scale", "200"],
         &["params", "get", "nonsense"],
+        &["params", "get", "pressures"],
         &["press", "1", "--seconds", "nan"],
         &["press", "1", "--within-s", "nan"],
         &["press", "1", "--seconds=-1"],
@@ -48,7 +50,7 @@ fn a_pause_between_states_ends_at_once() {
     let file = finger.file("slow.csv");
     // A state in a quarter of an hour.
     let mut child = finger.start(&["record", "--rate-hz", "0.001", &file]);
-    while fs::read_to_string(format!("{file}.new")).is_err() {
+    while fs::read_to_string(format!("{file}.part")).is_err() {
         std::thread::yield_now();
     }
     Served::interrupt(&child);
@@ -62,7 +64,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     finger.done(&["tare"]);
     let file = finger.file("again.csv");
     let child = finger.start(&["record", "--rate-hz", "0", "--seconds", "1000000", &file]);
-    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
         std::thread::yield_now();
     }
     finger.command(&format!("raw {REBOOT}"));
@@ -182,7 +184,7 @@ fn only_files_are_written_in_place_and_by_one_at_a_time() {
     let other = Served::begin("wall");
     let file = finger.file("both.csv");
     let child = finger.start(&["record", &file]);
-    while !fs::read_to_string(format!("{file}.new")).is_ok_and(|text| text.lines().count() > 10) {
+    while !fs::read_to_string(format!("{file}.part")).is_ok_and(|text| text.lines().count() > 10) {
         std::thread::yield_now();
     }
     let why = other.refused(&["record", "--seconds", "0", &file]);

@@ -44,7 +44,7 @@ fn a_restore_leaves_the_old_parameters_or_the_new_ones() {
     }
     assert!(seen.iter().sum::<i32>() >= 20 && seen.iter().all(|count| *count > 0), "{seen:?}");
     assert_eq!(get(), after, "the last one came to its end");
-    assert!(!fs::exists(finger.file("new.toml.new")).expect("a folder"));
+    assert!(!fs::exists(finger.file("new.toml.part")).expect("a folder"));
 }
 
 /// A controller that starts anew has what the flash holds, and calls that saved.

@@ -3,7 +3,9 @@
 
 mod attacked;
 mod captured;
+mod exits;
 mod killed;
+mod recorded;
 #[path = "../served/mod.rs"]
 mod served;
 mod stopped;
@@ -44,7 +46,7 @@ fn who_is_not_there_is_told() {
     assert!(why.contains("cannot open /nowhere"), "{why}");
     // One line has one host.
     let mut first = finger.start(&["record", &finger.file("first.csv")]);
-    while fs::metadata(finger.file("first.csv.new")).is_err() {
+    while fs::metadata(finger.file("first.csv.part")).is_err() {
         std::thread::yield_now();
     }
     let why = finger.refused(&["info"]);
@@ -219,66 +221,6 @@ fn a_backup_is_restored_whole() {
         assert_eq!(now, serde_json::json!({ "modulus_pa": 300_000, "fit_level": 4 }));
     }
     assert!(finger.refused(&["params", "restore", "/nowhere.toml"]).contains("/nowhere.toml"));
-}
-
-#[test]
-fn states_are_recorded_with_the_controllers_times() {
-    let finger = Served::begin("wall");
-    let file = finger.file("force.csv");
-    let done = finger.json(&["record", "--seconds", "0.5", "--rate-hz", "200", "--pressures", &file]);
-    let text = fs::read_to_string(&file).expect("it was written");
-    let rows: Vec<Vec<f64>> = text
-        .lines()
-        .skip(1)
-        .map(|line| line.split(',').map(|cell| cell.parse().expect("a number")).collect())
-        .collect();
-    assert!(text.starts_with("time_s,frame,mode,fault,limits,goal_mn,force_mn,"));
-    assert_eq!(text.lines().next().map(|head| head.split(',').count()), Some(115));
-    assert_eq!((rows.len() as u64, done["states"].as_u64()), (rows.len() as u64, Some(rows.len() as u64)));
-    assert!(rows.len() > 1 && rows.iter().all(|row| row.len() == 115));
-    for pair in rows.windows(2) {
-        // Time is that of the frames: 99.786 us each, cut to microseconds.
-        let (frames, time_s) = (pair[1][1] - pair[0][1], pair[1][0] - pair[0][0]);
-        assert!(frames > 0.0 && (time_s - frames * 99.786e-6).abs() < 2e-6, "{frames} frames in {time_s} s");
-    }
-    let mcap = finger.file("force.mcap");
-    let done = finger.json(&["record", "--seconds", "0.2", "--pressures", &mcap]);
-    let bytes = fs::read(&mcap).expect("it was written");
-    let messages: Vec<_> =
-        mcap::MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole")).collect();
-    assert_eq!(messages.len() as u64, 2 * done["states"].as_u64().expect("a number"));
-    assert_eq!(messages[0].channel.topic, "/finger0/scalars");
-    assert_eq!(messages[0].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("fingertip.Scalars"));
-    assert_eq!(messages[1].channel.schema.as_ref().map(|schema| schema.name.as_str()), Some("foxglove.RawImage"));
-    assert!(Served::not_understood(&["record", "force.txt"]).contains(".csv or .mcap"));
-    assert!(finger.refused(&["record", "/nowhere/force.csv"]).contains("cannot write /nowhere/force.csv"));
-}
-
-#[test]
-fn a_recording_that_is_interrupted_is_whole() {
-    let finger = Served::begin("wall");
-    let file = finger.file("stopped.csv");
-    let mut child = finger.start(&["record", &file]);
-    // Until something is on its way.
-    while fs::metadata(format!("{file}.new")).is_err() {
-        std::thread::yield_now();
-    }
-    Served::interrupt(&child);
-    assert!(child.wait().expect("it ends").success());
-    let text = fs::read_to_string(&file).expect("it is there");
-    assert!(text.ends_with('\n') && text.starts_with("time_s,"));
-    assert!(!fs::exists(format!("{file}.new")).expect("a folder"));
-
-    // One whose line is lost keeps what it had, and says why it ends.
-    let lost = finger.file("lost.csv");
-    let child = finger.start(&["record", &lost]);
-    while fs::metadata(format!("{lost}.new")).is_err() {
-        std::thread::yield_now();
-    }
-    finger.end();
-    let output = child.wait_with_output().expect("it ends");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{said}");
 }
 
 #[test]

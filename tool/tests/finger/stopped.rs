@@ -19,7 +19,7 @@ const MOTIONS: [(&[&str], &str); 4] = [
     (&["press", "1", "--seconds", "1000000", "--within-s", "3600"], "Force:"),
     (&["calibrate", "press", "--within-s", "3600"], "Identify:"),
     (&["commission", "measure"], "Commission:"),
-    (&["capture", "--press", "1", "--within-s", "3600", "--out"], "Force:"),
+    (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
 pub fn client(finger: &Served) -> Client {
@@ -195,6 +195,10 @@ fn commands_say_what_they_did_and_did_not_do() {
         finger.done(&["stop"]);
     }
     finger.done(&["tare"]);
+    for (command, hint) in [("accept", "`calibrate press`"), ("accept-scale", "`calibrate scale`")] {
+        let why = finger.refused(&["calibrate", command]);
+        assert!(why.contains(hint), "{why}");
+    }
     finger.done(&["calibrate", "press", "--within-s", "3600"]);
     let said = finger.done(&["calibrate", "accept"]);
     assert!(said.contains("the proposed gains are in force") && said.contains("`fingertip params save`"), "{said}");

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 /// Says how much of the force's error each of the sensor's weaknesses makes at 0.5, 1 and 5 N.
 #[derive(Debug, Parser)]
-#[command(name = "budget", version, after_help = "Example:\n  budget --fingers 300")]
+#[command(name = "budget", version, after_help = "Examples:\n  budget --fingers 300")]
 struct Args {
     /// How many fingers, each run 14 times
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..))]

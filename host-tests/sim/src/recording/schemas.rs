@@ -1,14 +1,18 @@
-//! What the messages look like, as JSON schemas.
+//! What the messages look like, as JSON schemas. Frames and images share theirs with the recordings of `fingertip`.
 
 use serde_json::{Value, json};
 
 /// A topic's last part, its schema's name, and the schema.
-pub fn all() -> [(&'static str, &'static str, Value); 4] {
+pub fn all() -> [(&'static str, &'static str, String); 4] {
+    let [frame, image] = [
+        include_str!("../../../../tool/src/messages/frame.json"),
+        include_str!("../../../../tool/src/messages/raw_image.json"),
+    ];
     [
-        ("scalars", "fingertip.Scalars", scalars()),
-        ("frame", "fingertip.Frame", frame()),
-        ("image", "foxglove.RawImage", raw_image()),
-        ("core", "fingertip.Core", core()),
+        ("scalars", "fingertip.Scalars", scalars().to_string()),
+        ("frame", "fingertip.Frame", frame.into()),
+        ("image", "foxglove.RawImage", image.into()),
+        ("core", "fingertip.Core", core().to_string()),
     ]
 }
 
@@ -42,39 +46,6 @@ fn scalars() -> Value {
         .map(|(name, about)| ((*name).to_owned(), json!({ "type": "number", "description": about })))
         .collect();
     json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
-}
-
-fn frame() -> Value {
-    let codes = json!({
-        "type": "array",
-        "description": "Converter codes by slot and column; the last slot has no row driven",
-        "items": { "type": "array", "items": { "type": "integer", "minimum": 0, "maximum": 4095 } },
-    });
-    let sequence = json!({ "type": "integer", "description": "Counts frames" });
-    json!({ "title": "fingertip.Frame", "type": "object", "properties": { "sequence": sequence, "codes": codes } })
-}
-
-/// As <https://docs.foxglove.dev/docs/sdk/schemas/raw-image> has it.
-fn raw_image() -> Value {
-    let count = json!({ "type": "integer", "minimum": 0 });
-    let time = json!({
-        "type": "object",
-        "title": "time",
-        "properties": { "sec": count, "nsec": { "type": "integer", "minimum": 0, "maximum": 999_999_999 } },
-    });
-    json!({
-        "title": "foxglove.RawImage",
-        "type": "object",
-        "properties": {
-            "timestamp": time,
-            "frame_id": { "type": "string" },
-            "width": count,
-            "height": count,
-            "encoding": { "type": "string" },
-            "step": count,
-            "data": { "type": "string", "contentEncoding": "base64" },
-        },
-    })
 }
 
 fn core() -> Value {

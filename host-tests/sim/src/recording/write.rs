@@ -127,7 +127,7 @@ impl Recorder {
         let schemas = schemas::all();
         let mut ids = [0; 4];
         for ((_, name, schema), id) in schemas.iter().zip(&mut ids) {
-            *id = out.add_schema(name, "jsonschema", schema.to_string().as_bytes())?;
+            *id = out.add_schema(name, "jsonschema", schema.as_bytes())?;
         }
         for number in 0..controllers.len() {
             let mut finger = Finger { next_frame_s: f64::NEG_INFINITY, ..Finger::default() };

@@ -51,12 +51,9 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, kept: &Kept) 
     for (row, gains) in gains.iter().enumerate() {
         let _ = writeln!(text, "row_{row} = {gains:?}");
     }
-    if path.exists() && !force {
-        return Err(format!("{} is there already: --force writes over it", path.display()).into());
-    }
-    let part = Part::begin(path)?;
+    let part = Part::begin(path, force)?;
     part.file().and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)?;
-    part.place().map_err(failed)
+    part.place()
 }
 
 /// Reads it.

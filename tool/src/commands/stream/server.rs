@@ -2,13 +2,12 @@
 
 use super::Args;
 use crate::commands::{Interrupt, aside};
-use crate::messages::Topic;
-use crate::state::{Clock, State};
+use crate::messages::{Topic, device};
+use crate::state::{Stamps, State};
 use crate::{Client, Error};
-use foxglove::{ChannelBuilder, Context, PartialMetadata, RawChannel, Schema, WebSocketServer};
-use std::sync::Arc;
+use foxglove::{ChannelBuilder, Context, PartialMetadata, Schema, WebSocketServer};
 use std::thread::sleep;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// How often to look for who wants the stream.
 const LOOK: Duration = Duration::from_millis(50);
@@ -21,13 +20,19 @@ const TOPICS: [Topic; 2] = [Topic::Scalars, Topic::Image];
 pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let context = Context::new();
-    let channel = |topic| Ok((topic, channel(&context, topic, client.id)?));
+    let device = device(client)?;
+    let channel = |topic: Topic| {
+        let schema = Schema::new(topic.schema_name(), "jsonschema", topic.schema());
+        let channel = ChannelBuilder::new(topic.name(client.id)).context(&context).message_encoding("json");
+        let channel = channel.metadata(device.clone()).schema(schema).build_raw();
+        Ok((topic, channel.map_err(|why| Error::Other(why.to_string()))?))
+    };
     let channels = TOPICS.into_iter().map(channel).collect::<Result<Vec<_>, Error>>()?;
     let server = WebSocketServer::new().name("fingertip").bind(&args.listen, args.tcp).context(&context);
     let server = server.start_blocking().map_err(|why| format!("{}:{}: {why}", args.listen, args.tcp))?;
     aside(format_args!("streaming at ws://{}:{}; Ctrl-C ends it", args.listen, server.port()));
     let period = Duration::from_secs_f64(1.0 / args.rate_hz.clamp(0.1, 1e3));
-    let (mut clock, mut begun, mut lost) = (Clock::default(), None, false);
+    let (mut stamps, mut lost) = (Stamps::default(), false);
     let mut due = Instant::now();
     while !interrupt.came() {
         if !channels.iter().any(|(_, channel)| channel.has_sinks()) {
@@ -37,16 +42,11 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
         match State::read_picture(client) {
             Ok(state) => {
                 lost = false;
-                let time_s = clock.time_s(&state).unwrap_or_else(|| {
-                    // It started anew: its time counts on from now.
-                    begun = None;
-                    clock.time_s(&state).unwrap_or_default()
-                });
-                let begun = *begun.get_or_insert_with(SystemTime::now);
-                let at = (begun + Duration::from_secs_f64(time_s)).duration_since(UNIX_EPOCH).unwrap_or_default();
+                // Where it started anew its time counts on from now.
+                let stamp = stamps.stamp(&state).or_else(|| stamps.stamp(&state)).unwrap_or_default();
                 for (topic, channel) in &channels {
-                    let when = PartialMetadata::with_log_time(at.as_nanos() as u64);
-                    channel.log_with_meta(&topic.message(time_s, &state), when);
+                    let when = PartialMetadata::with_log_time(stamp.read_ns);
+                    channel.log_with_meta(&topic.message(&stamp, &state), when);
                 }
             }
             Err(why) if lost => drop(why),
@@ -60,10 +60,4 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
     }
     server.stop().wait_blocking();
     Ok(())
-}
-
-fn channel(context: &Arc<Context>, topic: Topic, id: u8) -> Result<Arc<RawChannel>, Error> {
-    let schema = Schema::new(topic.schema_name(), "jsonschema", topic.schema());
-    let channel = ChannelBuilder::new(topic.name(id)).context(context).message_encoding("json").schema(schema);
-    channel.build_raw().map_err(|why| Error::Other(why.to_string()))
 }

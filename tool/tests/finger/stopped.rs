@@ -102,6 +102,60 @@ fn a_killed_command_leaves_no_force_and_the_fault_of_the_watchdog() {
     }
 }
 
+/// Ends of a program: its signal, or a cable that is pulled out.
+const ENDS: [Option<Signal>; 5] = [Some(Signal::INT), Some(Signal::TERM), Some(Signal::HUP), Some(Signal::KILL), None];
+
+/// One instant of every motion and end, drawn with a fixed seed. More with
+/// `INSTANTS=50 cargo test -p fingertip-cli --profile host --test finger any_instant -- --nocapture`.
+#[test]
+fn a_program_that_ends_at_any_instant_leaves_no_force() {
+    let instants = std::env::var("INSTANTS").map_or(1, |text| text.parse().expect("a number of instants"));
+    let mut random = fastrand::Rng::with_seed(28);
+    for (arguments, _) in MOTIONS {
+        // Long enough to be ended while the force is held.
+        let arguments: Vec<&str> =
+            arguments.iter().map(|word| if *word == "1000000" { "0.5" } else { *word }).collect();
+        let mut packets = 0;
+        for (end, instant) in ENDS.iter().flat_map(|end| (0..=instants).map(move |instant| (end, instant))) {
+            let finger = patient("wall");
+            finger.done(&["tare"]);
+            let (begun, file) = (finger.heard(), finger.file("ended.mcap"));
+            let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
+            let patience: &[&str] = if end.is_none() { &["--timeout-ms", "100"] } else { &[] };
+            if packets == 0 {
+                finger.done(&[&arguments, out].concat());
+                packets = finger.heard() - begun;
+                continue;
+            } else if instant == 0 {
+                continue;
+            }
+            let at = random.u64(1..packets);
+            let mut child = if end.is_none() {
+                finger.command(&format!("deaf after {at} for {}", u64::MAX));
+                finger.start(&[&arguments, out, patience].concat())
+            } else {
+                finger.start(&[&arguments, out].concat())
+            };
+            while finger.heard() - begun < at && child.try_wait().expect("it was started").is_none() {
+                std::thread::yield_now();
+            }
+            let ended_s = finger.now_s();
+            if let Some(signal) = end
+                && child.try_wait().expect("it was started").is_none()
+            {
+                Served::signal(&child, *signal);
+            }
+            child.wait().expect("it ends");
+            while finger.now_s() < ended_s + 1.0 {
+                finger.command("state");
+            }
+            let left_n = finger.true_force_n();
+            assert!(left_n < RESIDUAL_N, "{arguments:?} {end:?} after {at} of {packets}: {}", finger.command("state"));
+        }
+        println!("{arguments:?}: no force left at {instants} instants of {} ends, {packets} packets", ENDS.len());
+    }
+}
+
 #[test]
 fn stop_stops_every_mode() {
     let finger = patient("wall");

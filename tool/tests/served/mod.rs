@@ -41,8 +41,9 @@ struct Told {
     /// Its clock waits for the host: it goes on for `PATIENT_S` after a packet. On a loaded machine the bus watchdog must not
     /// outrun the program under test.
     patient: bool,
-    /// Time of the last packet, s.
+    /// Time of the last packet, s, and the number of packets.
     heard_s: f64,
+    heard: u64,
 }
 
 /// Simulated time that a patient finger goes on after a packet, s.
@@ -96,8 +97,14 @@ impl serve::Finger for Told {
     fn run_until(&mut self, time_s: f64) -> Result<(), Self::Error> {
         while let Ok((command, answer)) = self.commands.try_recv() {
             // A look leaves the finger's clock alone.
-            if command == "look" {
-                answer.send(self.native.command("state")).expect("somebody waits for it");
+            let look = match command.as_str() {
+                "look" => Some(self.native.command("state")),
+                "now" => Some(Ok(self.now_s().to_string())),
+                "heard" => Some(Ok(self.heard.to_string())),
+                _ => None,
+            };
+            if let Some(look) = look {
+                answer.send(look).expect("somebody waits for it");
                 continue;
             }
             let done = self.told(&command).unwrap_or_else(|| self.native.command(&command));
@@ -116,6 +123,7 @@ impl serve::Finger for Told {
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
         self.heard_s = self.native.now_s();
+        self.heard += 1;
         if let Some((left, lost, unheard)) = &mut self.ears {
             if *left > 0 {
                 *left -= 1;
@@ -168,6 +176,7 @@ impl Served {
                 restart: None,
                 patient: false,
                 heard_s: 0.0,
+                heard: 0,
             };
             let served = serve::serve(&mut told, &mut port, Duration::from_secs(3600), false);
             served.map(drop).unwrap_or_else(|never| match never {});
@@ -297,6 +306,16 @@ impl Served {
             assert!(begun.elapsed() < Duration::from_secs(60), "no {word} in {}", self.command(look));
             std::thread::sleep(Self::LOOK);
         }
+    }
+
+    /// The finger's clock, s.
+    pub fn now_s(&self) -> f64 {
+        self.command("now").parse().expect("a time")
+    }
+
+    /// Packets that the finger heard.
+    pub fn heard(&self) -> u64 {
+        self.command("heard").parse().expect("a number")
     }
 
     /// Force at the first finger's tip, N: the truth, not what the controller senses.

@@ -96,8 +96,9 @@ fn torque_off_ends_the_goal() {
 fn one_write_recovers_from_a_silent_bus() {
     let mut rig = holding();
     write_u8(&mut rig, address::BUS_WATCHDOG, 1);
-    rig.run_ms(60).expect("it runs");
+    rig.run_ms(200).expect("it runs");
     assert_eq!(read_u8(&mut rig, address::FAULT), Fault::BusSilent as u8);
+    assert_eq!(rig.world(|world| world.force_n()).expect("it runs"), 0.0, "released before the fault");
     let refused = |rig: &mut Rig, register: u16, bytes: &'static [u8]| {
         let written = rig.client(WAIT_NS, move |bus| bus.write(1, register, bytes).map(drop));
         match written.expect("the client runs") {

@@ -108,6 +108,11 @@ impl Client {
         Ok(())
     }
 
+    /// How long it waits.
+    pub fn timeout(&self) -> Duration {
+        self.timeout
+    }
+
     /// Waits differently long.
     pub fn set_timeout(&mut self, timeout: Duration) -> Duration {
         std::mem::replace(&mut self.timeout, timeout)
@@ -147,8 +152,7 @@ impl Client {
     /// The port is lost.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
         self.send(BROADCAST, instruction::PING, &[])?;
-        let slots = Duration::from_secs_f64(f64::from(u32::from(BROADCAST) * PING_BITS) / f64::from(self.baud));
-        let until = Instant::now() + self.timeout + slots;
+        let until = Instant::now() + self.timeout + self.ping_slots();
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());
         while let Some(left) = until.checked_duration_since(Instant::now()) {
             let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
@@ -241,6 +245,39 @@ impl Client {
         let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
         let data = table::encode(register, value);
         self.send(BROADCAST, instruction::WRITE, &[&address.to_le_bytes()[..], &data].concat())
+    }
+
+    /// Sends a packet as it is, and returns what comes in until the last of these answers, or until the time is over.
+    /// `from` is who answers, where it is one device.
+    ///
+    /// # Errors
+    /// The port is lost.
+    pub fn pass(&mut self, packet: &[u8], from: Option<u8>, mut answers: usize) -> Result<Vec<u8>, Error> {
+        self.settle()?;
+        self.line.discard();
+        self.line.write(packet).map_err(|why| self.lost(why))?;
+        let all = answers == usize::MAX;
+        let until = Instant::now() + self.timeout + if all { self.ping_slots() } else { Duration::ZERO };
+        let (mut receiver, mut heard) = (Receiver::new(), Vec::new());
+        while answers > 0
+            && let Some(left) = until.checked_duration_since(Instant::now())
+        {
+            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
+            for byte in &bytes {
+                let whole = matches!(receiver.push(*byte), Some(Event::Packet | Event::BadCrc));
+                let packet = receiver.packet();
+                let awaited = packet.instruction == instruction::STATUS && from.is_none_or(|id| id == packet.id);
+                answers = answers.saturating_sub(usize::from(whole && awaited));
+            }
+            heard.extend(bytes);
+        }
+        self.owed = answers > 0 && !all;
+        Ok(heard)
+    }
+
+    /// Time in which all IDs answer a broadcast Ping, one behind the other.
+    fn ping_slots(&self) -> Duration {
+        Duration::from_secs_f64(f64::from(u32::from(BROADCAST) * PING_BITS) / f64::from(self.baud))
     }
 
     /// Sends an instruction and waits for its answer: `length` bytes behind the error.

@@ -12,6 +12,7 @@ pub mod record;
 pub mod recover;
 pub mod replay;
 pub mod scan;
+pub mod share;
 pub mod stop;
 pub mod stream;
 pub mod tare;

@@ -4,8 +4,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
-    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, stop, stream, tare,
-    view,
+    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, share, stop, stream,
+    tare, view,
 };
 use fingertip_cli::{Client, Error};
 use serde_json::json;
@@ -48,6 +48,8 @@ enum Command {
     /// Tell what the controller is and how it stands
     #[command(after_help = "Examples:\n  fingertip info\n  fingertip info --json")]
     Info,
+    /// Own the bus for any number of clients: one commands, all watch, anyone stops
+    Share(share::Args),
     /// Watch map, force, goal, mode and faults live
     View(view::Args),
     /// Stream states live to Foxglove, over a WebSocket
@@ -132,6 +134,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     match &cli.command {
         Command::Scan(args) => scan::run(args, &cli.reach, cli.json),
         Command::Info => info::run(&mut connect()?, cli.json),
+        Command::Share(args) => share::run(args, &cli.reach),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
         Command::Record(args) => record::run(args, record::format(args)?, &mut connect()?, cli.json),

@@ -58,24 +58,11 @@ impl<'a> Moving<'a> {
 
     fn stop(&mut self) -> Result<(), Error> {
         let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
-        let released = self.release();
-        halt(self.client)?;
+        rest(RELEASE_S, self.client)?;
         // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
         // has tripped stays so, for `fingertip recover`.
         if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
             self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))?;
-        }
-        released
-    }
-
-    /// Takes the tip off the object. Only torque off ends a press that measures; friction would keep most of its force,
-    /// so torque goes on once more, with the goal of 0 that torque off leaves.
-    fn release(&mut self) -> Result<(), Error> {
-        if release(RELEASE_S, self.client)?.mode == Mode::Identify as i64 {
-            halt(self.client)?;
-            self.client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
-            wait_for(self.client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;
-            release(RELEASE_S, self.client)?;
         }
         Ok(())
     }
@@ -87,6 +74,21 @@ impl Drop for Moving<'_> {
             aside(format_args!("fingertip: stopping the finger failed: {why}"));
         }
     }
+}
+
+/// Takes the tip off the object and turns torque off, whatever comes of the release. Only torque off ends a press that
+/// measures, and friction would keep most of its force: torque then goes on once more, with the goal of 0 that torque off
+/// leaves.
+pub(super) fn rest(within_s: f64, client: &mut Client) -> Result<(), Error> {
+    let mut released = release(within_s, client);
+    if released.as_ref().is_ok_and(|state| state.mode == Mode::Identify as i64) {
+        halt(client)?;
+        client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
+        wait_for(client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;
+        released = release(within_s, client);
+    }
+    halt(client)?;
+    released.map(drop)
 }
 
 /// Ends a grip by the goal 0 and waits until the tip is clear of the object, at most for this time. Returns the last
@@ -116,6 +118,6 @@ pub(super) fn halt(client: &mut Client) -> Result<(), Error> {
 }
 
 /// True for the modes in which the motor is not driven.
-fn is_idle(mode: i64) -> bool {
+pub(super) fn is_idle(mode: i64) -> bool {
     [Mode::Off, Mode::Tare, Mode::Fault].iter().any(|idle| *idle as i64 == mode)
 }

@@ -147,6 +147,9 @@ fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) ->
         if state.fault != 0 {
             return Err(stopped(state.fault));
         }
+        if state.goal_mn != goal_mn {
+            return Err(format!("another program stopped the finger or set another goal: {} mN", state.goal_mn).into());
+        }
         let force_mn = state.force_mn;
         let near = state.mode == Mode::Force as i64 && ((force_mn - goal_mn) as f64).abs() <= tolerance_mn(args);
         near_s = if near { near_s.or(Some(time_s)) } else { None };

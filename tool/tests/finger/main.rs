@@ -8,6 +8,7 @@ mod killed;
 mod recorded;
 #[path = "../served/mod.rs"]
 mod served;
+mod shared;
 mod stopped;
 
 use fingertip::params::Params;

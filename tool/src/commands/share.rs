@@ -1,0 +1,267 @@
+//! `fingertip share`: owns the bus for any number of clients, one of which commands.
+//!
+//! A thread for each client passes its instruction packets on, one at a time, and returns the answers to that client
+//! alone. The first client that writes commands until it leaves. Others read; where one of them writes goal 0 or torque
+//! off, it stops the finger and takes the command from that client.
+
+use super::{Interrupt, aside, moving, say};
+use crate::client::Reach;
+use crate::{Client, Error, table};
+use fingertip::link::Reply;
+use fingertip::link::packet::{BROADCAST, HEADER, Packet, StatusError, instruction};
+use fingertip::link::receiver::{Event, Receiver};
+use fingertip::link::sender::Sender;
+use fingertip::shipped::address;
+use std::collections::BTreeSet;
+use std::io::{Read as _, Write as _};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::mpsc::{Receiver as Inbox, RecvTimeoutError, Sender as Outbox, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Instructions that change nothing.
+const READS: [u8; 6] = [
+    instruction::PING,
+    instruction::READ,
+    instruction::SYNC_READ,
+    instruction::FAST_SYNC_READ,
+    instruction::BULK_READ,
+    instruction::FAST_BULK_READ,
+];
+/// Registers to which everybody may write 0: to stop a finger.
+const STOPS: [u16; 2] = [address::TORQUE_ENABLE, address::GOAL_FORCE_MN];
+/// Longest release of a finger whose client left, in seconds of the controller's clock. Others wait for so long.
+const RELEASE_S: f64 = 0.5;
+/// Longest wait for a client that does not take its answers.
+const SLOW: Duration = Duration::from_secs(1);
+/// More bytes than any packet has: without a packet in them they are dropped.
+const JUNK: usize = 4096;
+
+/// Where to serve.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fingertip --port /dev/ttyUSB0 share\n  \
+    fingertip --port tcp:127.0.0.1:7777 press 1     (in a second terminal)\n  \
+    fingertip --port tcp:127.0.0.1:7777 view        (in a third)\n  \
+    socat pty,raw,echo=0,link=/tmp/bus tcp:127.0.0.1:7777    (for clients that know only serial ports)")]
+pub struct Args {
+    /// Address and TCP port for the clients. Who can connect can move the finger: keep it on this machine
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7777")]
+    listen: SocketAddr,
+}
+
+/// The bus and who commands on it.
+struct Bus {
+    client: Client,
+    commander: Option<Commander>,
+    /// Clients whose finger another one stopped: they command no more.
+    stopped: BTreeSet<SocketAddr>,
+}
+
+/// The client that may write.
+struct Commander {
+    from: SocketAddr,
+    /// IDs to which it wrote.
+    ids: BTreeSet<u8>,
+    /// Shortest bus watchdog that it set, and its last packet.
+    watchdog: Option<Duration>,
+    heard: Instant,
+}
+
+/// Serves until Ctrl-C, then stops what is still commanded.
+///
+/// # Errors
+/// The port or the address is taken, or the port is lost.
+pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
+    let interrupt = Interrupt::catch()?;
+    let mut client = Client::open(reach)?;
+    // A client whose packet waits behind an unanswered one still gets its answer within the usual time-out.
+    client.set_timeout(Duration::from_millis(reach.timeout_ms.div_ceil(2)));
+    let cannot = |why| Error::Other(format!("cannot listen at {}: {why}", args.listen));
+    let listener = TcpListener::bind(args.listen).map_err(cannot)?;
+    let address = listener.local_addr().map_err(cannot)?;
+    say(format_args!("shares {} at tcp:{address}; Ctrl-C ends it", client.port()));
+    say(format_args!("next, in other terminals: fingertip --port tcp:{address} view"));
+    let bus = Arc::new(Mutex::new(Bus { client, commander: None, stopped: BTreeSet::new() }));
+    let (lost, losses) = channel();
+    let shared = Arc::clone(&bus);
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            // Too many open files, for example: some will be closed.
+            let Ok(stream) = stream else {
+                std::thread::sleep(SLOW);
+                continue;
+            };
+            let (bus, lost) = (Arc::clone(&shared), lost.clone());
+            std::thread::spawn(move || converse(stream, &bus, &lost));
+        }
+    });
+    let ended = wait(&interrupt, &losses);
+    lock(&bus).end_command("`fingertip share` ends");
+    ended
+}
+
+fn wait(interrupt: &Interrupt, losses: &Inbox<Error>) -> Result<(), Error> {
+    while !interrupt.came() {
+        match losses.recv_timeout(super::INTERRUPT_EVERY) {
+            Ok(why) => return Err(why),
+            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {}
+        }
+    }
+    Ok(())
+}
+
+fn lock(bus: &Mutex<Bus>) -> std::sync::MutexGuard<'_, Bus> {
+    bus.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Serves one client until it leaves.
+fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
+    let Ok(from) = stream.peer_addr() else { return };
+    let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
+    let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
+    'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
+        for byte in &buffer[..count] {
+            raw.push(*byte);
+            if receiver.push(*byte) != Some(Event::Packet) {
+                if raw.len() > 2 * JUNK {
+                    raw.drain(..JUNK);
+                }
+                continue;
+            }
+            // Stuffing keeps the header out of a packet's inside.
+            let begin = raw.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
+            let answer = lock(bus).pass(from, &receiver.packet(), &raw[begin..]);
+            raw.clear();
+            match answer {
+                Ok(answer) if stream.write_all(&answer).is_ok() => {}
+                Ok(_) => break 'client,
+                Err(why) => {
+                    let _ = lost.send(why);
+                    break 'client;
+                }
+            }
+        }
+    }
+    let mut bus = lock(bus);
+    bus.stopped.remove(&from);
+    if bus.commander.as_ref().is_some_and(|commander| commander.from == from) {
+        bus.end_command("its client left");
+    }
+}
+
+impl Bus {
+    /// Passes a client's packet on, where it may, and returns the answers.
+    fn pass(&mut self, from: SocketAddr, packet: &Packet<'_>, raw: &[u8]) -> Result<Vec<u8>, Error> {
+        if packet.instruction == instruction::STATUS {
+            return Ok(Vec::new());
+        }
+        let slack = self.client.timeout();
+        let silent = |commander: &Commander| {
+            commander.from != from && commander.watchdog.is_some_and(|most| commander.heard.elapsed() > most + slack)
+        };
+        if self.commander.as_ref().is_some_and(silent) {
+            // Reads of others would feed its watchdog.
+            self.end_command("its client is silent");
+        }
+        if self.commander.as_ref().is_some_and(|commander| commander.from != from) && is_stop(packet) {
+            let stopped = self.commander.take().map(|commander| commander.from);
+            self.stopped.extend(stopped);
+        } else if !READS.contains(&packet.instruction) && !covers(packet, address::SCALE_SHOWS_MN) {
+            let new = || Commander { from, ids: BTreeSet::new(), watchdog: None, heard: Instant::now() };
+            let may = !self.stopped.contains(&from) && !covers(packet, address::BAUD_RATE);
+            let commander = if may { Some(self.commander.get_or_insert_with(new)) } else { None };
+            let Some(commander) = commander.filter(|commander| commander.from == from) else {
+                return Ok(if packet.id == BROADCAST { Vec::new() } else { refusal(packet.id) });
+            };
+            commander.ids.extend(targets(packet));
+            if covers(packet, address::BUS_WATCHDOG)
+                && let Some(steps @ 1..) = packet.params.get(2)
+            {
+                let watchdog = Duration::from_millis(20 * u64::from(*steps));
+                commander.watchdog = Some(commander.watchdog.map_or(watchdog, |shortest| shortest.min(watchdog)));
+            } else if covers(packet, address::BUS_WATCHDOG) {
+                commander.watchdog = None;
+            }
+        }
+        if let Some(commander) = self.commander.as_mut().filter(|commander| commander.from == from) {
+            commander.heard = Instant::now();
+        }
+        self.client.pass(raw, Some(packet.id).filter(|id| *id != BROADCAST), answers(packet))
+    }
+
+    /// Ends the command of a client: what it left with torque on is released and stopped.
+    fn end_command(&mut self, why: &str) {
+        let Some(commander) = self.commander.take() else { return };
+        let own = self.client.id;
+        let all = commander.ids.contains(&BROADCAST);
+        let found = if all { self.client.ping_all().unwrap_or_default() } else { Vec::new() };
+        for id in found.iter().map(|pong| pong.id).chain(commander.ids).filter(|id| *id != BROADCAST) {
+            self.client.id = id;
+            match stop(&mut self.client) {
+                Ok(true) => aside(format_args!("ID {id} was stopped: {why}")),
+                Ok(false) => {}
+                Err(error) => aside(format_args!("stopping ID {id} failed ({why}): {error}")),
+            }
+        }
+        self.client.id = own;
+    }
+}
+
+/// Stops a device that is driven. Returns whether it was.
+fn stop(client: &mut Client) -> Result<bool, Error> {
+    if i64::from(client.again(Client::ping)?.model) == table::model() {
+        let drives = !moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?);
+        return if drives { moving::rest(RELEASE_S, client).map(|()| true) } else { Ok(false) };
+    }
+    let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;
+    if drives {
+        client.again(|client| client.set(address::TORQUE_ENABLE, 0))?;
+    }
+    Ok(drives)
+}
+
+/// Returns whether a packet only stops a finger.
+fn is_stop(packet: &Packet<'_>) -> bool {
+    STOPS.into_iter().any(|register| covers(packet, register))
+        && packet.params.len() > 2
+        && packet.params.iter().skip(2).all(|byte| *byte == 0)
+}
+
+/// Returns whether a packet writes a register from its first byte on.
+fn covers(packet: &Packet<'_>, register: u16) -> bool {
+    packet.instruction == instruction::WRITE && packet.params.starts_with(&register.to_le_bytes())
+}
+
+/// IDs to which a packet writes.
+fn targets(packet: &Packet<'_>) -> Vec<u8> {
+    let Packet { id, instruction, params, .. } = *packet;
+    let entry =
+        |at: usize| params.get(at..at + 2).map_or(0, |length| usize::from(u16::from_le_bytes([length[0], length[1]])));
+    match instruction {
+        instruction::SYNC_WRITE => params.iter().skip(4).step_by(1 + entry(2)).copied().collect(),
+        instruction::BULK_WRITE => {
+            let places = std::iter::successors(Some(0), |at| Some(at + 5 + entry(at + 3)));
+            places.map_while(|at| params.get(at).copied()).collect()
+        }
+        _ => vec![id],
+    }
+}
+
+/// Status packets that answer a packet.
+fn answers(packet: &Packet<'_>) -> usize {
+    match packet.instruction {
+        instruction::SYNC_READ => packet.params.len().saturating_sub(4),
+        instruction::BULK_READ => packet.params.len() / 5,
+        instruction::FAST_SYNC_READ | instruction::FAST_BULK_READ => 1,
+        instruction::PING if packet.id == BROADCAST => usize::MAX,
+        _ => usize::from(packet.id != BROADCAST),
+    }
+}
+
+/// The answer to a write while another client commands.
+fn refusal(id: u8) -> Vec<u8> {
+    let mut reply = Reply::new();
+    Sender::status(&mut reply, id, Some(StatusError::Access), false).finish();
+    reply.to_vec()
+}

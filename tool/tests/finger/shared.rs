@@ -1,0 +1,164 @@
+//! `fingertip share`: one client commands, all read, anyone stops.
+
+use crate::served::Served;
+use fingertip::shipped::address;
+use fingertip_cli::Client;
+use fingertip_cli::client::Reach;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::process::{Child, Command, Output, Stdio};
+
+/// A force that a stopped finger may still show, N.
+const RESIDUAL_N: f64 = 0.05;
+
+/// A served finger and a broker in front of it.
+struct Shared {
+    finger: Served,
+    broker: Child,
+    address: String,
+}
+
+impl Shared {
+    fn begin(scene: &str) -> Self {
+        let finger = Served::begin(scene);
+        finger.command("patient on");
+        let mut broker = finger.start(&["share", "--listen", "127.0.0.1:0", "--timeout-ms", "2000"]);
+        let mut line = String::new();
+        BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
+        let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address").to_owned();
+        Self { finger, broker, address }
+    }
+
+    fn client(&self) -> Client {
+        let port = Some(format!("tcp:{}", self.address));
+        Client::open(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it listens")
+    }
+
+    /// A client in a process of its own.
+    fn start(&self, arguments: &[&str]) -> Child {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
+        command.env("FINGERTIP_PORT", format!("tcp:{}", self.address)).args(arguments);
+        command.args(["--timeout-ms", "600000"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("it starts")
+    }
+
+    fn output(&self, arguments: &[&str]) -> Output {
+        self.start(arguments).wait_with_output().expect("it ends")
+    }
+
+    /// Tares, and presses until the force is held.
+    fn press(&self) -> Child {
+        assert!(self.output(&["tare"]).status.success());
+        let press = self.start(&["press", "1", "--seconds", "1000000", "--within-s", "3600"]);
+        self.finger.until("Force:");
+        press
+    }
+
+    fn until_released(&self) {
+        let begun = std::time::Instant::now();
+        while self.finger.true_force_n() > RESIDUAL_N || !self.finger.command("look").contains(": Off") {
+            assert!(begun.elapsed().as_secs() < 60, "{}", self.finger.command("look"));
+            std::thread::sleep(Served::LOOK);
+        }
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        let _ = self.broker.kill();
+        let _ = self.broker.wait();
+    }
+}
+
+#[test]
+fn a_press_is_watched_and_no_answer_reaches_another_client() {
+    let shared = Shared::begin("wall");
+    let mut press = shared.press();
+    let record = shared.start(&["record", "--seconds", "0.5", &shared.finger.file("watched.csv")]);
+    let words = [(address::MODEL_NUMBER, 2), (address::GOAL_FORCE_MN, 4), (address::TORQUE_ENABLE, 1)];
+    let readers = words.map(|(register, length)| {
+        let mut client = shared.client();
+        std::thread::spawn(move || {
+            let first = client.read(register, length).expect("it answers");
+            for _ in 0..1_000 {
+                assert_eq!(client.read(register, length).expect("it answers"), first);
+            }
+        })
+    });
+    for reader in readers {
+        reader.join().expect("no answer of another client");
+    }
+    let record = record.wait_with_output().expect("it ends");
+    assert!(record.status.success(), "{record:?}");
+    // A second client does not command.
+    let why = shared.client().set(address::GOAL_FORCE_MN, 2_000).expect_err("another one commands").to_string();
+    assert!(why.contains("error 7") && why.contains("`fingertip share`"), "{why}");
+    assert!(press.try_wait().expect("it was started").is_none());
+    // But it stops.
+    let stop = shared.output(&["stop"]);
+    assert!(stop.status.success(), "{stop:?}");
+    shared.until_released();
+    assert_eq!(press.wait().expect("it ends").code(), Some(1));
+}
+
+#[test]
+fn a_killed_commander_is_stopped_though_others_read() {
+    let shared = Shared::begin("wall");
+    let mut reader = shared.client();
+    for round in 0..2 {
+        let mut press = shared.press();
+        let signal = [rustix::process::Signal::KILL, rustix::process::Signal::STOP][round];
+        Served::signal(&press, signal);
+        let begun = std::time::Instant::now();
+        while reader.number(address::PRESENT_MODE).expect("it answers") != 0 {
+            assert!(begun.elapsed().as_secs() < 60, "{}", shared.finger.command("look"));
+        }
+        shared.until_released();
+        let _ = press.kill();
+        press.wait().expect("it ends");
+        let fault = reader.number(address::FAULT).expect("it answers");
+        assert_eq!(fault, 0, "{signal:?}: the broker stopped it, not the watchdog");
+    }
+    // The end of the broker, too.
+    let mut press = shared.press();
+    Served::interrupt(&shared.broker);
+    shared.until_released();
+    press.wait().expect("it ends");
+}
+
+#[test]
+fn clients_that_send_junk_or_read_nothing_block_nobody() {
+    let shared = Shared::begin("wall");
+    let connect = || TcpStream::connect(&shared.address).expect("it listens");
+    let mut random = fastrand::Rng::with_seed(7);
+    let mut half = connect();
+    half.write_all(&[0xFF, 0xFF, 0xFD, 0x00, 1, 7, 0, 2]).expect("it listens");
+    let mut junk = connect();
+    junk.write_all(&std::iter::repeat_with(|| random.u8(..)).take(100_000).collect::<Vec<_>>()).expect("it listens");
+    // It asks for the whole table over and over, and takes no answer.
+    let mut deaf = connect();
+    deaf.set_write_timeout(Some(std::time::Duration::from_millis(100))).expect("a socket");
+    let mut read = fingertip::link::Reply::new();
+    let mut sender = fingertip::link::sender::Sender::new(&mut read, 1, fingertip::link::packet::instruction::READ);
+    [0, 0, 44, 1].into_iter().for_each(|byte| sender.push(byte));
+    sender.finish();
+    for _ in 0..100 {
+        let _ = deaf.write_all(&read);
+    }
+    for _ in 0..20 {
+        let mut client = connect();
+        let count = random.usize(..read.len() + 1);
+        client.write_all(&read[..count]).expect("it listens");
+        if random.bool() && count == read.len() {
+            client.read_exact(&mut [0; 4]).expect("it answers");
+        }
+    }
+    let mut client = shared.client();
+    for _ in 0..100 {
+        assert_eq!(client.ping().expect("it answers").id, 1);
+    }
+    // Nobody commands: all may.
+    client.set(address::TARE, 1).expect("it obeys");
+    client.set_timeout(std::time::Duration::from_secs(5));
+    assert_eq!(client.ping_all().expect("it answers").len(), 1);
+}

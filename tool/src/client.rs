@@ -75,6 +75,16 @@ impl Client {
         Ok(Self { line, port, baud: reach.baud, id: reach.id, timeout, owed: false })
     }
 
+    /// Opens a port again that was lost.
+    ///
+    /// # Errors
+    /// It is not back.
+    pub fn reopen(&mut self) -> Result<(), Error> {
+        self.line = Line::open(&self.port, self.baud).map_err(|why| Error::Open { port: self.port.clone(), why })?;
+        self.owed = false;
+        Ok(())
+    }
+
     /// Opens the port and sees to it that a fingertip of a known table answers.
     ///
     /// # Errors

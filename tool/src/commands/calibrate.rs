@@ -42,7 +42,7 @@ pub enum Command {
     Show,
     /// Make the proposed gains those in force; tare then
     Accept,
-    /// Hold a force in another terminal, and tell what a scale under the plate shows
+    /// While another program holds a force (both through `fingertip share`), tell what a scale under the plate shows
     Scale {
         /// What it shows, N; a gram is 0.00981
         #[arg(value_name = "NEWTONS", value_parser = numbers::shown_mn)]

@@ -92,7 +92,12 @@ fn watch(
     let begun = Instant::now();
     let (mut due, mut counted, mut updates) = (begun, begun, 0);
     loop {
-        seen.take(State::read_picture(client));
+        let read = State::read_picture(client);
+        if matches!(read, Err(Error::Port { .. })) {
+            // It may come back; until then the last state stays, with the reason.
+            let _ = client.reopen();
+        }
+        seen.take(read);
         updates += 1;
         if counted.elapsed() >= Duration::from_secs(1) {
             seen.rate_hz = f64::from(updates) / counted.elapsed().as_secs_f64();

@@ -162,3 +162,20 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
     client.set_timeout(std::time::Duration::from_secs(5));
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
 }
+
+/// As `view` does it.
+#[test]
+fn a_lost_port_is_opened_again_once_it_is_back() {
+    let mut shared = Shared::begin("wall");
+    let mut client = shared.client();
+    client.ping().expect("it answers");
+    shared.broker.kill().expect("it runs");
+    shared.broker.wait().expect("it ends");
+    assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port { .. })));
+    assert!(client.reopen().is_err(), "it is not back");
+    shared.broker = shared.finger.start(&["share", "--listen", &shared.address, "--timeout-ms", "2000"]);
+    let mut line = String::new();
+    BufReader::new(shared.broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
+    client.reopen().expect("it is back");
+    client.ping().expect("it answers");
+}

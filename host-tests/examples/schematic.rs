@@ -61,7 +61,7 @@ impl Sheet {
         self.known(net)?;
         let (wire, at, anchor) = if left { ("M0 0h-20", x - 24, "end") } else { ("M0 0h20", x + 24, "start") };
         self.path(x, y, 0, wire);
-        self.text(at, y + 4, anchor, &format!("<tspan fill=\"#0A5A28\">{net}</tspan>"));
+        self.text(at, y + 4, anchor, &format!("<tspan fill=\"#008278\">{net}</tspan>"));
         Ok(())
     }
 
@@ -151,9 +151,9 @@ impl Sheet {
         self.net(190, 440, true, "VG")?;
         self.known("OPA4354")?;
         self.text(210, 472, "start", "U11A OPA4354");
-        self.part(290, 420, false, RESISTOR, "47 Ohm")?;
-        self.path(330, 420, 0, "M0 0h30");
-        self.grounded(345, 420, CAPACITOR, "330 pF")?;
+        self.part(300, 420, false, RESISTOR, "47 Ohm")?;
+        self.path(290, 420, 0, "M0 0h10m40 0h20");
+        self.grounded(350, 420, CAPACITOR, "330 pF")?;
         self.net(360, 420, false, "COL0")
     }
 
@@ -175,11 +175,11 @@ impl Sheet {
 
     fn bridge(&mut self) -> Drawn {
         self.title(890, 40, "Bridge, motor and encoder");
-        self.block([1_050, 80, 130, 265], "U14 DRV8876")?;
+        self.block([1_050, 80, 130, 285], "U14 DRV8876")?;
         for (place, (net, pin)) in
             [("IN1", "EN/IN1"), ("IN2", "PH/IN2"), ("NSLEEP", "nSLEEP"), ("NFAULT", "nFAULT")].into_iter().enumerate()
         {
-            let y = 100 + 74 * place as i32;
+            let y = 100 + 80 * place as i32;
             self.known(pin)?;
             self.text(1_056, y + 4, "start", pin);
             self.net(930, y, true, net)?;
@@ -254,18 +254,19 @@ impl Sheet {
             self.text(1_206, y + 4, "start", &format!("bus {pin}"));
         }
         self.part(1_170, 750, true, RESISTOR, "120 Ohm")?;
-        self.text(1_170, 812, "start", "at the two ends");
+        self.text(1_190, 816, "start", "at the two ends");
         Ok(())
     }
 
     fn print(&self) {
-        let (wide, high) = SIZE;
-        println!(
-            "<svg width=\"{wide}\" height=\"{high}\" viewBox=\"0 0 {wide} {high}\" xmlns=\"http://www.w3.org/2000/svg\">"
+        let ((wide, high), Self { lines, texts, .. }) = (SIZE, self);
+        let svg = format!(
+            "<svg width=\"{wide}\" height=\"{high}\" viewBox=\"0 0 {wide} {high}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
+             <rect width=\"{wide}\" height=\"{high}\" fill=\"#FFFFFF\"/>\n\
+             <g fill=\"none\" stroke=\"#14285A\" stroke-width=\"1.5\">\n{lines}</g>\n\
+             <g font-family=\"sans-serif\" font-size=\"13\" fill=\"#000000\">\n{texts}</g>\n</svg>"
         );
-        println!("<rect width=\"{wide}\" height=\"{high}\" fill=\"#FFFFFF\"/>");
-        println!("<g fill=\"none\" stroke=\"#14285A\" stroke-width=\"1.5\">\n{}</g>", self.lines);
-        println!("<g font-family=\"sans-serif\" font-size=\"13\" fill=\"#000000\">\n{}</g>\n</svg>", self.texts);
+        println!("{}", output::plot::with_dark_scheme(&svg));
     }
 }
 

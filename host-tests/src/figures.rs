@@ -53,7 +53,7 @@ fn figure_7(tip: &Tip) -> Result<String, PlotError> {
         let row = seen(tip, d)[ROWS / 2];
         let side = |column: usize| column as f64 * PITCH_MM - half_mm;
         let steps = row.iter().enumerate().flat_map(|(column, kpa)| [(side(column), *kpa), (side(column + 1), *kpa)]);
-        let title = format!("d = {d_mm} mm: model (solid), simulated array (dashed)");
+        let title = format!("d = {d_mm} mm: model, array (dashed)");
         Curves {
             title,
             x: "distance from the centre, mm",
@@ -63,7 +63,7 @@ fn figure_7(tip: &Tip) -> Result<String, PlotError> {
             curves: vec![Curve::Dashed(steps.collect()), Curve::Solid(smooth)],
         }
     });
-    curves(&panels, (420, 320))
+    curves(&panels, (300, 260))
 }
 
 /// What the array sees, with the contact's circle dotted.

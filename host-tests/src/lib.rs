@@ -9,7 +9,6 @@ pub mod finger;
 pub mod fit_cases;
 pub mod fit_statistics;
 pub mod fit_tables;
-pub mod imports;
 pub mod long_run;
 pub mod model_file;
 pub mod page;

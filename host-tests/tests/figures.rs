@@ -11,6 +11,7 @@ fn the_pictures_are_well_formed_and_the_same_every_time() {
         assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
         assert!(!svg.contains("no modulus"), "{name}");
+        assert!(svg.contains("prefers-color-scheme:dark"), "{name}");
     }
     let [(_, profile), (_, maps), (_, force)] = pictures;
     assert_eq!(profile.matches("pressure p, kPa").count(), 3);

@@ -12,11 +12,10 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the example that prints their text.
-const GENERATED: [(&str, &str); 8] = [
+const GENERATED: [(&str, &str); 7] = [
     ("docs/control-table.md", "control-table"),
     ("docs/scenes.md", "scenes-page"),
     ("docs/budget.md", "budget-page"),
-    ("docs/pictures/imports.svg", "imports"),
     ("docs/pictures/schematic.svg", "schematic"),
     ("examples/dynamixel/fingertip.model", "model-file"),
     ("examples/dynamixel/fingertip_direct.model", "model-file-direct"),

@@ -56,6 +56,7 @@ const QUESTIONS: &str = r#"(() => {
     controls: all('#player, #choose').filter(shown).length,
     maps: all('.maps figure').filter(shown).length,
     scales: all('.scale').filter(shown).length,
+    cut: all('#bounds .scroll, #ledger .scroll').filter(table => table.scrollWidth > table.clientWidth).length,
     nameless: all('[role=img]').filter(image => !image.getAttribute('aria-label')).length,
     smallest_px: letters.length ? Math.min(...letters) : 0,
     outside: outside,
@@ -155,6 +156,7 @@ fn of_page(page: &Value, look: Look) -> Vec<String> {
     }
     check(number("bars") >= 2.0, format!("{} modes are shown", number("bars")));
     check(number("scales") >= 1.0, "the maps have no scale".into());
+    check(number("cut") == 0.0, format!("{} tables are cut off at the side", number("cut")));
     check(number("nameless") == 0.0, format!("{} pictures have no words", number("nameless")));
     check(page["outside"] == json!([]), format!("letters are cut off: {}", page["outside"]));
     let [paper, ink] = ["page", "text"].map(|name| brightness(page[name].as_str().unwrap_or_default()));

@@ -42,6 +42,32 @@ const GOAL_INK: RGBColor = RGBColor(200, 110, 0);
 const SECOND_INK: RGBColor = RGBColor(0, 130, 120);
 const FAINT: RGBColor = RGBColor(225, 225, 225);
 
+/// Every colour that a picture may have, and what a dark page has in its place.
+const DARK: [(&str, &str); 7] = [
+    ("#FFFFFF", "#0E1116"),
+    ("#000000", "#E6EDF3"),
+    ("#E1E1E1", "#30363D"),
+    ("#14285A", "#8FB4FF"),
+    ("#B9C3D7", "#4A5F8A"),
+    ("#C86E00", "#F0A04B"),
+    ("#008278", "#3FD0BF"),
+];
+
+/// A picture that follows the light or dark scheme of the page it is shown on.
+///
+/// # Panics
+/// A colour of the picture has none for dark pages.
+pub fn with_dark_scheme(svg: &str) -> String {
+    let drawn = svg.split(['"', '\'']).filter(|part| part.len() == 7 && part.starts_with('#'));
+    for colour in drawn {
+        assert!(DARK.iter().any(|(light, _)| *light == colour), "dark pages have no colour for {colour}");
+    }
+    let rules =
+        DARK.map(|(light, dark)| format!("[fill=\"{light}\"]{{fill:{dark}}}[stroke=\"{light}\"]{{stroke:{dark}}}"));
+    let style = format!("<style>@media(prefers-color-scheme:dark){{{}}}</style>", rules.concat());
+    svg.replacen('>', &format!(">\n{style}"), 1)
+}
+
 /// The library draws on whole pixels, on which a slow line looks like steps: charts are drawn larger by this, and shown smaller.
 const FINE: u32 = 10;
 
@@ -51,7 +77,7 @@ fn number(value: &f64) -> String {
     format!("{}", (value * 1e3).round() / 1e3 + 0.0)
 }
 
-/// Draws on a white picture of a size.
+/// Draws on an empty picture of a size.
 fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotError>) -> Result<String, PlotError> {
     let mut svg = String::new();
     {
@@ -60,7 +86,7 @@ fn picture(size_px: (u32, u32), draw: impl FnOnce(&Area<'_>) -> Result<(), PlotE
         draw(&area)?;
         area.present().map_err(failed)?;
     }
-    Ok(svg)
+    Ok(with_dark_scheme(&svg))
 }
 
 /// As [`picture`], drawn [`FINE`] times as large: what is drawn in it counts in these parts of a pixel.

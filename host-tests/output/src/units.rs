@@ -4,7 +4,7 @@
 //! needs no entry.
 
 /// Words that a unit is made of, and how they are shown.
-const WORDS: [(&str, &str); 40] = [
+const WORDS: [(&str, &str); 41] = [
     ("a", "A"),
     ("c", "degrees Celsius"),
     ("cm2", "cm^2"),
@@ -16,6 +16,7 @@ const WORDS: [(&str, &str); 40] = [
     ("deg", "degrees"),
     ("g", "g"),
     ("hz", "Hz"),
+    ("j", "J"),
     ("k", "K"),
     ("kpa", "kPa"),
     ("m2", "m^2"),
@@ -59,11 +60,8 @@ pub fn of(name: &str) -> Option<String> {
         return of(whole).map(|unit| format!("0.001 {unit}"));
     }
     let words: Vec<&str> = name.split('_').collect();
-    let mut from = words.len();
-    while from > 0 && (shown(words[from - 1]).is_some() || ["per", OF_WHAT].contains(&words[from - 1])) {
-        from -= 1;
-    }
-    let ends = words[from..].iter().skip_while(|word| **word == OF_WHAT).filter(|word| **word != OF_WHAT);
+    let ends =
+        words[before_unit(&words)..].iter().skip_while(|word| **word == OF_WHAT).filter(|word| **word != OF_WHAT);
     let mut unit = String::new();
     let mut divides = false;
     for word in ends {
@@ -78,6 +76,18 @@ pub fn of(name: &str) -> Option<String> {
         }
     }
     (!unit.is_empty()).then_some(unit)
+}
+
+/// How many words stand before the unit.
+fn before_unit(words: &[&str]) -> usize {
+    words.iter().rposition(|word| shown(word).is_none() && !["per", OF_WHAT].contains(word)).map_or(0, |last| last + 1)
+}
+
+/// A name as the label of an axis: `tip.modulus_kpa` is "tip modulus, kPa".
+pub fn label(name: &str) -> String {
+    let words: Vec<&str> = name.trim_end_matches(THOUSANDTHS).split('_').collect();
+    let quantity = words[..before_unit(&words)].join(" ").replace('.', " ");
+    of(name).map_or(quantity.clone(), |unit| format!("{quantity}, {unit}"))
 }
 
 fn shown(word: &str) -> Option<&'static str> {
@@ -118,6 +128,19 @@ mod tests {
         }
         for plain in ["ratio", "baseline_follows", "fingers", "min"] {
             assert_eq!(of(plain), None, "{plain}");
+        }
+    }
+
+    #[test]
+    fn a_label_has_words_and_the_unit() {
+        for (name, expected) in [
+            ("tip.modulus_kpa", "tip modulus, kPa"),
+            ("settling_s", "settling, s"),
+            ("drive.torque_constant_unm_per_a", "drive torque constant, uN m/A"),
+            ("params.gain_milli", "params gain"),
+            ("slips", "slips"),
+        ] {
+            assert_eq!(label(name), expected);
         }
     }
 

@@ -26,7 +26,8 @@ const DELAY: Duration = Duration::from_micros(500);
     version,
     after_help = "Examples:\n  serve\n  serve raspberry --pty /tmp/finger\n  \
     serve my-scene.toml --tcp 7000 --set effects.noise.rms_codes=3\n  \
-    echo move 3 | serve wall --pty /tmp/finger"
+    echo move 3 | serve wall --pty /tmp/finger\n  \
+    cargo xtask serve --board virtual    (the flash image on the emulated board)"
 )]
 struct Args {
     /// The scene: a file, or a name out of the library; its script, events, metrics and bounds are left out

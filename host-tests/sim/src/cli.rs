@@ -106,7 +106,8 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
             .ok_or_else(|| format!("--set {assignment}: TABLE.KEY=VALUE is asked for, such as tip.modulus_kpa=300"))?;
         source = text::set(&source, place.trim(), value.trim())?;
     }
-    read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))
+    let scene = read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))?;
+    Ok(Scene { set: set.to_vec(), ..scene })
 }
 
 /// Does what is asked for. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2: it

@@ -21,6 +21,8 @@ pub struct Scene {
     pub name: String,
     /// The file, whole.
     pub text: String,
+    /// What the command line put in place of the file's values, `TABLE.KEY=VALUE`; `text` has it too.
+    pub set: Vec<String>,
     /// What it shows, in a line.
     pub about: String,
     /// Where all randomness comes from.

@@ -17,8 +17,11 @@ pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
         best: by.is_none() && point.competes(),
         own: point.firmware,
     };
-    // Not every kernel has a way that the firmware goes.
-    let square = if points.iter().any(|point| point.firmware) { ", the square is the firmware's" } else { "" };
+    let square = match points.iter().find(|point| point.firmware) {
+        Some(point) if point.competes() => "; the square is the firmware's",
+        Some(_) => " of the sums; the square is the firmware's, no sum",
+        None => "",
+    };
     front(&Front {
         title: &format!("{}: filled points are the front{square}", kernel.title),
         x: "estimated cycles on a Cortex-M4F, median, without wait states",

@@ -72,6 +72,11 @@ fn is_near(value: f64, expected: f64, slack: f64) {
 fn a_drag_zooms_all_plots_and_a_double_click_shows_the_whole_run() {
     let (folder, mut browser, path) = opened("zoomed", SCREEN);
     let before = said(&mut browser);
+    // It opens where the array is pressed, and a dashed line is dashed in the legend.
+    assert!(before["maps"][0][2].as_f64().is_some_and(|peak_kpa| peak_kpa > 10.0), "{before}");
+    let dashed =
+        "[...document.querySelectorAll('.u-marker')].filter(mark => mark.style.borderStyle === 'dashed').length";
+    assert_eq!(browser.evaluate(dashed).unwrap(), 1);
     let [from, end] = range(&before);
     assert!(from == 0.0 && end > 0.3 && before["whole"] == true, "{before}");
     let over = ".plot .u-over";

@@ -5,10 +5,13 @@ use super::{
     number,
 };
 use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Points that a line has at most: two for each pixel of the widest chart.
 const POINTS_MAX: usize = 1_800;
 const WIDTH_PX: u32 = 900;
+/// Narrow, so that the letters can be read on a phone.
+const STEPS_WIDTH_PX: u32 = 640;
 /// Width of the mean.
 const SMOOTH_S: f64 = 0.01;
 
@@ -21,8 +24,6 @@ pub struct Sample {
     pub goal_n: f64,
     /// The contact force as it is.
     pub true_force_n: f64,
-    /// The contact force as the controller senses it.
-    pub sensed_force_n: f64,
     /// How far the tip has come.
     pub travel_mm: f64,
     /// Indentation of the tip.
@@ -88,13 +89,30 @@ pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
     if panels.iter().any(|panel| panel.samples.is_empty()) {
         return Err(PlotError("a panel has no samples".into()));
     }
-    let rows = panels.len().div_ceil(2);
-    fine_picture((WIDTH_PX, 260 * rows as u32), |area| {
-        for (panel, area) in panels.iter().zip(area.split_evenly((rows, 2))) {
+    let rows = panels.len() / 2 + 1;
+    fine_picture((STEPS_WIDTH_PX, 230 * rows as u32), |area| {
+        let mut areas = area.split_evenly((rows, 2)).into_iter();
+        for (panel, area) in panels.iter().zip(&mut areas) {
             draw_panel(panel, &area)?;
         }
-        Ok(())
+        areas.next().map_or(Ok(()), |area| draw_key(&area))
     })
+}
+
+/// What the lines of the panels are.
+fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
+    let range = [0.0, 6.0];
+    let context = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, range[0]..range[1]);
+    let mut chart = Chart { context: context.map_err(failed)?, range };
+    chart.solid(&[(0.08, 5.0), (0.22, 5.0)], INK)?;
+    chart.dashed(&[(0.08, 4.0), (0.22, 4.0)], GOAL_INK)?;
+    chart.dotted([(0.15, 2.6), (0.15, 3.4)])?;
+    for (y, text) in [(5.0, "contact force"), (4.0, "goal"), (3.0, "earliest arrival that"), (2.4, "the motor allows")]
+    {
+        let style = TextStyle::from((FONT, LABEL_PX * FINE)).pos(Pos::new(HPos::Left, VPos::Center));
+        chart.context.draw_series([Text::new(text, (0.3, y), style)]).map_err(failed)?;
+    }
+    Ok(())
 }
 
 fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
@@ -103,7 +121,6 @@ fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
     let shown = |sample: &&Sample| (-before_ms..=after_ms).contains(&ms(sample));
     let samples: Vec<Sample> = panel.samples.iter().filter(shown).copied().collect();
     let force: Vec<_> = samples.iter().map(|s| (ms(s), s.true_force_n)).collect();
-    let sensed: Vec<_> = samples.iter().map(|s| (ms(s), s.sensed_force_n)).collect();
     let goal = steps_of(&samples, |s| (ms(s), s.goal_n));
     let high = top(force.iter().chain(&goal).map(|(_, n)| *n));
     let frame =
@@ -113,7 +130,6 @@ fn draw_panel(panel: &Panel<'_>, area: &Area<'_>) -> Result<(), PlotError> {
             chart.upright(optimal_ms)?;
         }
         chart.dashed(&goal, GOAL_INK)?;
-        chart.dots(&sensed)?;
         chart.solid(&force, INK)
     })
 }
@@ -143,10 +159,11 @@ impl Frame<'_> {
         draw: impl FnOnce(&mut Chart<'_, 'b>) -> Result<(), PlotError>,
     ) -> Result<(), PlotError> {
         let ([left, right], [low, high]) = (self.x_range, self.range);
-        let context = ChartBuilder::on(area)
+        // The margin below the title keeps it off the numbers of the axis.
+        let area = area.margin(6 * FINE, 0, 0, 0).titled(self.title, (FONT, TITLE_PX * FINE)).map_err(failed)?;
+        let context = ChartBuilder::on(&area)
             .margin(8 * FINE)
             .margin_right(18 * FINE)
-            .caption(self.title, (FONT, TITLE_PX * FINE))
             .x_label_area_size(36 * FINE)
             .y_label_area_size(52 * FINE)
             .build_cartesian_2d(left..right, low..high)
@@ -195,14 +212,6 @@ impl Chart<'_, '_> {
         self.context.draw_series(line).map(drop).map_err(failed)
     }
 
-    /// Small dots, one for each value that differs from the one before.
-    fn dots(&mut self, points: &Points) -> Result<(), PlotError> {
-        let mut last = f64::NAN;
-        let fresh = points.iter().filter(|(_, value)| core::mem::replace(&mut last, *value) != *value);
-        let dots = fresh.map(|point| Circle::new(*point, 2 * FINE, INK.stroke_width(FINE)));
-        self.context.draw_series(dots).map(drop).map_err(failed)
-    }
-
     /// A circle at each point.
     pub fn circles(&mut self, points: &Points) -> Result<(), PlotError> {
         let circles = points.iter().map(|point| Circle::new(*point, 4 * FINE, BLACK.stroke_width(FINE)));
@@ -211,8 +220,11 @@ impl Chart<'_, '_> {
 
     /// A dotted upright line.
     fn upright(&mut self, x: f64) -> Result<(), PlotError> {
-        let [low, high] = self.range;
-        let line = DashedLineSeries::new([(x, low), (x, high)], 2 * FINE, 3 * FINE, BLACK.stroke_width(FINE));
+        self.dotted(self.range.map(|y| (x, y)))
+    }
+
+    fn dotted(&mut self, ends: [(f64, f64); 2]) -> Result<(), PlotError> {
+        let line = DashedLineSeries::new(ends, 2 * FINE, 3 * FINE, BLACK.stroke_width(FINE));
         self.context.draw_series(line).map(drop).map_err(failed)
     }
 }

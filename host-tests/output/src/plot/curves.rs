@@ -18,6 +18,18 @@ pub enum Curve {
     Circles(Vec<(f64, f64)>),
 }
 
+impl Curve {
+    /// Its points.
+    pub fn points_mut(&mut self) -> &mut Vec<(f64, f64)> {
+        let (Self::Solid(points)
+        | Self::Pale(points)
+        | Self::Second(points)
+        | Self::Dashed(points)
+        | Self::Circles(points)) = self;
+        points
+    }
+}
+
 /// A panel.
 #[derive(Clone, Debug)]
 pub struct Curves<'a> {

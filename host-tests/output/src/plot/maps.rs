@@ -113,9 +113,7 @@ fn draw_scale(full_kpa: f64, area: &Area<'_>) -> Result<(), PlotError> {
         .map_err(failed)
 }
 
-/// White for no pressure, the ink for the most, evenly between.
-fn ink(share: f64) -> RGBColor {
-    let share = share.clamp(0.0, 1.0);
-    let mix = |dark: u8| (255.0 - share * (255.0 - f64::from(dark)) + 0.5) as u8;
-    RGBColor(mix(INK.0), mix(INK.1), mix(INK.2))
+/// The ink for the largest pressure, more transparent for less.
+fn ink(share: f64) -> RGBAColor {
+    INK.mix(share.clamp(0.0, 1.0))
 }

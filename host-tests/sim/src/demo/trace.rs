@@ -79,7 +79,6 @@ impl Watch for Trace {
             time_s: step.time_s,
             goal_n,
             true_force_n: truth.force_n,
-            sensed_force_n: newtons(status.contact.force),
             travel_mm: truth.travel_mm,
             indentation_mm: truth.indentation_mm,
             duty: truth.duty,

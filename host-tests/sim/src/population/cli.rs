@@ -1,7 +1,7 @@
 //! The command line of `population`, the same for both boards.
 
 use super::report::{self, Ran, Report};
-use super::text::text;
+use super::text::{judged, text};
 use super::{load, run, worst};
 use crate::cli::verdict;
 use crate::part::Part;
@@ -23,7 +23,7 @@ use std::time::Instant;
     subcommand_negates_reqs = true,
     after_help = "Examples:\n  \
         population ordinary --fingers 1000 --seed 1 --json ordinary.json\n  \
-        population ordinary --fingers 100 --worst 5 --out worst    (then: sim worst/ordinary-1-17.toml)\n  \
+        population ordinary --fingers 100 --worst 5 --out worst    (then: sim with a file it wrote)\n  \
         population ordinary --fingers 300 --board calibrated\n  \
         population ordinary --fingers 1000 --shard 2/4 --json 2.json    (on the second of four machines)\n  \
         population merge 1.json 2.json 3.json 4.json --json all.json    (the same, byte for byte, as without --shard)"
@@ -49,7 +49,7 @@ pub struct Args {
     /// Writes every finger's draws, promises and metrics for scripts
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Writes the scenes of the N worst fingers
+    /// Writes the scenes of the N worst fingers: those that broke a promise, then those nearest to a bound
     #[arg(long, value_name = "N", requires = "out")]
     worst: Option<usize>,
     /// Where the scenes of the worst fingers go
@@ -131,8 +131,8 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     }
     say::text(text(&report));
     if let (Some(count), Some(out)) = (args.worst, &args.out) {
-        for path in worst::write(&population, &report, count, out)? {
-            say::line(format_args!("wrote {}", path.display()));
+        for (path, ran) in worst::write(&population, &report, count, out)?.iter().zip(report.worst()) {
+            say::line(format_args!("wrote {}: {}", path.display(), judged(ran)));
         }
     }
     let (count, s) = (report.fingers.len(), started.elapsed().as_secs_f64());

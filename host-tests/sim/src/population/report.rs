@@ -75,11 +75,16 @@ pub struct Promise {
 }
 
 impl Promise {
-    /// How far beyond what is allowed it is, as a share of that; what is only counted is far beyond.
+    /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as it must be.
     pub fn excess(&self) -> f64 {
-        let Some(value) = self.value else { return if self.held { 0.0 } else { f64::INFINITY } };
-        let over = self.max.map_or(0.0, |max| value - max).max(self.min.map_or(0.0, |min| min - value));
-        over / self.max.or(self.min).map(f64::abs).filter(|allowed| *allowed > 0.0).unwrap_or(1.0)
+        let Some(value) = self.value else { return if self.held { -1.0 } else { f64::INFINITY } };
+        let sides = [self.max.map(|max| value - max), self.min.map(|min| min - value)];
+        let over = sides.into_iter().flatten().fold(f64::NEG_INFINITY, f64::max);
+        match self.max.or(self.min).map_or(0.0, f64::abs) {
+            allowed if allowed > 0.0 => over / allowed,
+            _ if self.held => -1.0,
+            _ => over,
+        }
     }
 }
 
@@ -110,9 +115,9 @@ impl Ran {
         self.promises.iter().filter(|promise| !promise.held)
     }
 
-    /// How bad it is: the worst of its broken promises.
-    pub fn excess(&self) -> f64 {
-        self.broken().map(Promise::excess).fold(0.0, f64::max)
+    /// The promise that is broken by most, or, where none is, nearest to its bound.
+    pub fn nearest(&self) -> Option<&Promise> {
+        self.promises.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))
     }
 
     /// A metric; none where the run has none.
@@ -239,11 +244,12 @@ impl Report {
         [Spread::of(percent), Spread::of(holds().map(|hold| 1e3 * off_n(hold)).collect())]
     }
 
-    /// The worst first, of those that broke a promise.
+    /// All fingers, the worst first: those that broke a promise, then those nearest to a bound.
     pub fn worst(&self) -> Vec<&Ran> {
-        let mut outside: Vec<&Ran> = self.fingers.iter().filter(|ran| !ran.inside).collect();
-        outside.sort_by(|a, b| b.excess().total_cmp(&a.excess()).then(a.finger.cmp(&b.finger)));
-        outside
+        let excess = |ran: &Ran| ran.nearest().map_or(-1.0, Promise::excess);
+        let mut fingers: Vec<&Ran> = self.fingers.iter().collect();
+        fingers.sort_by(|a, b| excess(b).total_cmp(&excess(a)).then(a.finger.cmp(&b.finger)));
+        fingers
     }
 
     /// For scripts.

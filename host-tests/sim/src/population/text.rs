@@ -38,11 +38,11 @@ pub fn text(report: &Report) -> String {
     for (spread, unit) in [(of_goal, "% of the goal"), (mn, "mN")] {
         let _ = writeln!(text, "  {} {unit}", values(&spread).join(", "));
     }
-    let worst = report.worst();
+    let worst: Vec<&Ran> = report.worst().into_iter().filter(|ran| !ran.inside).collect();
     if !worst.is_empty() {
         text += "\n  outside, the worst first:\n";
     }
-    worst.iter().take(NAMED).for_each(|ran| text += &format!("  {}\n", broken(ran)));
+    worst.iter().take(NAMED).for_each(|ran| text += &format!("  {}\n", judged(ran)));
     if worst.len() > NAMED {
         let _ = writeln!(text, "  and {} more: --json FILE has them all", worst.len() - NAMED);
     }
@@ -55,12 +55,16 @@ pub fn text(report: &Report) -> String {
     text
 }
 
-/// What a finger broke, in a line.
-pub fn broken(ran: &Ran) -> String {
+/// A line with the promises that a finger broke, or the one that it kept most narrowly.
+pub fn judged(ran: &Ran) -> String {
     let promise = |Promise { metric, value, min, max, .. }: &Promise| {
         format!("{metric} {} ({})", shown(*value), asked(*min, *max))
     };
-    format!("finger {}: {}", ran.finger, ran.broken().map(promise).collect::<Vec<_>>().join("; "))
+    let about = match ran.nearest().filter(|_| ran.inside) {
+        Some(nearest) => format!("broke no promise, nearest to its bound is {}", promise(nearest)),
+        None => ran.broken().map(promise).collect::<Vec<_>>().join("; "),
+    };
+    format!("finger {}: {about}", ran.finger)
 }
 
 fn values(spread: &Spread) -> [String; 3] {

@@ -1,6 +1,6 @@
 //! The worst fingers, as scenes that can be run again.
 
-use super::text::broken;
+use super::text::judged;
 use super::{Population, Report};
 use crate::part::cannot_write;
 use crate::run::RunError;
@@ -9,7 +9,7 @@ use output::kept;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Writes the scenes of the worst so many fingers into a folder.
+/// Writes the scenes of the `count` worst fingers into a folder, in the order of [`Report::worst`].
 ///
 /// # Errors
 /// A file cannot be written.
@@ -19,11 +19,11 @@ pub fn write(population: &Population, report: &Report, count: usize, out: &Path)
     for ran in report.worst().into_iter().take(count) {
         let scene = population.finger(report.seed, ran.finger - 1)?.scene;
         let head = format!(
-            "# Drawn from the population `{}`, seed {}; of {}. It broke:\n# {}\n",
+            "# Drawn from the population `{}`, seed {}; of {}.\n# {}\n",
             population.name,
             report.seed,
             report.of_fingers,
-            broken(ran)
+            judged(ran)
         );
         let mut text = set(&scene.text, "seed", &scene.seed.to_string())?;
         // What was drawn left empty lines behind.

@@ -32,6 +32,8 @@ struct Shown {
     title: &'static str,
     unit: &'static str,
     about: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    range: Option<[f64; 2]>,
     lines: Vec<Drawn>,
 }
 
@@ -75,8 +77,8 @@ fn finger(tracks: &Tracks) -> Finger {
     }
 }
 
-fn shown(Plot { title, unit, about, lines }: Plot) -> Shown {
-    Shown { title, unit, about, lines: lines.iter().map(drawn).collect() }
+fn shown(Plot { title, unit, about, range, lines }: Plot) -> Shown {
+    Shown { title, unit, about, range, lines: lines.iter().map(drawn).collect() }
 }
 
 fn drawn(Line { label, style, kept }: &Line) -> Drawn {

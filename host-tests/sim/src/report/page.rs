@@ -47,7 +47,9 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                 header {
                     h1 { (scene.about) }
                     p.note {
-                        "Scene " code { (scene.name) } ", seed " (scene.seed) ", board " (board) ". "
+                        "Scene " code { (scene.name) } ", seed " (scene.seed) ", board " (board)
+                        @for set in &scene.set { ", " code { (set) } }
+                        ". "
                         strong { "Simulated: nothing here was measured on hardware." }
                     }
                     p { (verdict_line(&outcome.verdicts)) }

@@ -39,13 +39,15 @@ pub struct Plot {
     pub unit: &'static str,
     /// What it shows, in a line: the caption, and the text for who does not see it.
     pub about: String,
+    /// Lower and upper end of the axis; none where all values are to be seen.
+    pub range: Option<[f64; 2]>,
     /// The lines; the first is the main one.
     pub lines: Vec<Line>,
 }
 
 /// All plots of a finger.
 pub fn all(tracks: &Tracks) -> Vec<Plot> {
-    let Tracks { goal, force, sensed, control_error, sensing_error, .. } = tracks;
+    let Tracks { goal, force, sensed, control_error, held_error, sensing_error, .. } = tracks;
     let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;
     let Tracks { force_difference, travel_difference, .. } = tracks;
     let line = |label, style, track: &Track| Line { label, style, kept: track.along(&tracks.time) };
@@ -56,6 +58,7 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
         title,
         unit,
         about: format!("{title}: its mean (solid), from the least to the largest (pale), in {unit}"),
+        range: None,
         lines: vec![line(title, Style::Main, track)],
     };
     let smooth = |title, unit, track: &Track| {
@@ -64,16 +67,22 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
         let about = format!(
             "{title}: its mean over a hundredth of the run (solid), from the least to the largest (pale), in {unit}"
         );
-        Plot { title, unit, about, lines: vec![line] }
+        Plot { title, unit, about, range: None, lines: vec![line] }
     };
+    let mut control_error = one("True force less the goal", "mN", control_error);
+    if held_error.ends().is_some() {
+        control_error.about += "; the axis fits the holds, what is beyond it is cut off";
+    }
+    control_error.range = held_error.ends().map(|[low, high]| around(low.min(0.0), high.max(0.0)));
     let mut plots = vec![
         Plot {
             title: "Contact force",
             unit: "N",
             about: "True force (solid), sensed force (thin, on top), goal (dashed), in N".into(),
+            range: None,
             lines: vec![line("true", Style::Main, force), goal_line, line("sensed", Style::Second, sensed)],
         },
-        one("True force less the goal", "mN", control_error),
+        control_error,
         one("Sensed less the true force", "mN", sensing_error),
         one("Indentation of the tip", "mm", indentation),
         smooth("Duty of the bridge", "%", duty),
@@ -100,8 +109,10 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
 /// # Errors
 /// It cannot be drawn.
 pub fn drawn(plot: &Plot, times: &[f64]) -> Result<String, PlotError> {
-    let lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
-    let (x_range, y_range) = ranges(&lines);
+    let mut lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
+    let (x_range, all) = ranges(&mut lines);
+    let y_range @ [low, high] = plot.range.unwrap_or(all);
+    lines.iter_mut().flat_map(Curve::points_mut).for_each(|(_, y)| *y = y.clamp(low, high));
     let panel = Curves { title: plot.title.into(), x: "time, s", y: plot.unit, x_range, y_range, curves: lines };
     curves(&[panel], SIZE_PX)
 }
@@ -118,14 +129,8 @@ fn curves_of(line: &Line, times: &[f64]) -> Vec<Curve> {
 }
 
 /// From 0 to the end, and around all values with a little air; 0 is in sight where it is not far.
-fn ranges(lines: &[Curve]) -> ([f64; 2], [f64; 2]) {
-    let points = lines.iter().flat_map(|curve| match curve {
-        Curve::Solid(points)
-        | Curve::Pale(points)
-        | Curve::Second(points)
-        | Curve::Dashed(points)
-        | Curve::Circles(points) => points,
-    });
+fn ranges(lines: &mut [Curve]) -> ([f64; 2], [f64; 2]) {
+    let points = lines.iter_mut().flat_map(Curve::points_mut);
     let (mut end, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
     for (x, y) in points {
         (end, low, high) = (end.max(*x), low.min(*y), high.max(*y));

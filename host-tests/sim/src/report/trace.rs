@@ -5,13 +5,16 @@ use crate::agreement::Path;
 use crate::metrics::newtons;
 use crate::watch::{Step, Watch};
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
-use fingertip::units::Duty;
+use fingertip::state::Mode;
+use fingertip::units::{Duty, Newtons};
 use output::heatmap::Pressures;
 
 /// Stretches of time; of each the least, the largest and the mean value are kept.
 const STRETCHES: u64 = 900;
 /// Over how many of them a mean is taken of what changes from step to step.
 const OF_A_MEAN: usize = 9;
+/// As `metrics::response`: the steady error is judged from then on.
+const HELD_AFTER_S: f64 = 0.1;
 /// Pressure maps of a run.
 const MAPS: usize = 150;
 
@@ -86,9 +89,15 @@ impl Track {
         (0..all).map(mean).collect()
     }
 
+    /// The least and the largest value; none where it has none.
+    pub fn ends(&self) -> Option<[f64; 2]> {
+        let wider = |[low, high]: [f64; 2], at: &Stretch| [low.min(at.low), high.max(at.high)];
+        self.0.first().map(|first| self.0.iter().fold([first.low, first.high], wider))
+    }
+
     /// Whether it was ever other than it was first.
     pub fn moves(&self) -> bool {
-        self.0.first().is_some_and(|first| self.0.iter().any(|at| [at.low, at.high] != [first.low; 2]))
+        self.ends().is_some_and(|[low, high]| low < high)
     }
 }
 
@@ -116,6 +125,8 @@ pub struct Tracks {
     pub sensed: Track,
     /// The true force less the goal, mN.
     pub control_error: Track,
+    /// The control error while a force is held, [`HELD_AFTER_S`] after the goal changed or the touch.
+    pub held_error: Track,
     /// The sensed less the true force, mN.
     pub sensing_error: Track,
     /// Indentation, mm.
@@ -140,6 +151,9 @@ pub struct Tracks {
     pub instants: Vec<Instant>,
     states: Vec<States>,
     first: Option<Frame>,
+    /// Mode and goal, and since when.
+    asked: (Mode, Newtons),
+    asked_s: f64,
 }
 
 impl Tracks {
@@ -214,6 +228,13 @@ impl Watch for Trace {
             (&mut tracks.time, time_s),
         ] {
             track.add(stretch, value);
+        }
+        let asked = (status.mode, step.command.goal);
+        if tracks.asked != asked {
+            (tracks.asked, tracks.asked_s) = (asked, time_s);
+        }
+        if status.mode == Mode::Force && time_s >= tracks.asked_s + HELD_AFTER_S {
+            tracks.held_error.add(stretch, 1e3 * (truth.force_n - goal_n));
         }
         if let Some([force_n, travel_mm]) = self.other.as_ref().and_then(|other| other.difference(step)) {
             tracks.force_difference.add(stretch, force_n);

@@ -81,6 +81,7 @@ impl Reader<'_> {
         let scene = Scene {
             name: stem.into_owned(),
             text: self.text.to_owned(),
+            set: Vec::new(),
             about: head.text("about").to_owned(),
             seed: head.whole("seed") as u64,
             duration_s: head.number("duration_s"),

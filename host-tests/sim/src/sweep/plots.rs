@@ -4,6 +4,7 @@ use super::summary::{points, spread, values};
 use super::table::Table;
 use crate::report::around;
 use output::plot::{Curve, Curves, PlotError, curves};
+use output::units::label;
 
 const PANEL_PX: (u32, u32) = (560, 340);
 /// Runs that are drawn each; of more, only the least, the median and the largest.
@@ -18,9 +19,11 @@ pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
         let Some([low, _, high]) = spread(values(table.rows.iter(), column)) else { continue };
         if if bounded { table.expected(name).is_some() } else { low < high } {
             let varied = table.varied();
+            let (x, y) = (|key: usize| label(&table.head[key]), label(name));
+            let labels: Vec<String> = varied.clone().map(x).collect();
             let panels: Vec<Curves> = match varied.is_empty() {
-                true => vec![spread_over_seeds(table, column)],
-                false => varied.map(|key| over(table, key, column)).collect(),
+                true => vec![spread_over_seeds(table, column, &y)],
+                false => varied.zip(&labels).map(|(key, x)| over(table, (key, x), (column, &y))).collect(),
             };
             pictures.push((name.clone(), curves(&panels, PANEL_PX)?));
         }
@@ -30,7 +33,7 @@ pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
 
 /// A metric over a varied key: each run a circle, the medians a line, the least and the largest pale, the bounds
 /// dashed.
-fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
+fn over<'a>(table: &Table, (key, x): (usize, &'a str), (column, y): (usize, &'a str)) -> Curves<'a> {
     let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
     let at = |row: &Vec<String>| number(&row[key]);
     let mut places: Vec<f64> =
@@ -51,9 +54,9 @@ fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
     let mut heights: Vec<f64> = spreads.iter().flat_map(|(_, spread)| *spread).collect();
     heights.extend(self::bounds(table, column));
     Curves {
-        title: format!("{} over {}: runs, median (line), bounds (dashed)", table.head[column], table.head[key]),
-        x: &table.head[key],
-        y: &table.head[column],
+        title: "Runs (circles), median (solid), least and largest (pale), bounds (dashed)".into(),
+        x,
+        y,
         x_range: [left, right],
         y_range: around_all(&heights),
         curves,
@@ -61,7 +64,7 @@ fn over(table: &Table, key: usize, column: usize) -> Curves<'_> {
 }
 
 /// The share of the runs at or below each value.
-fn spread_over_seeds(table: &Table, column: usize) -> Curves<'_> {
+fn spread_over_seeds<'a>(table: &Table, column: usize, x: &'a str) -> Curves<'a> {
     let mut values = values(table.rows.iter(), column);
     values.sort_by(f64::total_cmp);
     let share = |rank: usize| 100.0 * rank as f64 / table.rows.len() as f64;
@@ -71,8 +74,8 @@ fn spread_over_seeds(table: &Table, column: usize) -> Curves<'_> {
     let upright = bounds.iter().map(|bound| Curve::Dashed(vec![(*bound, 0.0), (*bound, 100.0)]));
     let [left, right] = around_all(&[values, bounds.clone()].concat());
     Curves {
-        title: format!("{}: share of the runs at or below, bounds (dashed)", table.head[column]),
-        x: &table.head[column],
+        title: "Share of the runs at or below a value, bounds (dashed)".into(),
+        x,
         y: "share of the runs, %",
         x_range: [left, right],
         y_range: [0.0, 104.0],

@@ -31,6 +31,11 @@ fn a_report_stands_alone_and_has_every_part() {
     }
     assert!(page.contains("A &lt;b&gt;wall&lt;/b&gt; &amp; more") && !page.contains("<b>wall"));
     assert!(page.contains("Simulated") && page.contains("row_sag") && page.contains("[[expect]]"));
+    // The control error is drawn to the scale of the holds: the approach is off by the whole goal.
+    let plots = &trace.fingers[0];
+    let [[low, high], held] = [&plots.control_error, &plots.held_error].map(|track| track.ends().unwrap());
+    assert!(low < -900.0 && high < 100.0 && held[0] > -50.0 && held[1] < 50.0, "{low} to {high}, held {held:?}");
+    assert!(page.contains("the axis fits the holds"));
     // Nothing is fetched, and nothing may be: the only addresses are XML's names, and the library's of itself.
     assert!(page.contains("content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\""));
     assert_eq!(page.matches(LIBRARY).count(), 1);
@@ -57,6 +62,7 @@ fn a_report_stands_alone_and_has_every_part() {
 #[test]
 fn what_is_broken_comes_first_and_the_rest_is_folded() {
     let scene = cli::load(crate::SCENE, &["duration_s=0.05".into()], None).unwrap();
+    assert_eq!(scene.set, ["duration_s=0.05"]);
     let mut trace = Trace::new(scene.duration_s);
     let mut outcome = run(&scene, &native::board, &mut [&mut trace]).unwrap();
     let held = Verdict { held: true, ..outcome.verdicts[0].clone() };
@@ -66,6 +72,7 @@ fn what_is_broken_comes_first_and_the_rest_is_folded() {
     let report = Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &[], over: None };
     let page = page(&report).unwrap();
     let at = |part: &str| page.find(part).unwrap_or_else(|| panic!("no {part}"));
+    assert!(at("<code>duration_s=0.05</code>") < at("1 of 2 bounds broken"));
     assert!(at("1 of 2 bounds broken") < at("<code>energy_j</code>"));
     assert!(at("<code>energy_j</code>") < at("<details><summary>1 held</summary>"));
     let groups: Vec<&str> = page.split("<details class=\"group\"").skip(1).collect();

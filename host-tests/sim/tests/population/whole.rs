@@ -2,6 +2,7 @@
 
 use crate::population;
 use sim::native;
+use sim::population::report::Promise;
 use sim::population::{Population, Report, run, worst};
 use sim::sweep::Shard;
 use std::fs;
@@ -90,10 +91,19 @@ fn the_worst_run_again_as_they_did() {
     let inside = report.inside();
     assert!(inside > 0 && inside < FINGERS, "{inside}");
     let paths = worst::write(&population, &report, FINGERS, &folder("worst")).unwrap();
-    assert_eq!(paths.len(), FINGERS - inside);
-    for (path, ran) in paths.iter().zip(report.worst()) {
+    assert_eq!(paths.len(), FINGERS);
+    // Those that broke a promise come first; the others are as near to a bound as they come, and say so.
+    let worst = report.worst();
+    assert!(worst.is_sorted_by_key(|ran| ran.inside));
+    let nearest: Vec<f64> = worst.iter().filter_map(|ran| ran.nearest()).map(Promise::excess).collect();
+    assert!(
+        nearest.len() == FINGERS && nearest.is_sorted_by(|a, b| a >= b) && nearest[FINGERS - 1] < 0.0,
+        "{nearest:?}"
+    );
+    for (path, ran) in paths.iter().zip(worst) {
         let text = fs::read_to_string(path).unwrap();
-        assert!(text.contains("It broke:") && ran.broken().all(|promise| text.contains(&promise.metric)), "{text}");
+        assert!(ran.broken().all(|promise| text.contains(&promise.metric)), "{text}");
+        assert_eq!(ran.inside, text.contains("broke no promise, nearest to its bound is "), "{text}");
         let scene = sim::cli::load(path.to_str().unwrap(), &[], None).unwrap_or_else(|error| panic!("{error}"));
         let outcome = sim::run::run(&scene, &native::board, &mut []).unwrap();
         assert_eq!(outcome.summary.digest, ran.digest);

@@ -68,6 +68,10 @@ element('player').hidden = element('choose').hidden = false;
 const embedded = element('over');
 lay(embedded && JSON.parse(embedded.textContent));
 setRange(0, end_s);
+// At the instant of the largest force on the array there is something to see.
+const { times_s, true_dpa } = run.fingers[0].maps;
+const sums = true_dpa.map(frame => frame.reduce((sum, value) => sum + value, 0));
+setNow(times_s[sums.indexOf(Math.max(...sums))] ?? 0);
 new ResizeObserver(() => drawn.forEach(chart => {
   const width = chart.root.closest('.plot').clientWidth;
   if (width !== chart.width) chart.setSize({ width, height: HEIGHT_PX });

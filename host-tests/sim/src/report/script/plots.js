@@ -84,11 +84,13 @@ function draw(figure, finger, plot, other) {
     padding: [8, RIGHT_PX, 0, 0],
     scales: {
       x: { time: false, range: () => [view.from_s, view.to_s] },
-      y: { range: (_, low, high) => around(low, high) },
+      // Of the whole run, what the finger held is shown large; a part of it whole.
+      y: { range: (_, low, high) => whole.disabled && plot.range || around(low, high) },
     },
     axes: [axis({ label: 'time, s', labelSize: 18, size: 34, labelFont: FONT }), axis({ size: LEFT_PX })],
     series,
     bands,
+    legend: { markers: { dash: (_, n) => ({ 7: 'dashed', 2: 'dotted' })[series[n].dash?.[0]] ?? 'solid' } },
     // Where the cursor is, all plots are told by the view; what a pointer does is told to it by `handle`.
     cursor: {
       y: false,

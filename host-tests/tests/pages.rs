@@ -1,0 +1,265 @@
+//! What the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Programs behind a command of `cargo xtask`, which hands its arguments on.
+const BEHIND: [&str; 6] = ["sim", "sweep", "population", "budget", "sensor", "serve"];
+/// Folders of the repository: a path that begins with one names a file.
+const FOLDERS: [&str; 10] =
+    ["captures/", "docs/", "examples/", "host-tests/", "lanes/", "m4-timing/", "python/", "src/", "tool/", "xtask/"];
+
+fn root() -> PathBuf {
+    PathBuf::from(env!("FINGERTIP_ROOT"))
+}
+
+/// The files below a folder that end so, what is built and hidden aside.
+fn files(folder: &Path, ends: &[&str], found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).expect("a folder of the repository").map(|entry| entry.expect("its entry").path())
+    {
+        let name = entry.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        if entry.is_dir() {
+            if name != "target" && name != "venv" && !name.starts_with('.') {
+                files(&entry, ends, found);
+            }
+        } else if ends.iter().any(|end| name.ends_with(end)) {
+            found.push(entry);
+        }
+    }
+}
+
+/// Path and text of each page; the changelog may name what is gone.
+fn pages() -> Vec<(PathBuf, String)> {
+    let mut paths = Vec::new();
+    files(&root(), &[".md"], &mut paths);
+    paths.retain(|path| !path.ends_with("CHANGELOG.md"));
+    paths.into_iter().map(|path| (path.clone(), fs::read_to_string(path).expect("a page"))).collect()
+}
+
+/// A page's commands in blocks, without comments and with continued lines joined, and its spans of inline code.
+fn code(page: &str) -> (Vec<String>, Vec<String>) {
+    let (mut blocks, mut prose) = (Vec::new(), String::new());
+    for (place, part) in page.split("\n```").enumerate() {
+        match part.split_once('\n') {
+            Some((language, lines)) if place % 2 == 1 => {
+                if ["sh", "bash"].contains(&language) {
+                    let joined = lines.replace("\\\n", " ");
+                    blocks.extend(joined.lines().map(|line| line.split(" #").next().unwrap_or_default().to_owned()));
+                }
+            }
+            _ => prose += part,
+        }
+    }
+    let spans = prose.split('`').skip(1).step_by(2).map(|span| span.replace('\n', " "));
+    (blocks, spans.collect())
+}
+
+/// Words as a shell splits them: what stands in quotes is one word.
+fn words(command: &str) -> Vec<String> {
+    let (mut words, mut quote) = (vec![String::new()], None);
+    for sign in command.chars() {
+        match (sign, quote) {
+            ('"' | '\'', None) => quote = Some(sign),
+            (_, Some(open)) if sign == open => quote = None,
+            (' ', None) => words.push(String::new()),
+            _ => words.last_mut().expect("there is always one").push(sign),
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+/// The help texts of all programs, each asked once.
+struct Programs {
+    folder: PathBuf,
+    known: BTreeMap<Vec<String>, String>,
+}
+
+impl Programs {
+    /// Builds them in the profile that this test was built in.
+    fn new() -> Self {
+        let own = std::env::current_exe().expect("this program");
+        let folder = own.ancestors().nth(2).expect("the profile's folder").to_owned();
+        let profile = folder.file_name().expect("its name").to_string_lossy().replace("debug", "dev");
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--quiet", "--bins", "--profile", &profile]).current_dir(root());
+        for package in ["xtask", "sim", "sensor", "serve", "fingertip-cli"] {
+            build.args(["--package", package]);
+        }
+        assert!(build.status().expect("cargo").success(), "the programs do not build");
+        Self { folder, known: BTreeMap::new() }
+    }
+
+    fn help(&mut self, path: &[String]) -> String {
+        if let Some(known) = self.known.get(path) {
+            return known.clone();
+        }
+        let run = |program: &str, arguments: &[&str]| {
+            let output = Command::new(self.folder.join(program)).args(arguments).output().expect("a program");
+            String::from_utf8(output.stdout).expect("its help")
+        };
+        let below: Vec<&str> = path.iter().skip(1).map(String::as_str).collect();
+        let mut text = match (path[0].as_str(), below.first()) {
+            ("xtask", Some(name)) if BEHIND.contains(name) => {
+                // What the command says itself is beside what the program behind it says.
+                run("xtask", &["help", name]) + &run(name, &[&below[1..], &["--help"]].concat())
+            }
+            (program, _) => run(program, &[&below[..], &["--help"]].concat()),
+        };
+        text.push('\n');
+        self.known.insert(path.to_vec(), text.clone());
+        text
+    }
+
+    /// What is wrong with a command; nothing where all of it exists.
+    fn wrong(&mut self, words: &[String]) -> Option<String> {
+        let (mut path, mut rest) = match words {
+            [cargo, xtask, rest @ ..] if cargo == "cargo" && xtask == "xtask" => (vec!["xtask".to_owned()], rest),
+            [fingertip, rest @ ..] if fingertip == "fingertip" => (vec!["fingertip".to_owned()], rest),
+            _ => return None,
+        };
+        let mut flags = self.help(&path);
+        let mut subcommands = true;
+        while let [word, behind @ ..] = rest {
+            rest = behind;
+            let help = self.help(&path);
+            if let Some(flag) = word.strip_prefix("--").filter(|flag| !flag.is_empty()) {
+                let flag = flag.split('=').next().unwrap_or_default();
+                let (all, flag) = ([flags.as_str(), help.as_str()].concat(), format!("--{flag}"));
+                let mut uses = all.split(&flag).skip(1).filter(|after| !after.starts_with(in_a_word)).peekable();
+                if uses.peek().is_none() {
+                    return Some(format!("{} has no flag {flag}", path.join(" ")));
+                }
+                let value = rest.first().map(|value| format!(" {value}"));
+                let takes = |after: &str| {
+                    after.starts_with(" <") || value.as_ref().is_some_and(|value| after.starts_with(value))
+                };
+                if !word.contains('=') && uses.any(takes) {
+                    rest = rest.get(1..).unwrap_or_default();
+                }
+            } else if subcommands && lists(&help, word) {
+                path.push(word.clone());
+                flags += &help;
+            } else if subcommands
+                && help.contains("\nCommands:")
+                && !placeholder(word)
+                && !help.contains("\nArguments:")
+            {
+                return Some(format!("{} has no command {word}", path.join(" ")));
+            } else {
+                subcommands = false;
+                let library = match path.get(1).map(String::as_str) {
+                    Some("sim" | "sweep" | "serve") => "scenes",
+                    Some("population") => "populations",
+                    _ => continue,
+                };
+                let file = root().join(format!("host-tests/sim/{library}/{word}.toml"));
+                if !placeholder(word) && !word.contains(['.', '=', '/']) && path[0] == "xtask" && !file.is_file() {
+                    return Some(format!("there is no {}", file.display()));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Whether a letter goes on with the name of a flag.
+fn in_a_word(letter: char) -> bool {
+    letter.is_alphanumeric() || letter == '-'
+}
+
+/// Whether a help text lists a command.
+fn lists(help: &str, name: &str) -> bool {
+    let commands =
+        help.split("\nCommands:\n").skip(1).flat_map(|section| section.lines().take_while(|line| !line.is_empty()));
+    commands.into_iter().any(|line| line.starts_with("  ") && line.split_whitespace().next() == Some(name))
+}
+
+/// Whether a word stands for others: `FILE`, `[SCENE]`, `...`.
+fn placeholder(word: &str) -> bool {
+    !word.starts_with(|c: char| c.is_ascii_lowercase() || c == '-') || word.contains("...")
+}
+
+/// The anchors of a page, as GitHub makes them of its headings.
+fn anchors(page: &str) -> BTreeSet<String> {
+    let headings = page.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let kept = |c: &char| c.is_alphanumeric() || [' ', '-', '_'].contains(c);
+    headings.map(|text| text.to_lowercase().chars().filter(kept).collect::<String>().replace(' ', "-")).collect()
+}
+
+#[test]
+fn every_command_has_its_subcommands_and_flags() {
+    let mut programs = Programs::new();
+    let mut wrong = Vec::new();
+    for (path, page) in pages() {
+        let (blocks, spans) = code(&page);
+        for line in blocks.iter().chain(&spans) {
+            for command in line.split(" && ").flat_map(|part| part.split([';', '|', '&'])) {
+                if let Some(why) = programs.wrong(&words(command)) {
+                    wrong.push(format!("{}: `{command}`: {why}", path.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(programs.known.len() > 25, "{} programs and commands are named", programs.known.len());
+}
+
+#[test]
+fn every_file_that_a_page_names_exists() {
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    // That page names files of other projects, too.
+    for (path, page) in pages().into_iter().filter(|(path, _)| !path.ends_with("design.md")) {
+        let (blocks, spans) = code(&page);
+        for word in blocks.iter().chain(&spans).flat_map(|line| words(line)) {
+            let file = word.trim_end_matches([',', '.', '/']).split("::").next().unwrap_or_default();
+            if FOLDERS.iter().any(|folder| file.starts_with(folder)) && !file.contains(['*', '<', '{', '[']) {
+                seen += 1;
+                let beside = path.parent().unwrap_or(&path).join(file);
+                if !root().join(file).exists() && !beside.exists() {
+                    wrong.push(format!("{}: `{file}` does not exist", path.display()));
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(seen > 80, "{seen} files");
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for (path, page) in pages() {
+        for target in page.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            if target.contains("://") || target.contains(char::is_whitespace) {
+                continue;
+            }
+            seen += 1;
+            let (file, anchor) = target.split_once('#').map_or((target, None), |(file, anchor)| (file, Some(anchor)));
+            let other = if file.is_empty() { path.clone() } else { path.parent().unwrap_or(&path).join(file) };
+            let has = |anchor: &str| fs::read_to_string(&other).is_ok_and(|text| anchors(&text).contains(anchor));
+            if !other.exists() || anchor.is_some_and(|anchor| !has(anchor)) {
+                wrong.push(format!("{}: ({target}) leads nowhere", path.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(seen > 100, "{seen} links");
+}
+
+#[test]
+fn every_page_that_a_source_names_exists() {
+    let mut sources = Vec::new();
+    files(&root(), &[".md", ".rs", ".py", ".toml"], &mut sources);
+    for source in sources {
+        let text = fs::read_to_string(&source).expect("a source");
+        for rest in text.split("docs/").skip(1) {
+            let name = rest.split(|c: char| !c.is_alphanumeric() && c != '-' && c != '_').next().unwrap_or_default();
+            if rest[name.len()..].starts_with(".md") {
+                assert!(root().join("docs").join(name).with_extension("md").exists(), "{}: {name}", source.display());
+            }
+        }
+    }
+}

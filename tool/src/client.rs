@@ -264,7 +264,7 @@ impl Client {
     /// The port is lost.
     pub fn pass(&mut self, packet: &[u8], from: Option<u8>, mut answers: usize) -> Result<Vec<u8>, Error> {
         self.settle()?;
-        self.line.discard();
+        self.line.discard().map_err(|why| self.lost(why))?;
         self.line.write(packet).map_err(|why| self.lost(why))?;
         let all = answers == usize::MAX;
         let until = Instant::now() + self.timeout + if all { self.ping_slots() } else { Duration::ZERO };
@@ -333,7 +333,7 @@ impl Client {
 
     fn send(&mut self, id: u8, instruction: u8, params: &[u8]) -> Result<(), Error> {
         self.settle()?;
-        self.line.discard();
+        self.line.discard().map_err(|why| self.lost(why))?;
         let mut packet = Reply::new();
         let mut sender = Sender::new(&mut packet, id, instruction);
         params.iter().for_each(|byte| sender.push(*byte));

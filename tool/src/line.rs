@@ -88,11 +88,7 @@ impl Line {
         };
         match count {
             Ok(0) => Err(io::Error::new(ErrorKind::UnexpectedEof, "the other end closed it")),
-            // A served finger says in words that another client is there.
-            Ok(count) if buffer.starts_with(BUSY) => {
-                Err(io::Error::new(ErrorKind::ResourceBusy, String::from_utf8_lossy(&buffer[..count]).trim_end()))
-            }
-            Ok(count) => Ok(buffer[..count].to_vec()),
+            Ok(count) => not_busy(&buffer[..count]).map(|()| buffer[..count].to_vec()),
             Err(why) if matches!(why.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
                 Ok(Vec::new())
             }
@@ -101,7 +97,10 @@ impl Line {
     }
 
     /// Drops what came in so far.
-    pub fn discard(&mut self) {
+    ///
+    /// # Errors
+    /// What came in says that the port is busy.
+    pub fn discard(&mut self) -> io::Result<()> {
         match self {
             Self::Serial(port) => {
                 // What is left is no answer to what is asked now, and is dropped by its ID or its length.
@@ -109,11 +108,21 @@ impl Line {
             }
             Self::Tcp(stream) => {
                 let mut buffer = [0; BUFFER];
-                if stream.set_nonblocking(true).is_ok() {
-                    while matches!(stream.read(&mut buffer), Ok(1..)) {}
-                    let _ = stream.set_nonblocking(false);
+                stream.set_nonblocking(true)?;
+                while let Ok(count @ 1..) = stream.read(&mut buffer) {
+                    not_busy(&buffer[..count])?;
                 }
+                stream.set_nonblocking(false)?;
             }
         }
+        Ok(())
     }
+}
+
+/// Fails where a served finger says in words that another client is there.
+fn not_busy(bytes: &[u8]) -> io::Result<()> {
+    if !bytes.starts_with(BUSY) {
+        return Ok(());
+    }
+    Err(io::Error::new(ErrorKind::ResourceBusy, String::from_utf8_lossy(bytes).trim_end()))
 }

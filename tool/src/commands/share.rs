@@ -129,8 +129,9 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
                 }
                 continue;
             }
-            // Stuffing keeps the header out of a packet's inside.
-            let begin = raw.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
+            // Stuffing keeps the header out of a packet's inside, but not out of its last bytes, the check sum.
+            let inside = &raw[..raw.len() - 2];
+            let begin = inside.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
             let answer = lock(bus).pass(from, &receiver.packet(), &raw[begin..]);
             raw.clear();
             match answer {

@@ -22,7 +22,7 @@ def wait(text: str, asks: bool) -> None:
 def main() -> None:
     arguments = argparse.ArgumentParser(description="Calibrate the array of a fingertip.")
     arguments.add_argument("--port", required=True)
-    arguments.add_argument("--timeout-ms", type=float, default=100.0, help="how much longer than usual to wait for answers")
+    arguments.add_argument("--timeout-ms", type=float, default=1000.0, help="how much longer than usual to wait for answers")
     arguments.add_argument("--presses", type=int, default=3)
     arguments.add_argument("--modulus", action="store_true", help="measure and set Young's modulus first")
     arguments.add_argument("--holds", type=float, nargs="*", default=[], help="forces in N to hold on a kitchen scale")
@@ -53,7 +53,7 @@ def main() -> None:
         for newtons in given.holds:
             wait(f"{newtons} N: free the tip over the plate on the scale", not given.no_wait)
             finger.tare()
-            finger.press(newtons, silence_s=2.0)
+            finger.press(newtons)
             until = time.monotonic() + 10.0 + 1e-3 * given.timeout_ms
             while abs(finger.state().force_n - newtons) > 0.1 and time.monotonic() < until:
                 time.sleep(0.05)

@@ -12,7 +12,7 @@ from fingertip import Fingertip, FingertipError
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--port", required=True, help="serial port, or that of a served finger")
-    parser.add_argument("--timeout-ms", type=float, default=100.0, help="how long to wait for an answer")
+    parser.add_argument("--timeout-ms", type=float, default=1000.0, help="how long to wait for an answer")
     parser.add_argument("--yes", action="store_true", help="do not ask: the tip goes towards the object first")
     parser.add_argument("--save", action="store_true", help="keep the parameters over a reset")
     options = parser.parse_args()

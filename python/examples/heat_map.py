@@ -27,7 +27,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--port", required=True)
     parser.add_argument("--seconds", type=float)
-    parser.add_argument("--timeout-ms", type=float, default=100.0, help="how long to wait for an answer")
+    parser.add_argument("--timeout-ms", type=float, default=1000.0, help="how long to wait for an answer")
     arguments = parser.parse_args()
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:
         print("\x1b[2J", end="")

@@ -14,7 +14,7 @@ def main() -> None:
     parser.add_argument("--port", required=True)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--save", action="store_true", help="keep them over a reset")
-    parser.add_argument("--timeout-ms", type=float, default=100.0, help="how long to wait for an answer")
+    parser.add_argument("--timeout-ms", type=float, default=1000.0, help="how long to wait for an answer")
     arguments = parser.parse_args()
     values = {name: int(value) for name, _, value in (text.partition("=") for text in arguments.set)}
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:

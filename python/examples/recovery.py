@@ -17,7 +17,7 @@ def main() -> None:
     parser.add_argument("--port", required=True)
     parser.add_argument("--newtons", type=float, default=1.0)
     parser.add_argument("--seconds", type=float, default=10.0)
-    parser.add_argument("--timeout-ms", type=float, default=100.0, help="how long to wait for an answer")
+    parser.add_argument("--timeout-ms", type=float, default=1000.0, help="how long to wait for an answer")
     arguments = parser.parse_args()
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:
         until = time.monotonic() + arguments.seconds
@@ -25,7 +25,7 @@ def main() -> None:
         if finger.state().fault:
             finger.recover()
         finger.tare()
-        finger.press(arguments.newtons, silence_s=2.0)
+        finger.press(arguments.newtons)
         while time.monotonic() < until:
             state = finger.state()
             if state.fault:
@@ -33,7 +33,7 @@ def main() -> None:
                 try:
                     finger.recover()
                     # The tare outlives a fault: a new goal is all that is needed.
-                    finger.press(arguments.newtons, silence_s=2.0)
+                    finger.press(arguments.newtons)
                     recovered += 1
                 except FingertipError as why:
                     # The cause may still be there: try again later.

@@ -2,7 +2,7 @@
 
     python stream_to_csv.py --port /tmp/finger --seconds 10 --rate-hz 200 --press 1.5 force.csv --plot force.svg
 
-`--plot` needs matplotlib: pip install 'fingertip[plot]'.
+`--plot` needs matplotlib: pip install 'fingertip-controller[plot]'.
 """
 
 import argparse
@@ -21,14 +21,14 @@ def main() -> None:
     parser.add_argument("--rate-hz", type=float, default=200.0)
     parser.add_argument("--press", type=float, metavar="NEWTONS", help="tare, then hold this force meanwhile")
     parser.add_argument("--plot", metavar="FILE")
-    parser.add_argument("--timeout-ms", type=float, default=100.0, help="how long to wait for an answer")
+    parser.add_argument("--timeout-ms", type=float, default=1000.0, help="how long to wait for an answer")
     arguments = parser.parse_args()
 
     rows = []
     with Fingertip(arguments.port, timeout_ms=arguments.timeout_ms) as finger:
         if arguments.press:
             finger.tare()
-            finger.press(arguments.press, silence_s=2.0)
+            finger.press(arguments.press)
         with open(arguments.file, "w", newline="") as file:
             table = csv.writer(file)
             table.writerow(COLUMNS)
@@ -41,10 +41,10 @@ def main() -> None:
     print(f"{len(rows)} states over {span_s:.3f} s of the controller's time in {arguments.file}")
 
     if arguments.plot:
-        import matplotlib
+        import matplotlib  # type: ignore[import-not-found, unused-ignore]
 
         matplotlib.use("Agg")
-        from matplotlib import pyplot
+        from matplotlib import pyplot  # type: ignore[import-not-found, unused-ignore]
 
         times, forces, goals = zip(*rows)
         pyplot.plot(times, goals, "--", color="grey", label="goal")

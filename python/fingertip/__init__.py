@@ -13,10 +13,11 @@ The end of the `with`, an exception and the end of the program let go too. Times
 """
 
 from . import registers
-from .bus import Bus, FingertipError, NoAnswer, PortLost, Refused
+from .bus import Bus, Fingertip
 from .calibration import ArrayCalibration, Gain, Scale
 from .drive import Drive
-from .finger import Fingertip
+from .finger import Finger
+from .line import FingertipError, NoAnswer, PortLost, Refused
 from .state import Fault, Limits, Mode, Restarted, State
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "Bus",
     "Drive",
     "Fault",
+    "Finger",
     "Fingertip",
     "FingertipError",
     "Gain",

@@ -1,249 +1,349 @@
-"""Registers read and written, by `dynamixel-sdk`."""
+"""The fingers of one bus, together: read, pressed, released and kept alive as a group."""
 
-import errno
+import atexit
 import os
+import signal
+import sys
 import threading
 import time
-import weakref
-from typing import Any, List, Optional, Tuple, Type
+from typing import Any, Dict, Iterable, List, Mapping, Optional, Set, Type, Union
 
-import serial  # type: ignore[import-untyped, unused-ignore]
-from dynamixel_sdk import COMM_SUCCESS, PacketHandler, PortHandler  # type: ignore[import-untyped]
+from . import registers as reg
+from .device import encoded
+from .finger import MODEL, PATIENCE_S, Finger, check_silence
+from .line import FingertipError, Line, NoAnswer, PortLost
+from .state import FIRST, Mode, State, length
 
-from .registers import Register
-
-_ERRORS = {
-    1: "it was understood, but cannot be carried out as the loop stands now",
-    2: "it knows no such instruction",
-    3: "the packet arrived damaged: is the line noisy?",
-    4: "a value outside of its register's range",
-    5: "the data do not cover whole registers",
-    6: "a value beyond what other registers allow",
-    7: "the register cannot be written, or not while torque is on",
-}
-_ALERT = 0x80
-_TCP, _BUSY = "tcp:", b"busy: "
-_POLL_S = 0.01  # longest wait for bytes before the time-out is looked at
-_PORT_ERRORS: Tuple[Type[Exception], ...] = (OSError,)
-try:
-    import termios
-
-    _PORT_ERRORS += (termios.error,)
-except ImportError:
-    pass  # not on Windows
+_RELEASE_S = 0.5  # longest wait for the release when a bus or the program ends
+_TRIES = 3  # on a noisy line
+_CHUNK = 1000  # bytes of data in one Fast Sync Read, at most
+_GRIPS = [Mode.APPROACH, Mode.FORCE, Mode.RELEASE]
+_DRIVEN = [*_GRIPS, Mode.IDENTIFY, Mode.COMMISSION]
+_live: "Set[Bus]" = set()  # those that wrote something
 
 
-class FingertipError(Exception):
-    """Something went wrong on the bus."""
+@atexit.register
+def _close_all() -> None:
+    for bus in list(_live):
+        try:
+            bus.close()
+        except FingertipError as why:
+            print(f"fingertip: {why}", file=sys.stderr)
 
 
-class NoAnswer(FingertipError):
-    """There was no answer, or a damaged one."""
+def _exit(number: int, frame: Any) -> None:
+    sys.exit(128 + number)
 
 
-class Refused(FingertipError):
-    """The controller refused; `number` is the protocol's."""
-
-    def __init__(self, doing: str, number: int):
-        super().__init__(f"{doing}: refused with error {number}: {_ERRORS.get(number, 'unknown')}")
-        self.number = number
-
-
-class PortLost(FingertipError):
-    """The port is closed, was unplugged, or serves another client."""
-
-
-class _Line(PortHandler):  # type: ignore[misc]
-    """An open port. All objects of this program that name the same port share one: several devices on one bus."""
-
-    def __init__(self, name: str, baud: int):
-        super().__init__(name)
-        self.lock = threading.RLock()  # held during one exchange
-        self.users: "weakref.WeakSet[Bus]" = weakref.WeakSet()
-        self.patience_ms = 0.0  # time beyond the SDK's: a controller behind USB or on a busy machine may be late
-        self.owed = False  # an answer may still come
-        self.heard, self._again = b"", b""  # bytes of this exchange, and those to be read a second time
-        self._looked = False
-        if not self.setBaudRate(baud):
-            raise FingertipError(f"cannot open {name} at {baud} baud")
-
-    def setupPort(self, cflag_baud: int) -> bool:
-        name = self.port_name
-        url = "socket://" + name[len(_TCP) :] if name.startswith(_TCP) else name
-        # Two programs on one line would read each other's answers: `exclusive` is the `flock` of the tool `fingertip`.
-        self.ser = serial.serial_for_url(url, baudrate=self.baudrate, timeout=_POLL_S, exclusive=True)
-        self.tx_time_per_byte = 10_000.0 / self.baudrate
-        self.is_open = True
-        return True
-
-    def closePort(self) -> None:
-        if self.is_open:
-            super().closePort()
-
-    def clearPort(self) -> None:
-        if not self.port_name.startswith(_TCP):
-            self.ser.reset_input_buffer()
-            return
-        # What a served finger tells a second client may be there already, and the end of the connection.
-        while self.ser.in_waiting:
-            self.readPort(len(_BUSY))
-
-    def readPort(self, length: int) -> bytes:
-        if self._again:
-            data, self._again = self._again[:length], self._again[length:]
-            return data
-        data = bytes(self.ser.read(length))
-        self.heard += data
-        if data.startswith(_BUSY):
-            # A served finger tells a second client in words that the port is in use.
-            raise serial.SerialException((data + self.ser.readline()).decode(errors="replace").strip())
-        return data
-
-    def writePort(self, packet: Any) -> int:
-        self.owed, self.heard, self._again = True, b"", b""
-        return int(self.ser.write(packet))
-
-    def settle(self, packets: Any) -> None:
-        """Waits for an answer that is still owed: the protocol does not number its packets.
-
-        Without this, the late answer would be taken for the next one. Ctrl-C may have ended the exchange before with a
-        part of the answer read.
-        """
-        if self.owed:
-            self._again = self.heard
-            self.setPacketTimeout(0)
-            packets.rxPacket(self, False)
-
-    def getCurrentTime(self) -> float:
-        return time.monotonic() * 1000.0
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        super().setPacketTimeout(packet_length)
-        self.packet_timeout += self.patience_ms
-        self._looked = False
-
-    def isPacketTimeout(self) -> bool:
-        """Returns True once the time is over and the port was read once more after that.
-
-        A busy machine may stop this program between a read and this call until the time is over. The answer has often
-        come meanwhile.
-        """
-        if self._looked:
-            return True
-        self._looked = self.getTimeSinceStart() > self.packet_timeout
-        return False
-
-
-_lines: "weakref.WeakValueDictionary[str, _Line]" = weakref.WeakValueDictionary()
-_opening = threading.Lock()
+def _catch_signals() -> None:
+    """Makes SIGTERM and SIGHUP end the program as `sys.exit` does, where nobody else handles them."""
+    if threading.current_thread() is not threading.main_thread():
+        return  # Python sets handlers in the main thread only
+    for name in ["SIGTERM", "SIGHUP"]:
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _exit)
 
 
 class Bus:
-    """One controller on a port: a serial port, a pseudo-terminal, or `tcp:ADDRESS:PORT` of a served finger.
+    """A bus with its fingers: a serial port, a pseudo-terminal, or `tcp:ADDRESS:PORT` of a served finger.
 
-    Threads may share it: each exchange is whole.
+        with Bus("/dev/ttyACM0") as bus:
+            bus.scan()
+            bus.press({1: 0.5, 2: 1.0})
+            print(bus.states()[1].force_n)
+
+    The fingers that this object has written to are released when it is closed: at the end of a `with`, in `close()`, and
+    when the program exits, also by SIGTERM or SIGHUP. `leave_pressing=True` leaves torque and goals as they are.
     """
 
-    def __init__(self, port: str, device_id: int = 1, baud: int = 1_000_000, timeout_ms: float = 100.0):
-        self.name, self.device_id, self.baud, self._timeout_ms = port, device_id, baud, timeout_ms
-        self._packets: Any = PacketHandler(2.0)
-        key = port if port.startswith(_TCP) else os.path.realpath(port)
-        with _opening:
-            line = _lines.get(key)
-            if line is None or not line.is_open:
-                try:
-                    line = _Line(port, baud)
-                except _PORT_ERRORS as why:
-                    raise FingertipError(f"cannot open {port}: {_reason(why)}") from None
-                _lines[key] = line
-            elif line.baudrate != baud:
-                raise FingertipError(f"cannot open {port} at {baud} baud: this program uses it at {line.baudrate} baud")
-            line.users.add(self)
-            self._port: Any = line
+    def __init__(
+        self, port: str, baud: int = 1_000_000, timeout_ms: float = 1000.0, leave_pressing: bool = False
+    ) -> None:
+        self.line = Line(port, baud, timeout_ms)
+        self.fingers: Dict[int, Finger] = {}  # by ID: those that `finger` or `scan` found
+        self._leave_pressing = leave_pressing
+        self._silence_s: Dict[int, float] = {}  # bus watchdogs that are on, by ID
+        self._feeder: Optional[threading.Thread] = None
+        self._absent: Set[int] = set()  # those that gave no answer last time
+        self._process = os.getpid()
 
     def __enter__(self) -> "Bus":
         return self
 
     def __exit__(self, kind: Optional[Type[BaseException]], why: Any, trace: Any) -> None:
-        self.close()
+        try:
+            self.close()
+        except FingertipError:
+            if kind is None:
+                raise
+            # The exception that ended the block is reported instead.
 
     def close(self) -> None:
-        """Gives the port back."""
-        with _opening, self._port.lock:
-            self._port.users.discard(self)
-            if not self._port.users:
-                self._port.closePort()
+        """Releases the fingers, unless `leave_pressing`, and gives the port back.
 
-    def ping(self) -> int:
-        """The model number of who answers."""
-        return int(self._ask("ping", self._packets.ping))
+        Where a controller does not answer, its bus watchdog stops the motor.
+        """
+        if self._process != os.getpid():
+            return  # a forked child: the fingers are its parent's
+        wrote = [device_id for device_id, finger in self.fingers.items() if finger.wrote]
+        # Any other exception, as Ctrl-C, leaves the port open: the exit of the program tries again.
+        try:
+            if wrote and not self._leave_pressing:
+                self.release(wrote, _RELEASE_S)
+            self.unwatch(self._silence_s)
+        except FingertipError:
+            self._shut()
+            raise
+        self._shut()
 
-    def read_bytes(self, address: int, length: int) -> bytes:
-        """Bytes of the control table, 1 to 256 of them."""
-        doing = f"read {length} bytes at {address}"
-        with self._port.lock:
-            data = bytes(self._ask(doing, self._packets.readTxRx, address, length))
-            if len(data) != length:
-                self._port.owed, self._port.heard = True, b""  # that was another answer
-                raise NoAnswer(f"{doing}: {len(data)} came")
-        return data
+    def _shut(self) -> None:
+        with self.line.lock:
+            self._silence_s.clear()
+            self.line.feed_s = None
+            self.line.closePort()
+        for finger in self.fingers.values():
+            finger.wrote = False
+        _live.discard(self)
 
-    def write_bytes(self, address: int, data: bytes, doing: str = "") -> None:
-        """Writes whole registers side by side: all of it happens or nothing."""
-        doing = doing or f"write {len(data)} bytes at {address}"
-        self._ask(doing, self._packets.writeTxRx, address, len(data), list(data))
+    def touch(self, finger: Finger) -> None:
+        """Notes that something is written to a finger: it may press because of this program."""
+        finger.wrote = True
+        _live.add(self)
 
-    def read(self, register: Register) -> int:
-        """The number of a register, in the unit that its name ends with."""
-        return numbers(register, self.read_bytes(register.address, register.width * register.numbers))[0]
+    def finger(self, device_id: int = 1) -> Finger:
+        """The finger with this ID; raises `NoAnswer` where there is none."""
+        if device_id not in self.fingers:
+            self.fingers[device_id] = Finger(self, device_id)
+        return self.fingers[device_id]
 
-    def read_all(self, register: Register) -> List[int]:
-        """The numbers of a register that has many."""
-        return numbers(register, self.read_bytes(register.address, register.width * register.numbers))
+    def scan(self) -> List[int]:
+        """Finds all fingers of the bus by a broadcast Ping, while none presses; returns their IDs. Takes a second."""
+        if self._silence_s:
+            raise FingertipError("a scan is silent for longer than a bus watchdog allows: release() first")
+        found = self.line.scan()
+        return [device_id for device_id in sorted(found) if found[device_id] == MODEL and self.finger(device_id)]
 
-    def write(self, register: Register, value: int) -> None:
-        """Sets a register, in the unit that its name ends with."""
-        raw, rest = divmod(value, register.scale)
-        if rest or not register.least <= raw <= register.largest:
-            least, largest = register.least * register.scale, register.largest * register.scale
-            steps = f" in steps of {register.scale}" if register.scale != 1 else ""
-            raise ValueError(f"{register.name} of {value}: {least} to {largest}{steps} are allowed")
-        data = raw.to_bytes(register.width, "little", signed=register.signed)
-        self.write_bytes(register.address, data, f"set {register.name} to {value}")
+    def states(self, pressures: bool = False) -> Dict[int, State]:
+        """The states of all fingers, by ID, in one exchange; raises what is wrong with the first that has none."""
+        states = {}
+        for device_id, state in self._look(self.fingers, pressures).items():
+            if isinstance(state, FingertipError):
+                raise state
+            states[device_id] = state
+        return states
 
-    def _ask(self, doing: str, call: Any, *arguments: Any) -> Any:
-        """One exchange with the controller. Returns what the SDK's call returns in front of result and error."""
-        line = self._port
-        with line.lock:
-            if self not in line.users or not line.is_open:
-                raise PortLost(f"{doing}: {self.name} is not open any more")
-            line.patience_ms = self._timeout_ms
+    def press(self, newtons: Union[float, Mapping[int, float]], silence_s: Optional[float] = 0.5) -> None:
+        """Asks fingers for forces, all of them or each of these IDs: the tips approach, touch and hold. Returns at once.
+
+        Nothing moves where one of them cannot press. Where one refuses all the same, those that did not press before are
+        released again. `silence_s` is that of `Finger.enable_torque`.
+        """
+        check_silence(silence_s)
+        forces = newtons if isinstance(newtons, Mapping) else dict.fromkeys(self.fingers, newtons)
+        if not forces:
+            raise FingertipError("no finger is known on this bus: call scan() or finger()")
+        goals = {device_id: round(1000 * force) for device_id, force in forces.items()}
+        for goal_mn in goals.values():
+            encoded(reg.GOAL_FORCE_MN, goal_mn)
+        rest = [device_id for device_id, goal_mn in goals.items() if not self.finger(device_id).ready(goal_mn)]
+        try:
+            self.watch(goals, silence_s)
+            _check(self._set(reg.TORQUE_ENABLE, dict.fromkeys(goals, 1)))
+            _check(self._set(reg.GOAL_FORCE_MN, goals))
+        except FingertipError:
             try:
-                line.settle(self._packets)
-                line.is_using = False  # Ctrl-C may have ended the exchange before
-                *data, result, error = call(line, self.device_id, *arguments)
-                line.owed = result != COMM_SUCCESS
-            except _PORT_ERRORS as lost:
-                line.closePort()
-                raise PortLost(f"{self.name}: {_reason(lost)}; is it still connected?") from lost
-        if result != COMM_SUCCESS:
-            why = self._packets.getTxRxResult(result)
-            raise NoAnswer(f"{doing}: no answer of ID {self.device_id} on {self.name} at {self.baud} baud ({why})")
-        if error & ~_ALERT:
-            raise Refused(doing, error & ~_ALERT)
-        return data[0] if data else None
+                self.release(rest, _RELEASE_S)
+            except FingertipError:
+                pass  # the first failure tells more
+            raise
+
+    def release(self, ids: Optional[Iterable[int]] = None, within_s: float = PATIENCE_S) -> None:
+        """Releases all fingers, or these IDs: each turns torque off once its tip is clear, or after `within_s`.
+
+        A finger in a fault has been stopped by it. One that does not answer does not keep the others from it; its error is
+        raised when they are at rest.
+        """
+        all_ids = list(self.fingers if ids is None else ids)
+        self._rest(all_ids, within_s)
+        failed = self._set(reg.TORQUE_ENABLE, dict.fromkeys(all_ids, 0))
+        for device_id in all_ids:
+            if device_id not in failed:
+                try:
+                    self.fingers[device_id].wait(reg.PRESENT_MODE, *_DRIVEN)  # the loop takes torque off with its next frame
+                except NoAnswer as why:
+                    failed[device_id] = why
+        self.unwatch(all_ids, failed)
+        _check(failed)
+
+    def stop(self) -> None:
+        """Stops all fingers in every mode: a grip is released within 0.5 s, then torque is off, which ends all else."""
+        self.release(None, _RELEASE_S)
+
+    def watch(self, ids: Iterable[int], silence_s: Optional[float]) -> None:
+        """Sets bus watchdogs, and feeds them from a thread until the fingers are released. None turns them off."""
+        check_silence(silence_s)
+        _catch_signals()
+        if silence_s is None:
+            return self.unwatch(ids)
+        with self.line.lock:
+            self._silence_s.update(dict.fromkeys(ids, silence_s))
+            self.line.feed_s = min(self._silence_s.values()) / 4
+            if self._feeder is None:
+                self._feeder = threading.Thread(target=self._feed, daemon=True)
+                self._feeder.start()
+        _check(self._set(reg.BUS_WATCHDOG, dict.fromkeys(ids, 20 * round(silence_s / 0.02))))
+
+    def _feed(self) -> None:
+        while True:
+            with self.line.lock:
+                feed_s = self.line.feed_s
+                if feed_s is None or not self.line.is_open:
+                    self._feeder = None
+                    return
+                try:
+                    self.line.feed()
+                except FingertipError:
+                    pass  # the program sees a bad line in its own exchanges
+            time.sleep(feed_s / 2)
+
+    def unwatch(self, ids: Iterable[int], failed: Iterable[int] = ()) -> None:
+        """Turns the watchdogs off and feeds them no more. Those of fingers that did not answer stay on, to stop them."""
+        watched = [device_id for device_id in ids if device_id in self._silence_s]
+        unanswered = self._set(reg.BUS_WATCHDOG, {device_id: 0 for device_id in watched if device_id not in failed})
+        with self.line.lock:
+            for device_id in watched:
+                self._silence_s.pop(device_id, None)
+            self.line.feed_s = min(self._silence_s.values()) / 4 if self._silence_s else None
+        _check(unanswered)
+
+    def _look(self, ids: Iterable[int], pressures: bool = False) -> "Dict[int, Union[State, FingertipError]]":
+        """The states of these fingers, or why there is none."""
+        wanted, size = list(ids), length(pressures)
+        data: Dict[int, bytes] = {}
+        found: Dict[int, Union[State, FingertipError]] = {}
+        with self.line.lock:  # threads must count the time in the order of their reads
+            at_once = _CHUNK // (size + 4)
+            # One that is not there also silences those after it. Then each is asked by itself.
+            there = [device_id for device_id in wanted if device_id not in self._absent]
+            for part in (there[at : at + at_once] for at in range(0, len(there), at_once)):
+                if len(part) > 1:
+                    try:
+                        data.update(self.line.sync_read(FIRST.address, size, part))
+                    except NoAnswer:
+                        pass
+            for device_id in wanted:
+                finger = self.fingers[device_id]
+                try:
+                    found[device_id] = finger.state_of(data.get(device_id) or finger.read_bytes(FIRST.address, size))
+                    self._absent.discard(device_id)
+                except PortLost:
+                    raise
+                except FingertipError as why:
+                    found[device_id] = why
+                    if isinstance(why, NoAnswer):
+                        self._absent.add(device_id)
+        return found
+
+    def _tell(self, register: reg.Register, values: Mapping[int, int]) -> None:
+        """Writes a register of several fingers in one packet, which nobody answers."""
+        for device_id in values:
+            self.touch(self.fingers[device_id])
+        data = {device_id: encoded(register, value) for device_id, value in values.items()}
+        if data:
+            self.line.sync_write(register.address, register.width, data)
+
+    def _set(self, register: reg.Register, values: Mapping[int, int]) -> Dict[int, FingertipError]:
+        """Writes a register of several fingers at once, then of each by itself, which it answers; what failed."""
+        self._tell(register, values if len(values) > 1 else {})
+        failed: Dict[int, FingertipError] = {}
+        for device_id, value in values.items():
+            for _ in range(1 if device_id in self._absent else _TRIES):
+                try:
+                    self.fingers[device_id].write(register, value)
+                    failed.pop(device_id, None)
+                    break
+                except NoAnswer as why:
+                    failed[device_id] = why
+                except PortLost:
+                    raise
+                except FingertipError as why:
+                    failed[device_id] = why
+                    break
+        return failed
+
+    def _rest(self, ids: Iterable[int], within_s: float) -> None:
+        """Takes the tips off what they press, and waits for that by the controllers' clocks."""
+        until = time.monotonic() + PATIENCE_S + self.line.timeout_ms * 1e-3
+        missed = dict.fromkeys(ids, 0)  # reads in a row without an answer, of the fingers that may still press
+        begun_s: Dict[int, float] = {}
+        measured: Set[int] = set()
+        goals = list(missed)
+        while missed and time.monotonic() < until:
+            self._tell(reg.GOAL_FORCE_MN, dict.fromkeys(goals, 0))
+            goals, off, on = [], [], []
+            for device_id, state in self._look(missed).items():
+                if isinstance(state, NoAnswer):
+                    missed[device_id] += 1
+                    if missed[device_id] == _TRIES:
+                        del missed[device_id]
+                    continue
+                missed[device_id] = 0
+                if isinstance(state, FingertipError):
+                    del missed[device_id]  # it started anew: torque is off
+                elif state.mode == Mode.IDENTIFY:
+                    # Only torque off ends a press that measures, and friction would keep most of its force: torque goes
+                    # on once more with the goal 0, which takes the tip off.
+                    measured.add(device_id)
+                    off.append(device_id)
+                    begun_s[device_id] = state.time_s
+                elif state.time_s - begun_s.setdefault(device_id, state.time_s) > within_s:
+                    del missed[device_id]
+                elif state.mode == Mode.OFF and device_id in measured:
+                    on.append(device_id)
+                elif state.mode not in _GRIPS or _is_clear(state):
+                    del missed[device_id]
+                elif state.goal_n:
+                    goals.append(device_id)
+            self._tell(reg.TORQUE_ENABLE, {**dict.fromkeys(off, 0), **dict.fromkeys(on, 1)})
+            if missed:
+                time.sleep(0.01)
 
 
-def _reason(why: Exception) -> str:
-    """The system's reason for an error of a port."""
-    number = getattr(why, "errno", None)
-    if number in (errno.EAGAIN, errno.EBUSY):
-        return "another program has it open"
-    return os.strerror(number) if number else str(why.args[-1] if why.args else why)
+def _check(failed: Mapping[int, FingertipError]) -> None:
+    for why in failed.values():
+        raise why
 
 
-def numbers(register: Register, data: bytes) -> List[int]:
-    """What bytes come to."""
-    width = register.width
-    words = [data[at : at + width] for at in range(0, width * register.numbers, width)]
-    return [int.from_bytes(word, "little", signed=register.signed) * register.scale for word in words]
+def _is_clear(state: State) -> bool:
+    return state.mode == Mode.RELEASE and abs(state.speed_mm_per_s) < 1.0 and state.force_n < 0.01
+
+
+class Fingertip(Finger):
+    """The one finger of a bus: opens the port, and closes it as `Bus` does."""
+
+    def __init__(
+        self,
+        port: str,
+        device_id: int = 1,
+        baud: int = 1_000_000,
+        timeout_ms: float = 1000.0,
+        leave_pressing: bool = False,
+    ):
+        bus = Bus(port, baud, timeout_ms, leave_pressing)
+        try:
+            super().__init__(bus, device_id)
+            bus.fingers[device_id] = self
+        except BaseException:
+            bus.close()
+            raise
+
+    def __enter__(self) -> "Fingertip":
+        return self
+
+    def __exit__(self, kind: Optional[Type[BaseException]], why: Any, trace: Any) -> None:
+        self.bus.__exit__(kind, why, trace)
+
+    def close(self) -> None:
+        """Releases the finger, unless `leave_pressing`, and gives the port back."""
+        self.bus.close()

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Callable, List, Optional
 
 from . import registers as reg
-from .bus import FingertipError
-from .finger import Fingertip
+from .line import FingertipError
+from .finger import Finger
 
-_SILENCE_S = 2.0  # bus watchdog of a calibration: the controller ends its motions by itself
 ONE = 16384  # a gain of 1 on the bus
 _RUNNING, _DONE = 1, 2
 _PRESS, _FORGET, _ACCEPT = 1, 2, 3
@@ -59,13 +58,13 @@ class Scale:
 class ArrayCalibration:
     """The procedures that calibrate a finger's array."""
 
-    def __init__(self, finger: Fingertip, patience_s: float = 60.0):
+    def __init__(self, finger: Finger, patience_s: float = 60.0):
         self.finger, self.patience_s = finger, patience_s
 
     def modulus(self) -> float:
         """Measures Young's modulus by a press onto a hard flat plate and sets it; kPa."""
         finger = self.finger
-        finger.enable_torque(_SILENCE_S)
+        finger.enable_torque()
         try:
             finger.write(reg.IDENTIFY, 1)
             until = time.monotonic() + self.patience_s
@@ -83,7 +82,7 @@ class ArrayCalibration:
     def press(self, progress: Optional[Callable[[int], None]] = None) -> int:
         """Presses once onto a hard flat plate and lets go; how many taxels have a proposal by now."""
         finger = self.finger
-        finger.enable_torque(_SILENCE_S)
+        finger.enable_torque()
         try:
             finger.write(reg.CALIBRATE, _PRESS)
             until = time.monotonic() + self.patience_s

@@ -5,12 +5,14 @@ from dataclasses import dataclass
 from typing import Dict
 
 from . import registers as reg
-from .bus import Bus, FingertipError
+from .device import Device
+from .line import FingertipError
 from .state import Restarted
 
 _COMMISSION_S = 60.0
 JOG, MEASURE = 1, 2
-_NO_TASK, _RUNNING, _REFUSED = 0, 1, 4
+RUNNING = 1
+_NO_TASK, _REFUSED = 0, 4
 _DONE = {JOG: 2, MEASURE: 3}
 _REASONS = {
     1: "a stop, torque, a fault, a tare or new parameters ended it",
@@ -40,37 +42,30 @@ class Drive:
     sigma: Dict[str, float]
 
 
-def carry_out(bus: Bus, task: int) -> None:
-    """Jogs or measures, and waits for the end."""
-    if bus.read(reg.COMMISSION_STATE) == _RUNNING:
-        raise FingertipError("the tip is moving for a jog or a measurement: wait until it ends")
-    bus.write(reg.COMMISSION, task)
-    begun, frame_s = bus.read(reg.FRAME_COUNTER), 1e-9 * bus.read(reg.FRAME_PERIOD_NS)
-    try:
-        state, frames = _RUNNING, 0
-        # By the controller's own time: a simulated one may be slower than a real one.
-        while state == _RUNNING and frames * frame_s < _COMMISSION_S:
-            time.sleep(0.02)
-            state = bus.read(reg.COMMISSION_STATE)
-            frames = (bus.read(reg.FRAME_COUNTER) - begun) % 2**32
-            if frames >= 2**31:
-                # Frames count back.
-                state = _NO_TASK
-    except BaseException:
-        bus.write(reg.COMMISSION, 0)
-        raise
-    if state == _RUNNING:
-        bus.write(reg.COMMISSION, 0)
+def carry_out(finger: Device, task: int) -> None:
+    """Jogs or measures, and waits for the end. Torque off ends it before."""
+    finger.write(reg.COMMISSION, task)
+    begun, frame_s = finger.read(reg.FRAME_COUNTER), 1e-9 * finger.read(reg.FRAME_PERIOD_NS)
+    state, frames = RUNNING, 0
+    # By the controller's own time: a simulated one may be slower than a real one.
+    while state == RUNNING and frames * frame_s < _COMMISSION_S:
+        time.sleep(0.02)
+        state = finger.read(reg.COMMISSION_STATE)
+        frames = (finger.read(reg.FRAME_COUNTER) - begun) % 2**32
+        if frames >= 2**31:
+            # Frames count back.
+            state = _NO_TASK
+    if state == RUNNING:
         raise FingertipError("it did not end in a minute: stopped")
     if state == _REFUSED:
-        refusal = bus.read(reg.COMMISSION_REFUSAL)
+        refusal = finger.read(reg.COMMISSION_REFUSAL)
         raise FingertipError(f"refused: {_REASONS.get(refusal, refusal)}")
     if state != _DONE[task]:
         # A controller that started anew knows of no task.
         raise Restarted("it came to no end: the controller started anew, or its parameters were set")
 
 
-def measured(bus: Bus) -> Drive:
+def measured(finger: Device) -> Drive:
     """What the last measurement found."""
     rows = {
         "torque_constant_unm_per_a": (reg.MEASURED_TORQUE_CONSTANT, reg.TORQUE_CONSTANT_SIGMA),
@@ -79,5 +74,5 @@ def measured(bus: Bus) -> Drive:
         "friction_forward_unm": (reg.MEASURED_FRICTION_FORWARD, reg.FRICTION_FORWARD_SIGMA),
         "friction_back_unm": (reg.MEASURED_FRICTION_BACK, reg.FRICTION_BACK_SIGMA),
     }
-    values = {name: bus.read(value) for name, (value, _) in rows.items()}
-    return Drive(sigma={name: bus.read(sigma) * 1e-3 for name, (_, sigma) in rows.items()}, **values)
+    values = {name: finger.read(value) for name, (value, _) in rows.items()}
+    return Drive(sigma={name: finger.read(sigma) * 1e-3 for name, (_, sigma) in rows.items()}, **values)

@@ -4,7 +4,21 @@ from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import Optional, Tuple
 
-from .bus import FingertipError
+from . import registers as reg
+from .device import numbers
+from .line import FingertipError
+
+FIRST, _LAST = reg.PICTURE_TIME_US, reg.PRESSURES  # a state is what lies between them
+
+
+def length(pressures: bool) -> int:
+    """Bytes of a state with the pressures, or without: that is five times as short."""
+    return _LAST.address - FIRST.address + (_LAST.width * _LAST.numbers if pressures else 0)
+
+
+def number(register: reg.Register, data: bytes) -> int:
+    """The number of a register in the bytes of a state."""
+    return numbers(register, data[register.address - FIRST.address :])[0]
 
 
 class _Open(IntEnum):
@@ -74,3 +88,29 @@ class State:
     fault: Fault
     limits: Limits
     pressures_kpa: Tuple[Tuple[float, ...], ...]  # row by row; none where they were not read
+
+    @classmethod
+    def of(cls, data: bytes, columns: int, time_s: float) -> "State":
+        """The state that these bytes tell, with the pressures where there are any."""
+
+        def at(register: reg.Register) -> int:
+            return number(register, data)
+
+        pascals = numbers(_LAST, data[_LAST.address - FIRST.address :]) if len(data) == length(True) else []
+        rows = [pascals[begin : begin + columns] for begin in range(0, len(pascals), columns)]
+        return cls(
+            time_s=time_s,
+            frame=at(reg.PICTURE_FRAME),
+            force_n=at(reg.PICTURE_FORCE_MN) * 1e-3,
+            goal_n=at(reg.PICTURE_GOAL_MN) * 1e-3,
+            centre_x_mm=at(reg.PICTURE_CENTRE_X_UM) * 1e-3,
+            centre_y_mm=at(reg.PICTURE_CENTRE_Y_UM) * 1e-3,
+            indentation_mm=at(reg.PICTURE_INDENTATION_UM) * 1e-3,
+            travel_mm=at(reg.PICTURE_TRAVEL_UM) * 1e-3,
+            speed_mm_per_s=at(reg.PICTURE_SPEED_UM_PER_S) * 1e-3,
+            duty=at(reg.PICTURE_DUTY_PERMILLE) * 1e-3,
+            mode=Mode(at(reg.PICTURE_MODE)),
+            fault=Fault(at(reg.PICTURE_FAULT)),
+            limits=Limits(at(reg.PICTURE_LIMITS)),
+            pressures_kpa=tuple(tuple(pascal * 1e-3 for pascal in row) for row in rows),
+        )

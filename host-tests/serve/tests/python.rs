@@ -87,11 +87,9 @@ fn the_examples_stream_show_set_and_recover() {
 
 #[test]
 #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
-fn the_package_stands_what_is_wrong() {
-    let served = serve();
-    said(python().args([
-        &format!("{}/host-tests/serve/tests/package.py", env!("FINGERTIP_ROOT")),
-        &served.name,
-        PATIENCE_MS,
-    ]));
+fn the_package_passes_its_tests() {
+    let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
+    let mut command = python();
+    command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
+    said(command.args(["-m", "unittest", "discover"]).arg(tests));
 }

@@ -1,0 +1,222 @@
+"""Tests of several fingers on one bus."""
+
+import signal
+import time
+from typing import Any, List
+
+from fingertip import Bus, Fault, FingertipError, Mode, NoAnswer, Refused
+from fingertip import registers as reg
+
+from served import SOON_MS, OnServed
+
+# Two fingers press; the program then does what the test wants.
+CHILD = """
+import sys
+from fingertip import Bus
+bus = Bus(sys.argv[1], timeout_ms=60_000)
+for finger in [bus.finger(1), bus.finger(2)]:
+    finger.tare()
+bus.press({1: 0.5, 2: 0.8})
+print("pressing", flush=True)
+"""
+GO_ON = "while True: bus.states()"
+
+
+class Group(OnServed):
+    def pressing(self, timeout_ms: float = SOON_MS) -> Bus:
+        bus = self.open_bus(timeout_ms=timeout_ms)
+        bus.press({1: 0.5, 2: 0.8})
+        self.holds(bus, [1, 2])
+        return bus
+
+    def test_a_scan_finds_all_fingers(self) -> None:
+        bus = Bus(self.served.port)
+        self.addCleanup(self.close, bus)
+        self.assertEqual(bus.scan(), [1, 2])
+        self.assertEqual(list(bus.fingers), [1, 2])
+        self.assertIs(bus.finger(2), bus.fingers[2])
+        with self.assertRaises(NoAnswer):
+            bus.finger(3)
+        for finger in bus.fingers.values():
+            finger.tare()
+        bus.press(0.3)
+        with self.assertRaises(FingertipError):
+            bus.scan()
+
+    def test_all_states_are_of_one_exchange(self) -> None:
+        bus = self.pressing()
+        goals = [state.goal_n for state in bus.states().values()]
+        self.assertEqual(goals, [0.5, 0.8])
+        before = [finger.read(reg.GOOD_PACKETS) for finger in bus.fingers.values()]
+        bus.line.feed_s = None
+        for _ in range(10):
+            states = bus.states(pressures=True)
+            self.assertEqual(states[1].frame, states[2].frame)
+            self.assertEqual(len(states[2].pressures_kpa), 10)
+        after = [finger.read(reg.GOOD_PACKETS) for finger in bus.fingers.values()]
+        self.assertEqual([new - old for new, old in zip(after, before)], [11, 11], "one packet for each look")
+
+    def test_a_finger_that_nobody_polls_is_kept_alive(self) -> None:
+        bus = self.pressing()
+        first, silent = bus.fingers[1], bus.fingers[2]
+        # Reads of one finger leave no time for the thread, and the other hears them not as its own.
+        begun_s = first.state(pressures=False).time_s
+        while (state := first.state(pressures=False)).time_s - begun_s < 2.0:
+            self.assertFalse(state.fault)
+        self.assertEqual(silent.state().mode, Mode.FORCE)
+        # The release of one, which waits, leaves the other in peace.
+        self.served.ask("fault encoder-frozen 1")
+        first.release(1.5)
+        self.assertEqual(silent.state().mode, Mode.FORCE)
+        silent.release()
+        self.assert_released(ids=[1, 2])
+
+    def test_a_group_is_released_and_stopped(self) -> None:
+        bus = self.pressing()
+        for let_go in [bus.release, bus.stop]:
+            let_go()
+            self.assert_released(ids=[1, 2])
+            for finger in bus.fingers.values():
+                values = [finger.read(register) for register in [reg.TORQUE_ENABLE, reg.BUS_WATCHDOG, reg.FAULT]]
+                self.assertEqual(values, [0, 0, 0])
+            bus.press(0.4)
+            self.holds(bus, [1, 2])
+        bus.close()
+        self.assert_released(ids=[1, 2])
+
+    def test_one_in_a_fault_does_not_keep_the_others(self) -> None:
+        bus = self.pressing()
+        self.served.ask("fault bridge 2")
+        while not bus.states()[2].fault:
+            pass
+        self.assertEqual(bus.states()[1].mode, Mode.FORCE)
+        with self.assertRaisesRegex(FingertipError, "ID 2 is stopped by BRIDGE"):
+            bus.press(0.3)
+        self.assertEqual(bus.states()[1].goal_n, 0.5, "nothing was changed")
+        bus.stop()
+        self.assert_released(ids=[1])
+        self.assertEqual(bus.states()[1].mode, Mode.OFF)
+
+    def test_one_that_refuses_takes_the_others_back(self) -> None:
+        bus = self.open_bus()
+        with self.assertRaises(Refused):
+            bus.press({1: 0.5, 2: 100.0})
+        # The second is beyond what `ready` sees: as if the limit had changed behind it.
+        bus.fingers[2].ready = lambda goal_mn: False  # type: ignore[method-assign]
+        with self.assertRaises(Refused):
+            bus.press({1: 0.5, 2: 100.0})
+        self.assert_released(ids=[1, 2])
+        self.assertEqual([finger.read(reg.TORQUE_ENABLE) for finger in bus.fingers.values()], [0, 0])
+
+    def test_one_that_does_not_answer_does_not_keep_the_others(self) -> None:
+        bus = self.pressing()
+        # Another ID is for this bus the same as an unplugged finger.
+        for finger in bus.fingers.values():
+            finger.write(reg.GOAL_FORCE_MN, 0)
+            finger.write(reg.TORQUE_ENABLE, 0)
+        bus.finger(2).write(reg.ID, 7)
+        bus.finger(1).press(0.5)
+        self.holds_one(bus)
+        with self.assertRaisesRegex(NoAnswer, "ID 2"):
+            bus.states()
+        with self.assertRaisesRegex(NoAnswer, "ID 2"):
+            bus.press(0.3)
+        self.assertEqual(bus.fingers[1].state().mode, Mode.FORCE, "it was kept alive meanwhile")
+        with self.assertRaisesRegex(NoAnswer, "ID 2"):
+            bus.stop()
+        self.assert_released(ids=[1])
+        self.assertEqual(bus.fingers[1].read(reg.BUS_WATCHDOG), 0)
+
+    def holds_one(self, bus: Bus) -> None:
+        while bus.fingers[1].state().mode != Mode.FORCE:
+            time.sleep(0.01)
+
+    def test_the_end_of_a_program_releases_all(self) -> None:
+        ends = [("", 0), ("raise ValueError", 0), (GO_ON, signal.SIGINT), (GO_ON, signal.SIGTERM), (GO_ON, signal.SIGHUP)]
+        for then, kill in ends:
+            with self.subTest(then=then, kill=kill):
+                child = self.python("-c", CHILD + then, self.served.port)
+                assert child.stdout
+                self.assertEqual(child.stdout.readline(), "pressing\n")
+                if kill:
+                    child.send_signal(kill)
+                child.communicate()
+                self.assert_released(ids=[1, 2])
+
+    def test_killed_programs_leave_no_finger_pressing(self) -> None:
+        child = self.python("-c", CHILD + GO_ON, self.served.port)
+        assert child.stdout
+        self.assertEqual(child.stdout.readline(), "pressing\n")
+        with self.assertRaises(FingertipError):  # it holds the port
+            Bus(self.served.port)
+        time.sleep(0.3)
+        child.kill()
+        child.communicate()
+        # A packet for a third ID is no sign of life for these two, and nobody answers it: the server tells the time.
+        while any(truth.mode != "Fault" for truth in self.served.truths().values()):
+            time.sleep(0.01)
+        self.assert_released(ids=[1, 2])
+        with Bus(self.served.port) as bus:
+            self.assertEqual([bus.finger(one).recover() for one in bus.scan()], [Fault.BUS_SILENT] * 2)
+
+
+class Grasp(OnServed):
+    ARGUMENTS = ("grasp",)
+
+    def test_two_fingers_hold_an_object_between_them_and_let_go(self) -> None:
+        bus = self.open_bus()
+        bus.press(0.9)
+        self.holds(bus, [1, 2])
+        bus.release()
+        self.assert_released(ids=[1, 2])
+
+
+class Broken(OnServed):
+    """Whatever breaks in the middle of a method, its error is one of the package."""
+
+    def test_all_errors_are_of_the_package(self) -> None:
+        def methods(bus: Bus) -> List[Any]:
+            finger = bus.fingers[1]
+            return [
+                bus.states, lambda: bus.press(0.2), bus.release, bus.stop, bus.scan, finger.state, finger.tare, finger.jog,
+                finger.measure_drive, finger.confirm_direction, lambda: finger.accept_drive(True), finger.enable_torque,
+                finger.recover, finger.parameters, lambda: finger.set_parameters({"contact_on_mn": 50}, True),
+                lambda: list(finger.stream(0, 0.05)), bus.close,
+            ]  # fmt: skip
+
+        def close(bus: Bus) -> None:
+            bus.line.closePort()
+
+        def kill(bus: Bus) -> None:
+            self.served.stop(signal.SIGKILL)
+
+        def junk(bus: Bus) -> None:
+            bus.line.ser.read = bytes  # zeros, as many as are asked for
+
+        def other_id(bus: Bus) -> None:
+            bus.fingers[1].write(reg.ID, 9)
+
+        for broken in [close, junk, other_id, kill]:
+            for number in range(17):
+                if broken in [kill, other_id]:
+                    self.served.stop()
+                    self.served = self.serve(*self.ARGUMENTS)
+                bus = self.open_bus(tared=False, timeout_ms=SOON_MS)
+                method = methods(bus)[number]
+                bus.line.timeout_ms = 20.0
+                # In the middle of the method: in front of its second exchange.
+                exchange, left = bus.line._run, [2]
+
+                def run(failing: str, action: Any) -> Any:
+                    left[0] -= 1
+                    if left[0] == 0:
+                        broken(bus)
+                    return exchange(failing, action)
+
+                bus.line._run = run  # type: ignore[method-assign]
+                for doing in [method, bus.close]:
+                    with self.subTest(broken=broken.__name__, method=number, doing=doing):
+                        try:
+                            doing()
+                        except FingertipError:
+                            pass

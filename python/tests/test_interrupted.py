@@ -1,0 +1,98 @@
+"""Ends every moving method and every moving example at instants drawn by a fixed seed, and looks at the true force."""
+
+import random
+import signal
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+from typing import Dict, List
+
+from served import PYTHON, Cable, OnServed
+
+CHILD = """
+import sys
+from fingertip import ArrayCalibration, Bus, Fingertip
+bus = Bus(sys.argv[1])
+finger = bus.finger(1)
+finger.tare()
+array = ArrayCalibration(finger)
+while True:
+    {}
+"""
+METHODS = {
+    "press": "finger.press(0.8); finger.state()",
+    "press of a group": "bus.press(0.8); bus.states()",
+    "release": "finger.press(0.8); list(finger.stream(100, 0.3)); finger.release()",
+    "stop": "finger.press(0.8); list(finger.stream(100, 0.3)); bus.stop()",
+    "jog": "finger.jog()",
+    "measure_drive": "finger.measure_drive()",
+    "modulus": "array.modulus(); finger.tare()",
+    "calibration": "array.press(); finger.tare()",
+}
+EXAMPLES = {
+    "force.py": ["--readings", "1000000"],
+    "stream_to_csv.py": ["--seconds", "1000", "--press", "1.0", str(Path(tempfile.gettempdir()) / "interrupted.csv")],
+    "recovery.py": ["--seconds", "1000"],
+    "commission.py": ["--yes"],
+    "calibrate.py": ["--modulus", "--presses", "3", "--no-wait", "--holds", "1.5", "--shown", "160"],
+}
+PROGRAMS: Dict[str, List[str]] = {
+    **{name: ["-c", CHILD.format(call), "PORT"] for name, call in METHODS.items()},
+    **{name: [str(PYTHON / "examples" / name), "--port", "PORT", *rest] for name, rest in EXAMPLES.items()},
+}
+LATEST_S = 1.5  # between the first motion and the end
+
+
+class Interrupted(OnServed):
+    ARGUMENTS = (*OnServed.ARGUMENTS, "--tcp", "0")
+
+    def begin(self, name: str, port: str, draw: random.Random) -> "subprocess.Popen[str]":
+        """Starts a program, and comes back at an instant behind its first motion."""
+        child = self.python(*(port if argument == "PORT" else argument for argument in PROGRAMS[name]))
+        while child.poll() is None and self.served.truths()[1].mode in ["Off", "Tare"]:
+            time.sleep(0.005)
+        time.sleep(draw.uniform(0.0, LATEST_S))
+        return child
+
+    def test_signals(self) -> None:
+        draw = random.Random(1)
+        for name in PROGRAMS:
+            for number in [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]:
+                with self.subTest(name, number=number):
+                    cable = Cable(self.served.port)
+                    child = self.begin(name, cable.port, draw)
+                    child.send_signal(number)
+                    _, told = child.communicate()
+                    cable.unplug()
+                    self.assert_released(f"{name} {number!r} {told}")
+                    self.served.stop()
+                    self.served = self.serve(*self.ARGUMENTS)
+
+    def test_killed_programs_and_lost_links(self) -> None:
+        draw = random.Random(2)
+        for name in PROGRAMS:
+            for killed in [True, False]:
+                with self.subTest(name, killed=killed):
+                    cable = Cable(self.served.port)
+                    child = self.begin(name, cable.port, draw)
+                    if killed:
+                        child.kill()
+                        child.communicate()
+                        cable.unplug()
+                    else:
+                        cable.unplug()
+                        child.communicate()
+                    # Packets for another finger are no sign of life for this one.
+                    self.pass_s(1.0)
+                    self.assert_released(f"{name}, killed: {killed}")
+                    self.served.stop()
+                    self.served = self.serve(*self.ARGUMENTS)
+
+    def test_every_example_tells_its_options(self) -> None:
+        for path in sorted((PYTHON / "examples").glob("*.py")):
+            with self.subTest(path.name):
+                child = self.python(str(path), "--help")
+                told, _ = child.communicate()
+                self.assertEqual(child.returncode, 0)
+                self.assertIn("--port", told)

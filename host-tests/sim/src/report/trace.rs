@@ -125,7 +125,7 @@ pub struct Tracks {
     pub sensed: Track,
     /// The true force less the goal, mN.
     pub control_error: Track,
-    /// The control error while a force is held, [`HELD_AFTER_S`] after the goal changed or the touch.
+    /// The control error while a force is held, `HELD_AFTER_S` after the goal changed or the touch.
     pub held_error: Track,
     /// The sensed less the true force, mN.
     pub sensing_error: Track,

@@ -192,7 +192,9 @@ class Bus:
             if self._feeder is None:
                 self._feeder = threading.Thread(target=self._feed, daemon=True)
                 self._feeder.start()
-        _check(self._set(reg.BUS_WATCHDOG, dict.fromkeys(ids, 20 * round(silence_s / 0.02))))
+        failed = self._set(reg.BUS_WATCHDOG, dict.fromkeys(ids, 20 * round(silence_s / 0.02)))
+        self._forget(failed)
+        _check(failed)
 
     def _feed(self) -> None:
         while True:
@@ -211,11 +213,15 @@ class Bus:
         """Turns the watchdogs off and feeds them no more. Those of fingers that did not answer stay on, to stop them."""
         watched = [device_id for device_id in ids if device_id in self._silence_s]
         unanswered = self._set(reg.BUS_WATCHDOG, {device_id: 0 for device_id in watched if device_id not in failed})
+        self._forget(watched)
+        _check(unanswered)
+
+    def _forget(self, ids: Iterable[int]) -> None:
+        """Feeds the watchdogs of these fingers no more."""
         with self.line.lock:
-            for device_id in watched:
+            for device_id in ids:
                 self._silence_s.pop(device_id, None)
             self.line.feed_s = min(self._silence_s.values()) / 4 if self._silence_s else None
-        _check(unanswered)
 
     def _look(self, ids: Iterable[int], pressures: bool = False) -> "Dict[int, Union[State, FingertipError]]":
         """The states of these fingers, or why there is none."""

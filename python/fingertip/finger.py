@@ -45,8 +45,13 @@ class Finger(Device):
 
     def write_bytes(self, address: int, data: bytes, doing: str = "") -> None:
         """Writes whole registers side by side: all of it happens or nothing."""
+        wrote = self.wrote
         self.bus.touch(self)
-        super().write_bytes(address, data, doing)
+        try:
+            super().write_bytes(address, data, doing)
+        except Refused:
+            self.wrote = wrote  # nothing was written: the finger may press for another program
+            raise
 
     def state(self, pressures: bool = True) -> State:
         """Reads state and time in one packet, with the pressures or without: that is five times as short.

@@ -126,6 +126,16 @@ class Moves(OnServed):
         for value in [10, 2560, -20]:
             self.refused(ValueError, finger.write, reg.BUS_WATCHDOG, value)
 
+    def test_who_was_refused_leaves_the_finger_as_it_is(self) -> None:
+        with self.open(leave_pressing=True) as finger:
+            finger.tare()
+            finger.press(0.5)
+        finger = self.open()
+        self.refused(FingertipError, finger.write_bytes, reg.TARE.address, b"\1")  # not while torque is on
+        finger.close()
+        with self.open() as finger:
+            self.assertEqual(finger.read(reg.GOAL_FORCE_MN), 500)
+
     def test_release_right_after_press_lets_go(self) -> None:
         finger = self.open()
         finger.tare()

@@ -56,7 +56,7 @@ fn code(page: &str) -> (Vec<String>, Vec<String>) {
     (blocks, spans.collect())
 }
 
-/// Words as a shell splits them: what stands in quotes is one word.
+/// Splits a line into words as a shell does: a quoted text is one word.
 fn words(command: &str) -> Vec<String> {
     let (mut words, mut quote) = (vec![String::new()], None);
     for sign in command.chars() {

@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::line::Line;
 use crate::table::{self, Value};
 use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, instruction};
+use fingertip::link::packet::{BROADCAST, Packet, instruction};
 use fingertip::link::receiver::{Event, Receiver};
 use fingertip::link::sender::Sender;
 use fingertip::link::table::Register;
@@ -161,18 +161,14 @@ impl Client {
     /// # Errors
     /// The port is lost.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
-        self.send(BROADCAST, instruction::PING, &[])?;
-        let until = Instant::now() + self.timeout + self.ping_slots();
+        let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());
-        while let Some(left) = until.checked_duration_since(Instant::now()) {
-            let bytes = self.line.read(left).map_err(|why| self.lost(why))?;
-            for byte in bytes {
-                if receiver.push(byte) == Some(Event::Packet) && receiver.packet().instruction == instruction::STATUS {
-                    let packet = receiver.packet();
-                    if let [_, low, high, firmware] = *packet.params {
-                        found.push(Pong { id: packet.id, model: u16::from_le_bytes([low, high]), firmware });
-                    }
-                }
+        for byte in heard {
+            if receiver.push(byte) == Some(Event::Packet)
+                && let Packet { id, instruction: instruction::STATUS, params: &[_, low, high, firmware], .. } =
+                    receiver.packet()
+            {
+                found.push(Pong { id, model: u16::from_le_bytes([low, high]), firmware });
             }
         }
         Ok(found)
@@ -257,15 +253,13 @@ impl Client {
         self.send(BROADCAST, instruction::WRITE, &[&address.to_le_bytes()[..], &data].concat())
     }
 
-    /// Sends a packet as it is, and returns what comes in until the last of these answers, or until the time is over.
-    /// `from` is who answers, where it is one device.
+    /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the
+    /// time-out. Of a packet for one device, `from`, only answers of that device count.
     ///
     /// # Errors
     /// The port is lost.
     pub fn pass(&mut self, packet: &[u8], from: Option<u8>, mut answers: usize) -> Result<Vec<u8>, Error> {
-        self.settle()?;
-        self.line.discard().map_err(|why| self.lost(why))?;
-        self.line.write(packet).map_err(|why| self.lost(why))?;
+        self.transmit(packet)?;
         let all = answers == usize::MAX;
         let until = Instant::now() + self.timeout + if all { self.ping_slots() } else { Duration::ZERO };
         let (mut receiver, mut heard) = (Receiver::new(), Vec::new());
@@ -332,13 +326,13 @@ impl Client {
     }
 
     fn send(&mut self, id: u8, instruction: u8, params: &[u8]) -> Result<(), Error> {
+        self.transmit(&packet(id, instruction, params))
+    }
+
+    fn transmit(&mut self, packet: &[u8]) -> Result<(), Error> {
         self.settle()?;
         self.line.discard().map_err(|why| self.lost(why))?;
-        let mut packet = Reply::new();
-        let mut sender = Sender::new(&mut packet, id, instruction);
-        params.iter().for_each(|byte| sender.push(*byte));
-        sender.finish();
-        self.line.write(&packet).map_err(|why| self.lost(why))
+        self.line.write(packet).map_err(|why| self.lost(why))
     }
 
     /// Waits until the line is silent where an answer may come yet: the protocol does not number its packets, so a late
@@ -353,4 +347,13 @@ impl Client {
     fn lost(&self, why: std::io::Error) -> Error {
         Error::Port { port: self.port.clone(), why }
     }
+}
+
+/// The bytes of an instruction packet.
+fn packet(id: u8, instruction: u8, params: &[u8]) -> Reply {
+    let mut packet = Reply::new();
+    let mut sender = Sender::new(&mut packet, id, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
+    packet
 }

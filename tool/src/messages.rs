@@ -79,7 +79,7 @@ pub fn topic(id: u8, kind: &str) -> String {
     format!("/finger{}/{kind}", id.saturating_sub(1))
 }
 
-/// What a controller is, for the metadata of a recording and of its channels.
+/// Identity of a controller, for the metadata of a recording and of its channels.
 ///
 /// # Errors
 /// See [`Error`].

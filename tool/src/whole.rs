@@ -80,7 +80,7 @@ impl Part {
 
 impl Drop for Part {
     fn drop(&mut self) {
-        // Nothing was written: a command failed before. After a rename the name is free, or another's.
+        // A failed command wrote nothing. Once the file was renamed, its old name may belong to another program.
         if fs::metadata(&self.part).is_ok_and(|there| there.len() == 0 && is_same(&there, &self.file)) {
             let _ = fs::remove_file(&self.part);
         }

@@ -21,7 +21,7 @@ pub struct Scene {
     pub name: String,
     /// The file, whole.
     pub text: String,
-    /// What the command line put in place of the file's values, `TABLE.KEY=VALUE`; `text` has it too.
+    /// Values that the command line replaced, as `TABLE.KEY=VALUE`. `text` has them too.
     pub set: Vec<String>,
     /// What it shows, in a line.
     pub about: String,

@@ -64,7 +64,7 @@ fn compared(first: &Scene, second: &Scene) -> Agreement {
     agreement
 }
 
-/// A tare that an event asks for is not the tare before the scene's start.
+/// An event may request a tare after the one with which every scene starts.
 #[test]
 fn a_scene_may_ask_for_a_tare() {
     let released = WALL.replace("duration_s = 0.3", "duration_s = 0.6");

@@ -58,13 +58,14 @@ impl<'a> Moving<'a> {
 
     fn stop(&mut self) -> Result<(), Error> {
         let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
-        rest(RELEASE_S, self.client)?;
+        let released = take_off(RELEASE_S, self.client);
+        halt(self.client)?;
         // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
         // has tripped stays so, for `fingertip recover`.
         if self.client.again(|client| client.number(address::BUS_WATCHDOG))? >= 0 {
             self.client.again(|client| client.set(address::BUS_WATCHDOG, watchdog))?;
         }
-        Ok(())
+        released
     }
 }
 
@@ -76,19 +77,16 @@ impl Drop for Moving<'_> {
     }
 }
 
-/// Takes the tip off the object and turns torque off, whatever comes of the release. Only torque off ends a press that
-/// measures, and friction would keep most of its force: torque then goes on once more, with the goal of 0 that torque off
-/// leaves.
-pub(super) fn rest(within_s: f64, client: &mut Client) -> Result<(), Error> {
-    let mut released = release(within_s, client);
-    if released.as_ref().is_ok_and(|state| state.mode == Mode::Identify as i64) {
+/// Takes the tip off the object; [`halt`] must follow, whatever comes of it. Only torque off ends a press that measures,
+/// and friction would keep most of its force: torque then goes on once more, with the goal of 0 that torque off leaves.
+pub(super) fn take_off(within_s: f64, client: &mut Client) -> Result<(), Error> {
+    if release(within_s, client)?.mode == Mode::Identify as i64 {
         halt(client)?;
         client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
         wait_for(client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;
-        released = release(within_s, client);
+        release(within_s, client)?;
     }
-    halt(client)?;
-    released.map(drop)
+    Ok(())
 }
 
 /// Ends a grip by the goal 0 and waits until the tip is clear of the object, at most for this time. Returns the last

@@ -212,8 +212,12 @@ impl Bus {
 /// Stops a device that is driven. Returns whether it was.
 fn stop(client: &mut Client) -> Result<bool, Error> {
     if i64::from(client.again(Client::ping)?.model) == table::model() {
-        let drives = !moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?);
-        return if drives { moving::rest(RELEASE_S, client).map(|()| true) } else { Ok(false) };
+        if moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
+            return Ok(false);
+        }
+        let released = moving::take_off(RELEASE_S, client);
+        moving::halt(client)?;
+        return released.map(|()| true);
     }
     let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;
     if drives {

@@ -94,7 +94,7 @@ fn watch(
     loop {
         let read = State::read_picture(client);
         if matches!(read, Err(Error::Port { .. })) {
-            // It may come back; until then the last state stays, with the reason.
+            // The port may come back. Until then the screen shows the last state and the reason.
             let _ = client.reopen();
         }
         seen.take(read);

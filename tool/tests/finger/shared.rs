@@ -18,14 +18,20 @@ struct Shared {
     address: String,
 }
 
+/// Starts a broker; it and its address, once it listens.
+fn broker(finger: &Served, listen: &str) -> (Child, String) {
+    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", "2000"]);
+    let mut line = String::new();
+    BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
+    let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
+    (broker, address.to_owned())
+}
+
 impl Shared {
     fn begin(scene: &str) -> Self {
         let finger = Served::begin(scene);
         finger.command("patient on");
-        let mut broker = finger.start(&["share", "--listen", "127.0.0.1:0", "--timeout-ms", "2000"]);
-        let mut line = String::new();
-        BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
-        let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address").to_owned();
+        let (broker, address) = broker(&finger, "127.0.0.1:0");
         Self { finger, broker, address }
     }
 
@@ -173,9 +179,7 @@ fn a_lost_port_is_opened_again_once_it_is_back() {
     shared.broker.wait().expect("it ends");
     assert!(matches!(client.ping(), Err(fingertip_cli::Error::Port { .. })));
     assert!(client.reopen().is_err(), "it is not back");
-    shared.broker = shared.finger.start(&["share", "--listen", &shared.address, "--timeout-ms", "2000"]);
-    let mut line = String::new();
-    BufReader::new(shared.broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
+    (shared.broker, _) = broker(&shared.finger, &shared.address);
     client.reopen().expect("it is back");
     client.ping().expect("it answers");
 }

@@ -113,47 +113,61 @@ fn a_program_that_ends_at_any_instant_leaves_no_force() {
     let mut random = fastrand::Rng::with_seed(28);
     for (arguments, _) in MOTIONS {
         // Long enough to be ended while the force is held.
-        let arguments: Vec<&str> =
-            arguments.iter().map(|word| if *word == "1000000" { "0.5" } else { *word }).collect();
-        let mut packets = 0;
-        for (end, instant) in ENDS.iter().flat_map(|end| (0..=instants).map(move |instant| (end, instant))) {
-            let finger = patient("wall");
-            finger.done(&["tare"]);
-            let (begun, file) = (finger.heard(), finger.file("ended.mcap"));
-            let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
-            let patience: &[&str] = if end.is_none() { &["--timeout-ms", "100"] } else { &[] };
-            if packets == 0 {
-                finger.done(&[&arguments, out].concat());
-                packets = finger.heard() - begun;
-                continue;
-            } else if instant == 0 {
-                continue;
+        let short = arguments.iter().map(|word| if *word == "1000000" { "0.5" } else { *word });
+        let arguments: Vec<&str> = short.collect();
+        let packets = packets_of(&arguments);
+        for end in ENDS {
+            for _ in 0..instants {
+                ends_without_force(&arguments, end, random.u64(1..packets));
             }
-            let at = random.u64(1..packets);
-            let mut child = if end.is_none() {
-                finger.command(&format!("deaf after {at} for {}", u64::MAX));
-                finger.start(&[&arguments, out, patience].concat())
-            } else {
-                finger.start(&[&arguments, out].concat())
-            };
-            while finger.heard() - begun < at && child.try_wait().expect("it was started").is_none() {
-                std::thread::yield_now();
-            }
-            let ended_s = finger.now_s();
-            if let Some(signal) = end
-                && child.try_wait().expect("it was started").is_none()
-            {
-                Served::signal(&child, *signal);
-            }
-            child.wait().expect("it ends");
-            while finger.now_s() < ended_s + 1.0 {
-                finger.command("state");
-            }
-            let left_n = finger.true_force_n();
-            assert!(left_n < RESIDUAL_N, "{arguments:?} {end:?} after {at} of {packets}: {}", finger.command("state"));
         }
         println!("{arguments:?}: no force left at {instants} instants of {} ends, {packets} packets", ENDS.len());
     }
+}
+
+/// Its file, where a command writes one.
+fn with_file<'a>(arguments: &[&'a str], file: &'a str) -> Vec<&'a str> {
+    let file = Some(file).filter(|_| arguments[0] == "capture");
+    arguments.iter().copied().chain(file).collect()
+}
+
+/// Packets that a command sends from its beginning to its end.
+fn packets_of(arguments: &[&str]) -> u64 {
+    let finger = patient("wall");
+    finger.done(&["tare"]);
+    let begun = finger.heard();
+    finger.done(&with_file(arguments, &finger.file("ended.mcap")));
+    finger.heard() - begun
+}
+
+/// Ends a command behind a number of its packets, and judges the true force 1 s later.
+fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
+    let finger = patient("wall");
+    finger.done(&["tare"]);
+    let (begun, file) = (finger.heard(), finger.file("ended.mcap"));
+    let mut arguments = with_file(arguments, &file);
+    if end.is_none() {
+        finger.command(&format!("deaf after {packets} for {}", u64::MAX));
+        arguments.extend(["--timeout-ms", "100"]);
+    }
+    let mut child = finger.start(&arguments);
+    let mut runs = || child.try_wait().expect("it was started").is_none();
+    while finger.heard() - begun < packets && runs() {
+        std::thread::yield_now();
+    }
+    let (ended_s, runs) = (finger.now_s(), runs());
+    if let Some(signal) = end.filter(|_| runs) {
+        Served::signal(&child, signal);
+    }
+    child.wait().expect("it ends");
+    while finger.now_s() < ended_s + 1.0 {
+        finger.command("state");
+    }
+    assert!(
+        finger.true_force_n() < RESIDUAL_N,
+        "{arguments:?} {end:?} after {packets} packets: {}",
+        finger.command("state")
+    );
 }
 
 #[test]

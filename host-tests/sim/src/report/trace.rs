@@ -13,7 +13,7 @@ use output::heatmap::Pressures;
 const STRETCHES: u64 = 900;
 /// Over how many of them a mean is taken of what changes from step to step.
 const OF_A_MEAN: usize = 9;
-/// As `metrics::response`: the steady error is judged from then on.
+/// Time after which the steady error is judged, as in `metrics::response`.
 const HELD_AFTER_S: f64 = 0.1;
 /// Pressure maps of a run.
 const MAPS: usize = 150;

@@ -62,7 +62,9 @@ fn nothing_is_wrong(name: &str) {
     let (folder, mut browser) = browser(name);
     let (scene, trace, mut outcome) = ran(name);
     // The longest name of a metric must fit a phone.
-    outcome.verdicts[0].bound.metric = "over_force_defective_mn".into();
+    for verdict in &mut outcome.verdicts {
+        verdict.bound.metric = "over_force_defective_mn".into();
+    }
     let ablated = ledger::ablate(&scene, &native::board).unwrap();
     let report =
         Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated, over: None };

@@ -25,7 +25,7 @@ use crate::params::{ParamError, Params};
 use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
 use bounds::{Bounds, Drives};
-use codes::{codes_at_full_range, force_seen, sag_max};
+use codes::{codes_at_full_range, force_seen, sag_max, saturated_codes};
 use curve::Curve;
 use fixed::types::{I8F24, I16F16};
 use gains::{Gains, PACES};
@@ -70,6 +70,8 @@ pub struct Config {
     pub sag_q32: u16,
     /// See [`Params::dead_codes`].
     pub dead_codes: u16,
+    /// Smallest code of a saturated taxel, see [`Params::headroom_codes`].
+    pub saturated_codes: u16,
     /// The characteristic, where it is not a line.
     pub curve: Option<Curve>,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
@@ -230,6 +232,7 @@ impl Config {
             tip,
             sag_q32,
             dead_codes: p.dead_codes as u16,
+            saturated_codes: saturated_codes(p),
             curve: Curve::new(p.curve_permille),
             newtons_per_sum_q48: wide(newtons_per_sum * exp2(48)),
             pascals_per_sum_q32: wide(1e3 / (16.0 * codes_per_kpa) * exp2(32)),

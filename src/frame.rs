@@ -9,8 +9,8 @@ pub use lanes::Codes;
 
 /// Converters that work side by side.
 pub const BANKS: usize = 2;
-/// A code from which a taxel counts as saturated (12-bit converter).
-pub const SATURATED: u16 = 4090;
+/// Largest code of the 12-bit converter.
+pub const CODE_MAX: u16 = 4_095;
 
 /// The rows and columns of an array: 3 x 3 to 16 x 32. Another shape does not compile.
 pub struct Shape<const ROWS: usize, const COLUMNS: usize>;

@@ -172,6 +172,9 @@ params! {
     /// Change of every taxel's zero for a K, by the microcontroller's temperature since the zero was last learnt. 0 takes
     /// none off.
     array_zero_pa_per_k = 0 in -1_000..=1_000;
+    /// How far below the converter's largest code, 4,095, a column amplifier may clip. A taxel that reads this close to
+    /// it counts as saturated. 255 codes are 205 mV.
+    headroom_codes = 255 in 5..=2_000;
 }
 
 impl Default for Params {

@@ -143,7 +143,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             if !sound.suspects(row::larger_lane(row.largest)) {
                 continue;
             }
-            let bad = suspect::bad([codes, undriven], config.dead_codes);
+            let bad = suspect::bad([codes, undriven], config);
             if bad != 0 {
                 self.picture.peak_codes = 0;
             }
@@ -175,7 +175,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.suspects(sound.largest(codes)) {
-                count += (suspect::bad([codes, undriven], config.dead_codes) & !mask).count_ones();
+                count += (suspect::bad([codes, undriven], config) & !mask).count_ones();
             }
         }
         count

@@ -1,6 +1,5 @@
 //! The pass over a frame, which works on rows, against the same taxel by taxel: any codes, gains, masks and tares.
 
-use fingertip::frame::SATURATED;
 use fingertip::params::Params;
 use fingertip::pressure::{CODE_BITS, GAIN_MAX, TARE_BITS};
 use fingertip::shipped::{Array, COLUMNS, Calibration, Config, Frame, Picture, ROWS, TARE_FRAMES};
@@ -55,7 +54,7 @@ fn config(sag_ppb: i32, dead_codes: i32) -> Config {
 fn bad(frame: &Frame, row: usize, config: &Config) -> u32 {
     let wrong = |column: usize| {
         let (code, level) = (frame.code(row, column), frame.code(ROWS, column) & 0xfff);
-        code >= SATURATED || i32::from(code) - i32::from(level) < i32::from(config.dead_codes)
+        code >= config.saturated_codes || i32::from(code) - i32::from(level) < i32::from(config.dead_codes)
     };
     (0..COLUMNS).map(|column| u32::from(wrong(column)) << column).sum()
 }
@@ -170,7 +169,12 @@ fn a_taxel_is_bad_from_the_very_limit_on() {
         let mut levels = [300; COLUMNS];
         levels[highest] = 320;
         let codes = |code| Codes { levels, above: [[40; COLUMNS]; ROWS], wild: vec![(4, column, code)] }.frame();
-        for (code, bad) in [(SATURATED, 1), (SATURATED - 1, 0), (levels[column] + 11, 1), (levels[column] + 12, 0)] {
+        for (code, bad) in [
+            (config.saturated_codes, 1),
+            (config.saturated_codes - 1, 0),
+            (levels[column] + 11, 1),
+            (levels[column] + 12, 0),
+        ] {
             let mut array = Array::new();
             let picture = array.read(&codes(code), &config);
             assert_eq!((picture.bad_count, picture.bad[4]), (bad, u32::from(bad) << column), "{code} in {column}");

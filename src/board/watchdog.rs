@@ -6,14 +6,18 @@
 //! and what takes long later first asks for the longest time.
 
 use embassy_stm32::pac;
+use embassy_stm32::pac::iwdg::vals::{Key, Pr};
 use embassy_stm32::pac::wwdg::vals::Wdgtb;
 use embassy_stm32::peripherals::{IWDG, WWDG};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, rcc};
 use fingertip::scan::ScanTiming;
+use fingertip::shipped::CLOCKS;
 
-/// The independent watchdog's time by its nominal clock; 8 to 23 ms over the clock's tolerance.
-const INDEPENDENT_US: u32 = 12_000;
+/// Shortest time of the independent watchdog in its counts of 125 us: 12 ms by its nominal clock of 32 kHz, 8 to 23 ms
+/// over that clock's tolerance, 17 to 47 kHz.
+const INDEPENDENT_LEAST: u32 = 96;
+/// Ticks of the scan's timer in a count at 47 kHz.
+const INDEPENDENT_TICK: u32 = CLOCKS.timer_hz / 47_000 * 4;
 /// A tick of the window watchdog at its quickest, in ticks of the scan's timer: 4096 of APB1, 97.5 us.
 const TICK: u32 = 4_096 * 4;
 /// Ticks for about a millisecond.
@@ -26,32 +30,39 @@ const LARGEST: u32 = 0x3F;
 
 /// The two, once started fed by the control task alone.
 pub struct Watchdogs {
-    independent: IndependentWatchdog<'static, IWDG>,
     count: u8,
 }
 
 impl Watchdogs {
     /// Neither runs yet.
-    pub fn new(independent: Peri<'static, IWDG>, _window: Peri<'static, WWDG>) -> Self {
+    pub fn new(_independent: Peri<'static, IWDG>, _window: Peri<'static, WWDG>) -> Self {
         rcc::enable_and_reset::<WWDG>();
-        Self { independent: IndependentWatchdog::new(independent, INDEPENDENT_US), count: LARGEST as u8 }
+        Self { count: LARGEST as u8 }
     }
 
-    /// Starts both, with the longest time. The independent one takes its own some cycles of its clock after its start
-    /// (RM0390, IWDG_SR): until it is fed then, 0.2 ms later, it counts from 0.5 s.
+    /// Starts both, with the longest time. [`Watchdogs::expect_frames`] follows at once.
     pub fn start(&mut self) {
-        self.independent.unleash();
+        pac::IWDG.kr().write(|w| w.set_key(Key::START));
         self.allow_long();
     }
 
-    /// From now on a frame is to be answered in time: 1 ms, or eight frames where these take longer.
+    /// Expects each frame to be answered in time. The window watchdog waits for 1 ms, or for eight frames where these
+    /// take longer; the independent one for 12 ms, or for eight frames of its quickest clock.
+    ///
+    /// The independent one takes a new time after some cycles of its clock, 0.2 ms, and ignores another until then
+    /// (RM0390, IWDG_SR). At the start it counts from 0.5 s until it is fed after that. Later the time changes with
+    /// the parameters only, and a new configuration takes longer than that.
     pub fn expect_frames(&mut self, timing: ScanTiming) {
+        let counts = (FRAMES * timing.frame().0).div_ceil(INDEPENDENT_TICK).max(INDEPENDENT_LEAST);
+        pac::IWDG.kr().write(|w| w.set_key(Key::ENABLE));
+        pac::IWDG.pr().write(|w| w.set_pr(Pr::DIVIDE_BY4));
+        pac::IWDG.rlr().write(|w| w.set_rl(counts as u16));
         let ticks = (FRAMES * timing.frame().0).div_ceil(TICK).max(LEAST);
         let divider = (0u8..3).find(|divider| ticks >> divider < LARGEST).unwrap_or(3);
         self.set(Wdgtb::from_bits(divider), (ticks >> divider) as u8 + u8::from(divider > 0));
     }
 
-    /// From now on both wait for as long as they can: 8 ms at least.
+    /// Lets the window watchdog wait for as long as it can, 49 ms. The independent one bites after 8 ms at the earliest.
     pub fn allow_long(&mut self) {
         self.set(Wdgtb::DIV8, LARGEST as u8);
     }
@@ -69,7 +80,7 @@ impl Watchdogs {
 
     /// Feeds both.
     pub fn pet(&mut self) {
-        self.independent.pet();
+        pac::IWDG.kr().write(|w| w.set_key(Key::RESET));
         pac::WWDG.cr().write(|w| {
             w.set_t(END | self.count);
             w.set_wdga(true);

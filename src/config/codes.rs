@@ -2,7 +2,7 @@
 
 use super::ConfigError;
 use super::numbers::{exp2, narrow};
-use crate::frame::SATURATED;
+use crate::frame::CODE_MAX;
 use crate::model::Tip;
 use crate::params::{ParamError, Params};
 use crate::units::{Kilopascals, Newtons};
@@ -30,9 +30,14 @@ pub(super) fn codes_at_full_range(p: &Params) -> Result<i32, ConfigError> {
     Ok(codes as i32)
 }
 
+/// Smallest code of a saturated taxel, see [`Params::headroom_codes`].
+pub(super) const fn saturated_codes(p: &Params) -> u16 {
+    CODE_MAX - p.headroom_codes as u16
+}
+
 /// See [`super::Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.
 pub(super) fn force_seen(p: &Params, codes_milli: i32, tip: &Tip) -> Newtons {
-    let codes = SEEN * f32::from(SATURATED) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
+    let codes = SEEN * f32::from(saturated_codes(p)) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
     let grown = p.curve_permille as f32 * 1e-3;
     // See `Curve`: what so many codes carry, in those of the full range.
     let codes = codes * (1.0 + grown * codes / 4_096.0) / (1.0 + grown);

@@ -2,7 +2,6 @@
 
 use super::{CODE_BITS, GAIN_BITS};
 use crate::config::Config;
-use crate::frame::SATURATED;
 use lanes::{BOOST_BITS, Common, Total, codes_at, each_pair, filled, moment_bits, sum_drop};
 
 /// Bits by which a total is coarser than a row's sum or moment: the upper half of a product with the boost.
@@ -14,27 +13,29 @@ pub(super) struct Sound<const COLUMNS: usize> {
     pub common: Common<COLUMNS>,
     /// The highest undriven level.
     pub undriven_max: u16,
-    dead_codes: u16,
+    /// The smallest sum of [`Sound::largest`] and the highest undriven level that may belong to a bad taxel.
+    suspect: u32,
 }
 
 impl<const COLUMNS: usize> Sound<COLUMNS> {
     /// From the slot with nothing driven.
     #[inline(always)]
     pub fn new(undriven: &[u16; COLUMNS], config: &Config) -> Self {
-        let Config { dead_codes, sag_q32, .. } = *config;
+        let Config { dead_codes, saturated_codes, sag_q32, .. } = *config;
         let common = Common {
             undriven: *undriven,
             dead: lanes::pair(dead_codes as i16, dead_codes as i16),
             sag: lanes::pair(sag_q32 as i16, sag_q32 as i16),
         };
-        Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), dead_codes }
+        let suspect = u32::from(saturated_codes) - u32::from(dead_codes);
+        Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
     }
 
     /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a
     /// dead one is huge as an unsigned number.
     #[inline(always)]
     pub fn suspects(&self, largest: u16) -> bool {
-        u32::from(largest) + u32::from(self.undriven_max) + u32::from(self.dead_codes) >= u32::from(SATURATED)
+        u32::from(largest) + u32::from(self.undriven_max) >= self.suspect
     }
 
     /// That of a row.

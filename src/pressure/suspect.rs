@@ -1,15 +1,15 @@
 //! Which taxels of a row are dead or saturated.
 
 use super::calibration::all;
-use crate::frame::SATURATED;
+use crate::config::Config;
 use lanes::{SIGNS, codes_at, each_pair, pairs};
 
 /// A bit for each column of a row that is dead or saturated. Any codes and levels are taken.
 #[cold]
 #[inline(never)]
-pub(super) fn bad<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], dead_codes: u16) -> u32 {
-    let dead = lanes::pair(dead_codes as i16, dead_codes as i16);
-    let sound = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
+pub(super) fn bad<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], config: &Config) -> u32 {
+    let both = |codes: u16| lanes::pair(codes as i16, codes as i16);
+    let (dead, sound) = (both(config.dead_codes), both(config.saturated_codes - 1));
     let mut bad = 0;
     each_pair::<COLUMNS>(|at| {
         let (code, undriven) = (codes_at(codes, at), codes_at(undriven, at));

@@ -8,7 +8,6 @@ use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::observer::Observer;
 use fingertip::control::winding::Winding;
-use fingertip::frame::SATURATED;
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
@@ -168,7 +167,7 @@ fn tare_sum(array: &Array) -> i64 {
 
 /// Frames held or in turns, from a tare at 40 codes.
 fn baselines() -> Vec<Machine<Array>> {
-    let most = SATURATED - 372 - 1;
+    let most = config().saturated_codes - 372 - 1;
     let inputs = [
         ("as tared", [40; 2]),
         ("one code more", [41; 2]),
@@ -209,7 +208,7 @@ fn tare(array: &mut Array, frame: &Frame, config: &Config) {
 
 /// Tare upon tare, of one frame or of two in turns.
 fn tares() -> Vec<Machine<Array>> {
-    let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, SATURATED - 372 - 1])];
+    let inputs = [("one frame", [40, 40]), ("the extremes in turns", [12, config().saturated_codes - 372 - 1])];
     let machine = |(input, pair): (&str, [u16; 2])| {
         let config = config();
         let frames = pair.map(frame);

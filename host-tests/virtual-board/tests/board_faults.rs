@@ -45,6 +45,24 @@ fn a_core_that_hangs_is_reset_within_two_milliseconds_and_comes_up_in_fault() {
     assert_eq!(driven.resets().expect("it runs"), vec![]);
 }
 
+/// The slowest scan that the parameters allow, 2.5 ms a frame: the independent watchdog waits until the frame guard trips.
+#[test]
+fn a_slow_scan_that_stops_is_lost_frames_and_no_crash() {
+    let mut rig = sound();
+    write_u32(&mut rig, register("sample_cycles"), 480);
+    write_u32(&mut rig, register("settle_ns"), 100_000);
+    rig.run_ms(100).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::FAULT), 0);
+    rig.inject(Fault::ConvertersStall).expect("it runs");
+    // Clearing the fault starts the scan again, and its first frame has the longest time.
+    for _ in 0..2 {
+        rig.run_ms(100).expect("it runs");
+        assert_eq!(rig.resets().expect("it runs"), vec![]);
+        assert_eq!(read_u8(&mut rig, address::FAULT), 1);
+        write_u8(&mut rig, address::CLEAR_FAULT, 1);
+    }
+}
+
 /// Stops the core, as in a loop with interrupts masked.
 fn hangs(rig: &mut Rig) {
     let hung_ns = rig.now_ns();

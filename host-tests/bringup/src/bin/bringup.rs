@@ -79,7 +79,7 @@ fn main() -> ! {
         )),
         Stage::Waits => {}
         Stage::Window => stages::window(kept, p.IWDG, p.WWDG, config.timing),
-        Stage::Independent => stages::independent(kept, p.IWDG, p.WWDG),
+        Stage::Independent => stages::independent(kept, p.IWDG, p.WWDG, config.timing),
         Stage::Foot => stages::foot(kept),
         Stage::Rest => {}
     }

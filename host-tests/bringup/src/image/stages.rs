@@ -94,9 +94,11 @@ pub fn window(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static
 }
 
 /// Lets the independent watchdog bite, while the other waits for as long as it can.
-pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>) -> ! {
+pub fn independent(kept: Kept, independent: Peri<'static, IWDG>, window: Peri<'static, WWDG>, timing: ScanTiming) -> ! {
     let mut dogs = Watchdogs::new(independent, window);
     dogs.start();
+    dogs.expect_frames(timing);
+    dogs.allow_long();
     cortex_m::asm::delay(TAKES_BY);
     dogs.pet();
     bitten(Kept { stage: Stage::Foot, ..kept }, 1)

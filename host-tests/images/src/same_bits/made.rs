@@ -93,6 +93,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         tip,
         sag_q32,
         dead_codes,
+        saturated_codes,
         newtons_per_sum_q48,
         pascals_per_sum_q32,
         curve,
@@ -132,7 +133,9 @@ fn add_config(mix: &mut Mix, config: &Config) {
         force_max,
         force_seen,
     } = &**config;
-    for ticks in [settle.0, slot.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into()] {
+    for ticks in
+        [settle.0, slot.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into(), (*saturated_codes).into()]
+    {
         mix.add(ticks);
     }
     mix.add(u32::from(*sag_q32));

@@ -1,7 +1,6 @@
 //! The pass over a frame in other formats, taxel by taxel.
 
 use super::frame::{Bench, Sums};
-use fingertip::frame::SATURATED;
 use fingertip::shipped::{COLUMNS, ROWS};
 use fixed::types::I16F16;
 
@@ -16,7 +15,8 @@ macro_rules! floating {
                 for (column, net) in nets.iter_mut().enumerate() {
                     let code = bench.frame.code(row, column);
                     let above = i32::from(code) - i32::from(bench.frame.code(ROWS, column));
-                    bad += u32::from(code >= SATURATED || above < i32::from(bench.config.dead_codes));
+                    bad +=
+                        u32::from(code >= bench.config.saturated_codes || above < i32::from(bench.config.dead_codes));
                     *net = <$type>::from(above as i16);
                     total += *net;
                 }
@@ -48,7 +48,7 @@ pub extern "C" fn saturating(bench: &mut Bench) {
         for (column, net) in nets.iter_mut().enumerate() {
             let code = bench.frame.code(row, column);
             let above = i32::from(code).saturating_sub(i32::from(bench.frame.code(ROWS, column))).max(0);
-            bad += u32::from(code >= SATURATED || above < i32::from(bench.config.dead_codes));
+            bad += u32::from(code >= bench.config.saturated_codes || above < i32::from(bench.config.dead_codes));
             *net = I16F16::from_bits(above << 11);
             total = total.saturating_add(*net);
         }

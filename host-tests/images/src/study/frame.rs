@@ -6,7 +6,6 @@ use super::inputs::Inputs;
 use super::packed;
 use super::sparse::{self, Sparse};
 use crate::host::{fail, say};
-use fingertip::frame::SATURATED;
 use fingertip::shipped::{Array, BANK_COLUMNS, COLUMNS, Calibration, Config, Frame, Picture, ROWS, SLOTS, TARE_FRAMES};
 use fixed::types::I16F16;
 
@@ -126,7 +125,7 @@ pub fn run(region: &mut u32, config: &Config, inputs: &mut Inputs) {
             }
         }
         // What a flag is for: the same frame with a saturated, then with a dead taxel.
-        for code in [SATURATED, bench.frame.code(ROWS, 4)] {
+        for code in [bench.config.saturated_codes, bench.frame.code(ROWS, 4)] {
             let sound = bench.frame;
             bench.frame.set_code(3, 4, code);
             kernel(&mut bench);
@@ -250,7 +249,7 @@ extern "C" fn integers(bench: &mut Bench) {
         for (column, net) in nets.iter_mut().enumerate() {
             let code = bench.frame.code(row, column);
             *net = (i32::from(code) - i32::from(bench.frame.code(ROWS, column))).max(0);
-            bad += u32::from(code >= SATURATED || *net < i32::from(bench.config.dead_codes));
+            bad += u32::from(code >= bench.config.saturated_codes || *net < i32::from(bench.config.dead_codes));
             total += *net;
         }
         // 1 / (1 - rho N) in Q22.

@@ -4,7 +4,7 @@
 
 use super::frame::{Bench, Sums, pairs};
 use core::arch::asm;
-use fingertip::frame::SATURATED;
+use fingertip::config::Config;
 use fingertip::shipped::{BANK_COLUMNS, ROWS};
 
 type Pairs = [u32; BANK_COLUMNS];
@@ -25,21 +25,22 @@ struct Frame {
     signs: u32,
     peaks: u32,
     dead: u32,
+    sound: u32,
 }
 
 impl Frame {
     fn new(bench: &Bench) -> Self {
-        let dead = bench.config.dead_codes as i16;
-        Self { signs: 0, peaks: 0, dead: lanes::pair(dead, dead) }
+        let both = |codes: u16| lanes::pair(codes as i16, codes as i16);
+        let Config { dead_codes, saturated_codes, .. } = *bench.config;
+        Self { signs: 0, peaks: 0, dead: both(dead_codes), sound: both(saturated_codes - 1) }
     }
 
     #[inline(always)]
     fn row(&mut self, codes: &Pairs, undriven: &Pairs, first: &Pairs, second: &Pairs) -> Row {
-        const SOUND: u32 = lanes::pair(SATURATED as i16 - 1, SATURATED as i16 - 1);
         let mut row = Row { codes: 0, sum: 0, moment: 0 };
         let mut take = |place: usize| {
             let net = lanes::sub(codes[place], undriven[place]);
-            self.signs |= lanes::sub(net, self.dead) | lanes::sub(SOUND, codes[place]);
+            self.signs |= lanes::sub(net, self.dead) | lanes::sub(self.sound, codes[place]);
             self.peaks = larger(self.peaks, net);
             row.codes = lanes::dot(net, ONES, row.codes);
             row.sum = lanes::dot(net, first[place], row.sum);
@@ -126,7 +127,7 @@ pub extern "C" fn plain(bench: &mut Bench) {
     let [low, high] = halves(largest);
     let peak = low.max(high) + i32::from(bench.config.dead_codes);
     let [low, high] = halves(highest);
-    bench.suspect = peak + low.max(high) >= i32::from(SATURATED);
+    bench.suspect = peak + low.max(high) >= i32::from(bench.config.saturated_codes);
     let Sums { sum: tare, moment_x: tare_x, moment_y: tare_y, .. } = bench.plain_tare;
     let moment_y = 2 * numbered - 11 * sum;
     bench.out =

@@ -5,7 +5,6 @@
 //! floors hold back of a row's sums these begin with.
 
 use super::frame::{Bench, Sums, pairs};
-use fingertip::frame::SATURATED;
 use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Config, ROWS};
 use lanes::{BOOST_BITS, CODE_BITS, GAIN_BITS};
 
@@ -82,7 +81,7 @@ fn read(bench: &mut Bench, mut wanted: u16) {
     let larger_lane = |pair: u32| (pair & 0xffff).max(pair >> 16);
     let highest = larger_lane(undriven.iter().fold(0, |highest, level| lanes::larger(highest, *level)));
     let (largest, dead) = (larger_lane(largest as u32), u32::from(dead_codes));
-    bench.suspect = largest + highest + dead >= u32::from(SATURATED);
+    bench.suspect = largest + highest + dead >= u32::from(bench.config.saturated_codes);
 
     let rounded = |value: i32, bits: u32| (value + (1 << (bits - CODE_BITS - 1))) >> (bits - CODE_BITS);
     let moment_y = 11 * (first >> 2) - 2 * running;

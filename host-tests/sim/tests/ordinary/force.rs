@@ -176,3 +176,22 @@ fn a_doubtful_fit_never_says_less_than_the_taxels() {
         assert!(outcome.passed(), "finger {number}: {:#?}", outcome.verdicts);
     }
 }
+
+/// Column amplifiers clip 50 to 197 mV below the reference, down to 3,850 codes, in presses on round objects that
+/// need more than that. A clipped taxel counts as saturated, so the clipped force is no reason to press harder.
+#[test]
+fn a_clipped_amplifier_gives_no_over_force() {
+    for (headroom_mv, curvature_per_mm, goal_n) in [50, 120, 197]
+        .into_iter()
+        .flat_map(|headroom_mv| [0.0, 0.066, 0.16, 0.29].map(|curvature_per_mm| (headroom_mv, curvature_per_mm)))
+        .flat_map(|(headroom_mv, curvature_per_mm)| [5.0, 7.0].map(|goal_n| (headroom_mv, curvature_per_mm, goal_n)))
+    {
+        let finger = format!(
+            "[tip]\nradius_mm = 10\nmodulus_kpa = 800\n[controller]\nmodulus_pa = 800000\n[object]\ndistance_mm = 2\n\
+             [effects.sphere]\ncurvature_per_mm = {curvature_per_mm:?}\n[effects.saturation]\n\
+             headroom_mv = {headroom_mv}\n[effects.noise]\nrms_codes = 2"
+        );
+        let over = asks(&[(0.0, goal_n)], 0.7, &finger).of("over_force_mn");
+        assert!(over < 150.0 + 300.0 * goal_n, "{headroom_mv} mV, {curvature_per_mm}/mm, {goal_n} N: {over} mN");
+    }
+}

@@ -34,7 +34,7 @@ impl Codes {
 /// Sound taxels, and up to so many codes that are anything up to `code_max`.
 fn codes(wild: usize, code_max: u16) -> impl Strategy<Value = Codes> {
     let places = (0..=ROWS, 0..COLUMNS, 0..=code_max);
-    let above = proptest::array::uniform10(proptest::array::uniform10(12_u16..3_400));
+    let above = proptest::array::uniform10(proptest::array::uniform10(12_u16..3_200));
     (proptest::array::uniform10(300_u16..600), above, proptest::collection::vec(places, 0..=wild))
         .prop_map(|(levels, above, wild)| Codes { levels, above, wild })
 }

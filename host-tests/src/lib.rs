@@ -2,6 +2,7 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod analogue;
 pub mod control_table;
 pub mod emulator;
 pub mod figures;

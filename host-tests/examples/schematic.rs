@@ -164,7 +164,7 @@ impl Sheet {
         self.part(80, 600, true, RESISTOR, "10 kOhm")?;
         self.path(80, 640, 0, "M0 0h120");
         self.grounded(80, 640, RESISTOR, "1 kOhm")?;
-        self.grounded(160, 640, CAPACITOR, "1 uF")?;
+        self.grounded(155, 640, CAPACITOR, "1 uF")?;
         self.path(200, 600, 0, AMPLIFIER);
         for (x, y, text) in [(206, 604, "-"), (206, 644, "+"), (216, 672, "U13C")] {
             self.text(x, y, "start", text);

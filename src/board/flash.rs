@@ -48,7 +48,7 @@ impl Store {
         self.journal.make_room(&mut self.chip, Record::SLOT_MAX)
     }
 
-    /// Appends a record. The core stands while each of its words ([`Record::slot_bytes`]) is programmed, 16 us and at
+    /// Appends a record. The core stands while each of its words (`Record::slot_bytes`) is programmed, 16 us and at
     /// most 100 us: the motor must be off, the scan stopped, and `between` them the watchdog fed.
     ///
     /// # Errors

@@ -164,6 +164,12 @@ mod tests {
     }
 
     #[test]
+    fn a_server_that_finds_no_board_is_told() {
+        let error = Session::open(Command::new("false")).err().expect("an error").to_string();
+        assert_eq!(error, "probe-rs gdb: exit status: 1");
+    }
+
+    #[test]
     fn a_word_is_read_low_byte_first_with_its_runs() {
         let (mut session, server) = session(&["$21640010#00", "$0*\"00#00", "$E01#00"]);
         assert_eq!(session.read(0xe004_2000).expect("a word"), 0x1000_6421);

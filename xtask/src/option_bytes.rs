@@ -3,7 +3,7 @@
 //! A write erases and programs a sector of its own. If a reset or a power loss cuts it short, the device can come up
 //! with read protection level 1, and leaving level 1 erases the whole flash (sources: docs/board.md, Option bytes). The
 //! image's window watchdog resets a halted core too, after 1 ms. So the write begins behind a reset that halts the core
-//! before its first instruction: no watchdog runs, and no code can request a reset.
+//! before its first instruction: no code has started a watchdog, and none can request a reset.
 
 use anyhow::{Result, anyhow, bail};
 use std::fmt;
@@ -26,6 +26,8 @@ const BOR_LEV: u32 = 0b11 << 2;
 const RDP: u32 = 0xff << 8;
 /// Read protection level 0. Any other byte but 0xCC is level 1; 0xCC is level 2, for ever.
 const RDP_LEVEL_0: u32 = 0xaa << 8;
+/// One while only software starts the independent watchdog; zero starts it at reset, and 0.5 s later it resets.
+const WDG_SW: u32 = 1 << 5;
 /// All bits of the register that are option bytes.
 const OPTIONS: u32 = 0x80ff_ffec;
 
@@ -76,7 +78,12 @@ const PREPARE: [Step; 5] =
 /// Unlocks the option bytes and puts the wanted ones into the register (RM0390 3.6.1, 3.6.2). The flash keeps the old ones.
 fn unlock(wanted: u32) -> [Step; 7] {
     [
-        Step::Expect("read protection level 0", OPTCR, RDP, RDP_LEVEL_0),
+        Step::Expect(
+            "read protection level 0 and a software watchdog (STM32CubeProgrammer sets both)",
+            OPTCR,
+            RDP | WDG_SW,
+            RDP_LEVEL_0 | WDG_SW,
+        ),
         Step::Write(OPTKEYR, KEYS[0]),
         Step::Write(OPTKEYR, KEYS[1]),
         Step::Expect("unlocked option bytes", OPTCR, OPTLOCK, 0),
@@ -287,6 +294,7 @@ mod tests {
             (Mock { slip: start - 3, ..Mock::new(FACTORY) }, "a halted core"),
             (Mock { busy: usize::MAX, ..Mock::new(FACTORY) }, "an idle flash"),
             (Mock::new(FACTORY & !RDP), "read protection level 0"),
+            (Mock::new(FACTORY & !WDG_SW), "a software watchdog"),
         ] {
             let (message, started) = mock.failure();
             assert!(message.contains(part) && message.contains(UNCHANGED) && !started, "{message}");

@@ -14,6 +14,7 @@ use std::{fs, path::Path};
 /// Files that programs write: path, and the example that prints their text.
 const GENERATED: [(&str, &str); 8] = [
     ("docs/control-table.md", "control-table"),
+    ("docs/firmware.md", "firmware-page"),
     ("docs/scenes.md", "scenes-page"),
     ("docs/budget.md", "budget-page"),
     ("docs/board.md", "analogue"),

@@ -159,18 +159,40 @@ impl Sheet {
 
     fn virtual_ground(&mut self) -> Drawn {
         self.title(20, 560, "Virtual ground, 0.3 V");
-        self.net(90, 600, true, "AVDD")?;
-        self.path(90, 600, 0, "M0 0h10");
-        self.part(100, 600, true, RESISTOR, "10 kOhm")?;
-        self.path(100, 640, 0, "M0 0h150");
-        self.grounded(100, 640, RESISTOR, "1 kOhm")?;
-        self.grounded(180, 640, CAPACITOR, "1 uF")?;
-        self.path(250, 600, 0, AMPLIFIER);
-        self.path(250, 600, 0, "M0 0h-20v-35h100v55h-20h30");
-        self.text(256, 604, "start", "-");
-        self.text(256, 644, "start", "+");
-        self.text(270, 672, "start", "U13C");
-        self.net(340, 620, false, "VG")
+        self.net(70, 600, true, "AVDD")?;
+        self.path(70, 600, 0, "M0 0h10");
+        self.part(80, 600, true, RESISTOR, "10 kOhm")?;
+        self.path(80, 640, 0, "M0 0h120");
+        self.grounded(80, 640, RESISTOR, "1 kOhm")?;
+        self.grounded(155, 640, CAPACITOR, "1 uF")?;
+        self.path(200, 600, 0, AMPLIFIER);
+        for (x, y, text) in [(206, 604, "-"), (206, 644, "+"), (216, 672, "U13C")] {
+            self.text(x, y, "start", text);
+        }
+        self.path(200, 600, 0, "M0 0h-15v-60h55m40 0h70v80m-165-50h20m40 0h25v50m-10 0h20m40 0h50");
+        self.part(240, 540, false, RESISTOR, "10 kOhm")?;
+        self.part(205, 570, false, CAPACITOR, "10 nF")?;
+        self.part(280, 620, false, RESISTOR, "")?;
+        self.known("4.7 Ohm")?;
+        self.text(302, 642, "middle", "4.7 Ohm");
+        self.grounded(350, 620, CAPACITOR, "4.7 uF")?;
+        self.net(370, 620, false, "VG")
+    }
+
+    fn motor_supply(&mut self) -> Drawn {
+        self.title(20, 730, "Motor supply");
+        self.known("6 to 8.5 V")?;
+        self.path(100, 770, 0, "M0 0h60m-50-6h40v12h-40zm50 6h20l34-14m0 14h66");
+        self.text(96, 774, "end", "6 to 8.5 V");
+        for (x, part) in [(130, "F1 2.5 A"), (190, "S1")] {
+            self.text(x, 752, "middle", part);
+        }
+        self.block([280, 750, 80, 40], "Q1 AO3401A")?;
+        for (x, y, pin) in [(290, 774, "D"), (320, 786, "G"), (350, 774, "S")] {
+            self.text(x, y, "middle", pin);
+        }
+        self.grounded(320, 790, RESISTOR, "100 kOhm")?;
+        self.net(360, 770, false, "VM")
     }
 
     fn bridge(&mut self) -> Drawn {
@@ -219,7 +241,9 @@ impl Sheet {
         self.block([1_050, 400, 130, 70], "IE2-400 encoder")?;
         for (y, pin, net) in [(420, "A", "ENCA"), (450, "B", "ENCB")] {
             self.text(1_056, y + 4, "start", pin);
-            self.net(1_050, y, true, net)?;
+            self.path(1_000, y, 0, "M40 0h10");
+            self.part(1_000, y, false, RESISTOR, "1 kOhm")?;
+            self.net(1_000, y, true, net)?;
         }
         self.net(1_180, 420, false, "5V")?;
         self.net(1_180, 450, false, "GND")
@@ -277,6 +301,7 @@ fn main() -> Drawn {
     sheet.row()?;
     sheet.column()?;
     sheet.virtual_ground()?;
+    sheet.motor_supply()?;
     sheet.bridge()?;
     sheet.supply()?;
     sheet.bus()?;

@@ -2,6 +2,7 @@
 //!
 //! All of it is simulated; nothing here has touched silicon.
 
+pub mod analogue;
 pub mod control_table;
 pub mod emulator;
 pub mod figures;
@@ -14,5 +15,6 @@ pub mod model_file;
 pub mod page;
 pub mod program;
 pub mod prove;
+pub mod saves;
 pub mod stimulus;
 pub mod study;

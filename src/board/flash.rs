@@ -48,8 +48,8 @@ impl Store {
         self.journal.make_room(&mut self.chip, Record::SLOT_MAX)
     }
 
-    /// Appends a record. The core stands while each of its 78 words is written (178 with gains), 16 us and at most
-    /// 100 us: the motor must be off, the scan stopped, and `between` them the watchdog fed.
+    /// Appends a record. The core stands while each of its words (`Record::slot_bytes`) is programmed, 16 us and at
+    /// most 100 us: the motor must be off, the scan stopped, and `between` them the watchdog fed.
     ///
     /// # Errors
     /// There is no room, or the flash does not hold the record afterwards.

@@ -2,7 +2,8 @@
 
 use embassy_stm32::pac;
 
-/// The code of level 3 in the register: the reset holds below 2.7 V, the least for 168 MHz with five wait states.
+/// The code of level 3 in the register: it resets before the supply is below 2.7 V, the least for 168 MHz with five wait
+/// states (docs/board.md, Option bytes).
 const LEVEL_3: u8 = 0b00;
 
 /// All of them.

@@ -12,10 +12,12 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the example that prints their text.
-const GENERATED: [(&str, &str); 7] = [
+const GENERATED: [(&str, &str); 8] = [
     ("docs/control-table.md", "control-table"),
+    ("docs/firmware.md", "firmware-page"),
     ("docs/scenes.md", "scenes-page"),
     ("docs/budget.md", "budget-page"),
+    ("docs/board.md", "analogue"),
     ("docs/pictures/schematic.svg", "schematic"),
     ("examples/dynamixel/fingertip.model", "model-file"),
     ("examples/dynamixel/fingertip_direct.model", "model-file-direct"),

@@ -4,6 +4,7 @@ use crate::fleet::{crc32, named, names, of_values};
 use crate::nor::{Nor, bits, record};
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector};
+use host_tests::saves::{PAGE, table};
 use sim::encode;
 
 const SIZE: usize = 8 * SLOT_BYTES;
@@ -135,4 +136,9 @@ fn something_happens_before_each_word_of_a_save() {
     let mut fed = 0;
     assert_eq!(Journal::new(&nor).save(&mut nor, &record(1), || fed += 1), Ok(()));
     assert_eq!(fed, SLOT_BYTES / 4);
+}
+
+#[test]
+fn the_table_of_saves_is_fresh() {
+    PAGE.check(&table()).expect("docs/firmware.md");
 }

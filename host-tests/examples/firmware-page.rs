@@ -1,0 +1,8 @@
+//! Prints `docs/firmware.md` with its table of saves.
+
+use host_tests::saves::{PAGE, table};
+
+fn main() -> Result<(), String> {
+    print!("{}", PAGE.renewed(&table())?.1);
+    Ok(())
+}

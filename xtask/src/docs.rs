@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use std::{fs, path::Path};
 
 /// Files that programs write: path, and the example that prints their text.
-const GENERATED: [(&str, &str); 8] = [
+const GENERATED: &[(&str, &str)] = &[
     ("docs/control-table.md", "control-table"),
     ("docs/firmware.md", "firmware-page"),
     ("docs/scenes.md", "scenes-page"),

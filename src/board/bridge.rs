@@ -80,7 +80,7 @@ impl Bridge {
         });
         timer.egr().write(|w| w.set_ug(true));
         timer.cr1().modify(|w| w.set_cen(true));
-        pins::timer_input(nfault, TIM1_FUNCTION, Pull::Up);
+        pins::input(nfault, TIM1_FUNCTION, Pull::Up);
         pins::timer_output(in1, TIM1_FUNCTION, Speed::High);
         pins::timer_output(in2, TIM1_FUNCTION, Speed::High);
         Self { woken: None, ready: false, driving: false, period_ticks }

@@ -2,7 +2,9 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, away, holding, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_u8};
+use crate::common::{
+    WAIT_NS, away, holding, holding_on_a_bus, on_bus, poke, read_u8, read_u16, read_u32, running, write_goal, write_u8,
+};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
 use fingertip::link::crc;
@@ -10,6 +12,8 @@ use fingertip::link::sender::Sender;
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
+use fingertip::store::BAUD_RATES;
+use rigless::soc::stm32f427::generated::USART2;
 use virtual_board::{Options, Rig};
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
@@ -136,4 +140,42 @@ fn fast_bulk_read_is_answered_in_one_packet() {
     let (body, checksum) = wire.split_at(wire.len() - 2);
     assert_eq!((wire.len(), checksum), (74, &crc::update(crc::START, body).to_le_bytes()[..]));
     assert_eq!(body[10], Mode::Force as u8);
+}
+
+/// Packets at each speed.
+const PACKETS: u64 = 2_000;
+
+/// Broadcast reads, which nobody answers, with pauses of 10 to 110 us: the image reads some of them while the next one
+/// arrives.
+#[test]
+fn no_byte_of_a_fast_bus_is_lost() {
+    const { assert!(BAUD_RATES[5] == 3_000_000) };
+    let mut rig = holding_on_a_bus(5, 0);
+    let mut packet = Reply::new();
+    let mut sender = Sender::new(&mut packet, 254, 2);
+    [0, 0, 4, 0].into_iter().for_each(|byte| sender.push(byte));
+    sender.finish();
+    // 42 MHz / 10 is the fastest below 5.25 Mbaud: both ends of the line go by the register.
+    for (baud, divider) in [(3_000_000, None), (4_200_000, Some(0x12))] {
+        if let Some(divider) = divider {
+            poke(&mut rig, USART2.base + 8, divider);
+        }
+        let before = read_u32(&mut rig, address::GOOD_PACKETS);
+        let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
+        for first in (0..PACKETS).step_by(1_000) {
+            let bytes = packet.to_vec();
+            rig.with(move |stand| {
+                let mut at_ns = stand.bench.next_ns;
+                for nth in first..first + 1_000 {
+                    stand.session.board_mut().wire().send(at_ns, &bytes);
+                    at_ns += packet_ns + 10_000 + nth * 7_919 % 100_000;
+                }
+            })
+            .expect("it runs");
+            rig.run_ms(1 + (1_000 * (packet_ns + 60_000)).div_ceil(1_000_000)).expect("it runs");
+        }
+        let good = read_u32(&mut rig, address::GOOD_PACKETS) - before - 1;
+        println!("{baud} baud: {} of {PACKETS} packets lost", PACKETS - u64::from(good));
+        assert_eq!(u64::from(good), PACKETS, "at {baud} baud");
+    }
 }

@@ -49,9 +49,10 @@ fn USART2() {
     }
 }
 
-/// Half of the ring is full, or all of it.
+/// Half of the ring is full, or all of it. A stream that lost its memory receives nothing until a reset.
 #[embassy_stm32::interrupt]
 fn DMA1_STREAM5() {
+    assert!(!pac::DMA1.isr(1).read().teif(RX_STREAM - 4));
     pac::DMA1.ifcr(1).write(|w| {
         w.set_htif(RX_STREAM - 4, true);
         w.set_tcif(RX_STREAM - 4, true);
@@ -119,6 +120,7 @@ impl Bus {
             w.set_minc(true);
             w.set_htie(true);
             w.set_tcie(true);
+            w.set_teie(true);
             w.set_en(true);
         });
         pac::USART2.cr3().modify(|w| {

@@ -14,7 +14,7 @@ use super::{converter, health, pins};
 /// Full scale: 3.3 V behind the divider by 11.
 const FULL_SCALE_MV: u32 = 3_300 * 11;
 const SUPPLY: u8 = 0;
-pub const REFERENCE: u8 = 17;
+const REFERENCE: u8 = 17;
 const SENSOR: u8 = 18;
 /// The factory's codes of the reference, and of the sensor at 30 and 110 degrees Celsius (DS10693).
 const FACTORY: [*const u16; 3] = [0x1FFF_7A2A as _, 0x1FFF_7A2C as _, 0x1FFF_7A2E as _];

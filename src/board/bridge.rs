@@ -61,12 +61,7 @@ impl Bridge {
         let period_ticks = LONGEST.0 as u16;
         timer.arr().write(|w| w.set_arr(period_ticks - 1));
         timer.cr1().modify(|w| w.set_arpe(true));
-        timer.ccmr_output(0).modify(|w| {
-            for channel in 0..2 {
-                w.set_ocm(channel, Ocm::PWM_MODE1);
-                w.set_ocpe(channel, true);
-            }
-        });
+        set_preload(true);
         timer.ccer().modify(|w| {
             w.set_cce(0, true);
             w.set_cce(1, true);
@@ -80,7 +75,7 @@ impl Bridge {
         });
         timer.egr().write(|w| w.set_ug(true));
         timer.cr1().modify(|w| w.set_cen(true));
-        pins::timer_input(nfault, TIM1_FUNCTION, Pull::Up);
+        pins::input(nfault, TIM1_FUNCTION, Pull::Up);
         pins::timer_output(in1, TIM1_FUNCTION, Speed::High);
         pins::timer_output(in2, TIM1_FUNCTION, Speed::High);
         Self { woken: None, ready: false, driving: false, period_ticks }
@@ -152,11 +147,15 @@ impl Bridge {
         let period = self.period_ticks;
         let low = ticks_low(duty, period);
         let (in1, in2) = if duty < Duty::ZERO { (low, 0) } else { (0, low) };
+        if !self.driving {
+            // The compare values count before the outputs come on. An update event would do it too, but begin a period.
+            set_preload(false);
+        }
         pac::TIM1.ccr(0).write(|w| w.set_ccr(period - in1));
         pac::TIM1.ccr(1).write(|w| w.set_ccr(period - in2));
         if !self.driving {
-            // The compare values are preloaded: bring them in before the outputs come on. Forget an old break.
-            pac::TIM1.egr().write(|w| w.set_ug(true));
+            set_preload(true);
+            // Forget an old break.
             let mut cleared = SrAdv(u32::MAX);
             cleared.set_bif(0, false);
             pac::TIM1.sr().write_value(cleared);
@@ -164,6 +163,18 @@ impl Bridge {
             self.driving = true;
         }
     }
+}
+
+/// Whether a compare value waits for the next period. Not so only while the outputs are off: RM0390 (OC1PE) guarantees
+/// no PWM without preload.
+#[inline(never)]
+fn set_preload(on: bool) {
+    pac::TIM1.ccmr_output(0).write(|w| {
+        for channel in 0..2 {
+            w.set_ocm(channel, Ocm::PWM_MODE1);
+            w.set_ocpe(channel, on);
+        }
+    });
 }
 
 /// The share of the period for which one input is low, ticks, rounded.

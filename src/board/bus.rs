@@ -1,31 +1,47 @@
 //! The bus on USART2: receives into a ring by DMA, sends by DMA, and holds the transceiver's direction.
 
+use core::sync::atomic::{AtomicU8, Ordering};
+
 use embassy_stm32::gpio::{Level, Output, Pull, Speed};
-use embassy_stm32::interrupt::typelevel::{self, Handler};
+use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::mode::Async;
 use embassy_stm32::pac::usart::regs::Sr;
 use embassy_stm32::peripherals::{DMA1_CH5, DMA1_CH6, PA2, PA3, PC8, USART2};
-use embassy_stm32::usart::{self, ConfigError, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::usart::{self, ConfigError, UartTx};
 use embassy_stm32::{Peri, bind_interrupts, dma, pac};
-use static_cell::ConstStaticCell;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::signal::Signal;
+
+use super::pins;
 
 bind_interrupts!(struct Irqs {
-    USART2 => GiveBack, usart::InterruptHandler<USART2>;
-    DMA1_STREAM5 => dma::InterruptHandler<DMA1_CH5>;
     DMA1_STREAM6 => dma::InterruptHandler<DMA1_CH6>;
 });
 
-/// Gives the line back at the end of the last stop bit. The task would come after control, up to a frame later, when
-/// another device may send already.
-struct GiveBack;
-
-impl Handler<typelevel::USART2> for GiveBack {
-    unsafe fn on_interrupt() {
-        if !pac::USART2.sr().read().tc() || !pac::USART2.cr1().read().tcie() {
-            return;
+/// Takes the end of what comes in, and of what goes out.
+///
+/// A read of the data register takes a byte that the DMA has not yet fetched, and no flag tells. But the flags of the
+/// receiver are cleared by nothing else. So the register is read here only: where the line has just fallen idle, and
+/// the next byte takes longer to arrive than this takes to run, or with a byte in error.
+///
+/// The line is given back here, at the end of the last stop bit. The task would come after control, up to a frame
+/// later, when another device may send already.
+#[embassy_stm32::interrupt]
+fn USART2() {
+    let status = pac::USART2.sr().read();
+    let error = status.fe() || status.ne() || status.ore();
+    if error || status.idle() {
+        pac::USART2.dr().read();
+        // An error that nobody has taken yet is not covered by an idle line.
+        if error || !RECEIVED.signaled() {
+            RECEIVED.signal(status);
         }
+    }
+    if status.tc() && pac::USART2.cr1().read().tcie() {
         if pac::DMA1.st(TX_STREAM).ndtr().read().ndt() == 0 {
             pac::GPIOC.bsrr().write(|w| w.set_br(TRANSMIT_ENABLE, true));
+            pac::USART2.cr1().modify(|w| w.set_tcie(false));
+            SENT.signal(());
         } else {
             // The DMA came late between two bytes.
             forget_completion();
@@ -33,11 +49,32 @@ impl Handler<typelevel::USART2> for GiveBack {
     }
 }
 
+/// Half of the ring is full, or all of it. A stream that lost its memory receives nothing until a reset.
+#[embassy_stm32::interrupt]
+fn DMA1_STREAM5() {
+    assert!(!pac::DMA1.isr(1).read().teif(RX_STREAM - 4));
+    pac::DMA1.ifcr(1).write(|w| {
+        w.set_htif(RX_STREAM - 4, true);
+        w.set_tcif(RX_STREAM - 4, true);
+    });
+    if !RECEIVED.signaled() {
+        RECEIVED.signal(Sr(0));
+    }
+}
+
+/// The port's status when the line fell idle, or when a byte was in error.
+static RECEIVED: Signal<CriticalSectionRawMutex, Sr> = Signal::new();
+static SENT: Signal<CriticalSectionRawMutex, ()> = Signal::new();
+
 const TRANSMIT_ENABLE: usize = 8;
+const RX_STREAM: usize = 5;
 const TX_STREAM: usize = 6;
+/// USART2 in the list of both streams.
+const CHANNEL: u8 = 4;
+const USART2_FUNCTION: u8 = 7;
 
 /// 1.7 ms of bytes at 3 Mbaud.
-static RING: ConstStaticCell<[u8; 512]> = ConstStaticCell::new([0; 512]);
+static RING: [AtomicU8; 512] = [const { AtomicU8::new(0) }; 512];
 
 /// The hardware that the bus takes.
 pub struct Parts {
@@ -57,7 +94,8 @@ pub struct Parts {
 
 /// Eight bits, no parity, one stop bit.
 pub struct Bus {
-    rx: RingBufferedUartRx<'static>,
+    /// The place in the ring of the next byte to take.
+    next: usize,
     tx: UartTx<'static, Async>,
     transmit_enable: Output<'static>,
 }
@@ -70,20 +108,63 @@ impl Bus {
     pub fn new(parts: Parts, baud: u32) -> Result<Self, ConfigError> {
         let mut config = usart::Config::default();
         config.baudrate = baud;
-        config.rx_pull = Pull::Up;
-        let uart = Uart::new(parts.usart, parts.rx, parts.tx, parts.tx_dma, parts.rx_dma, Irqs, config)?;
-        let (tx, rx) = uart.split();
-        let mut rx = rx.into_ring_buffered(RING.take());
-        rx.start_uart();
-        Ok(Self { rx, tx, transmit_enable: Output::new(parts.transmit_enable, Level::Low, Speed::Medium) })
+        let tx = UartTx::new(parts.usart, parts.tx, parts.tx_dma, Irqs, config)?;
+        pins::input(parts.rx, USART2_FUNCTION, Pull::Up);
+        let stream = pac::DMA1.st(RX_STREAM);
+        stream.par().write_value(pac::USART2.dr().as_ptr() as u32);
+        stream.m0ar().write_value(&raw const RING as u32);
+        stream.ndtr().write(|w| w.set_ndt(RING.len() as u16));
+        stream.cr().write(|w| {
+            w.set_chsel(CHANNEL);
+            w.set_circ(true);
+            w.set_minc(true);
+            w.set_htie(true);
+            w.set_tcie(true);
+            w.set_teie(true);
+            w.set_en(true);
+        });
+        pac::USART2.cr3().modify(|w| {
+            w.set_eie(true);
+            w.set_dmar(true);
+        });
+        pac::USART2.cr1().modify(|w| {
+            w.set_re(true);
+            w.set_idleie(true);
+        });
+        // SAFETY: the handlers above touch only atomics and flags of their own, and their priority is set.
+        unsafe {
+            interrupt::USART2.enable();
+            interrupt::DMA1_STREAM5.enable();
+        }
+        Ok(Self { next: 0, tx, transmit_enable: Output::new(parts.transmit_enable, Level::Low, Speed::Medium) })
     }
 
     /// Waits for bytes: until the line falls idle, or half of the ring is full.
     ///
     /// # Errors
-    /// Framing, noise, parity or overrun; the next call listens again.
+    /// Framing, noise or overrun; the next call goes on.
     pub async fn receive(&mut self, bytes: &mut [u8]) -> Result<usize, usart::Error> {
-        self.rx.read(bytes).await
+        loop {
+            let stored = RING.len() - usize::from(pac::DMA1.st(RX_STREAM).ndtr().read().ndt());
+            let end = if stored < self.next { RING.len() } else { stored };
+            let fresh = RING.get(self.next..end).unwrap_or_default();
+            let count = fresh.len().min(bytes.len());
+            if count > 0 {
+                for (byte, stored) in bytes.iter_mut().zip(fresh) {
+                    *byte = stored.load(Ordering::Relaxed);
+                }
+                self.next = (self.next + count) % RING.len();
+                return Ok(count);
+            }
+            let status = RECEIVED.wait().await;
+            if status.fe() {
+                return Err(usart::Error::Framing);
+            } else if status.ne() {
+                return Err(usart::Error::Noise);
+            } else if status.ore() {
+                return Err(usart::Error::Overrun);
+            }
+        }
     }
 
     /// Sends, and gives the line back after the last stop bit.
@@ -95,10 +176,11 @@ impl Bus {
         // The flag of the last transmission still stands, as the DMA alone does not clear it: the line would be given
         // back early.
         forget_completion();
+        SENT.reset();
         cortex_m::interrupt::free(|_| pac::USART2.cr1().modify(|w| w.set_tcie(true)));
-        let mut result = self.tx.write(bytes).await;
+        let result = self.tx.write(bytes).await;
         if result.is_ok() {
-            result = self.tx.flush().await;
+            SENT.wait().await;
         }
         self.transmit_enable.set_low();
         result
@@ -109,7 +191,7 @@ impl Bus {
     /// # Errors
     /// The clocks cannot make that speed.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), ConfigError> {
-        self.rx.set_baudrate(baud)
+        self.tx.set_baudrate(baud)
     }
 }
 

@@ -7,7 +7,7 @@ use cortex_m::peripheral::NVIC;
 use embassy_stm32::interrupt::Priority;
 use embassy_stm32::pac;
 use embassy_stm32::rcc::{
-    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllSource, Sysclk,
+    AHBPrescaler, APBPrescaler, Hse, HseMode, Pll, PllMul, PllPDiv, PllPreDiv, PllQDiv, PllRDiv, PllSource, Sysclk,
 };
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
@@ -28,12 +28,16 @@ pub fn start_external() -> bool {
 }
 
 /// HSE 8 MHz / 4 x 168 / 2 = 168 MHz for the core, or HSI 16 MHz / 8 x 168 / 2; APB1 at 42 MHz, APB2 at 84 MHz.
+///
+/// Nothing uses the outputs Q (48 MHz) and R, but the dividers 0, as the driver leaves them, and 1 are wrong
+/// configurations (RM0390, RCC_PLLCFGR).
 fn config(external: bool) -> Config {
     let mut config = Config::default();
     config.rcc.hse = external.then_some(Hse { freq: Hertz(8_000_000), mode: HseMode::Bypass });
     let (source, prediv) = if external { (PllSource::HSE, PllPreDiv::DIV4) } else { (PllSource::HSI, PllPreDiv::DIV8) };
     config.rcc.pll_src = source;
-    config.rcc.pll = Some(Pll { prediv, mul: PllMul::MUL168, divp: Some(PllPDiv::DIV2), divq: None, divr: None });
+    let (divp, divq, divr) = (Some(PllPDiv::DIV2), Some(PllQDiv::DIV7), Some(PllRDiv::DIV2));
+    config.rcc.pll = Some(Pll { prediv, mul: PllMul::MUL168, divp, divq, divr });
     config.rcc.sys = Sysclk::PLL1_P;
     config.rcc.ahb_pre = AHBPrescaler::DIV1;
     config.rcc.apb1_pre = APBPrescaler::DIV4;

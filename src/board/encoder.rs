@@ -19,8 +19,8 @@ impl Encoder {
     /// Starts counting at zero, all four edges of a quadrature period.
     pub fn new(_timer: Peri<'static, TIM3>, a: Peri<'static, PC6>, b: Peri<'static, PC7>) -> Self {
         // The pins take the 5 V of a push-pull encoder, but only without a pull (DS10693).
-        pins::timer_input(a, TIM3_FUNCTION, Pull::None);
-        pins::timer_input(b, TIM3_FUNCTION, Pull::None);
+        pins::input(a, TIM3_FUNCTION, Pull::None);
+        pins::input(b, TIM3_FUNCTION, Pull::None);
         rcc::enable_and_reset::<TIM3>();
         let timer = pac::TIM3;
         timer.ccmr_input(0).modify(|w| {

@@ -38,8 +38,8 @@ pub fn analog(pins: impl IntoIterator<Item = Peri<'static, AnyPin>>) {
     }
 }
 
-/// A timer's input.
-pub fn timer_input(pin: Peri<'static, impl Pin>, function: u8, pull: Pull) {
+/// An input of a timer or a port.
+pub fn input(pin: Peri<'static, impl Pin>, function: u8, pull: Pull) {
     alternate(pin.into(), function, AfType::input(pull));
 }
 

@@ -131,7 +131,7 @@ const TABLE: [Row; 26] = [
     ),
     (
         "noise_prefetch_codes",
-        "noise of the internal reference, flash prefetch on, rms",
+        "noise of column 5 with no row driven, held by the DAC, while the step runs; flash prefetch on, rms",
         "codes",
         [0.0, 2.0],
         "estimate: 1 code for 10.3 effective bits (DS10693), and as much again",
@@ -139,12 +139,12 @@ const TABLE: [Row; 26] = [
         Some(NO_NOISE),
     ),
     (
-        "noise_codes",
-        "the same with the prefetch off",
+        "noise_by_prefetch_codes",
+        "the same, less the same with the prefetch off",
         "codes",
-        [0.0, 2.0],
-        "the same; AN4073 says that the prefetch may add noise",
-        "where it is much below the other: the scan would gain by a prefetch that is off",
+        [-0.5, 0.5],
+        "estimate: half a code; AN4073 says that the prefetch may add noise",
+        "above: the scan would gain by a prefetch that is off",
         Some(NO_NOISE),
     ),
     (

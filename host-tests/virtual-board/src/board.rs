@@ -25,8 +25,6 @@ const VDD_MV: u32 = 3_300;
 const CORE_HZ: NonZeroU64 = NonZeroU64::new(168_000_000).expect("the core is clocked");
 /// Its SysTick runs at an eighth.
 const REFCLK_DIVIDER: NonZeroU32 = NonZeroU32::new(8).expect("a divider divides");
-/// USART2 in the part's list.
-pub const BUS_PORT: usize = 1;
 const PORT_A: usize = 0;
 const PORT_C: usize = 2;
 /// TIM1's alternate function on PA8 and PA9.
@@ -51,7 +49,6 @@ impl FingerBoard {
         let mut part = Part::new(front_end)?;
         part.chip.rcc.attach_crystals(HSE_HZ, 0);
         part.chip.set_supply(VDD_MV);
-        part.chip.usart[BUS_PORT].attach(Wire::default());
         let (flash, registers) = part.chip.program();
         let loaded = optcr::BOR_LEV.set(registers.get(Register::Optcr), options.brown_out_bits.into());
         flash.keep_options(loaded, registers.get(Register::Optcr1), registers);
@@ -60,7 +57,7 @@ impl FingerBoard {
 
     /// The host's end of the bus.
     pub fn wire(&mut self) -> &mut Wire {
-        self.part.chip.usart[BUS_PORT].chip_mut().expect("the wire was attached when the board was made")
+        self.part.wire()
     }
 
     /// Whether the transceiver holds the line.

@@ -2,7 +2,8 @@
 //!
 //! The crate's clock tree switches over as the clock security system does, and breaks TIM1, but it cannot raise the
 //! exception that nothing masks. Its handler is entered as the frame guard's interrupt, which has the highest priority.
-//! Nor does the tree know of an oscillator that never gets ready: its enable is taken back as soon as it is set.
+//! Nor does the tree know of an oscillator that never gets ready: its enable is taken back as soon as it is set. It takes
+//! any divider of the PLL: those that the manual calls wrong are told as a gap.
 
 use crate::board::FingerBoard;
 use rigless::device::{DeviceContext, RegisterFile};
@@ -13,6 +14,8 @@ use rigless::soc::stm32f427::generated::RCC;
 use rigless::soc::stm32f427::generated::rcc::{Register, cr};
 use rigless::soc::stm32f427::peripherals::rcc::Rcc;
 
+/// The register with the PLL's dividers; the tree does not have the F446's divider R.
+const PLLCFGR: u64 = 4;
 const NMI_VECTOR: u64 = 0x0800_0008;
 /// TIM5's.
 const GUARD_VECTOR: u64 = 0x0800_0000 + 4 * (16 + 50);
@@ -22,6 +25,8 @@ const GUARD_LINE: InterruptLine = InterruptLine::new(50).expect("there are more 
 #[derive(Clone, Debug, Default)]
 pub struct ExternalClock {
     lost: bool,
+    /// The last setting of the PLL with a divider Q or R below 2.
+    pub wrong_pll: Option<u64>,
     /// The guard's vector, while another stands in its place.
     vector: Option<u64>,
 }
@@ -46,6 +51,10 @@ impl ExternalClock {
 
     /// The core touched a register.
     pub fn accessed(&mut self, session: &mut Session<FingerBoard>, host: &mut dyn Host, access: &Access) {
+        let pll = access.kind == AccessKind::Write && access.address == RCC.base + PLLCFGR;
+        if pll && (access.value >> 24 & 0b1111 < 2 || access.value >> 28 & 0b111 < 2) {
+            self.wrong_pll = Some(access.value);
+        }
         let control = self.lost && access.kind == AccessKind::Write && access.address == RCC.base;
         if control && cr::HSEON.is_set(access.value) {
             let off = cr::HSEON.set(access.value, 0);

@@ -37,8 +37,7 @@ pub enum Fault {
     ClockLost,
     /// The scan's half-frame interrupt stores a word just below RAM, as a stack that runs over does.
     StoreBelowRam,
-    /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic of
-    /// the driver.
+    /// The bus's receiving DMA stream points where nothing answers, so its next byte is a transfer error: a panic.
     BusMemoryLost,
     /// The core's next access to these addresses is a bus error: a hard fault.
     BusError {

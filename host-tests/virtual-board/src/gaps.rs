@@ -60,6 +60,9 @@ impl Rig {
             for told in session.told() {
                 gaps.push(gap("told", format!("{} {}", told.instance, told.register), told.reason.to_owned()));
             }
+            if let Some(value) = stand.bench.clock.wrong_pll {
+                gaps.push(gap("refused", "RCC PLLCFGR".into(), format!("divider Q or R below 2: {value:#010x}")));
+            }
             gaps
         })
     }

@@ -11,6 +11,7 @@ pub mod bench;
 pub mod board;
 #[cfg(feature = "bringup")]
 pub mod bringup;
+mod bus_port;
 pub mod client;
 mod clock;
 pub mod converter;

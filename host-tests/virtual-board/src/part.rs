@@ -2,9 +2,12 @@
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
 //! - The window watchdog, see `WindowWatchdog`.
+//! - The core may read a received byte before the DMA fetches it, see [`crate::bus_port`].
+//! - TIM1 counts what moves the phase of the PWM, see [`crate::pwm_timer`].
+//! - A divider of the PLL that the manual calls wrong is told as a gap, see `clock`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.
 
-use crate::board::BUS_PORT;
+use crate::bus_port::BusPort;
 use crate::converter::Converter;
 use crate::flash;
 use crate::front_end::Shared;
@@ -12,6 +15,7 @@ use crate::pwm_timer::PwmTimer;
 use crate::scan_timer::ScanTimer;
 use crate::streams::Streams;
 use crate::window_watchdog::WindowWatchdog;
+use crate::wire::Wire;
 use rigless::device::{Device, ErasedDevice, Level, RegisterFile, ResetCause};
 use rigless::mcu::Mcu;
 use rigless::snapshot::store;
@@ -39,6 +43,7 @@ const EDGE_NS: u64 = 250;
 enum Model {
     /// The crate's part.
     Chip,
+    BusPort,
     Converter(usize),
     PwmTimer,
     ScanTimer,
@@ -60,8 +65,9 @@ pub struct Inputs {
 /// The microcontroller.
 #[derive(Debug)]
 pub struct Part {
-    /// All that the crate's part has; its own converters, TIM1 and TIM8 are not used.
+    /// All that the crate's part has; its own USART2, converters, TIM1 and TIM8 are not used.
     pub chip: Stm32f427,
+    bus_port: BusPort,
     converters: [Converter; 3],
     pwm_timer: PwmTimer,
     scan_timer: ScanTimer,
@@ -72,15 +78,16 @@ pub struct Part {
     layout: Bus,
     laying_out: bool,
     wiring: Vec<Model>,
-    /// TIM1 on the bus, and what the converters share.
+    /// USART2 and TIM1 on the bus, and what the converters share.
+    port_slot: usize,
     pwm_slot: usize,
     common_slot: usize,
 }
 
 store!(Part {
     values: [inputs],
-    parts: [chip, converters, pwm_timer, scan_timer, streams, window_watchdog],
-    built: [front_end, layout, laying_out, wiring, pwm_slot, common_slot],
+    parts: [chip, bus_port, converters, pwm_timer, scan_timer, streams, window_watchdog],
+    built: [front_end, layout, laying_out, wiring, port_slot, pwm_slot, common_slot],
 });
 
 impl Part {
@@ -94,8 +101,10 @@ impl Part {
         for (nth, name) in CONVERTERS.iter().enumerate() {
             wiring[chip.bus().slot(name)?] = Model::Converter(nth);
         }
+        let port_slot = chip.bus().slot("USART2")?;
         let pwm_slot = chip.bus().slot("TIM1")?;
         let common_slot = chip.bus().slot("C_ADC")?;
+        wiring[port_slot] = Model::BusPort;
         wiring[pwm_slot] = Model::PwmTimer;
         wiring[chip.bus().slot("TIM8")?] = Model::ScanTimer;
         wiring[chip.bus().slot("DMA2")?] = Model::Streams;
@@ -106,6 +115,7 @@ impl Part {
         let layout = flash::layout(chip.bus())?;
         let mut part = Self {
             chip,
+            bus_port: BusPort::new(RESET_HZ),
             converters: Self::converters(&front_end),
             pwm_timer: PwmTimer::new(RESET_HZ),
             scan_timer: ScanTimer::new(RESET_HZ, front_end.clone()),
@@ -116,6 +126,7 @@ impl Part {
             layout,
             laying_out: false,
             wiring,
+            port_slot,
             pwm_slot,
             common_slot,
         };
@@ -130,6 +141,11 @@ impl Part {
     /// Whether the emulator is laying out memory just now: then the bus is one that knows who programs the flash.
     pub fn set_laying_out(&mut self, laying_out: bool) {
         self.laying_out = laying_out;
+    }
+
+    /// The host's end of the bus.
+    pub fn wire(&mut self) -> &mut Wire {
+        self.bus_port.wire()
     }
 
     /// The bridge's timer and its registers.
@@ -212,6 +228,7 @@ impl Mcu for Part {
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
         self.reset_chip(at, cause);
+        Device::reset(&mut self.bus_port);
         self.window_watchdog = WindowWatchdog::default();
         self.streams = Streams::new(self.front_end.clone());
         self.converters = Self::converters(&self.front_end);
@@ -223,9 +240,8 @@ impl Mcu for Part {
 
     fn poll(&mut self, now: VirtualNanos) {
         // Of all models only the bus has something outside, and stops come often.
-        self.chip.drive_serial_port(now, BUS_PORT, |port, registers, context| {
-            Device::poll(port, registers, context);
-        });
+        let (registers, mut context) = self.chip.bus_mut().drive(now, self.port_slot);
+        Device::poll(&mut self.bus_port, registers, &mut context);
     }
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
@@ -235,6 +251,7 @@ impl Mcu for Part {
                 self.converters[*nth].inside_on = ccr::TSVREFE.is_set(common) && !ccr::VBATE.is_set(common);
                 Some(&mut self.converters[*nth])
             }
+            Some(Model::BusPort) => Some(&mut self.bus_port),
             Some(Model::PwmTimer) => Some(&mut self.pwm_timer),
             Some(Model::ScanTimer) => Some(&mut self.scan_timer),
             Some(Model::Streams) => Some(&mut self.streams),

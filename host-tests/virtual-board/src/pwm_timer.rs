@@ -8,8 +8,10 @@
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
 use rigless::soc::RegisterSpec;
+use rigless::soc::stm32f427::generated::tim1::{bdtr, cr1, egr};
 use rigless::soc::stm32f427::peripherals::tim::{Advanced, Channel, Counter, Family, Tim};
 use rigless::time::{EventId, VirtualNanos};
+use serde::{Deserialize, Serialize};
 
 type Register = <Advanced as Family>::Register;
 
@@ -19,14 +21,31 @@ pub struct PwmTimer {
     timer: Tim<Advanced>,
     clock_hz: u64,
     awake_until_ns: u64,
+    on: bool,
+    counts: Counts,
 }
 
-store!(PwmTimer { values: [timer, clock_hz, awake_until_ns], parts: [], built: [] });
+/// What decides about the phase of the PWM: the image must not move it while it turns the outputs on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// How often the main output enable was set.
+    pub turned_on: u64,
+    /// How often the running counter was made to begin a period: by an update event, or by its own register.
+    pub restarted: u64,
+}
+
+store!(PwmTimer { values: [timer, clock_hz, awake_until_ns, on, counts], parts: [], built: [] });
 
 impl PwmTimer {
     /// Out of reset, on a clock.
     pub fn new(clock_hz: u64) -> Self {
-        Self { timer: Tim::with_clock(clock_hz, Counter::Narrow), clock_hz, awake_until_ns: 0 }
+        let timer = Tim::with_clock(clock_hz, Counter::Narrow);
+        Self { timer, clock_hz, awake_until_ns: 0, on: false, counts: Counts::default() }
+    }
+
+    /// What the image did to the phase since the reset.
+    pub fn counts(&self) -> Counts {
+        self.counts
     }
 
     /// The share of a period for which a channel's output is high; 0 where it is not driven.
@@ -80,6 +99,13 @@ impl Device for PwmTimer {
     }
 
     fn write(&mut self, register: Register, value: u64, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
+        let restarts = register == Register::Egr && egr::UG.is_set(value) || register == Register::Cnt;
+        self.counts.restarted += u64::from(restarts && cr1::CEN.is_set(registers.get(Register::Cr1)));
+        if register == Register::Bdtr {
+            let on = bdtr::MOE.is_set(value);
+            self.counts.turned_on += u64::from(on && !self.on);
+            self.on = on;
+        }
         Device::write(&mut self.timer, register, value, registers, context);
         self.wake(registers, context.now());
     }
@@ -159,5 +185,28 @@ mod tests {
             assert_eq!(share(&mut part), ticks as f64 / 6_720.0, "behind period {period}");
         }
         assert!(run(&mut part, 1_000 * PERIOD_NS) <= 2);
+    }
+
+    /// As `board::bridge` turns the outputs on.
+    #[test]
+    fn a_duty_written_without_preload_is_in_use_at_once_and_begins_no_period() {
+        let timer = PwmTimer::new(CLOCK_HZ);
+        let mut part = Single::new(builder(), "TIM1", timer).expect("the part has a TIM1");
+        for (offset, value) in [(0x2c, 6_719), (0x18, 0x68), (0x20, 1), (0x14, 1), (0x00, 0x81)] {
+            write(&mut part, 0, offset, value);
+        }
+        for turn in 1..=10_000 {
+            let at_ns = turn * 100_003;
+            run(&mut part, at_ns);
+            for (offset, value) in [(0x44, 0), (0x18, 0x60), (0x34, turn % 6_720), (0x18, 0x68), (0x44, 1 << 15)] {
+                write(&mut part, at_ns, offset, value);
+            }
+            assert!((share(&mut part) * 6_720.0 - (turn % 6_720) as f64).abs() < 0.5);
+            let counted = part.read(VirtualNanos(at_ns), TIM1.base + 0x24, Width::W32).expect("a counter");
+            assert_eq!(counted, at_ns % PERIOD_NS * CLOCK_HZ / 1_000_000_000, "turn {turn}");
+        }
+        assert_eq!(part.pair().0.counts(), Counts { turned_on: 10_000, restarted: 0 });
+        write(&mut part, 2_000_000_000, 0x14, 1);
+        assert_eq!(part.pair().0.counts().restarted, 1);
     }
 }

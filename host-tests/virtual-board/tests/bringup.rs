@@ -14,7 +14,7 @@ const NOT_SHOWN: [&str; 10] = [
     "flash_word_us",
     "flash_erase_ms",
     "noise_prefetch_codes",
-    "noise_codes",
+    "noise_by_prefetch_codes",
     "loop_answer_us",
     "step_cycles",
     "step_most_cycles",

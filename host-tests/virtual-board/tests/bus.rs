@@ -2,7 +2,10 @@
 //!
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
-use crate::common::{WAIT_NS, away, holding, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_u8};
+use crate::common::{
+    WAIT_NS, away, holding, holding_on_a_bus, let_go, on_bus, poke, read_u8, read_u16, read_u32, running, write_goal,
+    write_u8,
+};
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
 use fingertip::link::crc;
@@ -10,6 +13,8 @@ use fingertip::link::sender::Sender;
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
+use fingertip::store::BAUD_RATES;
+use rigless::soc::stm32f427::generated::USART2;
 use virtual_board::{Options, Rig};
 
 fn read(rig: &mut Rig, register: u16, bytes: u16) -> Vec<u8> {
@@ -124,16 +129,75 @@ fn one_write_recovers_from_a_silent_bus() {
 #[test]
 fn fast_bulk_read_is_answered_in_one_packet() {
     let mut rig = holding();
-    let mut request = Reply::new();
-    let mut sender = Sender::new(&mut request, 254, 0x9A);
     let [low, high] = address::PRESENT_MODE.to_le_bytes();
-    [1, low, high, 62, 0].into_iter().for_each(|byte| sender.push(byte));
-    sender.finish();
-    rig.send(&request).expect("it runs");
+    rig.send(&broadcast(0x9A, &[1, low, high, 62, 0])).expect("it runs");
     rig.run_ms(5).expect("it runs");
     let wire: Vec<u8> = rig.take_received().expect("it runs").iter().map(|timed| timed.byte).collect();
     assert_eq!(wire[..10], [0xFF, 0xFF, 0xFD, 0, 0xFE, 67, 0, 0x55, 0, 1]);
     let (body, checksum) = wire.split_at(wire.len() - 2);
     assert_eq!((wire.len(), checksum), (74, &crc::update(crc::START, body).to_le_bytes()[..]));
     assert_eq!(body[10], Mode::Force as u8);
+}
+
+/// A packet for all devices, which none answers.
+fn broadcast(instruction: u8, params: &[u8]) -> Vec<u8> {
+    let mut packet = Reply::new();
+    let mut sender = Sender::new(&mut packet, 254, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
+    packet.to_vec()
+}
+
+/// Packets at each speed.
+const PACKETS: u64 = 1_000;
+
+/// Reads with pauses of 10 to 110 us: the image takes some of them while the next one arrives.
+#[test]
+fn no_byte_of_a_fast_bus_is_lost() {
+    const { assert!(BAUD_RATES[5] == 3_000_000) };
+    let mut rig = holding_on_a_bus(5, 0);
+    // 42 MHz / 10 is the fastest below 5.25 Mbaud: both ends of the line go by the register.
+    for (baud, divider) in [(3_000_000, None), (4_200_000, Some(0x12))] {
+        if let Some(divider) = divider {
+            poke(&mut rig, USART2.base + 8, divider);
+        }
+        let before = read_u32(&mut rig, address::GOOD_PACKETS);
+        let end_ns = rig
+            .with(move |stand| {
+                let packet = broadcast(2, &[0, 0, 4, 0]);
+                let packet_ns = packet.len() as u64 * 10 * 1_000_000_000 / baud;
+                (0..PACKETS).fold(stand.bench.next_ns, |at_ns, nth| {
+                    stand.session.board_mut().wire().send(at_ns, &packet);
+                    at_ns + packet_ns + 10_000 + nth * 7_919 % 100_000
+                })
+            })
+            .expect("it runs");
+        rig.run_until_ns(end_ns + 1_000_000).expect("it runs");
+        let good = u64::from(read_u32(&mut rig, address::GOOD_PACKETS) - before - 1);
+        println!("{baud} baud: {} of {PACKETS} packets lost", PACKETS - good);
+        assert_eq!(good, PACKETS, "at {baud} baud");
+    }
+}
+
+/// How often the bridge is turned on: between two of them the motor is shorted until it stands.
+const TURNS: u64 = 10;
+
+/// The edges of a duty meet the same rows of the scan as long as no period of the PWM is begun out of turn.
+#[test]
+fn turning_the_bridge_on_keeps_the_phase_of_the_pwm() {
+    let mut rig = holding();
+    let_go(&mut rig);
+    rig.run_ms(100).expect("it runs");
+    let counts = |rig: &mut Rig| rig.with(|stand| stand.session.board_mut().part.pwm_timer().0.counts());
+    let before = counts(&mut rig).expect("it runs");
+    for _ in 0..TURNS {
+        for (torque, ms) in [(1, 1), (0, 40)] {
+            write_u8(&mut rig, address::TORQUE_ENABLE, torque);
+            rig.run_ms(ms).expect("it runs");
+        }
+    }
+    let after = counts(&mut rig).expect("it runs");
+    let (turned_on, restarted) = (after.turned_on - before.turned_on, after.restarted - before.restarted);
+    println!("turned on {turned_on} times, a period begun out of turn {restarted} times");
+    assert_eq!((turned_on, restarted), (TURNS, 0));
 }

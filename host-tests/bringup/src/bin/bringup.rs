@@ -103,7 +103,6 @@ fn main() -> ! {
     report::figure("stack_foot", f32::from(u8::from(boot.crashed && boot.crash.cause == CrashCause::HardFault)));
     loopback::run();
     flash_times::run(p.FLASH);
-    converters::noise();
     converters::means(Analogue::new(p.ADC1, p.PA0));
 
     let mut scan = Scan::new(p.TIM8, (p.ADC3, p.ADC2), (p.DMA2_CH0, p.DMA2_CH1, p.DMA2_CH2), pins::of_scan!(p));
@@ -114,6 +113,7 @@ fn main() -> ! {
     let (bench, pipeline) = (BENCH.take(), make_pipeline(config));
     bench.finger.make_table();
     on_chip::run(bench, pipeline);
+    converters::noise(&mut scan, bench, pipeline);
     scan.stop();
     pipeline.renew(Taken::default(), 0, Winding::new());
     report::number("loop_bits", bench.digest(pipeline));

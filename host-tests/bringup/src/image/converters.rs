@@ -1,19 +1,20 @@
-//! The converters: their noise by the internal reference, what the first one tells of the microcontroller, and when a
+//! The converters: their noise beside the running step, what the first one tells of the microcontroller, and when a
 //! sample ends by a step of the DAC, which is on the pin of column 5.
 
+use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use embassy_stm32::pac;
-use embassy_stm32::peripherals::ADC1;
-use embassy_stm32::rcc;
 use fingertip::chip::FRAMES;
 use fingertip::scan::ScanTiming;
-use fingertip::shipped::{Frame, ROWS};
+use fingertip::shipped::{Frame, Pipeline, ROWS};
 
-use crate::board::analogue::{Analogue, REFERENCE};
-use crate::board::{converter, health, scan};
+use crate::board::analogue::Analogue;
+use crate::board::{health, scan};
 use crate::{CYCLES_PER_US, passed, report};
 
-const SAMPLES: u32 = 4_096;
+const SAMPLES: u32 = 2_048;
+/// The DAC's code while the noise is measured.
+const MIDDLE: u16 = 2_048;
 /// The column on the DAC's pin, PA4: the first that its converter takes.
 const COLUMN: usize = 5;
 /// The slot in which it steps.
@@ -24,23 +25,22 @@ const SEEN: u16 = 1_500;
 /// Ticks of the scan's timer between two places of the step.
 const STRIDE: usize = 4;
 
-/// The noise of the reference, with the flash's prefetch on and off. The first converter is free.
-pub fn noise() {
-    rcc::enable_and_reset::<ADC1>();
-    converter::set_clock();
-    pac::ADC123_COMMON.ccr().modify(|w| w.set_tsvrefe(true));
-    converter::set_sequence(pac::ADC1, [REFERENCE], converter::sample_time(480));
-    pac::ADC1.cr2().write(|w| w.set_adon(true));
-    cortex_m::asm::delay(10 * CYCLES_PER_US);
-    for (name, prefetch) in [("noise_prefetch_codes", true), ("noise_codes", false)] {
+/// The noise of the DAC's column in the slot that drives no row, with the flash's prefetch on and off, while the step
+/// runs without a pause. The other columns' pins are open on a bare board.
+pub fn noise(scan: &mut scan::Scan, bench: &mut Bench, pipeline: &mut Pipeline) {
+    start_dac();
+    pac::DAC1.dhr12r(0).write(|w| w.set_dhr(MIDDLE));
+    cortex_m::asm::delay(1_000 * CYCLES_PER_US);
+    let [with, without] = [true, false].map(|prefetch| {
         pac::FLASH.acr().modify(|w| w.set_prften(prefetch));
-        if let Some(codes) = deviation() {
-            report::figure(name, codes);
-        }
-    }
+        deviation(scan, bench, pipeline)
+    });
     pac::FLASH.acr().modify(|w| w.set_prften(true));
-    pac::ADC1.cr2().write(|_| ());
-    pac::ADC123_COMMON.ccr().modify(|w| w.set_tsvrefe(false));
+    pac::DAC1.cr().modify(|w| w.set_en(0, false));
+    if let (Some(with), Some(without)) = (with, without) {
+        report::figure("noise_prefetch_codes", with);
+        report::figure("noise_by_prefetch_codes", with - without);
+    }
 }
 
 /// The analogue supply and the microcontroller's temperature, as in as many frames as a mean takes.
@@ -55,32 +55,35 @@ pub fn means(mut analogue: Analogue) {
     }
 }
 
-/// The standard deviation of the codes; none where the converter does not answer.
-fn deviation() -> Option<f32> {
-    let (mut sum, mut squares) = (0u64, 0u64);
+/// The standard deviation of the codes; none where the scan stands.
+fn deviation(scan: &mut scan::Scan, bench: &mut Bench, pipeline: &mut Pipeline) -> Option<f32> {
+    let (mut count, mut sum, mut squares) = (0u64, 0u64, 0u64);
+    let mut frame = Frame::EMPTY;
     for _ in 0..SAMPLES {
-        pac::ADC1.cr2().modify(|w| w.set_swstart(true));
-        let since = DWT::cycle_count();
-        while !pac::ADC1.sr().read().eoc() {
-            if passed(since, 1_000 * CYCLES_PER_US) {
-                return None;
-            }
+        let before = scan::newest();
+        wait_until(|| {
+            bench.record(pipeline);
+            scan::newest() != before
+        })?;
+        if scan.copy(scan::newest(), &mut frame) {
+            let code = u64::from(frame.code(ROWS, COLUMN));
+            (count, sum, squares) = (count + 1, sum + code, squares + code * code);
         }
-        let code = u64::from(pac::ADC1.dr().read().data());
-        sum += code;
-        squares += code * code;
     }
-    let count = u64::from(SAMPLES);
-    Some(libm::sqrtf((squares * count - sum * sum) as f32) / count as f32)
+    (count > 0).then(|| libm::sqrtf((squares * count - sum * sum) as f32) / count as f32)
 }
 
-/// From the trigger to the end of the column's sample: the latest step that it still sees.
-pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
+fn start_dac() {
     pac::RCC.apb1enr().modify(|w| w.set_dacen(true));
     pac::DAC1.cr().modify(|w| {
         w.set_en(0, true);
         w.set_boff(0, true);
     });
+}
+
+/// From the trigger to the end of the column's sample: the latest step that it still sees.
+pub fn sample_instant(scan: &mut scan::Scan, timing: ScanTiming) {
+    start_dac();
     let (from, to) = (timing.settle.0 as u16, timing.slot.0 as u16);
     let mut latest = None;
     for at in (from..to).step_by(STRIDE) {

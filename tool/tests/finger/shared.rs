@@ -11,6 +11,9 @@ use std::process::{Child, Command, Output, Stdio};
 /// A force that a stopped finger may still show, N.
 const RESIDUAL_N: f64 = 0.05;
 
+/// How long a client of the broker waits by its `--timeout-ms`.
+const TIMEOUT: &str = "3000";
+
 /// A served finger and a broker in front of it.
 struct Shared {
     finger: Served,
@@ -20,7 +23,7 @@ struct Shared {
 
 /// Starts a broker; it and its address, once it listens.
 fn broker(finger: &Served, listen: &str) -> (Child, String) {
-    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", "2000"]);
+    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", TIMEOUT]);
     let mut line = String::new();
     BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
     let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
@@ -167,6 +170,50 @@ fn clients_that_send_junk_or_read_nothing_block_nobody() {
     client.set(address::TARE, 1).expect("it obeys");
     client.set_timeout(std::time::Duration::from_secs(5));
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
+}
+
+/// The stopped program turns torque off, too.
+#[test]
+fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
+    let shared = Shared::begin("wall");
+    let (mut first, mut second) = (shared.client(), shared.client());
+    first.set(address::BUS_WATCHDOG, 25).expect("it obeys");
+    for _ in 0..2 {
+        second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
+    }
+    first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
+    second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
+}
+
+/// Each of their packets waits for nothing, for 2 s.
+#[test]
+fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
+    let shared = Shared::begin("wall");
+    assert!(shared.output(&["tare"]).status.success());
+    let mut press = shared.client();
+    press.set_timeout(std::time::Duration::from_millis(TIMEOUT.parse().expect("a number")));
+    for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
+    {
+        press.set(register, value).expect("it obeys");
+    }
+    let begun = shared.finger.heard();
+    let _pollers: Vec<Client> = std::iter::repeat_with(|| {
+        let mut client = shared.client();
+        client.id = 9;
+        client.set_timeout(std::time::Duration::from_millis(1));
+        client.ping().expect_err("it is absent");
+        client
+    })
+    .take(4)
+    .collect();
+    for reads in 0.. {
+        if shared.finger.heard() - begun >= reads + 4 {
+            break;
+        }
+        press.number(address::PRESENT_MODE).expect("it is answered in time");
+    }
+    press.set(address::GOAL_FORCE_MN, 900).expect("it still commands");
 }
 
 /// As `view` does it.

@@ -40,7 +40,7 @@ impl Shared {
 
     fn client(&self) -> Client {
         let port = Some(format!("tcp:{}", self.address));
-        Client::open(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it listens")
+        Client::open(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it listens")
     }
 
     /// A client in a process of its own.

@@ -1,6 +1,9 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
 use crate::served::Served;
+use fingertip::link::Reply;
+use fingertip::link::packet::{BROADCAST, instruction};
+use fingertip::link::sender::Sender;
 use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::Reach;
@@ -72,6 +75,14 @@ impl Shared {
     }
 }
 
+fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
+    let mut packet = Reply::new();
+    let mut sender = Sender::new(&mut packet, id, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
+    packet.to_vec()
+}
+
 impl Drop for Shared {
     fn drop(&mut self) {
         let _ = self.broker.kill();
@@ -139,34 +150,31 @@ fn a_killed_commander_is_stopped_though_others_read() {
 fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
     let connect = || TcpStream::connect(&shared.address).expect("it listens");
+    let mut client = shared.client();
+    client.set_timeout(std::time::Duration::from_secs(60));
+    client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
     half.write_all(&[0xFF, 0xFF, 0xFD, 0x00, 1, 7, 0, 2]).expect("it listens");
     let mut junk = connect();
     junk.write_all(&std::iter::repeat_with(|| random.u8(..)).take(100_000).collect::<Vec<_>>()).expect("it listens");
-    // It asks for the whole table over and over, and takes no answer.
+    // It is refused more often than the system has room for answers, and takes none.
     let mut deaf = connect();
     deaf.set_write_timeout(Some(std::time::Duration::from_millis(100))).expect("a socket");
-    let mut read = fingertip::link::Reply::new();
-    let mut sender = fingertip::link::sender::Sender::new(&mut read, 1, fingertip::link::packet::instruction::READ);
-    [0, 0, 44, 1].into_iter().for_each(|byte| sender.push(byte));
-    sender.finish();
-    for _ in 0..100 {
-        let _ = deaf.write_all(&read);
-    }
+    let [low, high] = address::TARE.to_le_bytes();
+    let write = packet(1, instruction::WRITE, &[low, high, 1]);
+    let _ = deaf.write_all(&write.repeat(200_000));
     for _ in 0..20 {
         let mut client = connect();
-        let count = random.usize(..read.len() + 1);
-        client.write_all(&read[..count]).expect("it listens");
-        if random.bool() && count == read.len() {
+        let count = random.usize(..write.len() + 1);
+        client.write_all(&write[..count]).expect("it listens");
+        if random.bool() && count == write.len() {
             client.read_exact(&mut [0; 4]).expect("it answers");
         }
     }
-    let mut client = shared.client();
     for _ in 0..100 {
         assert_eq!(client.ping().expect("it answers").id, 1);
     }
-    // Nobody commands: all may.
     client.set(address::TARE, 1).expect("it obeys");
     client.set_timeout(std::time::Duration::from_secs(5));
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
@@ -182,8 +190,25 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
         second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
     }
     first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
-    second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
     first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
+    second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
+    let shown = first.set(address::SCALE_SHOWS_MN, 1_000);
+    assert!(!shown.is_err_and(|why| why.refused_with(7)), "anyone reads a scale");
+}
+
+#[test]
+fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
+    let shared = Shared::begin("wall");
+    let mut commander = shared.client();
+    commander.set(address::TARE, 1).expect("it obeys");
+    while commander.number(address::TARE_STATE).expect("it answers") != 2 {}
+    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
+    let torque = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 1, 1]);
+    commander.pass(&torque, None, 0).expect("it listens");
+    while commander.number(address::TORQUE_ENABLE).expect("it answers") != 1 {}
+    drop(commander);
+    shared.until_released();
 }
 
 /// Each of their packets waits for nothing, for 2 s.

@@ -164,10 +164,8 @@ class OnServed(unittest.TestCase):
             except PortLost:
                 pass  # the served finger has not yet heard that the client before is gone
 
-    def assert_released(self, why: Optional[str] = None, ids: List[int] = [1]) -> float:
-        """Returns the largest force that is left, N."""
+    def assert_released(self, why: Optional[str] = None, ids: List[int] = [1]) -> None:
         truths = self.served.truths()
         for device_id in ids:
             self.assertLess(truths[device_id].force_n, RESIDUAL_N, f"{why}: {truths}")
             self.assertIn(truths[device_id].mode, ["Off", "Fault"], f"{why}: {truths}")
-        return max(truths[device_id].force_n for device_id in ids)

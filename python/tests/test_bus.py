@@ -47,7 +47,8 @@ class Group(OnServed):
             bus._tell = tell  # type: ignore[method-assign]
 
         for device_id, first in [(1, refused), (2, late)]:
-            bus._look, bus._tell = first, lost  # type: ignore[method-assign]
+            setattr(bus, "_look", first)
+            setattr(bus, "_tell", lost)
             bus.release([device_id], 0.5)
             self.assert_released(first.__name__, [device_id])
 

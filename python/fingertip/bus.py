@@ -12,7 +12,7 @@ from . import registers as reg
 from .device import encoded
 from .finger import MODEL, PATIENCE_S, Finger, check_silence
 from .line import FingertipError, Line, NoAnswer, PortLost
-from .state import FIRST, Mode, State, length
+from .state import FIRST, Mode, Restarted, State, length
 
 _RELEASE_S = 0.5  # longest wait for the release when a bus or the program ends
 _TRIES = 3  # on a noisy line
@@ -289,7 +289,7 @@ class Bus:
             self._tell(reg.GOAL_FORCE_MN, dict.fromkeys(goals, 0))
             goals, off, on = [], [], []
             for device_id, state in self._look(missed).items():
-                if isinstance(state, NoAnswer):
+                if isinstance(state, FingertipError) and not isinstance(state, Restarted):
                     missed[device_id] += 1
                     if missed[device_id] == _TRIES:
                         del missed[device_id]
@@ -303,14 +303,14 @@ class Bus:
                     measured.add(device_id)
                     off.append(device_id)
                     begun_s[device_id] = state.time_s
+                elif state.mode in _GRIPS and state.goal_n:
+                    goals.append(device_id)  # the first packet was lost: the release has not begun
                 elif state.time_s - begun_s.setdefault(device_id, state.time_s) > within_s:
                     del missed[device_id]
                 elif state.mode == Mode.OFF and device_id in measured:
                     on.append(device_id)
                 elif state.mode not in _GRIPS or _is_clear(state):
                     del missed[device_id]
-                elif state.goal_n:
-                    goals.append(device_id)
             self._tell(reg.TORQUE_ENABLE, {**dict.fromkeys(off, 0), **dict.fromkeys(on, 1)})
             if missed:
                 time.sleep(0.01)

@@ -29,6 +29,29 @@ class Group(OnServed):
         self.holds(bus, [1, 2])
         return bus
 
+    def test_a_release_survives_a_refused_read_and_a_lost_packet_before_a_pause(self) -> None:
+        bus = self.pressing()
+        look, tell = bus._look, bus._tell
+
+        def refused(*arguments: Any) -> Any:
+            bus._look = look  # type: ignore[method-assign]
+            return dict.fromkeys(arguments[0], Refused("read", 3))
+
+        def late(*arguments: Any) -> Any:
+            bus._look = look  # type: ignore[method-assign]
+            states = look(*arguments)
+            time.sleep(1.0)
+            return states
+
+        def lost(*arguments: Any) -> None:
+            bus._tell = tell  # type: ignore[method-assign]
+
+        for device_id, first in [(1, refused), (2, late)]:
+            setattr(bus, "_look", first)
+            setattr(bus, "_tell", lost)
+            bus.release([device_id], 0.5)
+            self.assert_released(first.__name__, [device_id])
+
     def test_a_scan_finds_all_fingers(self) -> None:
         bus = Bus(self.served.port)
         self.addCleanup(self.close, bus)

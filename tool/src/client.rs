@@ -20,6 +20,7 @@ const TRIES: usize = 3;
 const PING_BITS: u32 = 14 * 10;
 /// No bus is slower: all IDs would take minutes to answer.
 pub const BAUD_MIN: i64 = 1_200;
+const ID_MAX: u8 = 252;
 
 /// How to reach a controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -31,12 +32,19 @@ pub struct Reach {
     #[arg(long, short, global = true, default_value_t = 1_000_000)]
     #[arg(value_parser = clap::value_parser!(u32).range(BAUD_MIN..))]
     pub baud: u32,
-    /// The controller's address on the bus
-    #[arg(long, short, global = true, default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=252))]
-    pub id: u8,
+    /// The controller's ID on the bus. `stop`, `info`, `tare` and `recover` also take several (1,2), or all
+    #[arg(long = "id", short, global = true, value_name = "ID", value_delimiter = ',', default_value = "1")]
+    #[arg(value_parser = id)]
+    pub ids: Vec<u8>,
     /// How long to wait for an answer
     #[arg(long, global = true, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
     pub timeout_ms: u64,
+}
+
+/// An ID, or the one for all.
+fn id(text: &str) -> Result<u8, String> {
+    let id = if text == "all" { Some(BROADCAST) } else { text.parse().ok().filter(|id| *id <= ID_MAX) };
+    id.ok_or_else(|| format!("an ID is 0 to {ID_MAX}, or all"))
 }
 
 /// A controller on the bus.
@@ -72,7 +80,7 @@ impl Client {
         let port = reach.port.clone().ok_or(Error::NoPort)?;
         let line = Line::open(&port, reach.baud).map_err(|why| Error::Open { port: port.clone(), why })?;
         let timeout = Duration::from_millis(reach.timeout_ms);
-        Ok(Self { line, port, baud: reach.baud, id: reach.id, timeout, owed: false })
+        Ok(Self { line, port, baud: reach.baud, id: reach.ids[0], timeout, owed: false })
     }
 
     /// Opens a port again that was lost.
@@ -85,17 +93,31 @@ impl Client {
         Ok(())
     }
 
-    /// Opens the port and sees to it that a fingertip of a known table answers.
+    /// Opens the port and sees to it that one fingertip of a known table answers.
+    ///
+    /// # Errors
+    /// None answers, or it is another device, or several are named.
+    pub fn connect(reach: &Reach) -> Result<Self, Error> {
+        if reach.ids.len() > 1 || reach.ids.contains(&BROADCAST) {
+            return Err(Error::NotUnderstood(
+                "this command takes one --id; `stop`, `info`, `tare` and `recover` take several".into(),
+            ));
+        }
+        let mut client = Self::open(reach)?;
+        client.check()?;
+        Ok(client)
+    }
+
+    /// Sees to it that a fingertip of a known table answers.
     ///
     /// # Errors
     /// None answers, or it is another device.
-    pub fn connect(reach: &Reach) -> Result<Self, Error> {
-        let mut client = Self::open(reach)?;
-        let pong = client.ping()?;
+    pub fn check(&mut self) -> Result<(), Error> {
+        let pong = self.ping()?;
         if i64::from(pong.model) != table::model() {
-            return Err(format!("ID {} is no fingertip: its model number is {}", client.id, pong.model).into());
+            return Err(format!("ID {} is no fingertip: its model number is {}", self.id, pong.model).into());
         }
-        Ok(client)
+        Ok(())
     }
 
     /// The port's name.

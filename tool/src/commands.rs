@@ -18,7 +18,9 @@ pub mod stream;
 pub mod tare;
 pub mod view;
 
+use crate::client::Reach;
 use crate::{Client, Error, table};
+use fingertip::link::packet::BROADCAST;
 use serde_json::Value;
 use std::io::{self, Write as _};
 use std::sync::Arc;
@@ -61,6 +63,37 @@ pub fn aside(text: impl std::fmt::Display) {
 /// Says an answer for scripts.
 fn say_json(value: &Value) {
     say(serde_json::to_string_pretty(value).unwrap_or_default());
+}
+
+/// Runs a command for each ID that `--id` names. An error of one does not keep it from the others.
+///
+/// # Errors
+/// The port cannot be opened, nobody answers to `all`, or what the command came to.
+pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result<(), Error>) -> Result<(), Error> {
+    let mut client = Client::open(reach)?;
+    let mut ids = reach.ids.clone();
+    if ids.contains(&BROADCAST) {
+        let found = client.ping_all()?;
+        ids = found.into_iter().filter(|pong| i64::from(pong.model) == table::model()).map(|pong| pong.id).collect();
+        if ids.is_empty() {
+            return Err("no fingertip answers: is it powered, and is the baud rate right?".into());
+        }
+    }
+    if let [id] = ids[..] {
+        client.id = id;
+        return command(&mut client);
+    }
+    let mut failed = Vec::new();
+    for id in ids {
+        client.id = id;
+        if titled {
+            say(format_args!("ID {id}:"));
+        }
+        if let Err(why) = command(&mut client) {
+            failed.push(format!("ID {id}: {why}"));
+        }
+    }
+    if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
 }
 
 /// How long Ctrl-C may go unseen in a pause.

@@ -4,8 +4,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
-    calibrate, capture, commission, info, latency, params, press, record, recover, replay, scan, share, stop, stream,
-    tare, view,
+    calibrate, capture, commission, each, info, latency, params, press, record, recover, replay, scan, share, stop,
+    stream, tare, view,
 };
 use fingertip_cli::{Client, Error};
 use serde_json::json;
@@ -131,9 +131,12 @@ fn with_examples(command: clap::Command) -> clap::Command {
 
 fn run(cli: &Cli) -> Result<(), Error> {
     let connect = || Client::connect(&cli.reach);
+    let for_each = |command: &dyn Fn(&mut Client) -> Result<(), Error>| {
+        each(&cli.reach, !cli.json, |client| client.check().and_then(|()| command(client)))
+    };
     match &cli.command {
         Command::Scan(args) => scan::run(args, &cli.reach, cli.json),
-        Command::Info => info::run(&mut connect()?, cli.json),
+        Command::Info => for_each(&|client| info::run(client, cli.json)),
         Command::Share(args) => share::run(args, &cli.reach),
         Command::View(args) => view::run(args, &mut connect()?),
         Command::Stream(args) => stream::run(args, &mut connect()?),
@@ -141,12 +144,12 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Capture(args) => args.check().and_then(|()| capture::run(args, &mut connect()?, cli.json)),
         Command::Replay(args) => replay::run(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
-        Command::Tare(args) => tare::run(args, &mut connect()?, cli.json),
+        Command::Tare(args) => for_each(&|client| tare::run(args, client, cli.json)),
         Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
         Command::Stop(args) => stop::run(args, &cli.reach, cli.json),
         Command::Calibrate(command) => calibrate::run(command, &mut connect()?, cli.json),
-        Command::Recover => recover::run(&mut connect()?, cli.json),
+        Command::Recover => for_each(&|client| recover::run(client, cli.json)),
         Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
         Command::Completions { shell } => {
             let mut text = Vec::new();

@@ -21,9 +21,9 @@ pub struct Environment {
 
 const BUS: Environment = Environment {
     folder: "venv",
-    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1"],
-    imports: "dynamixel_sdk, rustypot",
-    does: "the example and tests talk to the board by them",
+    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1", "mypy==2.4.1", "setuptools==80.10.2"],
+    imports: "dynamixel_sdk, rustypot, mypy",
+    does: "tests talk to the board by the first two, and check and build the Python package by the others",
 };
 
 /// Finds or makes the environment with the bus client, and returns its interpreter.

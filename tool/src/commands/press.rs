@@ -7,11 +7,15 @@ use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::{Limits, Mode};
 use serde_json::json;
+use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
 /// How often it looks, and how often it says what it sees.
 const LOOK: Duration = Duration::from_millis(10);
 const SAY: Duration = Duration::from_millis(500);
+/// How often it rewrites the line of a terminal, and what clears that line.
+const REWRITE: Duration = Duration::from_millis(100);
+const CLEAR: &str = "\r\x1b[K";
 /// Least tolerance of a held force, for small goals: the resolution of a usual array, mN.
 const TOLERANCE_MN: f64 = 20.0;
 /// Time within the tolerance after which a force counts as reached, s of the controller's clock: an overshoot passes
@@ -67,7 +71,9 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     }
     let interrupt = Interrupt::catch()?;
     let moving = Moving::begin(client, &interrupt)?;
-    let pressed = press(args, moving.client, json, &interrupt);
+    let clear = if !json && io::stderr().is_terminal() { CLEAR } else { "" };
+    let pressed = press(args, moving.client, json, clear, &interrupt);
+    let _ = write!(io::stderr(), "{clear}");
     let held = moving.finish(pressed)?;
     let Held { count, outside, least_mn, most_mn, held_s, .. } = held;
     let (goal_mn, tolerance_mn, reached) = (args.goal_mn, tolerance_mn(args), count > 0);
@@ -134,7 +140,8 @@ pub(super) fn begin(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
     Err(format!("{why}: the parameter force_max_mn is {most_mn}").into())
 }
 
-fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) -> Result<Held, Error> {
+fn press(args: &Args, client: &mut Client, json: bool, clear: &str, interrupt: &Interrupt) -> Result<Held, Error> {
+    let (every, end) = if clear.is_empty() { (SAY, "\n") } else { (REWRITE, "") };
     let goal_mn = args.goal_mn;
     direction_confirmed(client)?;
     begin(goal_mn, client)?;
@@ -157,7 +164,7 @@ fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) ->
         if held.count == 0 && settled {
             held = Held { from_s: time_s, least_mn: force_mn, most_mn: force_mn, ..held };
             if !json {
-                aside(format_args!("reached after {time_s:.2} s"));
+                aside(format_args!("{clear}reached after {time_s:.2} s"));
             }
         }
         if held.count > 0 || settled {
@@ -168,9 +175,9 @@ fn press(args: &Args, client: &mut Client, json: bool, interrupt: &Interrupt) ->
             held.most_mn = held.most_mn.max(force_mn);
             held.held_s = time_s - held.from_s;
         }
-        if !json && said.elapsed() >= SAY {
+        if !json && said.elapsed() >= every {
             said = Instant::now();
-            aside(format_args!("{:10} {force_mn:6} mN of {goal_mn} mN", state.mode_name()));
+            let _ = write!(io::stderr(), "{clear}{:10} {force_mn:6} mN of {goal_mn} mN{end}", state.mode_name());
         }
         let late = held.count == 0 && begun.elapsed().as_secs_f64() > args.within_s;
         let done = held.count > 1 && held.held_s >= args.seconds;

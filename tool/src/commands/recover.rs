@@ -35,9 +35,10 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let untared = client.number(address::LIMITS)? as u16 & fingertip::state::Limits::NOT_TARED != 0;
     let on = client.number(address::TORQUE_ENABLE)? != 0;
     if json {
-        say_json(
-            &json!({ "fault": fault, "fault_name": words, "watchdog_tripped": tripped, "tared": !untared, "torque": on }),
-        );
+        say_json(&json!({
+            "id": client.id, "fault": fault, "fault_name": words, "watchdog_tripped": tripped, "tared": !untared,
+            "torque": on,
+        }));
         return Ok(());
     }
     match words {

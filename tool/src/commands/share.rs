@@ -2,7 +2,8 @@
 //!
 //! A thread for each client passes its instruction packets on, one at a time, and returns the answers to that client
 //! alone. The first client that writes commands until it leaves. Others read; where one of them writes goal 0 or torque
-//! off, it stops the finger and takes the command from that client.
+//! off, it stops the finger and takes the command from that client. Packets of the commander, and writes, go before reads
+//! of others: they wait for one exchange at most.
 
 use super::{Interrupt, aside, moving, say};
 use crate::client::Reach;
@@ -15,8 +16,9 @@ use fingertip::shipped::address;
 use std::collections::BTreeSet;
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver as Inbox, RecvTimeoutError, Sender as Outbox, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Instructions that change nothing.
@@ -36,6 +38,10 @@ const RELEASE_S: f64 = 0.5;
 const SLOW: Duration = Duration::from_secs(1);
 /// More bytes than any packet has: without a packet in them they are dropped.
 const JUNK: usize = 4096;
+/// Time between two looks of a read at whether it may go.
+const YIELD: Duration = Duration::from_millis(1);
+/// Packets that wait and go before reads.
+static URGENT: AtomicUsize = AtomicUsize::new(0);
 
 /// Where to serve.
 #[derive(Debug, clap::Args)]
@@ -75,8 +81,8 @@ struct Commander {
 pub fn run(args: &Args, reach: &Reach) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let mut client = Client::open(reach)?;
-    // A client whose packet waits behind an unanswered one still gets its answer within the usual time-out.
-    client.set_timeout(Duration::from_millis(reach.timeout_ms.div_ceil(2)));
+    // An unanswered packet takes two thirds, half of that for a late answer: the next one is still answered in time.
+    client.set_timeout(Duration::from_millis(reach.timeout_ms.div_ceil(3)));
     let cannot = |why| Error::Other(format!("cannot listen at {}: {why}", args.listen));
     let listener = TcpListener::bind(args.listen).map_err(cannot)?;
     let address = listener.local_addr().map_err(cannot)?;
@@ -111,8 +117,22 @@ fn wait(interrupt: &Interrupt, losses: &Inbox<Error>) -> Result<(), Error> {
     Ok(())
 }
 
-fn lock(bus: &Mutex<Bus>) -> std::sync::MutexGuard<'_, Bus> {
+fn lock(bus: &Mutex<Bus>) -> MutexGuard<'_, Bus> {
     bus.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Waits for the bus; a read of a client that does not command waits for all that is urgent.
+fn turn(bus: &Mutex<Bus>, urgent: bool) -> MutexGuard<'_, Bus> {
+    URGENT.fetch_add(usize::from(urgent), Ordering::SeqCst);
+    loop {
+        let free = lock(bus);
+        if urgent || URGENT.load(Ordering::SeqCst) == 0 {
+            URGENT.fetch_sub(usize::from(urgent), Ordering::SeqCst);
+            return free;
+        }
+        drop(free);
+        std::thread::sleep(YIELD);
+    }
 }
 
 /// Serves one client until it leaves.
@@ -120,6 +140,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
     let Ok(from) = stream.peer_addr() else { return };
     let _ = stream.set_nodelay(true).and_then(|()| stream.set_write_timeout(Some(SLOW)));
     let (mut receiver, mut raw, mut buffer) = (Receiver::new(), Vec::new(), [0; JUNK]);
+    let mut commands = false;
     'client: while let Ok(count @ 1..) = stream.read(&mut buffer) {
         for byte in &buffer[..count] {
             raw.push(*byte);
@@ -132,7 +153,11 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             // Stuffing keeps the header out of a packet's inside, but not out of its last bytes, the check sum.
             let inside = &raw[..raw.len() - 2];
             let begin = inside.windows(HEADER.len()).rposition(|window| window == HEADER).unwrap_or_default();
-            let answer = lock(bus).pass(from, &receiver.packet(), &raw[begin..]);
+            let packet = receiver.packet();
+            let mut free = turn(bus, commands || !READS.contains(&packet.instruction));
+            let answer = free.pass(from, &packet, &raw[begin..]);
+            commands = free.commander.as_ref().is_some_and(|commander| commander.from == from);
+            drop(free);
             raw.clear();
             match answer {
                 Ok(answer) if stream.write_all(&answer).is_ok() => {}
@@ -144,7 +169,7 @@ fn converse(mut stream: TcpStream, bus: &Mutex<Bus>, lost: &Outbox<Error>) {
             }
         }
     }
-    let mut bus = lock(bus);
+    let mut bus = turn(bus, commands);
     bus.stopped.remove(&from);
     if bus.commander.as_ref().is_some_and(|commander| commander.from == from) {
         bus.end_command("its client left");
@@ -165,7 +190,7 @@ impl Bus {
             // Reads of others would feed its watchdog.
             self.end_command("its client is silent");
         }
-        if self.commander.as_ref().is_some_and(|commander| commander.from != from) && is_stop(packet) {
+        if self.commander.as_ref().is_none_or(|commander| commander.from != from) && is_stop(packet) {
             let stopped = self.commander.take().map(|commander| commander.from);
             self.stopped.extend(stopped);
         } else if !READS.contains(&packet.instruction) && !covers(packet, address::SCALE_SHOWS_MN) {

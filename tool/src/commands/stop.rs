@@ -20,7 +20,7 @@ const RESIDUAL_MN: i64 = 50;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip stop\n  \
-    fingertip --id 2 stop\n  \
+    fingertip --id 2,3 stop\n  \
     fingertip stop --all    (torque off for every device on the bus, in one packet and without a release)")]
 pub struct Args {
     /// Stop all devices on the bus by the broadcast ID, servos included
@@ -33,14 +33,16 @@ pub struct Args {
 /// # Errors
 /// A controller does not answer, or its tip does not come to rest.
 pub fn run(args: &Args, reach: &Reach, json: bool) -> Result<(), Error> {
-    let mut client = Client::open(reach)?;
     if !args.all {
-        let stopped = stop(&mut client, true, json)?;
-        if json {
-            say_json(&stopped);
-        }
-        return Ok(());
+        return super::each(reach, false, |client| {
+            let stopped = stop(client, true, json)?;
+            if json {
+                say_json(&stopped);
+            }
+            Ok(())
+        });
     }
+    let mut client = Client::open(reach)?;
     client.set_all(address::TORQUE_ENABLE, 0)?;
     let found = client.ping_all()?;
     if found.is_empty() {
@@ -70,8 +72,9 @@ fn stop(client: &mut Client, releases: bool, json: bool) -> Result<Value, Error>
     let before = client
         .again(State::read)
         .and_then(|before| if releases { moving::release(RELEASE_S, client).map(|_| before) } else { Ok(before) });
-    moving::halt(client)?;
+    let halted = moving::halt(client);
     let before = before?;
+    halted?;
     let watchdog = client.again(|client| client.number(address::BUS_WATCHDOG))?;
     client.again(|client| client.set(address::BUS_WATCHDOG, 0))?;
     let speed = wait_for(client, address::SPEED_UM_PER_S, ROLL_OUT, |speed| speed.abs() < REST_UM_PER_S)?;

@@ -44,7 +44,9 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);
     let (least, most) = (codes.iter().min().copied().unwrap_or(0), codes.iter().max().copied().unwrap_or(0));
     if json {
-        say_json(&json!({ "tared": true, "touched": touched, "least_codes": least, "most_codes": most }));
+        say_json(
+            &json!({ "id": client.id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }),
+        );
     } else {
         say(format_args!("tared: zeros of {least} to {most} codes"));
     }

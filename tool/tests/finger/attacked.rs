@@ -164,7 +164,7 @@ fn recover_says_torque_is_off_only_where_it_is() {
 
 fn client(finger: &Served) -> Client {
     let port = Some(finger.port.clone());
-    Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
+    Client::connect(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it answers")
 }
 
 #[test]

@@ -8,7 +8,7 @@ use fingertip_cli::{Client, captured};
 use std::fs;
 
 fn client(finger: &Served) -> Client {
-    let reach = Reach { port: Some(finger.port.clone()), baud: 1_000_000, id: 1, timeout_ms: 600_000 };
+    let reach = Reach { port: Some(finger.port.clone()), baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 };
     Client::connect(&reach).expect("it is served")
 }
 

@@ -3,6 +3,7 @@
 use crate::served::Served;
 use serde_json::Value;
 use std::io::{BufRead as _, BufReader, Read as _};
+use std::os::fd::OwnedFd;
 use std::process::Child;
 
 /// Reads standard error until a line begins with this.
@@ -95,6 +96,22 @@ fn a_press_reports_whether_the_force_was_reached_and_held() {
     let (code, report) = press(&["--within-s", "0.5"]);
     assert_eq!((code, &report["reached"], &report["held"]), (Some(1), &false.into(), &false.into()), "{report}");
     assert_eq!((&report["states"], &report["mean_mn"]), (&0.into(), &Value::Null));
+}
+
+#[test]
+fn a_press_rewrites_one_line_of_a_terminal() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let (mut near, far) = serial2::SerialPort::pair().expect("a pseudo-terminal");
+    let mut press = finger.fingertip(&["press", "0.5", "--seconds", "0.5", "--within-s", "3600"]);
+    let output = press.stderr(OwnedFd::from(far)).output().expect("it starts");
+    drop(press);
+    let mut shown = Vec::new();
+    let _ = near.read_to_end(&mut shown);
+    let shown = String::from_utf8(shown).expect("UTF-8");
+    assert!(output.status.success(), "{shown}");
+    assert!(shown.matches("\r\x1b[Kforce ").count() > 1 && shown.ends_with("\r\x1b[K"), "{shown:?}");
+    assert_eq!(shown.lines().count(), 2, "{shown:?}");
 }
 
 /// Looks at the help of a command and of all that are below it.

@@ -60,6 +60,26 @@ fn who_is_not_there_is_told() {
 }
 
 #[test]
+fn several_ids_are_asked_one_after_the_other() {
+    let finger = Served::begin("grasp");
+    let why = Served::not_understood(&["--id", "1,2", "press", "1"]);
+    assert!(why.contains("takes one --id"), "{why}");
+    let infos = || {
+        let text = finger.done(&["--id", "all", "--timeout-ms", "1000", "info", "--json"]);
+        serde_json::Deserializer::from_str(&text).into_iter().map(|info| info.expect("JSON")).collect()
+    };
+    let why = finger.refused(&["--id", "9,2", "--timeout-ms", "1000", "tare"]);
+    assert!(why.contains("ID 9: ping: no answer") && !why.contains("ID 2"), "{why}");
+    let [first, second]: [serde_json::Value; 2] = Vec::try_into(infos()).expect("two fingers");
+    assert_eq!((&first["id"], &second["id"]), (&1.into(), &2.into()));
+    assert_eq!((first["limit_names"][0].as_str(), second["limit_names"][0].as_str()), (Some("not tared"), None));
+    let said = finger.done(&["--id", "1,2", "tare"]);
+    assert!(said.starts_with("ID 1:\ntared: ") && said.contains("\nID 2:\ntared: "), "{said}");
+    let said = finger.done(&["--id", "all", "--timeout-ms", "1000", "stop"]);
+    assert!(said.contains("ID 1: mode ") && said.contains("ID 2: mode "), "{said}");
+}
+
+#[test]
 fn a_drive_is_commissioned() {
     let finger = Served::begin("wall");
     finger.done(&["params", "set", "direction_confirmed=0"]);

@@ -1,6 +1,9 @@
 //! `fingertip share`: one client commands, all read, anyone stops.
 
 use crate::served::Served;
+use fingertip::link::Reply;
+use fingertip::link::packet::{BROADCAST, instruction};
+use fingertip::link::sender::Sender;
 use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::Reach;
@@ -11,6 +14,9 @@ use std::process::{Child, Command, Output, Stdio};
 /// A force that a stopped finger may still show, N.
 const RESIDUAL_N: f64 = 0.05;
 
+/// How long a client of the broker waits by its `--timeout-ms`.
+const TIMEOUT: &str = "3000";
+
 /// A served finger and a broker in front of it.
 struct Shared {
     finger: Served,
@@ -20,7 +26,7 @@ struct Shared {
 
 /// Starts a broker; it and its address, once it listens.
 fn broker(finger: &Served, listen: &str) -> (Child, String) {
-    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", "2000"]);
+    let mut broker = finger.start(&["share", "--listen", listen, "--timeout-ms", TIMEOUT]);
     let mut line = String::new();
     BufReader::new(broker.stdout.take().expect("a pipe")).read_line(&mut line).expect("it says where");
     let address = line.split("tcp:").nth(1).and_then(|rest| rest.split(';').next()).expect("an address");
@@ -37,7 +43,7 @@ impl Shared {
 
     fn client(&self) -> Client {
         let port = Some(format!("tcp:{}", self.address));
-        Client::open(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it listens")
+        Client::open(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it listens")
     }
 
     /// A client in a process of its own.
@@ -67,6 +73,14 @@ impl Shared {
             std::thread::sleep(Served::LOOK);
         }
     }
+}
+
+fn packet(id: u8, instruction: u8, params: &[u8]) -> Vec<u8> {
+    let mut packet = Reply::new();
+    let mut sender = Sender::new(&mut packet, id, instruction);
+    params.iter().for_each(|byte| sender.push(*byte));
+    sender.finish();
+    packet.to_vec()
 }
 
 impl Drop for Shared {
@@ -136,37 +150,110 @@ fn a_killed_commander_is_stopped_though_others_read() {
 fn clients_that_send_junk_or_read_nothing_block_nobody() {
     let shared = Shared::begin("wall");
     let connect = || TcpStream::connect(&shared.address).expect("it listens");
+    let mut client = shared.client();
+    client.set_timeout(std::time::Duration::from_secs(60));
+    client.set(address::TARE, 1).expect("it obeys");
     let mut random = fastrand::Rng::with_seed(7);
     let mut half = connect();
     half.write_all(&[0xFF, 0xFF, 0xFD, 0x00, 1, 7, 0, 2]).expect("it listens");
     let mut junk = connect();
     junk.write_all(&std::iter::repeat_with(|| random.u8(..)).take(100_000).collect::<Vec<_>>()).expect("it listens");
-    // It asks for the whole table over and over, and takes no answer.
+    // It is refused more often than the system has room for answers, and takes none.
     let mut deaf = connect();
-    deaf.set_write_timeout(Some(std::time::Duration::from_millis(100))).expect("a socket");
-    let mut read = fingertip::link::Reply::new();
-    let mut sender = fingertip::link::sender::Sender::new(&mut read, 1, fingertip::link::packet::instruction::READ);
-    [0, 0, 44, 1].into_iter().for_each(|byte| sender.push(byte));
-    sender.finish();
-    for _ in 0..100 {
-        let _ = deaf.write_all(&read);
+    let [low, high] = address::TARE.to_le_bytes();
+    let write = packet(1, instruction::WRITE, &[low, high, 1]);
+    deaf.write_all(&write.repeat(500_000)).expect("the system takes it, or the broker reads it");
+    while deaf.write_all(&write).is_ok() {
+        client.ping().expect("it answers");
     }
     for _ in 0..20 {
         let mut client = connect();
-        let count = random.usize(..read.len() + 1);
-        client.write_all(&read[..count]).expect("it listens");
-        if random.bool() && count == read.len() {
+        let count = random.usize(..write.len() + 1);
+        client.write_all(&write[..count]).expect("it listens");
+        if random.bool() && count == write.len() {
             client.read_exact(&mut [0; 4]).expect("it answers");
         }
     }
-    let mut client = shared.client();
     for _ in 0..100 {
         assert_eq!(client.ping().expect("it answers").id, 1);
     }
-    // Nobody commands: all may.
     client.set(address::TARE, 1).expect("it obeys");
     client.set_timeout(std::time::Duration::from_secs(5));
     assert_eq!(client.ping_all().expect("it answers").len(), 1);
+}
+
+/// The stopped program turns torque off, too.
+#[test]
+fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
+    let shared = Shared::begin("wall");
+    let (mut first, mut second) = (shared.client(), shared.client());
+    first.set(address::BUS_WATCHDOG, 25).expect("it obeys");
+    for _ in 0..2 {
+        second.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
+    }
+    first.set(address::TORQUE_ENABLE, 0).expect("anyone stops");
+    first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
+    second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
+    second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
+    let shown = first.set(address::SCALE_SHOWS_MN, 1_000);
+    assert!(!shown.is_err_and(|why| why.refused_with(7)), "anyone reads a scale");
+}
+
+#[test]
+fn a_finger_of_a_group_is_stopped_once_its_commander_has_left() {
+    let finger = Served::begin("grasp");
+    finger.command("patient on");
+    let mut own = crate::stopped::client(&finger);
+    for id in [1, 2] {
+        own.id = id;
+        own.set(address::TARE, 1).expect("it obeys");
+        while own.number(address::TARE_STATE).expect("it answers") != 2 {}
+    }
+    own.set(address::TORQUE_ENABLE, 1).expect("it obeys");
+    drop(own);
+    let (broker, address) = broker(&finger, "127.0.0.1:0");
+    let shared = Shared { finger, broker, address };
+    let mut commander = shared.client();
+    let [low, high] = address::TORQUE_ENABLE.to_le_bytes();
+    let torque = packet(BROADCAST, instruction::SYNC_WRITE, &[low, high, 1, 0, 1, 1]);
+    commander.pass(&torque, None, 0).expect("it listens");
+    while commander.number(address::TORQUE_ENABLE).expect("it answers") != 1 {}
+    drop(commander);
+    shared.until_released();
+    let mut client = shared.client();
+    client.id = 2;
+    assert_eq!(client.number(address::TORQUE_ENABLE).expect("it answers"), 1, "nobody commanded it");
+}
+
+/// Each of their packets waits for nothing, for 2 s.
+#[test]
+fn clients_that_ask_an_absent_id_do_not_starve_a_press() {
+    let shared = Shared::begin("wall");
+    assert!(shared.output(&["tare"]).status.success());
+    let mut press = shared.client();
+    // What is left of `TIMEOUT` is for its own answer: a USB port may delay it.
+    press.set_timeout(std::time::Duration::from_millis(2_500));
+    for (register, value) in [(address::BUS_WATCHDOG, 25), (address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)]
+    {
+        press.set(register, value).expect("it obeys");
+    }
+    let begun = shared.finger.heard();
+    let _pollers: Vec<Client> = std::iter::repeat_with(|| {
+        let mut client = shared.client();
+        client.id = 9;
+        client.set_timeout(std::time::Duration::from_millis(1));
+        client.ping().expect_err("it is absent");
+        client
+    })
+    .take(4)
+    .collect();
+    for reads in 0.. {
+        if shared.finger.heard() - begun >= reads + 4 {
+            break;
+        }
+        press.number(address::PRESENT_MODE).expect("it is answered in time");
+    }
+    press.set(address::GOAL_FORCE_MN, 900).expect("it still commands");
 }
 
 /// As `view` does it.

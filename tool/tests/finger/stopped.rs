@@ -5,6 +5,8 @@ use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::Reach;
 use rustix::process::Signal;
+use std::io::{Read as _, Write as _};
+use std::net::{Shutdown, TcpListener};
 use std::process::Child;
 
 /// A force that a stopped finger may still show, N.
@@ -24,7 +26,7 @@ const MOTIONS: [(&[&str], &str); 4] = [
 
 pub fn client(finger: &Served) -> Client {
     let port = Some(finger.port.clone());
-    Client::connect(&Reach { port, baud: 1_000_000, id: 1, timeout_ms: 600_000 }).expect("it answers")
+    Client::connect(&Reach { port, baud: 1_000_000, ids: vec![1], timeout_ms: 600_000 }).expect("it answers")
 }
 
 /// Starts a command and waits until it is in the middle of its motion: a press until it presses.
@@ -217,6 +219,20 @@ fn stop_works_in_a_fault_and_on_a_line_that_loses_packets() {
     finger.until_alone("SupplyLow");
     let said = finger.done(&["stop"]);
     assert!(said.contains("fault 9 (supply low) remains: `fingertip recover`"), "{said}");
+}
+
+#[test]
+fn stop_says_that_a_port_is_busy() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("some port is free");
+    let port = format!("tcp:{}", listener.local_addr().expect("a socket"));
+    std::thread::spawn(move || {
+        let (mut client, _) = listener.accept().expect("a client");
+        client.write_all(b"busy: somebody is connected").expect("it listens");
+        client.shutdown(Shutdown::Write).expect("it listens");
+        let _ = client.read_to_end(&mut Vec::new());
+    });
+    let why = Served::nobody(&["--port", &port, "stop"]);
+    assert!(why.contains("busy: somebody is connected"), "{why}");
 }
 
 #[test]

@@ -236,7 +236,7 @@ impl Served {
         child.wait_with_output().expect("it ends")
     }
 
-    fn fingertip(&self, arguments: &[&str]) -> Command {
+    pub fn fingertip(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fingertip"));
         command.env("FINGERTIP_PORT", &self.port).args(arguments);
         if !arguments.contains(&"--timeout-ms") && !arguments.contains(&"scan") {

@@ -67,7 +67,9 @@ impl Tcp {
         match &self.client {
             Some((_, first)) => {
                 // One bus has one host. Who is refused is told, in words that no client takes for a packet.
-                let _ = writeln!(client, "busy: {first} is connected to this fingertip, one client at a time");
+                let words = format!("busy: {first} is connected to this fingertip, one client at a time\n");
+                // In one piece: clients read once.
+                let _ = client.write(words.as_bytes());
                 // Were it closed with something unread, the words would be lost.
                 let _ = client.shutdown(Shutdown::Write);
                 self.refused = Some(client);

@@ -130,7 +130,7 @@ impl Arguments {
 }
 
 fn code() -> impl Strategy<Value = u16> {
-    prop_oneof![Just(0), Just(4_089), Just(4_090), Just(4_095), Just(u16::MAX), any::<u16>(), 300..700_u16]
+    prop_oneof![Just(0), Just(3_839), Just(3_840), Just(4_095), Just(u16::MAX), any::<u16>(), 300..700_u16]
 }
 
 fn codes() -> impl Strategy<Value = Codes> {
@@ -170,13 +170,13 @@ pub fn any_input() -> impl Strategy<Value = Input> {
     let sense = (
         turn(),
         prop_oneof![20 => 5_500..7_000_u16, 1 => Just(0), 1 => Just(u16::MAX), 1 => any::<u16>()],
-        prop_oneof![20 => Just(0), 1 => any::<u16>()],
+        prop_oneof![10 => Just(0), 1 => any::<u16>()],
         prop::bool::weighted(0.005),
     );
     let command = (
         prop::bool::weighted(0.9),
         prop_oneof![10 => 0..9 << 16, 2 => Just(0), 1 => Just(i32::MIN), 1 => Just(i32::MAX), 1 => any::<i32>()],
-        prop_oneof![20 => Just(0), 1 => any::<u16>()],
+        prop_oneof![10 => Just(0), 1 => any::<u16>()],
         requests(),
     );
     let missed = prop_oneof![20 => Just(0), 1 => any::<u32>()];

@@ -129,9 +129,11 @@ impl Run {
         if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Commission {
             let sound = match status.mode {
                 Mode::Approach | Mode::Force => command.goal > Newtons::ZERO,
-                // With a goal only where the array's signal vanished: that is released first.
+                // With a goal only where the array's signal vanished, or on a silent bus: that is released first.
                 Mode::Release => {
-                    command.goal <= Newtons::ZERO || status.contact.force < self.pipeline.config().contact_on
+                    let silent = command.bus_watchdog_ms != 0 && sense.bus_silent_ms >= command.bus_watchdog_ms;
+                    let vanished = status.contact.force < self.pipeline.config().contact_on;
+                    command.goal <= Newtons::ZERO || silent || vanished
                 }
                 _ => identifies,
             };
@@ -229,7 +231,7 @@ proptest! {
 fn the_runs_come_everywhere() {
     let all = RefCell::new(Seen::default());
     let inputs = (any_params(), any_inputs(200));
-    let outcome = TestRunner::new(crate::fixed(2 * CASES)).run(&inputs, |(params, inputs)| {
+    let outcome = TestRunner::new(crate::fixed(3 * CASES)).run(&inputs, |(params, inputs)| {
         let mut run = Run::new(&params, true);
         run.take(&inputs);
         for (all, seen) in all.borrow_mut().iter_mut().zip(run.seen) {

@@ -161,6 +161,7 @@ AMBIENT_C = Register("ambient_c", 668, 4, 1, True, 1, True, -40, 60)
 ARRAY_GAIN_PPM_PER_K = Register("array_gain_ppm_per_k", 672, 4, 1, True, 1, True, -10000, 10000)
 ARRAY_GAIN_AT_C = Register("array_gain_at_c", 676, 4, 1, True, 1, True, -40, 125)
 ARRAY_ZERO_PA_PER_K = Register("array_zero_pa_per_k", 680, 4, 1, True, 1, True, -1000, 1000)
+HEADROOM_CODES = Register("headroom_codes", 684, 4, 1, True, 1, True, 5, 2000)
 PICTURE_TIME_US = Register("picture_time_us", 720, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FRAME = Register("picture_frame", 724, 4, 1, False, 1, False, 0, 4294967295)
 PICTURE_FORCE_MN = Register("picture_force_mn", 728, 4, 1, True, 1, False, -32768000, 32768000)
@@ -364,6 +365,7 @@ ALL = (
     ARRAY_GAIN_PPM_PER_K,
     ARRAY_GAIN_AT_C,
     ARRAY_ZERO_PA_PER_K,
+    HEADROOM_CODES,
     PICTURE_TIME_US,
     PICTURE_FRAME,
     PICTURE_FORCE_MN,

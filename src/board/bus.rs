@@ -106,10 +106,11 @@ impl Bus {
     /// # Errors
     /// The clocks cannot make that speed.
     pub fn new(parts: Parts, baud: u32) -> Result<Self, ConfigError> {
+        let Parts { usart, tx, rx, transmit_enable, tx_dma, rx_dma: _rx_dma } = parts;
         let mut config = usart::Config::default();
         config.baudrate = baud;
-        let tx = UartTx::new(parts.usart, parts.tx, parts.tx_dma, Irqs, config)?;
-        pins::input(parts.rx, USART2_FUNCTION, Pull::Up);
+        let tx = UartTx::new(usart, tx, tx_dma, Irqs, config)?;
+        pins::input(rx, USART2_FUNCTION, Pull::Up);
         let stream = pac::DMA1.st(RX_STREAM);
         stream.par().write_value(pac::USART2.dr().as_ptr() as u32);
         stream.m0ar().write_value(&raw const RING as u32);
@@ -136,7 +137,7 @@ impl Bus {
             interrupt::USART2.enable();
             interrupt::DMA1_STREAM5.enable();
         }
-        Ok(Self { next: 0, tx, transmit_enable: Output::new(parts.transmit_enable, Level::Low, Speed::Medium) })
+        Ok(Self { next: 0, tx, transmit_enable: Output::new(transmit_enable, Level::Low, Speed::Medium) })
     }
 
     /// Waits for bytes: until the line falls idle, or half of the ring is full.

@@ -2,7 +2,7 @@
 //!
 //! - TIM8's update request reaches DMA2 stream 1 channel 7 (RM0390 table 29), and its compare 1 the converters.
 //! - The window watchdog, see `WindowWatchdog`.
-//! - The core may read a received byte before the DMA fetches it, see [`crate::bus_port`].
+//! - The core may read a received byte before the DMA fetches it, see `bus_port.rs`.
 //! - TIM1 counts what moves the phase of the PWM, see [`crate::pwm_timer`].
 //! - A divider of the PLL that the manual calls wrong is told as a gap, see `clock`.
 //! - The converters take external triggers and read the fingertip's array; DMA2 takes their words a sequence at a time.

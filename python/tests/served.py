@@ -104,6 +104,8 @@ class OnServed(unittest.TestCase):
         # The package sets handlers of signals.
         for number in [signal.SIGTERM, signal.SIGHUP]:
             self.addCleanup(signal.signal, number, signal.getsignal(number))
+        # A shell's background job ignores SIGINT, and so would the programs that it starts.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         self.served = self.serve(*self.ARGUMENTS)
 
     def serve(self, *arguments: str) -> Served:

@@ -52,6 +52,17 @@ class Group(OnServed):
             bus.release([device_id], 0.5)
             self.assert_released(first.__name__, [device_id])
 
+    def test_a_release_that_a_stalled_line_delivers_late_leaves_no_force(self) -> None:
+        bus = self.pressing()
+        bus.line.timeout_ms = 20.0
+        self.served.process.send_signal(signal.SIGSTOP)
+        with self.assertRaises(NoAnswer):
+            bus.stop()
+        self.served.process.send_signal(signal.SIGCONT)  # it hears all packets at once
+        while any(truth.mode not in ["Off", "Fault"] for truth in self.served.truths().values()):
+            time.sleep(0.01)
+        self.assert_released(ids=[1, 2])
+
     def test_a_scan_finds_all_fingers(self) -> None:
         bus = Bus(self.served.port)
         self.addCleanup(self.close, bus)

@@ -20,6 +20,7 @@ SERVE = os.environ.get("FINGERTIP_SERVE", "")
 PYTHON = Path(__file__).resolve().parents[1]
 PATIENT_MS = 60_000.0  # the slowest machine answers by then
 SOON_MS = 2_000.0  # for what does not answer
+LONG_S = 2.54  # bus watchdog that does not trip on a busy machine
 RESIDUAL_N = 0.05  # a tip that presses with less has let go
 
 

@@ -145,8 +145,12 @@ class OnServed(unittest.TestCase):
         return child
 
     def holds(self, bus: Bus, ids: List[int]) -> None:
-        """Waits until these fingers hold a force."""
-        while not all(state.mode.name == "FORCE" for device_id, state in bus.states().items() if device_id in ids):
+        """Waits until these fingers hold their goals: after the first touch a free object still flies between two tips."""
+        while any(
+            state.mode.name != "FORCE" or abs(state.force_n - state.goal_n) > 0.1 * state.goal_n
+            for device_id, state in bus.states().items()
+            if device_id in ids
+        ):
             for device_id in ids:
                 fault = bus.states()[device_id].fault
                 self.assertFalse(fault, f"ID {device_id}: {fault!r}")

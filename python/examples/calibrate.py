@@ -57,7 +57,7 @@ def main() -> None:
             until = time.monotonic() + 10.0 + 1e-3 * given.timeout_ms
             while abs(finger.state().force_n - newtons) > 0.1 and time.monotonic() < until:
                 time.sleep(0.05)
-            time.sleep(1.0)
+            list(finger.stream(10, 1.0, pressures=False))  # a second of the controller's time
             grams = shown.pop(0) if shown else float(input("the scale shows, in g: "))
             scale = array.shows(grams * GRAVITY)
             print(f"forces times {scale.factor:.4f} +- {scale.sigma:.4f} by {scale.numbers} numbers")

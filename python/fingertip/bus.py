@@ -162,11 +162,12 @@ class Bus:
         """Releases all fingers, or these IDs: each turns torque off once its tip is clear, or after `within_s`.
 
         A finger in a fault has been stopped by it. One that does not answer does not keep the others from it; its error is
-        raised when they are at rest.
+        raised when they are at rest. It keeps torque and releases, until its bus watchdog stops it: on a line that stalled,
+        torque off would arrive together with the goal of 0, and friction would keep most of the force.
         """
         all_ids = list(self.fingers if ids is None else ids)
-        self._rest(all_ids, within_s)
-        failed = self._set(reg.TORQUE_ENABLE, dict.fromkeys(all_ids, 0))
+        failed = self._rest(all_ids, within_s)
+        failed.update(self._set(reg.TORQUE_ENABLE, {device_id: 0 for device_id in all_ids if device_id not in failed}))
         for device_id in all_ids:
             if device_id not in failed:
                 try:
@@ -278,10 +279,11 @@ class Bus:
                     break
         return failed
 
-    def _rest(self, ids: Iterable[int], within_s: float) -> None:
-        """Takes the tips off what they press, and waits for that by the controllers' clocks."""
+    def _rest(self, ids: Iterable[int], within_s: float) -> Dict[int, FingertipError]:
+        """Takes the tips off what they press, and waits for that by the controllers' clocks; what failed."""
         until = time.monotonic() + PATIENCE_S + self.line.timeout_ms * 1e-3
         missed = dict.fromkeys(ids, 0)  # reads in a row without an answer, of the fingers that may still press
+        failed: Dict[int, FingertipError] = {}
         begun_s: Dict[int, float] = {}
         measured: Set[int] = set()
         goals = list(missed)
@@ -292,6 +294,7 @@ class Bus:
                 if isinstance(state, FingertipError) and not isinstance(state, Restarted):
                     missed[device_id] += 1
                     if missed[device_id] == _TRIES:
+                        failed[device_id] = state
                         del missed[device_id]
                     continue
                 missed[device_id] = 0
@@ -314,6 +317,7 @@ class Bus:
             self._tell(reg.TORQUE_ENABLE, {**dict.fromkeys(off, 0), **dict.fromkeys(on, 1)})
             if missed:
                 time.sleep(0.01)
+        return failed
 
 
 def _check(failed: Mapping[int, FingertipError]) -> None:

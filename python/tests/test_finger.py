@@ -8,9 +8,8 @@ from typing import Any, Callable, List, Tuple, Type
 from fingertip import Fault, Finger, FingertipError, Mode, Restarted
 from fingertip import registers as reg
 
-from served import OnServed
+from served import LONG_S, OnServed
 
-LONG_S = 2.54  # bus watchdog that does not trip on a busy machine
 # Presses, says so, and goes on as the test wants it.
 CHILD = """
 import sys
@@ -99,7 +98,7 @@ class Ends(OnServed):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
         finger = self.open()
         finger.tare()
-        finger.press(0.5)
+        finger.press(0.5, LONG_S)
         self.assertEqual((signal.getsignal(signal.SIGTERM), signal.getsignal(signal.SIGHUP)), (own, signal.SIG_IGN))
 
 
@@ -129,7 +128,7 @@ class Moves(OnServed):
     def test_who_was_refused_leaves_the_finger_as_it_is(self) -> None:
         with self.open(leave_pressing=True) as finger:
             finger.tare()
-            finger.press(0.5)
+            finger.press(0.5, LONG_S)
         finger = self.open()
         self.refused(FingertipError, finger.write_bytes, reg.TARE.address, b"\1")  # not while torque is on
         finger.close()
@@ -140,7 +139,7 @@ class Moves(OnServed):
         finger = self.open()
         finger.tare()
         for wait_s in [0.0, 0.002, 0.01, 0.05, 0.1, 0.2]:
-            finger.press(1.0)
+            finger.press(1.0, LONG_S)
             time.sleep(wait_s)
             finger.release()
             self.assert_released(f"after {wait_s} s")
@@ -149,7 +148,7 @@ class Moves(OnServed):
     def test_a_press_that_measures_is_released(self) -> None:
         finger = self.open()
         finger.tare()
-        finger.enable_torque()
+        finger.enable_torque(LONG_S)
         finger.write(reg.IDENTIFY, 1)
         while self.served.truths()[1].force_n < 0.1:
             time.sleep(0.002)
@@ -190,7 +189,7 @@ class Moves(OnServed):
     def test_recover_tells_the_fault(self) -> None:
         finger = self.open()
         finger.tare()
-        finger.press(0.5)
+        finger.press(0.5, LONG_S)
         self.served.ask("fault supply-low")
         while not finger.state().fault:
             pass

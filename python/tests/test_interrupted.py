@@ -17,7 +17,7 @@ from served import PYTHON, Cable, OnServed
 CHILD = """
 import sys
 from fingertip import ArrayCalibration, Bus, registers
-bus = Bus(sys.argv[1])
+bus = Bus(sys.argv[1], timeout_ms=60_000)
 finger = bus.finger(1)
 finger.tare()
 array = ArrayCalibration(finger)
@@ -44,7 +44,7 @@ EXAMPLES = {
 }
 PROGRAMS: Dict[str, List[str]] = {
     **{name: ["-c", CHILD.format(call), "PORT"] for name, call in METHODS.items()},
-    **{name: [str(PYTHON / "examples" / name), "--port", "PORT", *rest] for name, rest in EXAMPLES.items()},
+    **{name: [str(PYTHON / "examples" / name), "--port", "PORT", "--timeout-ms", "60000", *rest] for name, rest in EXAMPLES.items()},
 }
 # Signals, and a cable that is pulled out.
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL, None]

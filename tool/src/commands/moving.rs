@@ -59,6 +59,11 @@ impl<'a> Moving<'a> {
     fn stop(&mut self) -> Result<(), Error> {
         let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
         let released = take_off(RELEASE_S, self.client);
+        if matches!(released, Err(Error::Silent { .. })) {
+            // A line that stalled would deliver torque off together with the goal 0, and friction would keep most of the
+            // force. The bus watchdog releases the object, then turns torque off.
+            return released;
+        }
         halt(self.client)?;
         // Only with torque off: until then nothing else stops the motor once this program has ended. A watchdog that
         // has tripped stays so, for `fingertip recover`.

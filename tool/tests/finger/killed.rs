@@ -115,6 +115,25 @@ fn a_press_whose_packets_are_lost_does_not_press_on() {
     }
 }
 
+/// The line stalls, the press is interrupted, and the finger hears all of its packets at once.
+#[test]
+fn a_release_that_arrives_late_leaves_no_force() {
+    let finger = Served::begin("wall");
+    finger.done(&["tare"]);
+    let child = finger.start(&["--timeout-ms", "50", "press", "1", "--seconds", "3600", "--within-s", "3600"]);
+    finger.until("Force");
+    // The bus watchdog does not come first.
+    finger.command("patient on");
+    finger.command("stall");
+    Served::interrupt(&child);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(!output.status.success(), "{output:?}");
+    finger.command("go on");
+    finger.command("patient off");
+    at_rest(&finger, 0);
+    assert!(finger.true_force_n() < 0.05, "{} N", finger.true_force_n());
+}
+
 #[test]
 fn a_controller_that_starts_anew_was_not_commissioned() {
     let finger = Served::begin("wall");

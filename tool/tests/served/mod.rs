@@ -36,6 +36,8 @@ struct Told {
     ears: Option<(u64, u64, u64)>,
     /// An instruction to all that comes as soon as the finger's state has this word.
     trap: Option<(String, u8)>,
+    /// Packets on a line that stalls.
+    stalled: Option<Vec<Vec<u8>>>,
     /// How many more packets it hears before it starts anew.
     restart: Option<u64>,
     /// Its clock waits for the host: it goes on for `PATIENT_S` after a packet. On a loaded machine the bus watchdog must not
@@ -81,6 +83,14 @@ impl Told {
                 self.ears = None;
                 Some(Ok(String::new()))
             }
+            ["stall"] => {
+                self.stalled = Some(Vec::new());
+                Some(Ok(String::new()))
+            }
+            ["go", "on"] => {
+                self.stalled.take().into_iter().flatten().for_each(|bytes| self.native.0.hear(&bytes));
+                Some(Ok(String::new()))
+            }
             ["unheard"] => Some(Ok(self.ears.map_or(0, |(.., unheard)| unheard).to_string())),
             _ => None,
         }
@@ -122,6 +132,10 @@ impl serve::Finger for Told {
     }
 
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error> {
+        if let Some(stalled) = &mut self.stalled {
+            stalled.push(bytes.to_vec());
+            return Ok(());
+        }
         self.heard_s = self.native.now_s();
         self.heard += 1;
         if let Some((left, lost, unheard)) = &mut self.ears {
@@ -172,6 +186,7 @@ impl Served {
                 native,
                 commands: commanded,
                 ears: None,
+                stalled: None,
                 trap: None,
                 restart: None,
                 patient: false,

@@ -97,12 +97,12 @@ impl Bridge {
                 self.coast();
                 self.wake();
             }
-            Wanted::Brakes if self.ready => self.drive(Duty::ZERO),
+            Wanted::Brakes if self.ready => self.drive(Duty::ZERO, true),
             Wanted::Brakes => self.sleep(),
             Wanted::Driven(duty) => {
                 self.wake();
                 if self.ready {
-                    self.drive(duty);
+                    self.drive(duty, false);
                 }
             }
         }
@@ -143,18 +143,19 @@ impl Bridge {
         }
     }
 
-    fn drive(&mut self, duty: Duty) {
+    /// Drives the motor from the next period on, or shorts it `at_once`: a fault does not wait for half a frame.
+    fn drive(&mut self, duty: Duty, at_once: bool) {
         let period = self.period_ticks;
         let low = ticks_low(duty, period);
         let (in1, in2) = if duty < Duty::ZERO { (low, 0) } else { (0, low) };
-        if !self.driving {
+        if !self.driving || at_once {
             // The compare values count before the outputs come on. An update event would do it too, but begin a period.
             set_preload(false);
         }
         pac::TIM1.ccr(0).write(|w| w.set_ccr(period - in1));
         pac::TIM1.ccr(1).write(|w| w.set_ccr(period - in2));
+        set_preload(true);
         if !self.driving {
-            set_preload(true);
             // Forget an old break.
             let mut cleared = SrAdv(u32::MAX);
             cleared.set_bif(0, false);
@@ -165,8 +166,8 @@ impl Bridge {
     }
 }
 
-/// Whether a compare value waits for the next period. Not so only while the outputs are off: RM0390 (OC1PE) guarantees
-/// no PWM without preload.
+/// Whether a compare value waits for the next period. Not so only while the outputs are off, or where both become
+/// constant: RM0390 (OC1PE) guarantees no PWM without preload.
 #[inline(never)]
 fn set_preload(on: bool) {
     pac::TIM1.ccmr_output(0).write(|w| {

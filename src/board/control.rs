@@ -9,6 +9,7 @@ use elapsed::{BusClock, FrameClock};
 use fingertip::capture::Ended;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
+use fingertip::pipeline::Bridge as Wanted;
 use fingertip::shipped::{Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
@@ -149,7 +150,7 @@ impl State {
         }
         self.parts.scan.copy_so_far(&mut self.frame);
         if self.parts.pipeline.check_part(&self.frame) {
-            self.parts.bridge.apply(self.parts.pipeline.status().bridge());
+            self.parts.bridge.apply(Wanted::Brakes);
             self.keeper.end(Ended::Cut);
             self.publish();
         }

@@ -15,8 +15,8 @@ const FIGURES: [(&str, &str, &str, &str, &str); 3] = [
 const SHARE: f64 = 0.1;
 
 /// The force of two counts of the encoder at the goal, in percent of what an overshoot is told in: where within a
-/// count a step ends is chance, here and in the demonstration, whose images of other timing drew 0.00 to 0.26 % at the
-/// same step.
+/// count a step ends is chance, here and in the demonstration, whose images of other timing drew 0.00 to 0.48 % at the
+/// same step. Therefore an overshoot has no lower bound: none is as good as a small one.
 fn two_counts_percent(from_n: f64, to_n: f64) -> f64 {
     let count_mm = f64::from(MM_PER_RAD) / f64::from(COUNTS_PER_RAD);
     let stiffness_n_per_mm = 2.0 * (f64::from(FORCE_PER_MM2) * to_n).sqrt();
@@ -39,12 +39,13 @@ pub fn checks() -> Vec<Check> {
             let expected = number(theirs);
             let counts = if unit == "%" { two_counts_percent(from_n, to_n) } else { 0.0 };
             let allowed = f64::max(expected * SHARE, counts);
+            let least = if unit == "%" { 0.0 } else { expected - allowed };
             checks.push(Check {
                 name: format!("{figure}_{}_{ends}", place + 1),
                 what: format!("simulated finger, {from_n:.1} to {to_n:.1} N: {words}"),
                 unit,
-                within: [f64::max(expected - allowed, 0.0), expected + allowed],
-                source: "docs/demo.json, within a tenth, an overshoot within two counts of the encoder",
+                within: [least, expected + allowed],
+                source: "docs/demo.json, within a tenth, an overshoot at most two counts of the encoder more",
                 then: "the step computes something else than on the emulated board: tell us, with the JSON file",
                 unseen: None,
             });

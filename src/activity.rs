@@ -4,11 +4,10 @@
 //! outlives them is few and observed in every frame: the tactile image with its baseline, the [`crate::touch`], the
 //! motion with its zero and winding, the temperature compensation, and the time budget.
 
-use crate::commission::Run;
 use crate::config::Config;
 use crate::control::SpeedLoop;
 use crate::grip::Grip;
-use crate::identify::Press;
+use crate::measure::{Press, Strokes};
 use crate::state::{Fault, Mode};
 use crate::touch::Touch;
 use crate::units::{Millimetres, MillimetresPerSecond};
@@ -33,10 +32,10 @@ pub enum Activity {
     },
     /// Approach, hold and release.
     Grip(Grip),
-    /// A press that measures Young's modulus, or the taxels' gains.
+    /// A press that measures tip and array.
     Press(Press),
     /// Motions in the air that measure the drive.
-    Strokes(Run),
+    Strokes(Strokes),
     /// Stopped by a fault.
     Fault(Fault),
 }
@@ -48,8 +47,8 @@ impl Activity {
             Self::Off(_) => Mode::Off,
             Self::Tare { .. } => Mode::Tare,
             Self::Grip(grip) => grip.mode(touch),
-            Self::Press(_) => Mode::Identify,
-            Self::Strokes(_) => Mode::Commission,
+            Self::Press(_) => Mode::Press,
+            Self::Strokes(_) => Mode::Strokes,
             Self::Fault(_) => Mode::Fault,
         }
     }
@@ -59,8 +58,7 @@ impl Activity {
         matches!(self, Self::Grip(_) | Self::Press(_) | Self::Strokes(_))
     }
 
-    /// Whether the contact is fitted to the model. A press that measures the modulus must not lean on the configured
-    /// one.
+    /// Whether the contact is fitted to the model. A press must not lean on the configured modulus.
     pub fn fits(&self) -> bool {
         !matches!(self, Self::Press(_) | Self::Strokes(_))
     }

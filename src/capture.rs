@@ -15,10 +15,13 @@
 //! | 8 | a number for the names and the order of the parameters |
 //! | 12 | frames, bits of all frames, digest after the last one, check sum of the bits, missed frames before the first one |
 //! | 32 | numbers of the requests taken up before, as in [`Taken`](crate::pipeline::Taken); 0 |
-//! | 40 | from frame to frame, ns |
-//! | 44 | what is known of the motor's winding, as [`Winding`](crate::control::winding::Winding) tells it |
-//! | 72 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
+//! | 36 | from frame to frame, ns |
+//! | 40 | what is known of the motor's winding, as [`Winding`](crate::control::winding::Winding) tells it |
+//! | 68 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |
 //! | then | the frames, without a gap |
+//!
+//! The same memory keeps the record of a motion that measures ([`Capture::follow`]); [`crate::measure::series`] has its
+//! layout.
 //!
 //! Of a frame only what changed is written: numbers as bits of their difference to the frame before, codes with a
 //! width that follows their noise.
@@ -36,7 +39,7 @@ use crate::command::Command;
 use crate::frame::{Frame, Sense};
 
 /// The version of the layout.
-pub const VERSION: u8 = 2;
+pub const VERSION: u8 = 3;
 
 /// What a capture is doing. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -143,12 +146,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
             tare_request: 0,
             tare_forced: false,
             clear_request: 0,
-            identify_request: 0,
-            commission_request: 0,
-            calibrate_request: 0,
-            forget_request: 0,
-            shown_request: 0,
-            shown_mn: 0,
+            measure_request: 0,
         },
         duty: 0,
         mode: 0,

@@ -31,16 +31,6 @@ pub struct Command {
     pub tare_forced: bool,
     /// A change of this number clears a fault.
     pub clear_request: u8,
-    /// A change of this number asks for a measurement of Young's modulus.
-    pub identify_request: u8,
-    /// A change of this number asks for a [`crate::commission::Task`], which its lowest bits name.
-    pub commission_request: u8,
-    /// A change of this number asks for a press that calibrates the taxels.
-    pub calibrate_request: u8,
-    /// A change of this number forgets the presses that calibrate the taxels.
-    pub forget_request: u8,
-    /// A change of this number says that a scale under the plate shows [`Command::shown_mn`].
-    pub shown_request: u8,
-    /// What it shows, mN.
-    pub shown_mn: i32,
+    /// A change of this number asks for a [`crate::measure::Task`], which its lowest bits name.
+    pub measure_request: u8,
 }

@@ -273,7 +273,7 @@ impl Config {
             bounds,
             warm: Warm::new(p, shape),
             heat: Heat::new(p, frame_s, current_limit),
-            motions: Motions::new(p, &tip, &Driven { frame_s, mm_per_count, damping: c, mass }),
+            motions: Motions::new(p, &Driven { frame_s, mm_per_count, damping: c }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
             force_seen: force_seen(p, codes_milli, &tip),

@@ -46,11 +46,7 @@ pub mod command;
 
 pub mod control;
 
-pub mod identify;
-
-pub mod calibrate;
-
-pub mod commission;
+pub mod measure;
 
 pub mod grip;
 

@@ -6,10 +6,7 @@ mod requests;
 pub use crate::status::{Bridge, Status, Taken, Taring};
 
 use crate::activity::{Activity, Halt};
-use crate::calibrate::scale::Scale;
-use crate::calibrate::{Calibrator, Proposal};
 use crate::command::Command;
-use crate::commission::{self, Commissioning};
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
 use crate::control::SpeedLoop;
@@ -17,7 +14,8 @@ use crate::control::warmth::Warmth;
 use crate::control::winding::Winding;
 use crate::frame::{Frame, Sense, Shape};
 use crate::grip::{Goal, Grip};
-use crate::identify::PressView;
+use crate::measure::strokes::{self, Kept};
+use crate::measure::{Row, press};
 use crate::pressure::{Array, Calibration};
 use crate::safety::guard::{Guard, Seen};
 use crate::safety::monitor::{self, Monitor, View};
@@ -46,8 +44,7 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     array: Array<ROWS, COLUMNS>,
     config: Shaped<ROWS, COLUMNS>,
     budget: Budget<ROWS, COLUMNS>,
-    scale: Scale,
-    calibrator: Calibrator<ROWS, COLUMNS>,
+    step: press::Step<ROWS, COLUMNS>,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
@@ -66,8 +63,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             monitor: Monitor::default(),
             guard: Guard::default(),
             activity: Activity::Off(Halt::OPEN),
-            calibrator: Calibrator::new(),
-            scale: Scale::new(),
+            step: press::Step::NONE,
             status: Status::default(),
             tared: false,
             zeroed: false,
@@ -114,7 +110,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.motion.drive.cut();
         }
 
-        self.report(duty, &contact, sense, command, limits);
+        self.report(duty, &contact, sense, limits);
         (duty, &self.status)
     }
 
@@ -213,7 +209,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     #[inline(always)]
     fn act(&mut self, contact: &Contact, tares: bool, sense: &Sense, command: &Command, limits: &mut Limits) -> Duty {
         self.status.drift = self.warmth.force(command.goal, &self.config);
-        let Self { activity, motion, touch, config, array, status, calibrator, .. } = self;
+        let applied = i64::from(self.status.duty.0) * i64::from(sense.supply_mv);
+        let Self { activity, motion, touch, config, array, status, step, .. } = self;
         let (picture, supply_mv) = (array.picture(), sense.supply_mv);
         let reference = match activity {
             Activity::Grip(grip) => {
@@ -221,19 +218,23 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 grip.reference(&goal, contact, touch, motion, config, limits)
             }
             Activity::Press(press) => {
-                let view = PressView { picture, contact, encoder: sense.encoder, motion };
-                press.observe(&view, config);
-                calibrator.observe(press, &view, config);
-                if !press.deep() {
-                    status.identification = press.outcome();
-                }
+                let view = press::View {
+                    sequence: status.sequence,
+                    picture,
+                    contact,
+                    encoder: sense.encoder,
+                    motion,
+                    applied_mv: (applied >> 15) as i32,
+                    chip: sense.chip,
+                };
+                press.observe(&view, step, &mut status.measure, config);
                 press.reference(motion, config, limits)
             }
             Activity::Strokes(run) => {
-                let held_back = motion.drive.voltage() != config.push(run.voltage_mv());
                 let force = contact.force.max(picture.force(config));
-                run.observe(&commission::View { encoder: sense.encoder, force, supply_mv, held_back }, config);
-                status.commissioning = run.outcome();
+                let view =
+                    strokes::View { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
+                run.observe(&view, &mut status.measure, config);
                 let voltage = config.push(run.voltage_mv());
                 if !run.running() {
                     *activity = Activity::Off(Halt::BRAKES);
@@ -274,7 +275,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     #[inline(always)]
-    fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, command: &Command, mut limits: Limits) {
+    fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, mut limits: Limits) {
         for (held, flag) in [
             (self.array.picture().bad_count > 0, Limits::TAXELS),
             (!self.tared, Limits::NOT_TARED),
@@ -282,16 +283,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         ] {
             limits.set(if held { flag } else { 0 });
         }
-        self.calibrator.work(&self.array, &self.config);
         self.report_activity();
         self.status.creep = if let Activity::Grip(grip) = &self.activity { grip.creep.force() } else { Newtons::ZERO };
-        let held = contact.force.0.saturating_sub(self.status.creep.0).saturating_sub(self.status.drift.0);
-        self.scale.observe(self.status.mode, command.goal, Newtons(held), &self.config);
-        if command.shown_request != self.status.taken.shown {
-            self.status.taken.shown = command.shown_request;
-            self.scale.take(command.shown_mn, contact);
-        }
-        self.status.scale = self.scale.standing();
         self.status.limits = limits;
         self.status.contact = *contact;
         self.status.travel = self.motion.observer.travel;
@@ -307,7 +300,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if let Activity::Fault(fault) = self.activity {
             self.status.fault = Some(fault);
         }
-        self.status.calibration = self.calibrator.standing();
     }
 
     /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array
@@ -329,10 +321,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.config = config.clone();
         self.array.forget_line();
         self.restart();
-        // What was measured belonged to the parameters before.
-        if !matches!(self.status.commissioning, Commissioning::Refused(_)) {
-            self.status.commissioning = Commissioning::None;
-        }
     }
 
     /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one
@@ -346,7 +334,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     fn restart(&mut self) {
         self.fit.lose();
         self.touch = Touch::default();
-        self.forget();
         match self.activity {
             Activity::Tare { .. } => self.array.start_tare(),
             Activity::Off(_) => {}
@@ -368,8 +355,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (self.touch, self.warmth) = (Touch::default(), Warmth::default());
         (self.monitor, self.guard) = (Monitor::default(), Guard::default());
         self.activity = Activity::Off(Halt::OPEN);
-        self.scale = Scale::new();
-        self.calibrator.renew();
         self.status = Status { taken, missed_frames, ..Status::default() };
         (self.tared, self.zeroed) = (false, false);
     }
@@ -384,9 +369,21 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         &self.array
     }
 
-    /// The gains that presses propose.
-    pub fn proposal(&self) -> &Proposal<ROWS, COLUMNS> {
-        self.calibrator.proposal()
+    /// What the last step adds to the record of a motion that measures.
+    pub fn row(&self) -> Option<Row<'_, ROWS, COLUMNS>> {
+        match &self.activity {
+            Activity::Press(press) if press.complete() => Some(Row::Step(&self.step)),
+            Activity::Strokes(run) => run.row().map(|kept| match kept {
+                Kept::Stroke => Row::Stroke,
+                Kept::Sample(count, voltage) => Row::Sample { count, voltage },
+            }),
+            _ => None,
+        }
+    }
+
+    /// The encoder's count from which such a record counts: of travel 0, or where the strokes began.
+    pub fn measured_from(&self) -> i32 {
+        if let Activity::Strokes(run) = &self.activity { run.origin() } else { self.motion.observer.origin() }
     }
 
     /// The configuration in force.

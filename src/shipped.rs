@@ -51,8 +51,6 @@ pub type Config = crate::config::Shaped<ROWS, COLUMNS>;
 pub type Picture = crate::pressure::Picture<ROWS, COLUMNS>;
 /// See [`crate::pressure::Gains`].
 pub type Gains = crate::pressure::Gains<ROWS, COLUMNS>;
-/// See [`crate::calibrate::Proposal`].
-pub type Proposal = crate::calibrate::Proposal<ROWS, COLUMNS>;
 /// See [`crate::pressure::Calibration`].
 pub type Calibration = crate::pressure::Calibration<ROWS, COLUMNS>;
 /// See [`crate::pressure::Array`].
@@ -98,8 +96,4 @@ pub mod address {
     pub const TARE_CODES: u16 = PICTURES[2];
     /// The gain of each taxel, row by row.
     pub const GAINS: u16 = PICTURES[3];
-    /// The gain of each taxel that presses propose, row by row.
-    pub const PROPOSED_GAINS: u16 = PICTURES[4];
-    /// Their standard uncertainty.
-    pub const PROPOSED_SIGMAS: u16 = PICTURES[5];
 }

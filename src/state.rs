@@ -7,12 +7,12 @@
 //! | 2 approach | at the set speed towards the object | contact: force; goal = 0: release |
 //! | 3 force | holds the goal in d = sqrt(F/(pi Y)) | goal = 0, or the force vanished at once: release; contact is lost: approach |
 //! | 4 release | backs off to the set clearance behind the surface, farther while something is pressed, then holds there | goal > 0: approach, or force where something is pressed |
-//! | 7 commission | small steps of voltage, to learn what the drive is like | done, refused or stopped: off |
-//! | 6 identify | backs off, seeks the contact, presses slowly to 0.3 a or the largest force, for the modulus or the taxels' gains | done or refused: as from off |
+//! | 7 strokes | small steps of voltage in the air, to measure the drive | done, refused or stopped: off |
+//! | 6 press | backs off, seeks the contact, presses twice to 0.3 a or 7/8 of the largest force, to measure tip and array | done, refused or stopped: as from off |
 //! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
-//! Commission is asked for in off, with torque off. Identify, which measures Young's modulus or calibrates the taxels,
-//! is asked for in approach, force or release. [`crate::activity`] owns the state behind each mode.
+//! Strokes are asked for in off, with torque off; a press in approach, force or release. [`crate::activity`] owns the
+//! state behind each mode.
 //!
 //! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault,
 //! and from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what
@@ -35,10 +35,10 @@ pub enum Mode {
     Release = 4,
     /// Stopped by a fault.
     Fault = 5,
-    /// Pressing to measure Young's modulus or the taxels' gains.
-    Identify = 6,
-    /// Moving a little in the air to measure the drive.
-    Commission = 7,
+    /// Pressing into a plate, to measure tip and array.
+    Press = 6,
+    /// Moving a little in the air, to measure the drive.
+    Strokes = 7,
 }
 
 impl Mode {
@@ -50,8 +50,8 @@ impl Mode {
         Self::Force,
         Self::Release,
         Self::Fault,
-        Self::Identify,
-        Self::Commission,
+        Self::Press,
+        Self::Strokes,
     ];
 }
 

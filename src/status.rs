@@ -1,9 +1,7 @@
 //! What a step reports beside the duty, and the same as numbers: what digests of runs are made of.
 
-use crate::calibrate::{self, Standing, scale};
-use crate::commission::{Commissioning, Drive};
 use crate::contact::{Contact, FitLevel};
-use crate::identify::{Identification, Modulus};
+use crate::measure::Standing;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, Newtons};
 
@@ -14,16 +12,8 @@ pub struct Taken {
     pub tare: u8,
     /// See [`crate::command::Command::clear_request`].
     pub clear: u8,
-    /// See [`crate::command::Command::identify_request`].
-    pub identify: u8,
-    /// See [`crate::command::Command::calibrate_request`].
-    pub calibrate: u8,
-    /// See [`crate::command::Command::forget_request`].
-    pub forget: u8,
-    /// See [`crate::command::Command::shown_request`].
-    pub shown: u8,
-    /// See [`crate::command::Command::commission_request`].
-    pub commission: u8,
+    /// See [`crate::command::Command::measure_request`].
+    pub measure: u8,
 }
 
 /// How the tare that was last asked for stands. The numbers are stable.
@@ -74,14 +64,8 @@ pub struct Status {
     pub duty: Duty,
     /// In off and tare: the tip still moves, so the motor is shorted.
     pub braking: bool,
-    /// The measurement of Young's modulus.
-    pub identification: Identification,
-    /// The commissioning of the drive.
-    pub commissioning: Commissioning,
-    /// The calibration of the taxels.
-    pub calibration: Standing,
-    /// The absolute scale by what a scale shows.
-    pub scale: scale::Standing,
+    /// The motion that measures.
+    pub measure: Standing,
     /// The tare.
     pub tare: Taring,
     /// The requests taken up.
@@ -113,7 +97,7 @@ impl Status {
             Mode::Fault => Bridge::Brakes,
             Mode::Off | Mode::Tare if self.braking => Bridge::Brakes,
             Mode::Off | Mode::Tare => Bridge::Open,
-            Mode::Approach | Mode::Force | Mode::Release | Mode::Identify | Mode::Commission => {
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => {
                 Bridge::Driven(self.duty)
             }
         }
@@ -121,22 +105,21 @@ impl Status {
 }
 
 impl Taken {
-    /// Four numbers in a word; the last one's upper byte is 0.
-    pub(crate) fn words(self) -> [u32; 2] {
-        let Self { tare, clear, identify, calibrate, forget, shown, commission } = self;
-        [[tare, clear, identify, calibrate], [forget, shown, commission, 0]].map(u32::from_le_bytes)
+    /// The numbers in a word, whose upper byte is 0.
+    pub(crate) fn word(self) -> u32 {
+        let Self { tare, clear, measure } = self;
+        u32::from_le_bytes([tare, clear, measure, 0])
     }
 
-    /// Reads the two words that a capture has of the numbers; `None` where the last one's upper byte is not 0.
-    pub fn from_words(words: [u32; 2]) -> Option<Self> {
-        let [[tare, clear, identify, calibrate], [forget, shown, commission, none]] = words.map(u32::to_le_bytes);
-        (none == 0).then_some(Self { tare, clear, identify, calibrate, forget, shown, commission })
+    /// Reads the word that a capture has of the numbers; `None` where its upper byte is not 0.
+    pub fn from_word(word: u32) -> Option<Self> {
+        let [tare, clear, measure, none] = word.to_le_bytes();
+        (none == 0).then_some(Self { tare, clear, measure })
     }
 }
 
 impl Status {
-    /// Hands over every field, and the duty that the step returned with it. What a measurement found counts once it is
-    /// there.
+    /// Hands over every field, and the duty that the step returned with it.
     pub fn words(&self, duty: Duty, mut each: impl FnMut(u32)) {
         // Taken apart field by field, so that a field cannot be forgotten.
         let Self {
@@ -152,10 +135,7 @@ impl Status {
             speed,
             duty: applied,
             braking,
-            identification,
-            commissioning,
-            calibration,
-            scale,
+            measure,
             tare,
             taken,
             winding,
@@ -164,9 +144,7 @@ impl Status {
         } = *self;
         let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } =
             contact;
-        let calibrate::Standing { state, progress, presses, reached, proposals } = calibration;
-        let scale::Standing { refusal, points, factor_ppm, sigma_ppm } = scale;
-        let [taken, more_taken] = taken.words();
+        let Standing { state, task, ended, value, progress } = measure;
         let always = [
             sequence,
             missed_frames,
@@ -186,46 +164,10 @@ impl Status {
             radius.to_bits().cast_unsigned(),
             travel.to_bits().cast_unsigned(),
             u32::from(duty.0.cast_unsigned()) | u32::from(applied.0.cast_unsigned()) << 16,
-            taken,
-            more_taken,
-            u32::from_le_bytes([state.number(), state.refusal(), progress, presses]),
-            u32::from(reached) | u32::from(proposals) << 16,
-            u32::from_le_bytes([refusal.map_or(0, |refusal| refusal as u8), points, 0, 0]),
-            factor_ppm,
-            sigma_ppm,
-            u32::from_le_bytes([
-                identification.number(),
-                identification.refusal(),
-                commissioning.number(),
-                commissioning.refusal(),
-            ]),
-            commissioning.progress().into(),
+            taken.word(),
+            u32::from_le_bytes([state as u8, task as u8, ended as u8, progress]),
+            value.cast_unsigned(),
         ];
         always.iter().for_each(|word| each(*word));
-        if identification.number() == 2 {
-            let Modulus { modulus, sigma, contact, points } = identification.result();
-            for bits in [modulus.to_bits(), sigma.to_bits(), contact.to_bits(), points.into()] {
-                each(bits.cast_unsigned());
-            }
-        }
-        if commissioning.number() == 3 {
-            let Drive {
-                torque_constant_unm_per_a,
-                torque_constant_sigma,
-                time_constant_us,
-                time_constant_sigma,
-                inertia_ug_m2,
-                inertia_sigma,
-                friction_unm: [forward, back],
-                friction_sigma: [forward_sigma, back_sigma],
-            } = commissioning.drive();
-            for word in [torque_constant_unm_per_a, time_constant_us, inertia_ug_m2] {
-                each(word);
-            }
-            let halves = [torque_constant_sigma, time_constant_sigma, inertia_sigma, forward, back];
-            for half in halves.into_iter().chain([forward_sigma, back_sigma]) {
-                each(half.into());
-            }
-        }
     }
 }

@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use fingertip::capture::{Ended, Standing, State};
 use fingertip::command::Command;
 use fingertip::frame::Sense;
+use fingertip::measure::{State as Motion, Task};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Frame, Pipeline};
 
@@ -23,12 +24,16 @@ pub fn ask(arm: bool) {
 
 /// What control knows of the capture without reaching for it.
 #[derive(Clone, Copy, Default)]
-pub struct Keeper(Standing);
+pub struct Keeper {
+    standing: Standing,
+    /// A motion that measures was under way in the step before.
+    measures: bool,
+}
 
 impl Keeper {
     /// How it stands.
     pub fn standing(self) -> Standing {
-        self.0
+        self.standing
     }
 
     /// Takes up what the host asked for.
@@ -36,7 +41,7 @@ impl Keeper {
         match ASKED.load(Ordering::Relaxed) {
             NOTHING => return,
             // The link may be reading the one before: then in a later turn.
-            ARM if self.0.state == State::Done => {
+            ARM if self.standing.state == State::Done => {
                 if CAPTURE.take(|_| ()).is_none() {
                     return;
                 }
@@ -50,7 +55,7 @@ impl Keeper {
 
     /// Whether the next step is to be the first one kept.
     pub fn is_due(&mut self, status: &Status, command: impl FnOnce() -> Command) -> bool {
-        if self.0.state != State::Armed {
+        if self.standing.state != State::Armed {
             return false;
         }
         let (mut due, command) = (false, command());
@@ -66,14 +71,29 @@ impl Keeper {
 
     /// Keeps a step, where one is to be kept.
     pub fn record(&mut self, frame: &Frame, sense: &Sense, command: &Command, status: &Status) {
-        if self.0.state == State::Recording {
+        if self.standing.state == State::Recording {
             self.work(|capture| capture.record(frame, sense, command, status));
         }
     }
 
+    /// Keeps the record of a motion that measures.
+    pub fn follow(&mut self, pipeline: &Pipeline) {
+        let motion = pipeline.status().measure;
+        let runs = motion.state == Motion::Running && motion.task != Task::Jog;
+        if !runs && !self.measures {
+            return;
+        }
+        // The link may be reading what was kept before: then in the next frame.
+        if self.standing.state == State::Done && !self.measures && CAPTURE.take(|_| ()).is_none() {
+            return;
+        }
+        self.work(|capture| capture.follow(pipeline));
+        self.measures = runs;
+    }
+
     /// Ends it.
     pub fn end(&mut self, why: Ended) {
-        if matches!(self.0.state, State::Armed | State::Recording) {
+        if matches!(self.standing.state, State::Armed | State::Recording) {
             self.work(|capture| capture.end(why));
         }
     }
@@ -85,8 +105,8 @@ impl Keeper {
             act(capture);
             capture.standing()
         });
-        self.0 = standing.unwrap_or(self.0);
-        if self.0.state == State::Done {
+        self.standing = standing.unwrap_or(self.standing);
+        if self.standing.state == State::Done {
             CAPTURE.fill(|_| ());
         }
     }

@@ -195,6 +195,7 @@ impl State {
         self.clear_seen = command.clear_request;
         self.publish();
         self.keeper.record(&self.frame, &sense, &command, self.parts.pipeline.status());
+        self.keeper.follow(self.parts.pipeline);
     }
 
     /// The guard cut the bridge: latches the fault. The scan starts anew when that is cleared.
@@ -244,10 +245,6 @@ impl State {
             picture.taxels.copy_from_slice(&pipeline.array().picture().taxels);
             picture.pascals_per_sum_q32 = pipeline.config().pascals_per_sum_q32;
             picture.tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
-            if picture.proposals != status.calibration.proposals {
-                picture.proposals = status.calibration.proposals;
-                picture.proposal = *pipeline.proposal();
-            }
         });
     }
 }

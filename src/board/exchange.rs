@@ -11,7 +11,7 @@ use fingertip::capture::Standing as CaptureStanding;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Capture, Frame, Gains, Proposal, ROWS, Record};
+use fingertip::shipped::{COLUMNS, Capture, Frame, Gains, ROWS, Record};
 use fingertip::state::{Fault, Mode};
 
 use super::flash::SaveError;
@@ -77,10 +77,6 @@ pub struct Picture {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
     pub tare: [[i32; COLUMNS]; ROWS],
-    /// Which proposal of gains, by its count,
-    pub proposals: u8,
-    /// and the gains.
-    pub proposal: Proposal,
 }
 
 /// What the loop is doing.
@@ -102,8 +98,6 @@ pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     taxels: [[0; COLUMNS]; ROWS],
     pascals_per_sum_q32: 0,
     tare: [[0; COLUMNS]; ROWS],
-    proposals: 0,
-    proposal: Proposal::NONE,
 });
 
 /// The capture: full once it is done. All zeros before, so the image does not grow by it.

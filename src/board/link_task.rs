@@ -137,7 +137,7 @@ async fn save(record: &Record) -> bool {
 
 /// What the bus may read, of the newest picture.
 fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
-    let Picture { report, frame, taxels, pascals_per_sum_q32, tare, proposals: _, proposal } = picture;
+    let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
     let report = report.unwrap_or_default();
     Snapshot {
         status: report.status,
@@ -154,7 +154,6 @@ fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
         taxels,
         pascals_per_sum_q32: *pascals_per_sum_q32,
         tare,
-        proposal,
         capture: Captured { standing: report.capture, data: &[] },
     }
 }

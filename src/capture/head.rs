@@ -36,7 +36,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 /// First bytes of a capture.
 pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
 /// Bytes before the parameters.
-const FIXED: usize = 44 + 4 * winding::WORDS;
+const FIXED: usize = 40 + 4 * winding::WORDS;
 
 /// A number for the names and the order of the parameters (FNV-1a of 32 bits).
 pub const LAYOUT: u32 = {
@@ -60,8 +60,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
 
     /// What the digest of the steps goes on from: all that is known before the first one.
     pub fn seed(&self) -> u32 {
-        let [taken, more_taken] = self.taken.words();
-        let first = [self.missed_frames, taken, more_taken, self.frame_ns];
+        let first = [self.missed_frames, self.taken.word(), self.frame_ns];
         let params = self.params.to_array().map(i32::cast_unsigned);
         let gains = (0..Gains::<ROWS, COLUMNS>::WORDS).map(|word| self.gains.word(word));
         digest::words(LAYOUT, first.into_iter().chain(self.winding).chain(params).chain(gains))
@@ -80,7 +79,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         for word in [LAYOUT, self.frames, self.bits, self.digest, self.check, self.missed_frames] {
             put(word.to_le_bytes());
         }
-        self.taken.words().into_iter().for_each(|word| put(word.to_le_bytes()));
+        put(self.taken.word().to_le_bytes());
         put(self.frame_ns.to_le_bytes());
         self.winding.iter().for_each(|word| put(word.to_le_bytes()));
         self.params.to_array().iter().for_each(|value| put(value.to_le_bytes()));

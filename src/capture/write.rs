@@ -4,6 +4,8 @@ use super::bits::{Place, Writer};
 use super::{Ended, Head, Last, Standing, State, digest, width};
 use crate::command::Command;
 use crate::frame::{Frame, Sense};
+use crate::measure::series::{CHECK, HEAD, Head as Series, Out};
+use crate::measure::{self, Task};
 use crate::pipeline::{Pipeline, Status};
 use crate::pressure::Gains;
 use crate::state::Mode;
@@ -15,6 +17,11 @@ pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> 
     standing: Standing,
     place: Place,
     last: Last<ROWS, COLUMNS>,
+    /// The head of a record of a motion, while one is kept, and its bytes so far.
+    series: Series,
+    length: usize,
+    /// A motion was under way in the step before.
+    ran: bool,
     bytes: [u8; BYTES],
 }
 
@@ -30,6 +37,9 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         standing: Standing { state: State::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
         place: Place::START,
         last: Last::NONE,
+        series: Series::NONE,
+        length: 0,
+        ran: false,
         bytes: [0; BYTES],
     };
 
@@ -93,7 +103,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
 
     /// Keeps what a step took and answered.
     pub fn record(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command, status: &Status) {
-        if self.standing.state != State::Recording {
+        if self.standing.state != State::Recording || self.series.kind != 0 {
             return;
         }
         let body = self.bytes.get_mut(Head::<ROWS, COLUMNS>::BYTES..).unwrap_or_default();
@@ -126,10 +136,61 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         self.last = Last { frame: *frame, sense: *sense, command: *command, duty, mode, fault, spread, digest };
     }
 
+    /// Keeps what a step adds to the record of a motion that measures: it begins with the motion, over whatever was kept,
+    /// and ends with it. Not while frames are being kept.
+    pub fn follow(&mut self, pipeline: &Pipeline<ROWS, COLUMNS>) {
+        let motion = pipeline.status().measure;
+        let runs = motion.state == measure::State::Running;
+        let begins = runs && !core::mem::replace(&mut self.ran, runs);
+        if begins && motion.task != Task::Jog && self.standing.state != State::Recording {
+            let press = motion.task == Task::Press;
+            self.series = Series {
+                kind: if press { 1 } else { 2 },
+                shape: [ROWS as u8, COLUMNS as u8],
+                ended: measure::Ended::Complete,
+                rows: 0,
+                check: CHECK,
+                frame_ns: pipeline.config().timing.frame_ns,
+                origin: pipeline.measured_from(),
+                delay_ns: if press { 0 } else { measure::strokes::DELAY_NS },
+                value: 0,
+            };
+            self.length = HEAD;
+            let count = self.standing.count.wrapping_add(1);
+            self.standing = Standing { state: State::Recording, count, ..Standing::default() };
+        }
+        let Self { series: head, length, bytes, .. } = self;
+        if head.kind == 0 {
+            return;
+        }
+        if let Some(row) = pipeline.row() {
+            let mut out = Out::new(bytes.get_mut(*length..).unwrap_or_default(), head.check);
+            out.row(&row);
+            if out.full {
+                let rows = head.rows.cast_signed();
+                return self.end_series(measure::Ended::Full, rows);
+            }
+            *length += out.count;
+            (head.check, head.rows) = (out.check, head.rows + 1);
+            self.standing.frames = head.rows;
+        }
+        if !runs {
+            self.end_series(motion.ended, motion.value);
+        }
+    }
+
+    fn end_series(&mut self, ended: measure::Ended, value: i32) {
+        let head = Series { ended, value, ..core::mem::replace(&mut self.series, Series::NONE) }.bytes();
+        self.bytes.iter_mut().zip(head).for_each(|(to, byte)| *to = byte);
+        let ended = if ended == measure::Ended::Full { Ended::Full } else { Ended::Asked };
+        self.standing = Standing { state: State::Done, ended, bytes: self.length as u32, ..self.standing };
+    }
+
     /// Ends it, or calls it off where it has not begun.
     pub fn end(&mut self, why: Ended) {
         match self.standing.state {
             State::Armed if why == Ended::Asked => self.standing.state = State::None,
+            State::Recording if self.series.kind != 0 => self.end_series(measure::Ended::Interrupted, 0),
             State::Recording => {
                 let (bits, frames) = (self.place.bits(), self.standing.frames);
                 let digest = digest::words(self.last.digest, core::iter::once(why as u32));
@@ -164,17 +225,14 @@ fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {
     if !changed {
         return;
     }
-    let Command { torque, goal, bus_watchdog_ms, fit_level, shown_mn, tare_forced, .. } = *command;
-    let Command { tare_request, clear_request, identify_request, commission_request, .. } = *command;
-    let Command { calibrate_request, forget_request, shown_request, .. } = *command;
+    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_forced, .. } = *command;
+    let Command { tare_request, clear_request, measure_request, .. } = *command;
     out.put(torque.into(), 1);
     out.put(tare_forced.into(), 1);
     out.put(goal.to_bits().cast_unsigned(), 32);
     out.put(bus_watchdog_ms.into(), 16);
     out.put(fit_level as u32, 8);
-    let requests = [tare_request, clear_request, identify_request, commission_request];
-    for request in requests.into_iter().chain([calibrate_request, forget_request, shown_request]) {
+    for request in [tare_request, clear_request, measure_request] {
         out.put(request.into(), 8);
     }
-    out.put(shown_mn.cast_unsigned(), 32);
 }

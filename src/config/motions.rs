@@ -1,66 +1,87 @@
-//! The bounds of the motions that measure the drive, derived once from the parameters; see [`crate::commission`].
+//! The bounds of the motions that measure the drive, derived once from the parameters; see [`crate::measure::strokes`].
 
 use super::newtons;
-use crate::model::Tip;
 use crate::params::Params;
 use crate::units::Newtons;
 
-/// Half of the way that the strokes go to and fro, mm, and no farther than this from where it began.
-const HALF_MM: f32 = 0.9;
-const FARTHEST_MM: f32 = 1.6;
-/// How far a jog goes at most, mm, and for how long, s; its voltage rises to the limit in the first half.
-const JOG_MM: f32 = 0.5;
-const JOG_S: f32 = 0.1;
-/// A touch: the array's force, where that for contact is not below.
-const TOUCH_MN: i32 = 60;
-/// What a fast stroke may press with once it brakes.
-const PRESS_MN: i32 = 250;
-/// Speed of a fast stroke at most, mm/s, and a slow one's share.
-const SPEED_MM_PER_S: f32 = 30.0;
-const SLOW: f32 = 0.55;
-/// A shorted motor rolls on for this far at most, mm.
+/// The way is felt this far to each side, strokes rest here, and any motion beyond the last is shorted, mm.
+const FELT_MM: f32 = 0.8;
+const STROKE_MM: f32 = 0.7;
+const FARTHEST_MM: f32 = 1.2;
+/// Rise of the voltage of a quick pulse, as by this force at the tip, N/s, and of a slow one: by the back-EMF of the
+/// fastest stroke in this time, s.
+const JOG_N_PER_S: f32 = 50.0;
+const RISE_S: f32 = 0.36;
+/// A pulse ends this far, mm, or this long, s, after it began to move.
+const PULSE_MM: f32 = 0.04;
+const PULSE_S: f32 = 0.05;
+/// A pulse, or the start of a stroke, may need this force more than the easiest pulse, N.
+const FEEL_N: f32 = 0.17;
+/// What a stroke has at least beyond the voltage at which pulses moved: as by this force at the tip, N, and no more than
+/// this share of the back-EMF of the fastest one.
+const START_N: f32 = 0.05;
+const START_PART: f32 = 0.1;
+/// Speed of the fastest stroke, mm/s, at most what rolls on for this far, mm, when shorted.
+const SPEED_MM_PER_S: f32 = 28.0;
 const ROLL_MM: f32 = 0.25;
-/// So many time constants belong to the run-up.
-const RUN_UP: f32 = 5.0;
-/// At rest: so long without a count, within so long, s.
-const STILL_S: f32 = 0.02;
+/// The way that a shorted motor rolls on, in time constants of the parameters.
+const ROLL: f32 = 1.4;
+/// A stroke takes this long at most, s.
+const STROKE_S: f32 = 0.5;
+/// A fall of the speed as by this force, mN, over the span, s, ends a stroke.
+const PUSH_MN: i32 = 300;
+const SPAN_S: f32 = 0.016;
+/// The span's counts are kept at so many places.
+pub const SPAN_PARTS: usize = 16;
+/// At rest: no count for this long, within this long, s.
+const STILL_S: f32 = 0.012;
 const REST_S: f32 = 0.5;
-/// A stroke takes so long at most, s.
-const STROKE_S: f32 = 1.0;
-/// The motor is to feel this force, N, over this time, s, or one in which it takes so many counts.
-const PUSH_N: f32 = 0.1;
-const SPAN_S: f32 = 0.008;
-const SPAN_MAX_S: f32 = 0.05;
-const DROP_COUNTS: f32 = 2.0;
+/// A touch: the array's force, mN, or that of a contact where this is less.
+const TOUCH_MN: i32 = 40;
+/// Against its direction nothing moves by more counts, and farther, mm.
+const BACK: i32 = 4;
+const BACK_MM: f32 = 0.03;
+/// Counts and uV that the motions calculate with at most.
+const COUNTS_MAX: f32 = 1_048_576.0;
+const UV_MAX: f32 = 50_000_000.0;
 
-/// A stroke has so many counts at most: what the sums of its line hold.
-pub const COUNTS_MAX: i32 = 1 << 20;
-
-/// Lengths in encoder counts, times in frames.
+/// Lengths in encoder counts, times in frames, voltages in uV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motions {
-    /// From the middle to where a stroke is over, and from where it began to where everything is.
-    pub half: i32,
-    /// See [`Motions::half`].
+    /// How far the way is felt, where strokes rest, and beyond what everything is shorted.
+    pub felt: i32,
+    /// See [`Motions::felt`].
+    pub stroke: i32,
+    /// See [`Motions::felt`].
     pub farthest: i32,
-    /// Way of a jog at most, and its time.
-    pub jog: i32,
-    /// See [`Motions::jog`].
-    pub jog_frames: u32,
-    /// How far a shorted motor rolls on from a slow and from a fast stroke.
-    pub roll: [i32; 2],
-    /// What voltage a slow and a fast stroke has beyond that of friction, mV.
-    pub beyond_mv: [i32; 2],
-    /// Speed that a slow stroke is to have, counts a frame, Q16.
-    pub slow: i32,
-    /// Time constant of a run-up.
-    pub time: u32,
-    /// Time of a run-up.
-    pub run_up: u32,
-    /// Time over which the speed is looked at for a force, and what a force takes off its counts.
-    pub span: u32,
-    /// See [`Motions::span`].
-    pub drop: i32,
+    /// Against its direction nothing moves by more.
+    pub back: i32,
+    /// A pulse ends so far, or so long, after it began to move.
+    pub pulse: i32,
+    /// See [`Motions::pulse`].
+    pub pulse_frames: u32,
+    /// Rise of the voltage of a quick pulse and of others in a frame.
+    pub jog_rise_uv: i32,
+    /// See [`Motions::jog_rise_uv`].
+    pub rise_uv: i32,
+    /// What a pulse may need more than the easiest one.
+    pub feel_uv: i32,
+    /// What a stroke has at least beyond the voltage at which pulses moved.
+    pub start_uv: i32,
+    /// The back-EMF of the fastest stroke.
+    pub fastest_uv: i32,
+    /// That of a count in a span, Q8.
+    pub uv_per_count_q8: i32,
+    /// Voltage for a force at the tip at standstill.
+    pub uv_per_newton: i32,
+    /// A part of the span over which the speed is looked at.
+    pub span_part: u32,
+    /// What a force that ends a stroke takes off the counts of a span, and that force.
+    pub push: i32,
+    /// See [`Motions::push`].
+    pub push_mn: i32,
+    /// How far a shorted motor rolls on, for the counts of a quarter of a span, Q8.
+    pub roll_q8: i32,
     /// Without a count for so long is rest, and how long to wait for it.
     pub still: u32,
     /// See [`Motions::still`].
@@ -69,6 +90,8 @@ pub struct Motions {
     pub longest: u32,
     /// The force that is a touch.
     pub touch: Newtons,
+    /// Length of a count, Q16 um.
+    um_per_count_q16: i64,
 }
 
 /// What the configuration knows of frame, encoder and motor.
@@ -77,80 +100,60 @@ pub(crate) struct Driven {
     pub mm_per_count: f32,
     /// c, 1/s.
     pub damping: f32,
-    /// The motor's inertia at the tip, kg.
-    pub mass: f32,
 }
 
 impl Motions {
-    /// Before there are any.
-    pub const NONE: Self = Self {
-        half: 0,
-        farthest: 0,
-        jog: 0,
-        jog_frames: 0,
-        roll: [0; 2],
-        beyond_mv: [0; 2],
-        slow: 0,
-        time: 0,
-        run_up: 0,
-        span: 0,
-        drop: 0,
-        still: 0,
-        rest: 0,
-        longest: 0,
-        touch: Newtons::ZERO,
-    };
-
-    pub(crate) fn new(p: &Params, tip: &Tip, driven: &Driven) -> Self {
-        let Driven { frame_s, mm_per_count, damping, mass } = *driven;
-        let counts = |mm: f32| (mm / mm_per_count).clamp(4.0, COUNTS_MAX as f32) as i32;
+    pub(crate) fn new(p: &Params, driven: &Driven) -> Self {
+        let Driven { frame_s, mm_per_count, damping } = *driven;
+        let counts = |mm: f32| (mm / mm_per_count).clamp(4.0, COUNTS_MAX) as i32;
         let frames = |s: f32| (s / frame_s).max(2.0) as u32;
-        let touch = newtons(p.contact_on_mn.min(TOUCH_MN));
-        let room = tip.indentation(newtons(PRESS_MN)).to_bits().saturating_sub(tip.indentation(touch).to_bits());
-        let room_mm = (room.max(0) as f32 / super::exp2(24)).min(ROLL_MM);
-        let fast = (room_mm * damping).min(SPEED_MM_PER_S).min(p.approach_um_per_s as f32 * 1e-3);
-        let speeds = [SLOW * fast, fast];
-        // mm/s times rad/mm times V s.
-        let volts = p.torque_constant_unm_per_a as f32 * 1e-6 * p.reduction_mrad_per_mm as f32 * 1e-3;
-        let millivolts = |speed: f32| (1e3 * volts * speed).min(p.voltage_max_mv as f32) as i32;
-        // What a force takes of the speed: F / (m c).
-        let counts_per_s = 1e3 * PUSH_N / (mass * damping) / mm_per_count;
-        let span_s = (DROP_COUNTS / counts_per_s).clamp(SPAN_S, SPAN_MAX_S);
-        let run_up = RUN_UP / damping;
+        let microvolts = |uv: f32| uv.clamp(1.0, UV_MAX) as i32;
+        // Back-EMF for a speed of the tip, uV s/mm, and voltage for a force, uV/N.
+        let (k, rad_per_mm) = (p.torque_constant_unm_per_a as f32, p.reduction_mrad_per_mm as f32 * 1e-3);
+        let uv_s_per_mm = k * rad_per_mm;
+        let uv_per_newton = p.resistance_mohm as f32 * 1e6 / uv_s_per_mm;
+        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping);
+        let span_part = frames(SPAN_S / SPAN_PARTS as f32).max(1);
+        let span_s = span_part as f32 * SPAN_PARTS as f32 * frame_s;
+        let push_mm_per_s = PUSH_MN as f32 * 1e-3 * uv_per_newton / uv_s_per_mm;
         Self {
-            half: counts(HALF_MM),
+            felt: counts(FELT_MM),
+            stroke: counts(STROKE_MM),
             farthest: counts(FARTHEST_MM),
-            jog: counts(JOG_MM),
-            jog_frames: frames(JOG_S),
-            roll: speeds.map(|speed| counts(speed / damping)),
-            beyond_mv: speeds.map(millivolts),
-            slow: super::narrow(speeds[0] / mm_per_count * frame_s * super::exp2(16)),
-            time: frames(1.0 / damping),
-            run_up: frames(run_up.min(STROKE_S)),
-            span: frames(span_s),
-            drop: (counts_per_s * span_s).clamp(DROP_COUNTS, COUNTS_MAX as f32) as i32,
+            back: BACK.max(counts(BACK_MM)),
+            pulse: counts(PULSE_MM),
+            pulse_frames: frames(PULSE_S),
+            jog_rise_uv: microvolts(JOG_N_PER_S * uv_per_newton * frame_s),
+            rise_uv: microvolts(fastest_uv / RISE_S * frame_s),
+            feel_uv: microvolts(FEEL_N * uv_per_newton),
+            start_uv: microvolts((START_N * uv_per_newton).min(START_PART * fastest_uv)),
+            fastest_uv: microvolts(fastest_uv),
+            uv_per_count_q8: super::narrow(uv_s_per_mm * mm_per_count / span_s * 256.0),
+            uv_per_newton: microvolts(uv_per_newton),
+            span_part,
+            push: counts(push_mm_per_s * span_s),
+            push_mn: PUSH_MN,
+            roll_q8: super::narrow(ROLL / damping / (span_s / 4.0) * 256.0),
             still: frames(STILL_S),
             rest: frames(REST_S),
             longest: frames(STROKE_S),
-            touch,
+            touch: newtons(p.contact_on_mn.min(TOUCH_MN)),
+            um_per_count_q16: super::wide(mm_per_count * 1e3 * 65_536.0),
         }
     }
 
-    /// For a drive whose time constant is longer than thought: as far, and so less fast.
-    pub fn slower(&self, time: u32) -> Self {
-        if time <= self.time {
-            return *self;
-        }
-        let less = |value: i32| {
-            let value = u64::from(value.max(0).unsigned_abs()) * u64::from(self.time);
-            value.checked_div(time.into()).unwrap_or(0) as i32
-        };
-        Self {
-            beyond_mv: self.beyond_mv.map(less),
-            slow: less(self.slow),
-            time,
-            run_up: time.saturating_mul(RUN_UP as u32),
-            ..*self
-        }
+    /// Frames of a span.
+    pub fn span(&self) -> u32 {
+        self.span_part.saturating_mul(SPAN_PARTS as u32)
+    }
+
+    /// A length, um.
+    pub fn um(&self, counts: i32) -> i32 {
+        ((i64::from(counts) * self.um_per_count_q16) >> 16) as i32
+    }
+
+    /// The force at the tip that a voltage makes at standstill, mN.
+    pub fn millinewtons(&self, uv: i32) -> i32 {
+        (i64::from(uv) * 1_000).checked_div(self.uv_per_newton.into()).unwrap_or(0) as i32
     }
 }

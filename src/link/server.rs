@@ -60,8 +60,6 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
     pub counters: Counters,
     registered: Option<Registered>,
     actions: Actions,
-    /// The gains proposed are to be those in force.
-    accept: bool,
     turn: Turn,
     /// Once this device has sent its part of a shared packet: how much comes behind it.
     behind: Option<u16>,
@@ -110,7 +108,6 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
             counters: Counters::default(),
             registered: None,
             actions: Actions::default(),
-            accept: false,
             turn: Turn::None,
             behind: None,
             heard_ms: 0,

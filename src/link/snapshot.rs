@@ -1,6 +1,5 @@
 //! What the bus may read of the running controller, gathered by the firmware.
 
-use crate::calibrate::Proposal;
 use crate::capture;
 use crate::frame::Frame;
 use crate::pipeline::Status;
@@ -38,8 +37,6 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
     pub pascals_per_sum_q32: i64,
     /// What they read without contact, corrected codes with [`TARE_BITS`] fractional bits.
     pub tare: &'a [[i32; COLUMNS]; ROWS],
-    /// The gains that presses propose.
-    pub proposal: &'a Proposal<ROWS, COLUMNS>,
     /// The capture.
     pub capture: Captured<'a>,
 }
@@ -192,7 +189,6 @@ mod tests {
             taxels: &taxels,
             pascals_per_sum_q32: 8 << 32,
             tare: &tare,
-            proposal: &Proposal::NONE,
             capture: Captured::default(),
         };
         let at = |place| (snapshot.pressure_10pa(place), snapshot.tare_codes(place));

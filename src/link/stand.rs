@@ -2,12 +2,11 @@
 //!
 //! The link knows the loop by a snapshot that may be a frame old, and by what it has itself let through since. A
 //! request that is impossible by these is refused with the result error. What comes in between, as a fault in the next
-//! frame, shows in the registers `tare_state`, `identify_state` and `saved_state`.
+//! frame, shows in the registers `tare_state`, `measure_state` and `saved_state`.
 
-use crate::calibrate::State;
 use crate::capture;
 use crate::command::Command;
-use crate::commission::{Commissioning, Task};
+use crate::measure::Task;
 use crate::params::Params;
 use crate::pipeline::Taken;
 use crate::state::{Fault, Limits, Mode};
@@ -24,18 +23,12 @@ pub(super) struct Stand {
     pub faulted: bool,
     /// It is that of the bus watchdog.
     pub bus_silent: bool,
-    /// What commissioning found.
-    pub commissioned: Commissioning,
     taken: Taken,
     mode: Mode,
     tared: bool,
     tared_touching: bool,
     supply_mv: u16,
     bad_taxels: u8,
-    /// Taxels have gains proposed.
-    pub proposed: bool,
-    /// The factor that a scale proposes for forces, millionths; 0 none.
-    pub factor_ppm: u32,
     /// Frames are being kept for a capture.
     pub captures: bool,
 }
@@ -58,16 +51,12 @@ impl Stand {
         Self {
             faulted: status.fault.is_some(),
             bus_silent: status.fault == Some(Fault::BusSilent),
-            commissioned: status.commissioning,
             taken: status.taken,
             mode: status.mode,
             tared: !status.limits.has(Limits::NOT_TARED),
             tared_touching: status.limits.has(Limits::TARED_TOUCHING),
             supply_mv: snapshot.supply_mv,
             bad_taxels: status.contact.bad_taxels,
-            // While a press runs, or is worked out, there may be a mixture.
-            proposed: status.calibration.presses > 0 && status.calibration.state != State::Running,
-            factor_ppm: status.scale.factor_ppm,
             captures: snapshot.capture.standing.state == capture::State::Recording,
         }
     }
@@ -93,35 +82,31 @@ impl Stand {
         self.tared_touching && !command.tare_forced && command.tare_request == self.taken.tare
     }
 
-    /// Whether what was measured is about to be forgotten.
-    pub fn forgets(&self, command: &Command) -> bool {
-        command.forget_request != self.taken.forget
-    }
-
-    /// Whether the motor moves to be measured, or is about to.
-    pub fn commissioning(&self, command: &Command) -> bool {
-        let waits = command.commission_request != self.taken.commission;
-        self.mode == Mode::Commission || waits && Task::of(command.commission_request) != Task::Stop
+    /// Whether the motor jogs or makes strokes, or is about to.
+    pub fn strokes(&self, command: &Command) -> bool {
+        let waits = command.measure_request != self.taken.measure;
+        self.mode == Mode::Strokes || waits && matches!(Task::of(command.measure_request), Task::Jog | Task::Strokes)
     }
 
     /// Refuses what a write asks for and what cannot be done.
     ///
     /// # Errors
-    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press that measures
-    /// modulus or gains without torque or tare; a measurement of the drive with torque, in a fault or without a tare; a
-    /// save while the loop drives, is about to or tares, when it must not wait for the flash.
+    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press without torque or tare;
+    /// a jog or strokes with torque, in a fault or without a tare; a save while the loop drives, is about to or tares,
+    /// when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;
         let taring = self.mode == Mode::Tare || after.tare_request != self.taken.tare;
         let tare = after.tare_request == before.tare_request || !stopped;
-        let pressed = [before, after].map(|command| (command.identify_request, command.calibrate_request));
-        let identify = pressed[0] == pressed[1] || after.torque && (self.tared || taring);
-        let commission = after.commission_request == before.commission_request
-            || Task::of(after.commission_request) == Task::Stop
-            || !after.torque && self.tared && !taring && !self.faulted;
-        let moves = self.commissioning(after);
+        let measure = after.measure_request == before.measure_request
+            || match Task::of(after.measure_request) {
+                Task::Stop => true,
+                Task::Press => after.torque && (self.tared || taring),
+                Task::Jog | Task::Strokes => !after.torque && self.tared && !taring && !self.faulted,
+            };
+        let moves = self.strokes(after);
         let save = !actions.save || !after.torque && !taring && !moves && matches!(self.mode, Mode::Off | Mode::Fault);
-        if goal && tare && identify && commission && save { Ok(()) } else { Err(StatusError::Result) }
+        if goal && tare && measure && save { Ok(()) } else { Err(StatusError::Result) }
     }
 }

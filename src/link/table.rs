@@ -102,8 +102,6 @@ impl Cell {
 pub(super) struct Staged<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
-    /// The gains that presses propose are to be those in force.
-    pub accept: bool,
     /// How the loop stands.
     pub stand: Stand,
     /// The board's.
@@ -171,7 +169,7 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
         return Err(StatusError::Length);
     }
     let before = staged.settings.command;
-    let moves = before.torque || staged.stand.commissioning(&before);
+    let moves = before.torque || staged.stand.strokes(&before);
     let params = staged.settings.record.params;
     let mut at = address;
     let mut rest = data;

@@ -6,18 +6,17 @@
 //! | tare | in every activity but fault, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
 //! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced) | the finger stays off; limits 6 and 10 give the reason |
 //! | torque off | in every activity | |
-//! | commission | in off, with torque off and the array tared; a stop in commission | refused: [`commission::Refusal`] |
-//! | identify, calibrate | in a grip; with torque on it waits while torque is taken up, a tare is under way or another measurement ends | refused: `NotReady` |
+//! | jog, strokes | in off, with torque off, the array tared and nothing at the tip | refused: [`Ended`] |
+//! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
+//! | stop | a jog, strokes or a press under way | |
 
 use super::Pipeline;
 use crate::activity::{Activity, Halt};
-use crate::calibrate::Refusal as Unfit;
 use crate::command::Command;
-use crate::commission::{self, Commissioning, Run, Task};
 use crate::contact::Contact;
 use crate::frame::Sense;
 use crate::grip::Grip;
-use crate::identify::{Identification, Press, Refusal};
+use crate::measure::{Ended, Press, Standing, State, Strokes, Task};
 use crate::safety::guard::Guard;
 use crate::state::Fault;
 use crate::status::{Taken, Taring};
@@ -38,10 +37,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         waits
             || command.tare_request != taken.tare
             || command.clear_request != taken.clear
-            || command.identify_request != taken.identify
-            || command.calibrate_request != taken.calibrate
-            || command.forget_request != taken.forget
-            || command.commission_request != taken.commission
+            || command.measure_request != taken.measure
     }
 
     /// Serves what a command newly asks for.
@@ -49,20 +45,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     pub(super) fn serve(&mut self, command: &Command, sense: &Sense, contact: &Contact) {
         let before = self.status.taken;
         if let Activity::Press(press) = &self.activity
-            && (!press.running() || press.deep() && !self.calibrator.running())
+            && !press.running()
         {
             self.activity = Activity::Grip(Grip::default());
         }
-        self.status.taken = Taken {
-            tare: command.tare_request,
-            clear: command.clear_request,
-            forget: command.forget_request,
-            commission: command.commission_request,
-            ..before
-        };
-        if command.forget_request != before.forget {
-            self.forget();
-        }
+        self.status.taken = Taken { tare: command.tare_request, clear: command.clear_request, ..before };
         if command.clear_request != before.clear && !command.torque && matches!(self.activity, Activity::Fault(_)) {
             self.status.fault = None;
             self.activity = Activity::Off(Halt::BRAKES);
@@ -73,22 +60,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         if !command.torque && matches!(self.activity, Activity::Grip(_) | Activity::Press(_)) {
             self.leave(Halt::BRAKES);
         }
-        let task = Task::of(command.commission_request);
-        if command.commission_request != before.commission || command.torque {
-            let task = if command.torque { Task::Stop } else { task };
-            self.serve_commission(task, command.tare_forced, sense.encoder, contact);
-            if command.torque && command.commission_request != before.commission && task != Task::Stop {
-                self.status.commissioning = Commissioning::Refused(commission::Refusal::NotReady);
+        if command.torque {
+            if let Activity::Strokes(run) = &mut self.activity {
+                run.halt(sense.encoder);
+            }
+            if self.may_drive(command.tare_forced) {
+                self.serve_torque(sense.encoder);
             }
         }
-        if command.torque && self.may_drive(command.tare_forced) {
-            self.serve_torque(sense.encoder);
-        }
-        if command.identify_request != before.identify {
-            self.serve_press(false, command);
-        }
-        if command.calibrate_request != before.calibrate {
-            self.serve_press(true, command);
+        if command.measure_request != before.measure {
+            self.serve_measure(command, sense.encoder, contact);
         }
     }
 
@@ -139,65 +120,57 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.monitor.restart(self.array.picture(), &self.motion);
     }
 
+    /// A motion that measures, or its end. A press waits for torque that is being taken up.
     #[inline(never)]
-    fn serve_commission(&mut self, task: Task, tare_forced: bool, encoder: i32, contact: &Contact) {
-        let free = self.may_drive(tare_forced) && contact.force < self.config.contact_on;
-        let refusal = match &mut self.activity {
-            Activity::Strokes(run) => return run.halt(encoder),
-            _ if task == Task::Stop => return,
-            Activity::Off(_) if free => {
-                if task != Task::Measure || self.config.params.direction_confirmed != 0 {
-                    self.start(encoder);
-                    self.activity = Activity::Strokes(Run::begun(task, encoder, &self.config));
-                    return;
-                }
-                commission::Refusal::Unconfirmed
-            }
-            _ => commission::Refusal::NotReady,
-        };
-        self.status.commissioning = Commissioning::Refused(refusal);
-    }
-
-    /// A press that measures Young's modulus, or the taxels' gains.
-    #[inline(never)]
-    fn serve_press(&mut self, gains: bool, command: &Command) {
-        let works = gains && self.calibrator.busy() && !self.calibrator.running();
-        let accepted = match &self.activity {
-            // The press before has its answer first.
-            _ if works => return,
-            Activity::Press(press) if press.deep() == gains => true,
-            Activity::Grip(_) => {
-                self.activity = Activity::Press(Press::begin(gains, &self.motion));
-                if gains {
-                    self.calibrator.start();
-                } else {
-                    self.status.identification = Identification::Running;
-                }
-                true
-            }
-            Activity::Tare { .. } if command.torque => return,
-            Activity::Off(_) | Activity::Press(_) if command.torque && self.may_drive(command.tare_forced) => return,
+    fn serve_measure(&mut self, command: &Command, encoder: i32, contact: &Contact) {
+        let task = Task::of(command.measure_request);
+        let may_drive = self.may_drive(command.tare_forced);
+        let waits = match &self.activity {
+            Activity::Tare { .. } => command.torque,
+            Activity::Off(_) | Activity::Strokes(_) => command.torque && may_drive,
             _ => false,
         };
-        let taken = &mut self.status.taken;
-        *(if gains { &mut taken.calibrate } else { &mut taken.identify }) =
-            if gains { command.calibrate_request } else { command.identify_request };
-        match (accepted, gains) {
-            (true, _) => {}
-            (false, true) => self.calibrator.refuse(Unfit::NotReady),
-            (false, false) => self.status.identification = Identification::Refused(Refusal::NotReady),
+        if task == Task::Press && waits {
+            return;
         }
+        self.status.taken.measure = command.measure_request;
+        let runs = self.status.measure.state == State::Running;
+        let refusal = match (task, &mut self.activity) {
+            (Task::Stop, Activity::Strokes(run)) => return run.halt(encoder),
+            (Task::Stop, Activity::Press(_)) => {
+                self.leave(Halt::BRAKES);
+                self.activity = Activity::Grip(Grip::default());
+                return;
+            }
+            (Task::Stop, _) => return,
+            (Task::Press, Activity::Grip(_)) => {
+                self.status.measure = Standing::running(task);
+                self.activity = Activity::Press(Press::begin(&self.motion));
+                return;
+            }
+            // The one under way answers for both.
+            _ if runs => return,
+            (Task::Jog | Task::Strokes, Activity::Off(_))
+                if !command.torque && may_drive && contact.force < self.config.contact_on =>
+            {
+                if task == Task::Jog || self.config.params.direction_confirmed != 0 {
+                    self.start(encoder);
+                    self.status.measure = Standing::running(task);
+                    self.activity = Activity::Strokes(Strokes::begin(task, encoder));
+                    return;
+                }
+                Ended::Unconfirmed
+            }
+            _ => Ended::NotReady,
+        };
+        self.status.measure = Standing::refused(task, refusal, 0);
     }
 
     /// Ends what drives the motor, for the reason that something else begins: off, where there is no fault.
     #[inline(never)]
     pub(super) fn leave(&mut self, halt: Halt) {
         match &mut self.activity {
-            Activity::Press(press) if press.deep() => self.calibrator.interrupt(),
-            Activity::Press(_) => self.status.identification = Identification::Refused(Refusal::Interrupted),
-            Activity::Strokes(_) => {
-                self.status.commissioning = Commissioning::Refused(commission::Refusal::Interrupted);
-            }
+            Activity::Press(_) | Activity::Strokes(_) => self.status.measure.end(Ended::Interrupted, 0),
             Activity::Tare { .. } if self.status.tare == Taring::Running => self.status.tare = Taring::Refused,
             Activity::Fault(_) => return,
             Activity::Off(_) | Activity::Tare { .. } | Activity::Grip(_) => {}
@@ -215,13 +188,5 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.report_activity();
         self.motion.short(&self.config);
         self.status.duty = Default::default();
-    }
-
-    /// Forgets what presses and a scale measured: parameters or gains are others now, or the host wants so.
-    #[inline(never)]
-    pub(super) fn forget(&mut self) {
-        self.calibrator.forget();
-        self.scale.forget();
-        (self.status.calibration, self.status.scale) = (self.calibrator.standing(), self.scale.standing());
     }
 }

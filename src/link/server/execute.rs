@@ -47,7 +47,6 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             instruction::FAST_BULK_READ if !own => self.fast_bulk_read(params, snapshot, reply),
             _ => {
                 let result = self.change(packet, own);
-                self.accept(snapshot);
                 self.conclude(packet, level, result, reply);
             }
         }
@@ -111,7 +110,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
     }
 
     fn staged(&self) -> Staged<ROWS, COLUMNS> {
-        Staged { settings: self.settings, actions: self.actions, accept: false, stand: self.stand, clocks: self.clocks }
+        Staged { settings: self.settings, actions: self.actions, stand: self.stand, clocks: self.clocks }
     }
 
     fn commit(&mut self, mut staged: Staged<ROWS, COLUMNS>) {
@@ -120,27 +119,12 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
         staged.actions.configure |= params;
         let gains = before.gains != after.gains;
         staged.actions.calibrate |= gains;
-        // What was measured with those before is void from now on, not only once the loop has the others.
-        if params || gains {
-            let forget = &mut staged.settings.command.forget_request;
-            *forget = forget.wrapping_add(1);
-        }
         staged.actions.baud |= before.baud_code != after.baud_code;
         if before != after {
             staged.settings.saved = Saved::Changed;
         }
         self.settings = staged.settings;
         self.actions = staged.actions;
-        self.accept |= staged.accept;
-    }
-
-    /// Makes proposed gains those in force, where that was asked for.
-    fn accept(&mut self, snapshot: &Snapshot<'_, ROWS, COLUMNS>) {
-        if core::mem::take(&mut self.accept) {
-            let mut staged = self.staged();
-            staged.settings.record.gains = snapshot.proposal.gains;
-            self.commit(staged);
-        }
     }
 
     /// Reg Write: checked now, written by Action.
@@ -170,7 +154,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             0xFF => return Ok(()),
             _ => return Err(StatusError::Range),
         };
-        if self.settings.command.torque || self.stand.commissioning(&self.settings.command) {
+        if self.settings.command.torque || self.stand.strokes(&self.settings.command) {
             return Err(StatusError::Access);
         }
         let mut staged = self.staged();

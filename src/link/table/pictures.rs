@@ -15,7 +15,7 @@ pub(super) const FIRST: u16 = 768;
 /// Where it begins of an array whose pictures would reach from there into other registers: beyond all of these.
 const FIRST_OF_MANY: u16 = 8_192;
 /// How many there are.
-pub const COUNT: usize = 6;
+pub const COUNT: usize = 4;
 /// Name, largest value, unit and resolution of each, and what it means.
 const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
     ("PRESSURES", 0xFFFF, "Pa", 10, " Pressure on each taxel, row by row; 0 before the first tare."),
@@ -34,31 +34,14 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
         1,
         " What each taxel's reading is multiplied by, row by row: a half to just below 2. New gains need a new tare.",
     ),
-    (
-        "PROPOSED_GAINS",
-        GAIN_MAX as i64,
-        "1/16384",
-        1,
-        " The gains that the presses propose; those in force where none reached a taxel.",
-    ),
-    (
-        "PROPOSED_SIGMAS",
-        255,
-        "permille",
-        1,
-        " Their standard uncertainty, at most 254; 255 where no press reached the taxel.",
-    ),
 ];
 
 /// Where they are in an array's table.
 pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
     let few = cells_from::<ROWS, COLUMNS>(FIRST);
-    let [.., gains, proposed, sigmas] = &few;
-    let apart = gains.end() <= address::CALIBRATE
-        && address::SCALE_SIGMA_PPM < proposed.address
-        && sigmas.end() <= address::COMMISSION;
-    if apart { few } else { cells_from::<ROWS, COLUMNS>(FIRST_OF_MANY) }
+    let [.., gains] = &few;
+    if gains.end() <= address::MEASURE { few } else { cells_from::<ROWS, COLUMNS>(FIRST_OF_MANY) }
 }
 
 const fn cells_from<const ROWS: usize, const COLUMNS: usize>(address: u16) -> [Cell; COUNT] {
@@ -68,10 +51,7 @@ const fn cells_from<const ROWS: usize, const COLUMNS: usize>(address: u16) -> [C
     let second = cell(after(&first), codes);
     let third = cell(after(&second), taxels);
     let gains = Cell { access: Access::Stored, ..cell(after(&third), taxels) };
-    let proposed = cell(after(&gains), taxels);
-    // Right behind them.
-    let sigmas = Cell { kind: Kind::U8, ..cell(proposed.address + 2 * taxels, taxels) };
-    [first, second, third, gains, proposed, sigmas]
+    [first, second, third, gains]
 }
 
 const fn cell(address: u16, count: u16) -> Cell {
@@ -118,8 +98,6 @@ pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Reg
         register(1, &cells),
         register(2, &cells),
         register(3, &cells),
-        register(4, &cells),
-        register(5, &cells),
     ]
 }
 
@@ -137,7 +115,7 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     address: u16,
     element: usize,
 ) -> u32 {
-    let [pressures, codes, tare, gains, proposed, sigmas] = const { cells::<ROWS, COLUMNS>() };
+    let [pressures, codes, tare, gains] = const { cells::<ROWS, COLUMNS>() };
     let snapshot = view.snapshot;
     let value = if address == pressures.address {
         if view.tared() { snapshot.pressure_10pa(element) } else { 0 }
@@ -147,10 +125,6 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
         snapshot.tare_codes(element)
     } else if address == gains.address {
         view.settings().record.gains.get(element)
-    } else if address == proposed.address {
-        snapshot.proposal.gains.get(element)
-    } else if address == sigmas.address {
-        snapshot.proposal.sigmas.as_flattened().get(element).copied().unwrap_or(0).into()
     } else {
         0
     };
@@ -191,13 +165,9 @@ mod tests {
 
     #[test]
     fn pictures_stand_apart() {
-        assert_eq!(addresses::<10, 10>(), [768, 1_024, 1_280, 1_536, 1_792, 1_992]);
-        assert_eq!(addresses::<3, 3>(), [768, 1_024, 1_280, 1_536, 1_792, 1_810]);
-        assert_eq!(addresses::<4, 4>(), [768, 1_024, 1_280, 1_536, 1_792, 1_824]);
-        assert_eq!(addresses::<8, 8>(), [768, 1_024, 1_280, 1_536, 1_792, 1_920]);
-        assert_eq!(addresses::<3, 32>(), [768, 1_024, 1_280, 1_536, 1_792, 1_984]);
-        assert_eq!(addresses::<10, 11>(), [8_192, 8_448, 8_704, 8_960, 9_216, 9_436]);
-        assert_eq!(addresses::<16, 16>(), [8_192, 8_704, 9_472, 9_984, 10_496, 11_008]);
-        assert_eq!(addresses::<16, 32>(), [8_192, 9_216, 10_496, 11_520, 12_544, 13_568]);
+        assert_eq!(addresses::<10, 10>(), [768, 1_024, 1_280, 1_536]);
+        assert_eq!(addresses::<3, 3>(), [768, 1_024, 1_280, 1_536]);
+        assert_eq!(addresses::<16, 16>(), [768, 1_280, 2_048, 2_560]);
+        assert_eq!(addresses::<16, 32>(), [8_192, 9_216, 10_496, 11_520]);
     }
 }

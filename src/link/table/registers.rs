@@ -25,7 +25,7 @@ use crate::link::snapshot::hardware_error;
 use crate::store;
 
 use super::values::{
-    bump, permille, set_accept, set_calibrate, set_capture, set_commission, set_goal, set_recover, set_scale, set_tare,
+    bump, permille, set_capture, set_goal, set_measure, set_recover, set_tare,
     set_torque, set_watchdog, short, watchdog,
 };
 /// The defaults go by no shape.

@@ -1,10 +1,10 @@
 //! Registers whose values take more than a line to read or to write.
 
-use crate::commission::{Commissioning, Task};
 use crate::config::newtons;
 use crate::link::packet::StatusError;
 use crate::link::settings::Settings;
 use crate::link::stand::Hindrance;
+use crate::measure::Task;
 use crate::units::{Duty, Newtons};
 
 use super::Staged;
@@ -24,13 +24,13 @@ pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
     if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed || touched) {
         return Err(StatusError::Result);
     }
-    let commissioning = staged.stand.commissioning(&staged.settings.command);
+    let strokes = staged.stand.strokes(&staged.settings.command);
     let command = &mut staged.settings.command;
     command.torque = on;
     if !on {
         command.goal = Newtons::ZERO;
-        if commissioning {
-            command.commission_request = Task::Stop.after(command.commission_request);
+        if strokes {
+            command.measure_request = Task::Stop.after(command.measure_request);
         }
     }
     Ok(())
@@ -46,34 +46,17 @@ pub(super) fn set_tare<const ROWS: usize, const COLUMNS: usize>(
     Ok(())
 }
 
-/// Commission: a task.
-pub(super) fn set_commission<const ROWS: usize, const COLUMNS: usize>(
+/// Measure: a task.
+pub(super) fn set_measure<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     value: i64,
 ) -> Result<(), StatusError> {
     let task = Task::of(value as u8);
     let command = &mut staged.settings.command;
-    command.commission_request = task.after(command.commission_request);
-    Ok(())
-}
-
-/// Takes what commissioning found into the parameters.
-pub(super) fn set_accept<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let params = &mut staged.settings.record.params;
-    match (value, staged.stand.commissioned) {
-        (0, _) => {}
-        (1, Commissioning::Directed | Commissioning::Measured(_)) => params.direction_confirmed = 1,
-        (2, Commissioning::Measured(drive)) => {
-            params.torque_constant_unm_per_a = drive.torque_constant_unm_per_a as i32;
-            params.inertia_ug_m2 = drive.inertia_ug_m2 as i32;
-            params.friction_unm = drive.friction_unm.iter().map(|&way| i32::from(way)).sum::<i32>() / 2;
-        }
-        _ => return Err(StatusError::Result),
-    }
-    Ok(())
+    command.measure_request = task.after(command.measure_request);
+    // Its record needs the memory of a capture.
+    let kept = matches!(task, Task::Strokes | Task::Press) && staged.stand.captures;
+    if kept { Err(StatusError::Result) } else { Ok(()) }
 }
 
 /// Goal force: refused while a tripped watchdog stands.
@@ -117,46 +100,6 @@ pub(super) fn set_recover<const ROWS: usize, const COLUMNS: usize>(
     }
     set_torque(staged, 0)?;
     bump(&mut staged.settings.command.clear_request, 1);
-    Ok(())
-}
-
-/// Calibrate: a press, to forget, or to accept.
-pub(super) fn set_calibrate<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let command = &mut staged.settings.command;
-    match value {
-        1 => bump(&mut command.calibrate_request, 1),
-        2 => bump(&mut command.forget_request, 1),
-        3 if command.torque => return Err(StatusError::Access),
-        3 if !staged.stand.proposed || staged.stand.forgets(command) => return Err(StatusError::Result),
-        3 => staged.accept = true,
-        _ => {}
-    }
-    Ok(())
-}
-
-/// Scale: to forget, or to accept.
-pub(super) fn set_scale<const ROWS: usize, const COLUMNS: usize>(
-    staged: &mut Staged<ROWS, COLUMNS>,
-    value: i64,
-) -> Result<(), StatusError> {
-    let factor_ppm = i64::from(staged.stand.factor_ppm);
-    match value {
-        2 => bump(&mut staged.settings.command.forget_request, 1),
-        3 if staged.settings.command.torque => return Err(StatusError::Access),
-        3 if factor_ppm == 0 || staged.stand.forgets(&staged.settings.command) => return Err(StatusError::Result),
-        3 => {
-            let params = &mut staged.settings.record.params;
-            let by = |value: i32, over: i64, under: i64| {
-                (i64::from(value) * over + under / 2).checked_div(under).unwrap_or(0) as i32
-            };
-            params.codes_per_kpa_milli = by(params.codes_per_kpa_milli, 1_000_000, factor_ppm);
-            params.modulus_pa = by(params.modulus_pa, factor_ppm, 1_000_000);
-        }
-        _ => {}
-    }
     Ok(())
 }
 

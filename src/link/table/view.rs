@@ -1,10 +1,8 @@
 //! What a read sees: the device's own state, and the picture of the loop.
 
-use crate::calibrate::State as Press;
 use crate::capture;
-use crate::commission::{Commissioning, Drive};
 use crate::contact::Contact;
-use crate::identify::{Identification, Modulus};
+use crate::measure;
 use crate::link::packet::StatusError;
 use crate::link::server::{Counters, State};
 use crate::link::settings::Settings;
@@ -69,10 +67,6 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         byte.unwrap_or(0)
     }
 
-    pub(super) fn identified(&self) -> Modulus {
-        self.snapshot.status.identification.result()
-    }
-
     /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
     pub(super) fn tare_state(&self) -> u32 {
         let status = &self.snapshot.status;
@@ -82,41 +76,13 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         status.tare as u32
     }
 
-    pub(super) fn identify_state(&self) -> u32 {
+    /// As the tare's.
+    pub(super) fn measure_state(&self) -> u32 {
         let status = &self.snapshot.status;
-        if self.settings().command.identify_request != status.taken.identify {
-            return Identification::Running.number().into();
+        if self.settings().command.measure_request != status.taken.measure {
+            return measure::State::Running as u32;
         }
-        status.identification.number().into()
-    }
-
-    pub(super) fn measured(&self) -> Drive {
-        self.snapshot.status.commissioning.drive()
-    }
-
-    pub(super) fn commission_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.commission_request != status.taken.commission {
-            return Commissioning::Running(0).number().into();
-        }
-        status.commissioning.number().into()
-    }
-
-    /// As the tare's: what has not been taken up is running.
-    pub(super) fn calibrate_state(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.calibrate_request != status.taken.calibrate {
-            return Press::Running.number().into();
-        }
-        status.calibration.state.number().into()
-    }
-
-    pub(super) fn scale_points(&self) -> u32 {
-        let status = &self.snapshot.status;
-        if self.settings().command.shown_request != status.taken.shown {
-            return u8::MAX.into();
-        }
-        status.scale.points.into()
+        status.measure.state as u32
     }
 
     /// As the tare's: what was asked for counts already.

@@ -1,117 +1,35 @@
-//! What the finger finds out about itself: the taxels' gains, the drive, captures; and its temperatures.
+//! Motions that measure, captures, and temperatures.
 
 macro_rules! measured {
     ($($before:tt)*) => {
         control_table! {
             $($before)*
-            /// 1 presses once onto a hard flat plate, to find the taxels' gains: backs off, presses slowly, lets go.
-            /// Move finger or plate between presses. Refused with a result error without torque and before a tare. 2
-            /// forgets all presses. 3 makes the proposed gains those in force, with torque off; save_parameters keeps
-            /// them. Reads 0.
-            1736 CALIBRATE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
+            /// A motion that measures; its record is read like a capture. 1 jogs, with torque off and the tip in the air:
+            /// at 8 % of duty at most, 0.8 mm towards the object and back. 2 makes strokes of 0.7 mm to both sides, under
+            /// the same conditions and with the direction confirmed. 3 presses twice into a hard flat plate, with torque
+            /// on. 0 stops. Refused with a result error where the conditions are not met or a capture is under way.
+            /// Reads 0.
+            4224 MEASURE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
                 |_, _| 0,
-                set_calibrate;
-            /// The press that was last asked for: 0 none since reset, 1 running or being worked out, 2 taken into the
-            /// proposal, 3 refused.
-            1737 CALIBRATE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
-                |view, _| view.calibrate_state();
-            /// Why a press was not taken; 0 it was. 1 soft, 2 moving, 3 off the array, 4 not flat, 5 too few taxels
-            /// pressed, 6 contact lost, 7 no contact, 8 stalled, 9 interrupted, 10 no torque or no tare, 11 beyond half
-            /// or twice of the modulus.
-            1738 CALIBRATE_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
-                |view, _| u32::from(view.snapshot.status.calibration.state.refusal());
-            /// How far the press is, with what is worked out after it.
-            1739 CALIBRATE_PROGRESS: U8 ReadOnly, "percent" * 1, 0 to 100,
-                |view, _| u32::from(view.snapshot.status.calibration.progress);
-            /// Presses that the proposal is made of.
-            1740 CALIBRATE_PRESSES: U8 ReadOnly, "" * 1, 0 to 200,
-                |view, _| u32::from(view.snapshot.status.calibration.presses);
-            /// Taxels that a press reached: the others keep their gain.
-            1742 CALIBRATE_TAXELS: U16 ReadOnly, "" * 1, 0 to 512,
-                |view, _| u32::from(view.snapshot.status.calibration.reached);
-            /// What a scale under the plate shows while a force is held: a number for the absolute scale. Reads the
-            /// last one.
-            1744 SCALE_SHOWS_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
-                |view, _| view.settings().command.shown_mn as u32,
-                |staged, value| {
-                    staged.settings.command.shown_mn = value as i32;
-                    bump(&mut staged.settings.command.shown_request, 1);
-                    Ok(())
-                };
-            /// Why the last number was not taken; 0 it was. 1 no force held for long enough, 2 off the array, 3 less
-            /// than 100 mN, 4 beyond half or twice of what the array reads, 5 contradicts the numbers before, 6 eight
-            /// already.
-            1748 SCALE_REFUSAL: U8 ReadOnly, "" * 1, 0 to 6,
-                |view, _| view.snapshot.status.scale.refusal.map_or(0, |refusal| refusal as u32);
-            /// Numbers taken; 255 while the last one waits for the loop.
-            1749 SCALE_POINTS: U8 ReadOnly, "" * 1, 0 to 255,
-                |view, _| view.scale_points();
-            /// 2 forgets all numbers and presses. 3 takes the proposed factor, with torque off: codes_per_kpa_milli is
-            /// divided by it and modulus_pa multiplied; save_parameters keeps them. Reads 0.
-            1750 SCALE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
-                |_, _| 0,
-                set_scale;
-            /// What a force that is read is to be multiplied by; 0 where there is no number.
-            1752 SCALE_FACTOR_PPM: U32 ReadOnly, "ppm" * 1, 0 to 4_000_000,
-                |view, _| view.snapshot.status.scale.factor_ppm;
-            /// Its standard uncertainty.
-            1756 SCALE_SIGMA_PPM: U32 ReadOnly, "ppm" * 1, 0 to 1_000_000,
-                |view, _| view.snapshot.status.scale.sigma_ppm;
-            /// Asks the drive what it is like, with torque off and the tip in the air: 1 jogs, which proves the
-            /// direction, 2 jogs and measures, 0 stops what is under way. Refused with a result error with torque on,
-            /// in a fault and before a tare. Reads 0.
-            4224 COMMISSION: U8 ReadWrite, "" * 1, 0 to 2 = 0,
-                |_, _| 0,
-                set_commission;
-            /// The commissioning that was last asked for: 0 none since reset or new parameters, 1 running, 2 the jog
-            /// proved the direction, 3 measured, 4 refused.
-            4225 COMMISSION_STATE: U8 ReadOnly, "" * 1, 0 to 4,
-                |view, _| view.commission_state();
+                set_measure;
+            /// The motion that was last asked for: 0 none since reset, 1 running, 2 complete, 3 ended early.
+            4225 MEASURE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
+                |view, _| view.measure_state();
             /// How much of it is done.
-            4226 COMMISSION_PROGRESS: U8 ReadOnly, "%" * 1, 0 to 100,
-                |view, _| u32::from(view.snapshot.status.commissioning.progress());
-            /// Why there is no result; 0 it was not refused. 1 interrupted, 2 not ready: not tared, touching or torque
-            /// on, 3 the direction is not confirmed, 4 the encoder stood, 5 it counts against the motor, 6 it does not
-            /// follow, 7 touched, 8 blocked, 9 the voltage was held back, 10 never at rest, 11 the strokes do not
-            /// agree, 12 out of range.
-            4227 COMMISSION_REFUSAL: U8 ReadOnly, "" * 1, 0 to 12,
-                |view, _| u32::from(view.snapshot.status.commissioning.refusal());
-            /// 1 says that the jog first moved the tip towards the object: sets direction_confirmed. 2 takes what was
-            /// measured into torque_constant_unm_per_a, inertia_ug_m2 and friction_unm. Refused with a result error
-            /// where there is nothing to accept. Saved by save_parameters only. Reads 0.
-            4228 COMMISSION_ACCEPT: U8 TorqueOff, "" * 1, 0 to 2 = 0,
-                |_, _| 0,
-                set_accept;
-            /// Torque constant as measured; 0, as all that follow, where there is no result.
-            4232 MEASURED_TORQUE_CONSTANT: U32 ReadOnly, "uN m/A" * 1, 0 to 200_000,
-                |view, _| view.measured().torque_constant_unm_per_a;
-            /// Time constant of a run-up: resistance times inertia over the square of the torque constant.
-            4236 MEASURED_TIME_CONSTANT: U32 ReadOnly, "us" * 1, 0 to 0xFFFF_FFFF,
-                |view, _| view.measured().time_constant_us;
-            /// Inertia at the motor's shaft, where resistance_mohm is true.
-            4240 MEASURED_INERTIA: U32 ReadOnly, "ug m^2" * 1, 0 to 20_000,
-                |view, _| view.measured().inertia_ug_m2;
-            /// Friction at the motor's shaft on the way forward, where resistance_mohm is true.
-            4244 MEASURED_FRICTION_FORWARD: U16 ReadOnly, "uN m" * 1, 0 to 20_000,
-                |view, _| u32::from(view.measured().friction_unm[0]);
-            /// The same on the way back.
-            4246 MEASURED_FRICTION_BACK: U16 ReadOnly, "uN m" * 1, 0 to 20_000,
-                |view, _| u32::from(view.measured().friction_unm[1]);
-            /// Standard uncertainty of the torque constant.
-            4248 TORQUE_CONSTANT_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
-                |view, _| u32::from(view.measured().torque_constant_sigma);
-            /// That of the time constant.
-            4250 TIME_CONSTANT_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
-                |view, _| u32::from(view.measured().time_constant_sigma);
-            /// That of the inertia; what resistance_mohm is wrong by comes on top.
-            4252 INERTIA_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
-                |view, _| u32::from(view.measured().inertia_sigma);
-            /// That of the friction on the way forward, in the same way.
-            4254 FRICTION_FORWARD_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
-                |view, _| u32::from(view.measured().friction_sigma[0]);
-            /// That of the friction on the way back.
-            4256 FRICTION_BACK_SIGMA: U16 ReadOnly, "permille" * 1, 0 to 0xFFFF,
-                |view, _| u32::from(view.measured().friction_sigma[1]);
+            4226 MEASURE_PROGRESS: U8 ReadOnly, "%" * 1, 0 to 100,
+                |view, _| u32::from(view.snapshot.status.measure.progress);
+            /// Why it ended early, with the number behind it in measure_value; 0 it did not. 1 interrupted, 2 not ready:
+            /// not tared, touching, or torque not as it must be, 3 the direction is not confirmed, 4 the encoder stood
+            /// (mV), 5 it counts against the motor (counts), 6 the tip left its way (um), 7 touched (mN), 8 the motor felt
+            /// a force (mN), 10 never at rest (counts), 11 no contact (um), 12 stalled (um), 13 memory full.
+            4227 MEASURE_ENDED: U8 ReadOnly, "" * 1, 0 to 13,
+                |view, _| view.snapshot.status.measure.ended as u32;
+            /// The number behind measure_ended.
+            4228 MEASURE_VALUE: I32 ReadOnly, "" * 1, -0x7FFF_FFFF to 0x7FFF_FFFF,
+                |view, _| view.snapshot.status.measure.value as u32;
+            /// Which motion it was: 1 a jog, 2 strokes, 3 a press.
+            4232 MEASURE_TASK: U8 ReadOnly, "" * 1, 0 to 3,
+                |view, _| view.snapshot.status.measure.task as u32;
             /// 1 arms a capture: it begins with the next tare and keeps every frame until its memory is full. 0 ends
             /// it, or calls it off. 1 is refused with an access error with torque on, with a result error while frames
             /// are being kept. Reads 0.

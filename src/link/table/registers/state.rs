@@ -28,7 +28,7 @@ macro_rules! state {
             /// How the stored registers stand to the flash: 0 the same, 1 changed since, 2 the last save failed.
             263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
                 |view, _| view.settings().saved as u32;
-            /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 identify, 7 commission.
+            /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 press, 7 strokes.
             264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 7,
                 |view, _| view.snapshot.status.mode as u32;
             /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
@@ -125,32 +125,6 @@ macro_rules! state {
             /// Good instruction packets for this device, broadcasts included; wraps.
             346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
                 |view, _| view.counters().good_packets;
-            /// 1 measures Young's modulus: backs off, presses slowly, lets go. Refused with a result error without
-            /// torque and before a tare. Reads 0.
-            350 IDENTIFY: U8 ReadWrite, "" * 1, 0 to 1 = 0,
-                |_, _| 0,
-                |staged, value| { bump(&mut staged.settings.command.identify_request, value); Ok(()) };
-            /// The measurement of Young's modulus that was last asked for: 0 none since reset, 1 running, 2 done, 3
-            /// refused.
-            351 IDENTIFY_STATE: U8 ReadOnly, "" * 1, 0 to 3,
-                |view, _| view.identify_state();
-            /// Young's modulus as measured; 0 where there is no result. The parameter modulus_pa stays as it is.
-            352 IDENTIFIED_MODULUS_PA: U32 ReadOnly, "Pa" * 1, 0 to 2_000_000,
-                |view, _| thousandths(view.identified().modulus.to_bits(), 16) as u32;
-            /// Its standard uncertainty: scatter of the points and the array's readout, not the array's calibration.
-            356 IDENTIFIED_SIGMA_PA: U32 ReadOnly, "Pa" * 1, 0 to 2_000_000,
-                |view, _| thousandths(view.identified().sigma.to_bits(), 16) as u32;
-            /// Travel at which the tip touched.
-            360 IDENTIFIED_CONTACT_UM: I32 ReadOnly, "um" * 1, -128_000 to 128_000,
-                |view, _| thousandths(view.identified().contact.to_bits(), 24) as u32;
-            /// From how many points.
-            364 IDENTIFIED_POINTS: U16 ReadOnly, "" * 1, 0 to 4096,
-                |view, _| u32::from(view.identified().points);
-            /// Why there is no result; 0 it was not refused. 1 span below 0.3 mm, 2 too few points, 3 residual, 4
-            /// scatter, 5 out of the model's range, 6 bad taxels, 7 array's edge, 8 no contact, 9 stalled, 10
-            /// interrupted, 11 no torque.
-            366 IDENTIFY_REFUSAL: U8 ReadOnly, "" * 1, 0 to 11,
-                |view, _| u32::from(view.snapshot.status.identification.refusal());
             /// How much work the loop puts into the contact of a frame: 0 force by the sum, 1 centre by the moments, 2
             /// the model with a row a frame, 3 with two rows, 4 with five, 5 with all rows and a solution in every
             /// frame.

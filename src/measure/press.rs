@@ -1,0 +1,355 @@
+//! The press onto a hard flat plate: approach, then twice in and back, with means of all taxels for every step.
+//!
+//! ```text
+//! back off - seek the touch - 0.5 mm back
+//! in and back at 10 mm/s - in at 2 mm/s - hold for 3 s - back at 2 mm/s
+//! ```
+//!
+//! Two speeds show the tip's relaxation, two directions its hysteresis, the hold its creep. The way in ends 0.3 a deep (the
+//! range of the paper's measurement), at 7/8 of the largest force, at the travel's end, or where one more taxel than in
+//! the air is dead or saturated.
+
+use super::{Ended, Standing};
+use crate::config::Config;
+use crate::contact::Contact;
+use crate::control::SpeedLoop;
+use crate::control::profile::Reference;
+use crate::pressure::Picture;
+use crate::state::Limits;
+use crate::units::{Celsius, Millimetres, MillimetresPerSecond};
+
+/// Speeds of the quick and of the slow way: 10 and 2 mm/s, at most that of an approach.
+const QUICK: MillimetresPerSecond = MillimetresPerSecond::from_bits(10 << 16);
+const SLOW: MillimetresPerSecond = MillimetresPerSecond::from_bits(2 << 16);
+/// A way begins and ends this far before the touch: 0.5 mm, Q24.
+const BEFORE: i32 = 1 << 23;
+/// Steps of a way at most, and their least length: 0.1 mm, Q24.
+pub const STEPS: usize = 28;
+const STEP: i32 = (1 << 24) / 10;
+/// When the steps of the hold end, ms.
+pub const HOLDS_MS: [u32; 9] = [20, 40, 80, 160, 320, 640, 1_300, 2_100, 3_000];
+/// Rows of a press at most: four ways, each with a step that is begun before it turns and one that turning makes, and
+/// the hold.
+pub const ROWS_MAX: usize = 4 * (STEPS + 2) + HOLDS_MS.len();
+/// How near to its end the travel counts as used up, Q24 mm.
+const END: i32 = 1 << 20;
+/// A way that is longer than the brake needs at the speeds of a press.
+const FAR: Millimetres = Millimetres::from_bits(4 << 24);
+/// The tip must move on by 1/128 mm (Q24) within this time, ns.
+const MOVES: i32 = 1 << 17;
+const STALL_NS: u32 = 1_000_000_000;
+/// For so many frames in turn one more taxel than before must be bad.
+const BAD_FRAMES: u8 = 4;
+/// A taxel's code is held to this, and what it differs by from the step's first frame: sixteenths and quarters.
+const CODE_MAX: i32 = 1 << 17;
+const CHANGE_MAX: i32 = 1_023;
+/// More frames than this are not taken into a step: the sums then have 31 bits.
+const FRAMES_MAX: u16 = 16_383;
+
+/// A press.
+#[derive(Clone, Copy, Debug)]
+pub struct Press {
+    phase: Phase,
+    /// Where the tip touched, by the force and the configured modulus.
+    touch: Millimetres,
+    /// How deep the quick way went.
+    deepest: Millimetres,
+    /// Where the step under way began.
+    step_from: Millimetres,
+    /// Time of the hold, ns, and the steps of it that are over.
+    held_ns: u32,
+    holds: u8,
+    moved_to: Millimetres,
+    still_ns: u32,
+    /// The most taxels that were bad in the air, and frames in turn with more.
+    bad_before: u16,
+    bad_frames: u8,
+    /// A step is complete with this frame.
+    complete: bool,
+    /// The next frame begins a step.
+    fresh: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Backs off until nothing touches.
+    Retreat,
+    /// Approaches until something does.
+    Seek,
+    /// Backs off to where the ways begin.
+    Before,
+    In(Pace),
+    Hold,
+    Back(Pace),
+    /// Nothing is left to do.
+    Over,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Pace {
+    Quick,
+    Slow,
+}
+
+/// What a frame says to a press.
+pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
+    /// The frame's number.
+    pub sequence: u32,
+    /// The array.
+    pub picture: &'a Picture<ROWS, COLUMNS>,
+    /// The contact by the plain sum.
+    pub contact: &'a Contact,
+    /// The encoder's count.
+    pub encoder: i32,
+    /// The motion estimated.
+    pub motion: &'a SpeedLoop,
+    /// What the bridge gave since the frame before, mV.
+    pub applied_mv: i32,
+    /// The microcontroller's temperature.
+    pub chip: Option<Celsius>,
+}
+
+/// Sums over the frames of a step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Step<const ROWS: usize, const COLUMNS: usize> {
+    /// Numbers of its first and last frame.
+    pub frames: [u32; 2],
+    /// The encoder's counts at these.
+    pub counts: [i32; 2],
+    /// How many were taken.
+    pub taken: u16,
+    /// Whether it is one of a way back.
+    pub back: bool,
+    /// Sum of the bridge's voltage, mV.
+    pub voltage_mv: i32,
+    /// The microcontroller's temperature at its end.
+    pub chip: Option<Celsius>,
+    /// What each taxel read in the first frame, sixteenths of a corrected code above tare.
+    pub first: [[i32; COLUMNS]; ROWS],
+    /// Sum of what it read.
+    pub sums: [[i32; COLUMNS]; ROWS],
+    /// Sum of the squares of what it differed by from the first frame, quarters of a code.
+    pub squares: [[u32; COLUMNS]; ROWS],
+    /// A bit for each column that was bad in any frame, for each row.
+    pub bad: [u32; ROWS],
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
+    /// Without a frame.
+    pub const NONE: Self = Self {
+        frames: [0; 2],
+        counts: [0; 2],
+        taken: 0,
+        back: false,
+        voltage_mv: 0,
+        chip: None,
+        first: [[0; COLUMNS]; ROWS],
+        sums: [[0; COLUMNS]; ROWS],
+        squares: [[0; COLUMNS]; ROWS],
+        bad: [0; ROWS],
+    };
+
+    /// Takes a frame; a fresh one begins the step.
+    fn take(&mut self, view: &View<ROWS, COLUMNS>, fresh: bool, back: bool) {
+        if fresh {
+            (self.frames[0], self.counts[0]) = (view.sequence, view.encoder);
+            (self.taken, self.voltage_mv, self.back) = (0, 0, back);
+            (self.first, self.bad) = (view.picture.taxels, [0; ROWS]);
+            self.sums = [[0; COLUMNS]; ROWS];
+            self.squares = [[0; COLUMNS]; ROWS];
+        }
+        (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
+        if self.taken >= FRAMES_MAX {
+            return;
+        }
+        self.taken += 1;
+        self.voltage_mv = self.voltage_mv.saturating_add(view.applied_mv);
+        self.bad.iter_mut().zip(&view.picture.bad).for_each(|(all, bad)| *all |= bad);
+        let taxels = view.picture.taxels.as_flattened().iter().zip(self.first.as_flattened());
+        let sums = self.sums.as_flattened_mut().iter_mut().zip(self.squares.as_flattened_mut());
+        for ((taxel, first), (sum, square)) in taxels.zip(sums) {
+            *sum = sum.wrapping_add((*taxel).max(-CODE_MAX).min(CODE_MAX));
+            let change = (taxel.wrapping_sub(*first) >> 2).max(-CHANGE_MAX).min(CHANGE_MAX);
+            *square = square.saturating_add((change * change).cast_unsigned());
+        }
+    }
+}
+
+impl Press {
+    /// Begins; the tip may touch or not.
+    pub fn begin(motion: &SpeedLoop) -> Self {
+        Self {
+            phase: Phase::Retreat,
+            touch: Millimetres::ZERO,
+            deepest: Millimetres::ZERO,
+            step_from: Millimetres::ZERO,
+            held_ns: 0,
+            holds: 0,
+            moved_to: motion.observer.travel,
+            still_ns: 0,
+            bad_before: 0,
+            bad_frames: 0,
+            complete: false,
+            fresh: true,
+        }
+    }
+
+    /// Whether it still needs the motor.
+    pub fn running(&self) -> bool {
+        self.phase != Phase::Over
+    }
+
+    /// Whether a step is complete with this frame.
+    pub fn complete(&self) -> bool {
+        self.complete
+    }
+
+    /// Takes a frame.
+    #[inline(never)]
+    pub fn observe<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        step: &mut Step<ROWS, COLUMNS>,
+        standing: &mut Standing,
+        config: &Config,
+    ) {
+        self.complete = false;
+        let travel = view.motion.observer.travel;
+        if self.stalled(travel, config) {
+            return self.end(standing, Ended::Stalled, travel);
+        }
+        let bad = self.one_more_bad(view.picture.bad_count);
+        let at_end = config.travel_max.0.saturating_sub(travel.0).to_bits() < END;
+        let force = view.contact.force;
+        let measured = view.motion.observer.measured(view.encoder, config);
+        match self.phase {
+            Phase::Over => {}
+            Phase::Retreat if force < config.contact_off => self.phase = Phase::Seek,
+            Phase::Retreat => {}
+            Phase::Seek if force >= config.contact_on => {
+                self.touch = Millimetres(travel.0.saturating_sub(config.tip.indentation(force).0));
+                self.phase = Phase::Before;
+            }
+            Phase::Seek if at_end => self.end(standing, Ended::NoContact, travel),
+            Phase::Seek => {}
+            Phase::Before if travel <= self.start(config) => self.next(Phase::In(Pace::Quick), measured, standing),
+            Phase::Before => {}
+            Phase::In(pace) => {
+                let depth = Millimetres(measured.0.saturating_sub(self.touch.0));
+                let most = if pace == Pace::Quick { depth_goal(config) } else { self.deepest };
+                let pressed = force.0 >= config.force_max.0 - (config.force_max.0 >> 3);
+                let turns = bad || at_end || pressed || depth >= most;
+                self.sample(view, step, measured, turns, config);
+                if turns {
+                    let after = if pace == Pace::Quick { Phase::Back(Pace::Quick) } else { Phase::Hold };
+                    self.deepest = if pace == Pace::Quick { depth } else { self.deepest };
+                    self.next(after, measured, standing);
+                }
+            }
+            Phase::Hold => {
+                self.held_ns = self.held_ns.saturating_add(config.timing.frame_ns);
+                let over = |holds: u8| HOLDS_MS.get(usize::from(holds)).is_none_or(|ms| self.held_ns >= ms * 1_000_000);
+                let complete = over(self.holds);
+                step.take(view, self.fresh, false);
+                (self.fresh, self.complete) = (complete, complete);
+                self.holds += u8::from(complete);
+                if usize::from(self.holds) >= HOLDS_MS.len() {
+                    self.next(Phase::Back(Pace::Slow), measured, standing);
+                }
+            }
+            Phase::Back(pace) => {
+                let turns = travel <= self.start(config);
+                self.sample(view, step, measured, turns, config);
+                match (turns, pace) {
+                    (false, _) => {}
+                    (true, Pace::Quick) => self.next(Phase::In(Pace::Slow), measured, standing),
+                    (true, Pace::Slow) => self.end(standing, Ended::Complete, Millimetres::ZERO),
+                }
+            }
+        }
+    }
+
+    /// The speed to follow.
+    pub fn reference(&self, motion: &mut SpeedLoop, config: &Config, limits: &mut Limits) -> Reference {
+        let back = Millimetres(-FAR.0);
+        let of = |pace| config.approach.min(if pace == Pace::Quick { QUICK } else { SLOW });
+        let (way, speed) = match self.phase {
+            Phase::Over => (Millimetres::ZERO, config.approach),
+            Phase::Retreat => (back, config.approach),
+            Phase::Before => (back, of(Pace::Quick)),
+            Phase::Seek => (motion.within_travel(FAR, config, limits), config.approach),
+            Phase::In(pace) => (motion.within_travel(FAR, config, limits), of(pace)),
+            Phase::Hold => {
+                let held = self.step_from.0.saturating_sub(motion.observer.travel.0);
+                (motion.within_travel(Millimetres(held), config, limits), of(Pace::Slow))
+            }
+            Phase::Back(pace) => (back, of(pace)),
+        };
+        motion.towards(way, Millimetres::ZERO, speed, config).0
+    }
+
+    /// Adds a frame to the step of a way; the step is over after its length, or where the way turns.
+    fn sample<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        view: &View<ROWS, COLUMNS>,
+        step: &mut Step<ROWS, COLUMNS>,
+        at: Millimetres,
+        turns: bool,
+        config: &Config,
+    ) {
+        step.take(view, self.fresh, matches!(self.phase, Phase::Back(_)));
+        let gone = at.0.saturating_sub(self.step_from.0).saturating_abs().to_bits();
+        let whole = depth_goal(config).to_bits().saturating_add(BEFORE);
+        self.complete = turns || gone >= STEP.max(whole / STEPS as i32);
+        self.fresh = self.complete;
+        if self.complete {
+            self.step_from = at;
+        }
+    }
+
+    /// The next part of the press; the place of the turn is where its first step begins, and where a hold holds.
+    fn next(&mut self, phase: Phase, at: Millimetres, standing: &mut Standing) {
+        (self.phase, self.step_from, self.fresh) = (phase, at, true);
+        standing.progress = match phase {
+            Phase::In(Pace::Quick) => 10,
+            Phase::Back(Pace::Quick) => 20,
+            Phase::In(Pace::Slow) => 30,
+            Phase::Hold => 50,
+            _ => 80,
+        };
+    }
+
+    fn end(&mut self, standing: &mut Standing, ended: Ended, at: Millimetres) {
+        self.phase = Phase::Over;
+        standing.end(ended, ((i64::from(at.to_bits()) * 1_000) >> 24) as i32);
+    }
+
+    /// Where the ways begin: before the touch, and within the guard's rear end.
+    fn start(&self, config: &Config) -> Millimetres {
+        let rear = config.bounds.back.to_bits().saturating_neg().saturating_add(BEFORE / 2);
+        Millimetres::from_bits(self.touch.to_bits().saturating_sub(BEFORE).max(rear))
+    }
+
+    /// Whether one more taxel than in the air is bad.
+    fn one_more_bad(&mut self, bad: u16) -> bool {
+        if !matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
+            self.bad_before = self.bad_before.max(bad);
+        }
+        self.bad_frames = if bad > self.bad_before { self.bad_frames.saturating_add(1) } else { 0 };
+        self.bad_frames >= BAD_FRAMES
+    }
+
+    fn stalled(&mut self, travel: Millimetres, config: &Config) -> bool {
+        if self.phase == Phase::Hold || travel.0.saturating_sub(self.moved_to.0).saturating_abs().to_bits() > MOVES {
+            self.moved_to = travel;
+            self.still_ns = 0;
+        }
+        self.still_ns = self.still_ns.saturating_add(config.timing.frame_ns);
+        self.running() && self.still_ns > STALL_NS
+    }
+}
+
+/// How deep a press goes: 0.3 a, the range of the paper's measurement.
+fn depth_goal(config: &Config) -> Millimetres {
+    Millimetres::from_bits((i64::from(config.tip.radius().to_bits()) * 3 / 10) as i32)
+}

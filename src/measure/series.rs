@@ -1,0 +1,208 @@
+//! The record of a motion, as it lies in the memory of a capture and is read over the bus; little-endian.
+//!
+//! | byte | what |
+//! | --- | --- |
+//! | 0 | the letters `FTS` and [`VERSION`] |
+//! | 4 | 1 press or 2 strokes, rows, columns, the number of [`Ended`] |
+//! | 8 | rows that follow; check sum of their bytes (FNV-1a, 32 bits) |
+//! | 16 | from frame to frame, ns |
+//! | 20 | the encoder's count of travel 0 (press), or where the strokes began |
+//! | 24 | from the count of a sample to the moment at which the voltage acts, ns; 0 in a press |
+//! | 28 | the number behind the end, see [`Ended`] |
+//! | 32 | the rows |
+//!
+//! A row of a press is a step: numbers of its first and last frame, the encoder's counts at these, frames taken (2
+//! bytes), whether it is one of the way back, 0, mean voltage of the bridge in mV (2), temperature of the
+//! microcontroller in 0.1 K (2, 0 unknown). Then of every taxel, row by row: the mean above tare in eighths of a
+//! corrected code, plus 1,024 (2 bytes each); the variance of a frame in quarters of a code, squared, as
+//! `(8 + (byte & 7)) << (byte >> 3) >> 3`, 0 below 1 (a byte each); a bit that is 1 where it was bad or saturated in any
+//! frame, lowest bit first. Zeros fill it up to a multiple of 4 bytes.
+//!
+//! A row of strokes is a sample: count from the origin, mean voltage since the sample before in quarters of a mV (2
+//! bytes each). A count of -32,768 begins a stroke.
+
+use super::press::Step;
+use super::{Ended, Row};
+
+/// The version of the layout.
+pub const VERSION: u8 = 1;
+/// Bytes of the head.
+pub const HEAD: usize = 32;
+/// First value of the check sum.
+pub const CHECK: u32 = 0x811C_9DC5;
+const PRIME: u32 = 0x0100_0193;
+/// Bytes of a step before its taxels.
+const STEP: usize = 24;
+/// What is added to a mean, eighths of a code.
+const OFFSET: i32 = 1_024;
+
+/// Bytes of a step.
+pub const fn step_bytes(taxels: usize) -> usize {
+    (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
+}
+
+/// What stands before the rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Head {
+    /// 0 none, 1 a press, 2 strokes.
+    pub kind: u8,
+    /// Rows and columns of the array.
+    pub shape: [u8; 2],
+    /// How it ended.
+    pub ended: Ended,
+    /// Rows that follow.
+    pub rows: u32,
+    /// Their check sum.
+    pub check: u32,
+    /// From frame to frame.
+    pub frame_ns: u32,
+    /// Encoder count of travel 0, or where the strokes began.
+    pub origin: i32,
+    /// From the count of a sample to the moment at which the voltage acts.
+    pub delay_ns: u32,
+    /// The number behind the end.
+    pub value: i32,
+}
+
+impl Head {
+    /// Of no record: all zeros, so an image does not grow by it.
+    pub const NONE: Self = Self {
+        kind: 0,
+        shape: [0; 2],
+        ended: Ended::Complete,
+        rows: 0,
+        check: 0,
+        frame_ns: 0,
+        origin: 0,
+        delay_ns: 0,
+        value: 0,
+    };
+
+    /// Its bytes.
+    pub fn bytes(&self) -> [u8; HEAD] {
+        let mut bytes = [0; HEAD];
+        let [rows, columns] = self.shape;
+        let words = [
+            [b'F', b'T', b'S', VERSION],
+            [self.kind, rows, columns, self.ended as u8],
+            self.rows.to_le_bytes(),
+            self.check.to_le_bytes(),
+            self.frame_ns.to_le_bytes(),
+            self.origin.to_le_bytes(),
+            self.delay_ns.to_le_bytes(),
+            self.value.to_le_bytes(),
+        ];
+        bytes.as_chunks_mut().0.iter_mut().zip(words).for_each(|(to, word)| *to = word);
+        bytes
+    }
+}
+
+/// Bytes put one after the other, with their check sum; what does not fit shows in [`Out::full`].
+pub struct Out<'a> {
+    room: core::slice::IterMut<'a, u8>,
+    /// The check sum so far.
+    pub check: u32,
+    /// How many were put.
+    pub count: usize,
+    /// Whether some did not fit.
+    pub full: bool,
+}
+
+impl<'a> Out<'a> {
+    /// Into this room, after bytes with this check sum.
+    pub fn new(room: &'a mut [u8], check: u32) -> Self {
+        Self { room: room.iter_mut(), check, count: 0, full: false }
+    }
+
+    fn put(&mut self, byte: u8) {
+        let Some(place) = self.room.next() else {
+            self.full = true;
+            return;
+        };
+        *place = byte;
+        self.check = (self.check ^ u32::from(byte)).wrapping_mul(PRIME);
+        self.count += 1;
+    }
+
+    fn half(&mut self, value: u16) {
+        value.to_le_bytes().into_iter().for_each(|byte| self.put(byte));
+    }
+
+    fn word(&mut self, value: u32) {
+        value.to_le_bytes().into_iter().for_each(|byte| self.put(byte));
+    }
+
+    /// A row.
+    pub fn row<const ROWS: usize, const COLUMNS: usize>(&mut self, row: &Row<'_, ROWS, COLUMNS>) {
+        match row {
+            Row::Stroke => self.word(0x8000),
+            Row::Sample { count, voltage } => {
+                self.half(count.cast_unsigned());
+                self.half(voltage.cast_unsigned());
+            }
+            Row::Step(step) => self.step(step),
+        }
+    }
+
+    fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
+        let taken = i32::from(step.taken.max(1));
+        step.frames.into_iter().for_each(|frame| self.word(frame));
+        step.counts.into_iter().for_each(|count| self.word(count.cast_unsigned()));
+        self.half(step.taken);
+        self.put(step.back.into());
+        self.put(0);
+        let voltage = (step.voltage_mv / taken).max(i16::MIN.into()).min(i16::MAX.into()) as i16;
+        self.half(voltage.cast_unsigned());
+        // Degrees Celsius with 16 fractional bits.
+        let kelvin = step.chip.map_or(0, |chip| ((i64::from(chip.to_bits()) * 10) >> 16) + 2_731);
+        self.half(kelvin.max(0).min(u16::MAX.into()) as u16);
+        for sum in step.sums.as_flattened() {
+            let eighths = (sum / 2 + taken.div_euclid(2)).div_euclid(taken).saturating_add(OFFSET);
+            self.half(eighths.max(0).min(u16::MAX.into()) as u16);
+        }
+        for (place, square) in step.squares.as_flattened().iter().enumerate() {
+            let at = |all: &[[i32; COLUMNS]; ROWS]| all.as_flattened().get(place).copied().unwrap_or(0);
+            // Mean of what it differed by from the first frame, quarters.
+            let mean = (at(&step.sums) / taken).saturating_sub(at(&step.first)) >> 2;
+            let mean = mean.max(-65_535).min(65_535);
+            let variance = (square / taken.cast_unsigned()).saturating_sub((mean * mean).cast_unsigned());
+            self.put(coded(variance));
+        }
+        let bad = |place: usize| step.bad.get(place / COLUMNS).is_some_and(|row| row >> (place % COLUMNS) & 1 != 0);
+        for first in (0..ROWS * COLUMNS).step_by(8) {
+            let bits = (0..8).filter(|bit| first + bit < ROWS * COLUMNS && bad(first + bit));
+            self.put(bits.fold(0, |byte, bit| byte | 1 << bit));
+        }
+        while !self.count.is_multiple_of(4) && !self.full {
+            self.put(0);
+        }
+    }
+}
+
+/// A variance in a byte, as the layout tells.
+fn coded(variance: u32) -> u8 {
+    if variance == 0 {
+        return 0;
+    }
+    // The exponent of 8 + mantissa, which are the upper four bits.
+    let exponent = 31 - variance.leading_zeros();
+    let mantissa = ((u64::from(variance) << 3) >> exponent) as u32 & 7;
+    (exponent << 3 | mantissa).min(255) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_variance_is_told_to_an_eighth() {
+        for variance in (1..5_000).chain([100_000, 1 << 24, (1 << 31) - 1, u32::MAX]) {
+            let byte = u64::from(coded(variance));
+            let told = ((8 + (byte & 7)) << (byte >> 3)) >> 3;
+            let variance = u64::from(variance);
+            assert!(told <= variance && variance - told <= variance / 8, "{variance}: {told}");
+        }
+        // Small ones are told by the shift as they are; 0 and 1 share a byte with nothing else.
+        assert_eq!((coded(0), coded(1)), (0, 0));
+    }
+}

@@ -1,0 +1,414 @@
+//! The motions in the air that show what the drive is like: pulses, and strokes under one voltage each.
+//!
+//! ```text
+//! pulse forward, pulse back      quick, so that nothing goes far without an encoder: motor and encoder go the same way
+//! pulse forward, pulse back      slower: the voltage at which it moves
+//! feel forward to 0.8 mm         pulses: the voltage rises until it moves, then the motor is shorted
+//! go back to 0                   by the voltage at which pulses moved. A jog ends here
+//! feel back to -0.8 mm
+//! 32 strokes within +-0.7 mm     recorded: 8 speeds, twice each, forward and back
+//! go home                        as the slowest stroke
+//! ```
+//!
+//! Voltage is given, not closed over the encoder. A pulse presses with what its voltage has beyond that of the easiest
+//! pulse, and is shorted 40 um after it began to move: a force of 0.17 N stops it whatever the array sees. Strokes stay
+//! within the way that was felt. Whatever else happens shorts the motor at once and waits until it rests.
+
+use super::{Ended, Standing, Task};
+use crate::config::Config;
+use crate::config::motions::{Motions, SPAN_PARTS};
+use crate::units::Newtons;
+
+/// From the end of a frame, when the encoder is read, to the moment at which the voltage of its step acts, ns, by the
+/// emulated board.
+pub const DELAY_NS: u32 = 33_000;
+/// Frames of a sample.
+pub const SAMPLE_FRAMES: u32 = 8;
+/// Speeds of the strokes, in quarters of the fastest. The first goes as slowly as it will start; fast ones are short, so
+/// there are more of them.
+const SPEEDS: [u8; 8] = [0, 1, 2, 3, 4, 4, 3, 2];
+/// Strokes: each speed twice, forward and back.
+const STROKES: u8 = 4 * SPEEDS.len() as u8;
+/// A pulse takes at most 2/25 of the supply, a stroke a third.
+const PULSE_SUPPLY: [i32; 2] = [2, 25];
+const STROKE_SUPPLY: [i32; 2] = [1, 3];
+/// Counts that are motion.
+const MOVED: i32 = 2;
+
+/// What a frame says.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    /// The encoder's count.
+    pub encoder: i32,
+    /// The array's force.
+    pub force: Newtons,
+    /// The bridge's supply.
+    pub supply_mv: u16,
+    /// What the bridge gave since the frame before, quarters of a mV.
+    pub applied: i32,
+}
+
+/// The parts of the motion, in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// A pulse; quick ones prove the direction.
+    Pulse {
+        quick: bool,
+    },
+    /// Pulses until the end of the way.
+    Feel,
+    /// Under one voltage to a place.
+    Go,
+    /// The same, recorded, with the number of the stroke.
+    Stroke(u8),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Moving,
+    /// Shorted until it rests; then on, or to this end.
+    Rest(Option<(Ended, i32)>),
+    Over,
+}
+
+/// A jog, or all strokes.
+#[derive(Clone, Copy, Debug)]
+pub struct Strokes {
+    task: Task,
+    phase: Phase,
+    part: Part,
+    /// Parts begun so far: the pulses of a way that is felt are one.
+    done: u8,
+    /// Forward 1, back -1.
+    sign: i32,
+    /// Counts where it all began, and where this motion did.
+    origin: i32,
+    begun: i32,
+    /// Frames of this motion, and of motion within it, or of this rest.
+    frames: u32,
+    moving: u32,
+    /// What is asked for, uV, always as if forward; and by how much it was raised because nothing moved.
+    voltage_uv: i32,
+    more_uv: i32,
+    /// The lowest voltages at which pulses moved, forward and back, and what friction takes at the slowest strokes.
+    moved_uv: [i32; 2],
+    friction_uv: [i32; 2],
+    /// Counts of the last span, a part of it apart; the fastest span.
+    history: [i32; SPAN_PARTS],
+    fastest: i32,
+    /// The count that stood last, since which frame, and where the second half of a rest began.
+    stood: (i32, u32),
+    half_rest: i32,
+    /// Frames and voltage of the sample under way; what this frame gives the record.
+    sampled: u32,
+    sum: i32,
+    row: Option<Kept>,
+}
+
+/// What a frame gives the record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// A stroke begins with the next frame.
+    Stroke,
+    /// Count from the origin, and mean voltage in quarters of a mV.
+    Sample(i16, i16),
+}
+
+/// No pulse has moved yet.
+const UNKNOWN: i32 = i32::MAX;
+
+impl Strokes {
+    /// Begins a jog or the strokes, at rest at this count.
+    pub fn begin(task: Task, encoder: i32) -> Self {
+        Self {
+            task,
+            phase: Phase::Moving,
+            part: Part::Pulse { quick: true },
+            done: 0,
+            sign: 1,
+            origin: encoder,
+            begun: encoder,
+            frames: 0,
+            moving: 0,
+            voltage_uv: 0,
+            more_uv: 0,
+            moved_uv: [UNKNOWN; 2],
+            friction_uv: [0; 2],
+            history: [encoder; SPAN_PARTS],
+            fastest: 0,
+            stood: (encoder, 0),
+            half_rest: encoder,
+            sampled: 0,
+            sum: 0,
+            row: None,
+        }
+    }
+
+    /// Whether it still needs the motor.
+    pub fn running(&self) -> bool {
+        self.phase != Phase::Over
+    }
+
+    /// Where it began.
+    pub fn origin(&self) -> i32 {
+        self.origin
+    }
+
+    /// What this frame gives the record.
+    pub fn row(&self) -> Option<Kept> {
+        self.row
+    }
+
+    /// Shorts the motor until it rests, and ends.
+    pub fn halt(&mut self, encoder: i32) {
+        if !matches!(self.phase, Phase::Rest(Some(_)) | Phase::Over) {
+            self.short(encoder, Some((Ended::Interrupted, 0)));
+        }
+    }
+
+    /// What the motor is to get, mV.
+    pub fn voltage_mv(&self) -> i32 {
+        match self.phase {
+            Phase::Moving => self.sign * (self.voltage_uv.saturating_add(self.more_uv) / 1_000),
+            Phase::Rest(_) | Phase::Over => 0,
+        }
+    }
+
+    /// Takes a frame.
+    #[inline(never)]
+    pub fn observe(&mut self, view: &View, standing: &mut Standing, config: &Config) {
+        let plan = &config.motions;
+        self.row = None;
+        self.sample(view);
+        match self.phase {
+            Phase::Over => {}
+            Phase::Rest(ended) => self.rest(ended, view, standing, plan),
+            Phase::Moving => {
+                let ended = self.danger(view, plan);
+                match (ended, self.part) {
+                    (Some(ended), _) => self.short(view.encoder, Some(ended)),
+                    (None, Part::Pulse { .. } | Part::Feel) => self.pulse(view, plan),
+                    (None, Part::Go | Part::Stroke(_)) => self.stroke(view, plan),
+                }
+                self.frames = self.frames.saturating_add(1);
+            }
+        }
+    }
+
+    /// The record of a stroke: it goes on until the tip rests.
+    fn sample(&mut self, view: &View) {
+        if !matches!(self.part, Part::Stroke(_)) {
+            return;
+        }
+        self.sum = self.sum.saturating_add(view.applied);
+        if self.sampled.is_multiple_of(SAMPLE_FRAMES) {
+            let narrow = |value: i32| value.max(i16::MIN as i32 + 1).min(i16::MAX.into()) as i16;
+            let count = narrow(view.encoder.wrapping_sub(self.origin));
+            self.row = Some(Kept::Sample(count, narrow(self.sum / SAMPLE_FRAMES as i32)));
+            self.sum = 0;
+        }
+        self.sampled = self.sampled.wrapping_add(1);
+    }
+
+    /// Counts from where this motion began, in its direction.
+    fn gone(&self, encoder: i32) -> i32 {
+        encoder.wrapping_sub(self.begun).saturating_mul(self.sign)
+    }
+
+    /// Counts from the origin in the direction of this motion.
+    fn place(&self, encoder: i32) -> i32 {
+        encoder.wrapping_sub(self.origin).saturating_mul(self.sign)
+    }
+
+    fn side(&self) -> usize {
+        usize::from(self.sign < 0)
+    }
+
+    /// What ends any motion.
+    fn danger(&self, view: &View, plan: &Motions) -> Option<(Ended, i32)> {
+        let place = self.place(view.encoder);
+        if view.force >= plan.touch {
+            Some((Ended::Touched, millinewtons(view.force)))
+        } else if place.saturating_abs() > plan.farthest {
+            Some((Ended::Astray, plan.um(place)))
+        } else if self.gone(view.encoder) < -plan.back {
+            Some((Ended::Reversed, self.gone(view.encoder)))
+        } else {
+            None
+        }
+    }
+
+    /// Shorts the motor.
+    fn short(&mut self, encoder: i32, ended: Option<(Ended, i32)>) {
+        self.phase = Phase::Rest(ended);
+        (self.voltage_uv, self.more_uv, self.frames) = (0, 0, 0);
+        (self.stood, self.half_rest) = ((encoder, 0), encoder);
+    }
+
+    fn rest(&mut self, ended: Option<(Ended, i32)>, view: &View, standing: &mut Standing, plan: &Motions) {
+        self.frames = self.frames.saturating_add(1);
+        let ended = match ended {
+            None if view.force >= plan.touch => Some((Ended::Touched, millinewtons(view.force))),
+            ended => ended,
+        };
+        self.phase = Phase::Rest(ended);
+        if view.encoder != self.stood.0 {
+            self.stood = (view.encoder, self.frames);
+        }
+        if self.frames <= plan.rest / 2 {
+            self.half_rest = view.encoder;
+        }
+        let still = self.frames.wrapping_sub(self.stood.1) >= plan.still;
+        let restless = self.frames >= plan.rest;
+        if !still && !restless {
+            return;
+        }
+        match ended {
+            Some((ended, value)) => self.end(standing, ended, value),
+            None if restless => {
+                self.end(standing, Ended::Restless, view.encoder.wrapping_sub(self.half_rest).saturating_abs());
+            }
+            None => self.next(view, standing, plan),
+        }
+    }
+
+    fn end(&mut self, standing: &mut Standing, ended: Ended, value: i32) {
+        self.phase = Phase::Over;
+        standing.end(ended, value);
+        if ended == Ended::Complete {
+            *standing = Standing::refused(self.task, ended, value);
+        }
+    }
+
+    /// The next motion, or the end. It begins with the next frame.
+    fn next(&mut self, view: &View, standing: &mut Standing, plan: &Motions) {
+        let felt = self.part != Part::Feel || self.place(view.encoder) >= plan.felt;
+        self.done += u8::from(felt);
+        if felt {
+            let part = match self.done {
+                1 => (Part::Pulse { quick: true }, -1),
+                2 => (Part::Pulse { quick: false }, 1),
+                3 => (Part::Pulse { quick: false }, -1),
+                4 => (Part::Feel, 1),
+                5 => (Part::Go, -1),
+                6 if self.task == Task::Jog => return self.end(standing, Ended::Complete, 0),
+                6 => (Part::Feel, -1),
+                7.. if self.done - 7 < STROKES => {
+                    (Part::Stroke(self.done - 7), if (self.done - 7).is_multiple_of(2) { 1 } else { -1 })
+                }
+                _ if self.done == 7 + STROKES => (Part::Go, 1),
+                _ => return self.end(standing, Ended::Complete, 0),
+            };
+            (self.part, self.sign) = part;
+        }
+        if self.done == 2 {
+            // The slower pulses find the voltages anew.
+            self.moved_uv = [UNKNOWN; 2];
+        }
+        standing.progress = (u32::from(self.done) * 100 / (u32::from(STROKES) + 8)) as u8;
+        (self.begun, self.frames, self.moving, self.more_uv) = (view.encoder, 0, 0, 0);
+        (self.history, self.fastest) = ([view.encoder; SPAN_PARTS], 0);
+        self.voltage_uv = match self.part {
+            Part::Pulse { .. } | Part::Feel => match self.easiest() {
+                UNKNOWN => 0,
+                // It begins at 0.6 of the easiest.
+                easiest => easiest / 5 * 3,
+            },
+            Part::Go => self.least(plan),
+            Part::Stroke(stroke) => {
+                (self.sampled, self.sum, self.row) = (0, 0, Some(Kept::Stroke));
+                let speed = SPEEDS.get(usize::from(stroke / 4)).copied().unwrap_or(0);
+                let wanted = self.friction(self.side()) + plan.fastest_uv / 4 * i32::from(speed);
+                wanted.max(self.least(plan))
+            }
+        }
+        .min(of_supply(view, if matches!(self.part, Part::Go | Part::Stroke(_)) { STROKE_SUPPLY } else { PULSE_SUPPLY }));
+        self.phase = Phase::Moving;
+    }
+
+    fn easiest(&self) -> i32 {
+        self.moved_uv.get(self.side()).copied().unwrap_or(UNKNOWN)
+    }
+
+    fn friction(&self, side: usize) -> i32 {
+        self.friction_uv.get(side).copied().unwrap_or(0)
+    }
+
+    /// The voltage with which a stroke starts for certain.
+    fn least(&self, plan: &Motions) -> i32 {
+        self.easiest().saturating_add(plan.start_uv)
+    }
+
+    /// The voltage rises until it moves; a little later the motor is shorted.
+    fn pulse(&mut self, view: &View, plan: &Motions) {
+        let (gone, easiest) = (self.gone(view.encoder), self.easiest());
+        let limit = easiest.saturating_add(plan.feel_uv).min(of_supply(view, PULSE_SUPPLY));
+        if gone >= MOVED {
+            if let Some(moved) = self.moved_uv.get_mut(usize::from(self.sign < 0)) {
+                *moved = self.voltage_uv.max(1).min(*moved);
+            }
+            self.moving += 1;
+            if gone >= plan.pulse || self.moving > plan.pulse_frames {
+                self.short(view.encoder, None);
+            }
+        } else if self.voltage_uv >= limit {
+            let ended = if easiest == UNKNOWN {
+                (Ended::Still, self.voltage_uv / 1_000)
+            } else {
+                (Ended::Pushed, plan.millinewtons(self.voltage_uv - easiest))
+            };
+            self.short(view.encoder, Some(ended));
+        } else {
+            let quick = self.part == Part::Pulse { quick: true };
+            self.voltage_uv += if quick { plan.jog_rise_uv } else { plan.rise_uv };
+        }
+    }
+
+    /// A stroke under one voltage that comes to rest at a place.
+    fn stroke(&mut self, view: &View, plan: &Motions) {
+        let gone = self.gone(view.encoder);
+        let [span, quarter] = [SPAN_PARTS, SPAN_PARTS / 4].map(|parts| self.counts_over(parts, gone));
+        if self.frames.is_multiple_of(plan.span_part) {
+            self.history.rotate_right(1);
+            self.history[0] = view.encoder;
+        }
+        // The first spans are those of the run-up.
+        if self.frames > 2 * plan.span() {
+            self.fastest = self.fastest.max(span);
+        }
+        let end = if matches!(self.part, Part::Stroke(_)) { plan.stroke } else { 0 };
+        let roll = ((i64::from(quarter) * i64::from(plan.roll_q8)) >> 8) as i32;
+        if self.place(view.encoder).saturating_add(roll) >= end || self.frames >= plan.longest {
+            if let Part::Stroke(0 | 1) = self.part {
+                let back_emf = i64::from(span) * i64::from(plan.uv_per_count_q8) >> 8;
+                let friction = i64::from(self.voltage_uv + self.more_uv) - back_emf;
+                if let Some(place) = self.friction_uv.get_mut(usize::from(self.sign < 0)) {
+                    *place = friction.max(0) as i32;
+                }
+            }
+            self.short(view.encoder, None);
+        } else if self.fastest - span > plan.push {
+            let force = plan.push_mn.saturating_mul(self.fastest - span).checked_div(plan.push.max(1)).unwrap_or(0);
+            self.short(view.encoder, Some((Ended::Pushed, force)));
+        } else if gone < MOVED && self.frames > 3 * plan.span() {
+            self.more_uv += plan.rise_uv;
+            if self.more_uv > plan.feel_uv {
+                self.short(view.encoder, Some((Ended::Pushed, plan.millinewtons(self.more_uv))));
+            }
+        }
+    }
+
+    /// Counts over the last parts of a span, or since the motion began, in its direction.
+    fn counts_over(&self, parts: usize, gone: i32) -> i32 {
+        let before = self.history.get(parts - 1).copied().unwrap_or(self.begun);
+        gone.saturating_sub(before.wrapping_sub(self.begun).saturating_mul(self.sign))
+    }
+}
+
+fn of_supply(view: &View, [part, of]: [i32; 2]) -> i32 {
+    i32::from(view.supply_mv) * 1_000 / of * part
+}
+
+fn millinewtons(force: Newtons) -> i32 {
+    ((i64::from(force.to_bits()) * 1_000) >> 16) as i32
+}

@@ -70,7 +70,7 @@ fn each_mode_has_its_command_for_the_bridge() {
         for mode in [Mode::Off, Mode::Tare] {
             assert_eq!(bridge(mode, None, braking), expected, "{mode:?}");
         }
-        for mode in [Mode::Approach, Mode::Force, Mode::Release, Mode::Identify, Mode::Commission] {
+        for mode in [Mode::Approach, Mode::Force, Mode::Release, Mode::Press, Mode::Strokes] {
             assert_eq!(bridge(mode, None, braking), Bridge::Driven(Duty(-77)), "{mode:?}");
         }
         assert_eq!(bridge(Mode::Fault, Some(Fault::Bridge), braking), Bridge::Asleep);

@@ -96,7 +96,7 @@ fn a_modulus_asked_for_meanwhile_waits_and_so_does_a_press() {
         if both && status.taken.calibrate == 1 && status.taken.identify == 1 {
             assert!(matches!(status.identification, Identification::Done(_)), "{:?}", status.identification);
             assert_eq!(status.calibration.state, State::Done);
-            assert_eq!(modes, [Mode::Off, Mode::Identify, Mode::Release], "one press right behind the other");
+            assert_eq!(modes, [Mode::Off, Mode::Press, Mode::Release], "one press right behind the other");
             return;
         }
     }
@@ -108,11 +108,11 @@ fn a_modulus_asked_for_meanwhile_waits_and_so_does_a_press() {
 fn the_next_press_waits_until_the_last_one_is_worked_out() {
     let mut board = board(&Setup::default(), &Params::DEFAULT, &Gains::ONE);
     board.command().calibrate_request += 1;
-    while board.step().mode != Mode::Identify {}
-    while board.step().mode == Mode::Identify {}
+    while board.step().mode != Mode::Press {}
+    while board.step().mode == Mode::Press {}
     board.command().calibrate_request += 1;
     let mut working = 0;
-    while board.step().mode != Mode::Identify {
+    while board.step().mode != Mode::Press {
         working += 1;
         assert!(working < 4_000);
     }
@@ -134,8 +134,8 @@ fn the_next_press_waits_until_the_last_one_is_worked_out() {
     assert_eq!(board.status().calibration.presses, 1);
     // Forgotten in the middle of the work: nothing is proposed.
     board.command().calibrate_request += 1;
-    while board.step().mode != Mode::Identify {}
-    while board.step().mode == Mode::Identify {}
+    while board.step().mode != Mode::Press {}
+    while board.step().mode == Mode::Press {}
     for _ in 0..1_000 {
         board.step();
     }

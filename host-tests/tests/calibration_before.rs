@@ -56,7 +56,7 @@ fn a_press_that_waits_and_is_refused_leaves_the_one_before() {
         board.step();
         board.command().calibrate_request += 1;
         board.step();
-        while board.step().mode == Mode::Identify {}
+        while board.step().mode == Mode::Press {}
         for _ in 0..wait {
             board.step();
         }

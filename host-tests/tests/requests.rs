@@ -201,7 +201,7 @@ fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     board.command().torque = true;
     board.command().identify_request += 1;
     let mut frames = 0;
-    while board.step().mode != Mode::Identify {
+    while board.step().mode != Mode::Press {
         frames += 1;
         assert!(frames < TARE_FRAMES + 5);
         assert_eq!(board.status().identification, Identification::None);
@@ -213,7 +213,7 @@ fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     board.step();
     board.command().torque = true;
     board.command().identify_request += 1;
-    assert_eq!(board.step().mode, Mode::Identify);
+    assert_eq!(board.step().mode, Mode::Press);
 }
 
 #[test]

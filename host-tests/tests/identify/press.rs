@@ -154,7 +154,7 @@ fn torque_off_a_fault_and_new_parameters_interrupt_it() {
         let mut board = board(&Setup::default());
         board.command().identify_request += 1;
         for _ in 0..2_500 {
-            assert_eq!(board.step().mode, Mode::Identify);
+            assert_eq!(board.step().mode, Mode::Press);
         }
         board
     };

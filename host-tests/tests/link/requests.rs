@@ -121,7 +121,7 @@ fn identify_is_refused_without_torque_or_tare() {
 #[test]
 fn a_save_is_refused_while_the_loop_drives_or_tares() {
     let mut bench = Bench::new();
-    for mode in [Mode::Tare, Mode::Approach, Mode::Force, Mode::Release, Mode::Identify] {
+    for mode in [Mode::Tare, Mode::Approach, Mode::Force, Mode::Release, Mode::Press] {
         bench.status.mode = mode;
         assert_eq!(bench.write(address::SAVE_PARAMETERS, &[1]), RESULT, "{mode:?}");
         assert_eq!(bench.ask(0x06, &[0x02]).number(), 1, "{mode:?}");

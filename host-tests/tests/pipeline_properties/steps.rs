@@ -76,7 +76,7 @@ impl Run {
         if !drives(status.mode) {
             assert_eq!(duty, Duty::ZERO, "{:?} does not drive", status.mode);
         }
-        if !command.torque && status.mode != Mode::Commission {
+        if !command.torque && status.mode != Mode::Strokes {
             assert!(!drives(status.mode), "{:?} without torque", status.mode);
         }
         assert_eq!(status.mode == Mode::Fault, status.fault.is_some());
@@ -87,7 +87,7 @@ impl Run {
                 Mode::Fault if cleared => tares || commissions,
                 Mode::Fault => status.fault == self.before.fault,
                 Mode::Tare => cleared && tares,
-                Mode::Commission => cleared && commissions,
+                Mode::Strokes => cleared && commissions,
                 Mode::Off => cleared && (!tares || status.tare == Taring::Refused),
                 _ => false,
             };
@@ -119,14 +119,14 @@ impl Run {
         } else if identifies {
             let number = status.identification.number();
             // A press that ends in this very frame has its answer; the grip comes with the next one.
-            assert!(if status.mode == Mode::Identify { number > 0 } else { number == 3 }, "{status:?}");
+            assert!(if status.mode == Mode::Press { number > 0 } else { number == 3 }, "{status:?}");
         }
-        if status.mode == Mode::Identify && !identifies && command.calibrate_request == 0 {
+        if status.mode == Mode::Press && !identifies && command.calibrate_request == 0 {
             assert_eq!(self.before.identification.number(), 1, "a press goes on after its answer: {status:?}");
         }
         // Enabling torque begins with what the goal and the touch are, whatever was requested before; a measurement
         // begins only with its request.
-        if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Commission {
+        if drives(status.mode) && !drives(self.before.mode) && status.mode != Mode::Strokes {
             let sound = match status.mode {
                 Mode::Approach | Mode::Force => command.goal > Newtons::ZERO,
                 // With a goal only where the array's signal vanished, or on a silent bus: that is released first.
@@ -158,7 +158,7 @@ impl Run {
 fn drives(mode: Mode) -> bool {
     match mode {
         Mode::Off | Mode::Tare | Mode::Fault => false,
-        Mode::Approach | Mode::Force | Mode::Release | Mode::Identify | Mode::Commission => true,
+        Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => true,
     }
 }
 

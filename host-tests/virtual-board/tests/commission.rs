@@ -37,7 +37,7 @@ fn outcome(rig: &mut Rig, task: u8) -> (u8, u8) {
         if state != 1 {
             return (state, read_u8(rig, address::COMMISSION_REFUSAL));
         }
-        assert_eq!(mode, Mode::Commission as u8);
+        assert_eq!(mode, Mode::Strokes as u8);
     }
     panic!("it does not end: {} %", read_u8(rig, address::COMMISSION_PROGRESS));
 }

@@ -85,7 +85,7 @@ impl Drop for Moving<'_> {
 /// Takes the tip off the object; [`halt`] must follow, whatever comes of it. Only torque off ends a press that measures,
 /// and friction would keep most of its force: torque then goes on once more, with the goal of 0 that torque off leaves.
 pub(super) fn take_off(within_s: f64, client: &mut Client) -> Result<(), Error> {
-    if release(within_s, client)?.mode == Mode::Identify as i64 {
+    if release(within_s, client)?.mode == Mode::Press as i64 {
         halt(client)?;
         client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
         wait_for(client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;

@@ -105,7 +105,7 @@ fn what_interrupts_a_press_leaves_what_was() {
             }
             end(&mut bench);
             let status = bench.step();
-            let (ended, was_pressing) = (status.mode != Mode::Identify, mode == Mode::Identify);
+            let (ended, was_pressing) = (status.mode != Mode::Press, mode == Mode::Press);
             if ended && was_pressing {
                 assert_eq!(status.calibration.state, State::Refused(Refusal::Interrupted), "{number} after {frames}");
                 assert_eq!((*bench.pipeline().proposal(), status.calibration.presses), (before, 1));

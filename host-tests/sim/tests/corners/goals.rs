@@ -113,7 +113,7 @@ fn goal_zero_releases_a_soft_object_after_a_press_that_measures() {
         finger.ask_press(gains);
         finger.step();
         let until_s = finger.time_s() + 12.0;
-        while mode(&finger) == Mode::Identify && finger.time_s() < until_s {
+        while mode(&finger) == Mode::Press && finger.time_s() < until_s {
             finger.step();
         }
         let what = format!("{yield_mm_per_n} mm/N, gains {gains}, then {:?} {:?}", mode(&finger), fault(&finger));

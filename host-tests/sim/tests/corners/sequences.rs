@@ -96,7 +96,7 @@ impl Run<'_> {
         // The last event is acknowledged in the next frame; a press that measures ends by itself.
         self.wait(0.002);
         let until_s = self.finger.time_s() + 10.0;
-        while mode(&self.finger) == Mode::Identify && self.finger.time_s() < until_s {
+        while mode(&self.finger) == Mode::Press && self.finger.time_s() < until_s {
             self.wait(0.1);
         }
         let driven = needs_torque(mode(&self.finger));

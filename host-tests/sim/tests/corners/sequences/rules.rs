@@ -29,9 +29,9 @@ pub struct Forces {
 impl Forces {
     /// Takes in a frame. `approaching`: the object moves towards the tip.
     pub fn observe(&mut self, time_s: f64, force_n: f64, command: &Command, mode: Mode, approaching: bool) {
-        let driven = matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Identify);
+        let driven = matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Press);
         let goal_n = match mode {
-            Mode::Identify => MEASURING_N,
+            Mode::Press => MEASURING_N,
             _ if driven => command.goal.0.to_num(),
             _ => 0.0,
         };
@@ -83,7 +83,7 @@ impl Forces {
 
 /// Whether a mode drives the motor for a goal or a measurement, so that torque off ends it.
 pub fn needs_torque(mode: Mode) -> bool {
-    matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Identify)
+    matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Press)
 }
 
 /// The table of modes in `src/state.rs`: the reason where a change is not in it.
@@ -93,10 +93,10 @@ pub fn check_mode(before: Mode, now: Mode, command: &Command) -> Option<String> 
         (_, Mode::Fault | Mode::Tare) => before != Mode::Fault || now != Mode::Tare || !command.torque,
         (Mode::Fault, _) => now == Mode::Off && !command.torque,
         (Mode::Tare, _) => now == Mode::Off,
-        (Mode::Off, _) => command.torque || now == Mode::Commission,
-        (Mode::Commission, _) => now == Mode::Off,
-        (Mode::Force, Mode::Off) | (Mode::Approach | Mode::Release | Mode::Identify, Mode::Off) => !command.torque,
-        (_, Mode::Commission) => false,
+        (Mode::Off, _) => command.torque || now == Mode::Strokes,
+        (Mode::Strokes, _) => now == Mode::Off,
+        (Mode::Force, Mode::Off) | (Mode::Approach | Mode::Release | Mode::Press, Mode::Off) => !command.torque,
+        (_, Mode::Strokes) => false,
         _ => true,
     };
     if !command.torque && needs_torque(now) {

@@ -13,17 +13,21 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::measure::Task;
+use fingertip::measure::{Standing, State, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
 
 /// The first finger of a scene, or the plant's.
 pub struct Bench<E: Set = Reference> {
     board: Board<E>,
     sense: Sense,
+    capture: Box<Capture>,
 }
+
+/// Frames within which every motion that measures ends: 30 s.
+const MEASURE_FRAMES: usize = 300_000;
 
 impl<E: Set> Bench<E> {
     /// At rest, torque off, not tared.
@@ -31,7 +35,7 @@ impl<E: Set> Bench<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        Ok(Self { board: Board::new(&scene.without_events(), Begun::default())?, sense: Sense::default() })
+        Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
     /// Exchanges the world and the array's effects; the controller stays as it is.
@@ -63,6 +67,10 @@ impl<E: Set> Bench<E> {
         (to.clock, to.start) = (from.clock, from.start);
         fork.sense = self.sense;
         Ok(fork)
+    }
+
+    fn around(board: Board<E>) -> Self {
+        Self { board, sense: Sense::default(), capture: Box::new(Capture::NEW) }
     }
 
     fn unit(&self) -> &Unit<E> {
@@ -114,7 +122,8 @@ impl<E: Set> Bench<E> {
         let unit = &mut self.board.units[0];
         let (_, status) = unit.pipeline.step(&record.frame, &record.sense, &record.command);
         unit.next = Bridge::of(status);
-        *status
+        self.capture.follow(&unit.pipeline);
+        *self.status()
     }
 
     /// Steps for so long; the largest true force on the way, N.
@@ -126,6 +135,28 @@ impl<E: Set> Bench<E> {
             largest_n = largest_n.max(self.truth().force_n);
         }
         largest_n
+    }
+
+    /// Makes a motion that measures and calls `each` after every frame; returns how the motion ended.
+    ///
+    /// # Panics
+    /// The motion does not end within 30 s.
+    pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> Standing {
+        self.request(task);
+        let request = self.command().measure_request;
+        for _ in 0..MEASURE_FRAMES {
+            let Status { taken, measure, .. } = self.step();
+            each(self);
+            if taken.measure == request && measure.state != State::Running {
+                return measure;
+            }
+        }
+        panic!("{task:?} does not end: {:?}", self.status().measure);
+    }
+
+    /// The record of the last motion that measured, as it is read over the bus.
+    pub fn kept(&self) -> &[u8] {
+        self.capture.data()
     }
 
     /// Requests a motion that measures, or its end.
@@ -207,7 +238,7 @@ impl Bench {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));
         let board = Board::of(&scene, Begun::default(), config, setup, parts);
-        Self { board: board.unwrap_or_else(|error| panic!("{error}")), sense: Sense::default() }
+        Self::around(board.unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Breaks something or mends it.

@@ -8,8 +8,19 @@ use std::process::Command;
 /// Programs behind a command of `cargo xtask`, which hands its arguments on.
 const BEHIND: [&str; 6] = ["sim", "sweep", "population", "budget", "sensor", "serve"];
 /// Folders of the repository: a path that begins with one names a file.
-const FOLDERS: [&str; 10] =
-    ["captures/", "docs/", "examples/", "host-tests/", "lanes/", "m4-timing/", "python/", "src/", "tool/", "xtask/"];
+const FOLDERS: [&str; 11] = [
+    "captures/",
+    "docs/",
+    "examples/",
+    "host-tests/",
+    "lanes/",
+    "m4-timing/",
+    "python/",
+    "solve/",
+    "src/",
+    "tool/",
+    "xtask/",
+];
 
 fn root() -> PathBuf {
     PathBuf::from(env!("FINGERTIP_ROOT"))

@@ -1,0 +1,109 @@
+//! What a reading does by itself: creep under a held force, and its change with temperature.
+
+use crate::Value;
+use crate::modulus::{NoModulus, modulus};
+use crate::press::Press;
+use crate::robust::{Fit, minimise};
+use nalgebra::DVector;
+
+/// Readings under a force that does not change: a weight, or a loop that holds a scale's number.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HeldSeries {
+    /// Time from the begin of the hold, s, and force by the array's sum, N.
+    pub readings: Vec<[f64; 2]>,
+}
+
+/// Creep of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Creep {
+    /// How much a held reading has grown in the end, as a share (`creep_permille`).
+    pub share: Value,
+    /// Time constant, s (`creep_time_ms`).
+    pub time_s: Value,
+    /// Growth for each decade of time, as a share: what remains of it where the hold lasts longer than was seen.
+    pub per_decade: Value,
+    /// Root mean square of what the share and its time constant leave, as a share of the reading.
+    pub left: f64,
+}
+
+/// Reason why there is no creep or temperature coefficient, with the number behind it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum NoDrift {
+    /// Number of readings of the hold.
+    #[error("the hold has {0} readings; 10 are needed")]
+    Readings(usize),
+    /// Duration of the hold, s.
+    #[error("the hold lasts {0:.1} s; 5 s are needed")]
+    Short(f64),
+    /// Difference of the chip's temperature between the presses, K.
+    #[error("the presses differ by {0:.1} K; 3 K are needed")]
+    Warming(f64),
+    /// A press gave no modulus.
+    #[error("{0}")]
+    Press(#[from] NoModulus),
+    /// The fit has no solution.
+    #[error("the fit has no solution")]
+    Fit,
+}
+
+/// Creep by a hold.
+///
+/// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control/creep.rs`).
+/// Ink creeps with the logarithm of time instead, so k and tau are those that serve this hold best; `left` shows how well.
+///
+/// # Errors
+/// See [`NoDrift`].
+pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
+    let readings = &series.readings;
+    if readings.len() < 10 {
+        return Err(NoDrift::Readings(readings.len()));
+    }
+    let begin_s = readings[0][0];
+    let long_s = readings[readings.len() - 1][0] - begin_s;
+    if long_s < 5.0 {
+        return Err(NoDrift::Short(long_s));
+    }
+    let first_n = readings[0][1];
+    let off = |model: &dyn Fn(f64) -> f64| {
+        let off = readings.iter().map(|[time_s, force_n]| (model(time_s - begin_s) - force_n / first_n) / 1e-3);
+        DVector::from_iterator(readings.len(), off)
+    };
+    // Beside the unknowns a weak bound holds the time constant near to what the hold shows.
+    let lag = |x: &DVector<f64>| {
+        let model = |time_s: f64| x[0] * (1.0 + x[1] * (1.0 - (-time_s / x[2].exp()).exp()));
+        off(&model).push((x[2] - (0.3 * long_s).ln()) / 2.0)
+    };
+    let fit = minimise(&[1.0, 0.03, (0.3 * long_s).ln()], &[1e-5, 1e-5, 1e-3], lag).ok_or(NoDrift::Fit)?;
+    let log = |x: &DVector<f64>| off(&|time_s: f64| x[0] + x[1] * (1.0 + time_s / 0.1).log10());
+    let slope = minimise(&[1.0, 0.03], &[1e-5, 1e-5], log).ok_or(NoDrift::Fit)?;
+    let scale = |fit: &Fit| (fit.cost / (readings.len() - fit.unknowns.len()) as f64).sqrt();
+    let sigma = |fit: &Fit, at: usize| scale(fit) * fit.covariance[(at, at)].sqrt();
+    let time_s = fit.unknowns[2].exp();
+    Ok(Creep {
+        share: Value { value: fit.unknowns[1], sigma: sigma(&fit, 1) },
+        time_s: Value { value: time_s, sigma: sigma(&fit, 2) * time_s },
+        per_decade: Value { value: slope.unknowns[1] / slope.unknowns[0], sigma: sigma(&slope, 1) },
+        left: 1e-3 * scale(&fit),
+    })
+}
+
+/// Change of the array's gain with the chip's temperature, as a share for each K (FlexiForce A201: 0.0036), from two presses
+/// at the same place.
+///
+/// Both presses are solved for the modulus; what the two have in common, radius and gains, cancels in their ratio.
+///
+/// # Errors
+/// See [`NoDrift`].
+pub fn temperature(cold: &Press, warm: &Press) -> Result<Value, NoDrift> {
+    let mean_c =
+        |press: &Press| press.steps.iter().map(|step| step.chip_c).sum::<f64>() / press.steps.len().max(1) as f64;
+    let warmer_k = mean_c(warm) - mean_c(cold);
+    if warmer_k.abs() < 3.0 {
+        return Err(NoDrift::Warming(warmer_k));
+    }
+    let found = modulus(&[cold.clone(), warm.clone()])?;
+    let [before, after] = found.presses.as_slice() else { return Err(NoDrift::Fit) };
+    let ratio = after.kpa / before.kpa;
+    let sigma = (before.sigma_kpa / before.kpa).hypot(after.sigma_kpa / after.kpa);
+    Ok(Value { value: (ratio - 1.0) / warmer_k, sigma: (sigma / warmer_k).abs() })
+}

@@ -1,0 +1,45 @@
+//! The host's solver: Young's modulus, taxel gains, poses, scale, creep and temperature from recorded presses, and the drive
+//! from recorded strokes.
+//!
+//! The chip moves the tip and records; nothing is fitted there. On the host, in double precision:
+//!
+//! | function | gives |
+//! | --- | --- |
+//! | [`gains()`] | poses of the presses, gains of the taxels, dead and odd taxels, a judgement of each press |
+//! | [`modulus()`] | Young's modulus and contact point, with hysteresis, creep and relaxation of tip and ink |
+//! | [`scale()`] | scale of the array from forces on a kitchen scale |
+//! | [`creep()`] | the chip's creep term from a held force |
+//! | [`temperature()`] | temperature coefficient from a cold and a warm press |
+//! | [`strokes::solve`] | torque constant, time constant, inertia and friction from strokes in the air |
+//!
+//! Every number comes with its standard uncertainty, every refusal with the number behind it. `docs/solve.md` has the motion
+//! that the chip must make, why each method was chosen, and the accuracy on simulated fingers.
+//!
+//! ```
+//! use solve::scale::Held;
+//!
+//! let held = [(1.05, 1.0), (2.62, 2.5), (4.21, 4.0)].map(|(shown_n, read_n)| Held { shown_n, read_n });
+//! let scale = solve::scale(&held)?;
+//! assert!((scale.factor.value - 1.05).abs() < 0.01);
+//! # Ok::<(), solve::scale::NoScale>(())
+//! ```
+
+pub mod drift;
+mod force;
+pub mod gains;
+mod joint;
+pub mod judge;
+pub mod memory;
+pub mod model;
+pub mod modulus;
+pub mod press;
+mod robust;
+pub mod scale;
+pub mod strokes;
+mod value;
+
+pub use drift::{creep, temperature};
+pub use gains::gains;
+pub use modulus::modulus;
+pub use scale::scale;
+pub use value::Value;

@@ -1,0 +1,194 @@
+//! Young's modulus and the contact point from force over travel.
+//!
+//! The force of a step is `F = pi y d^2` (Park, Kim and Hirai 2003, eq. 14) with the stiffness y that all sound taxels give
+//! together ([`crate::gains`]). What the tip and the ink remember changes it by 5 to 20 %, so it is fitted along
+//! ([`crate::memory`]): the two ways of a press and its holds show all of it. Unknowns of a press: Y, the contact point,
+//! hysteresis, creep, relaxation and its time constant.
+
+use crate::gains::{Gains, NoGains, Settled, settle};
+use crate::memory::{Memory, Motion};
+use crate::model::Pose;
+use crate::press::Press;
+use crate::robust::{Fit, minimise};
+use nalgebra::DVector;
+use std::f64::consts::PI;
+
+/// Usual widths of what is remembered; they only matter where a press does not show it. Hysteresis up to 10 %, creep
+/// under 5 % a decade (Interlink FSR 400 guide); silicones forget 5 to 20 %, most of it within a second or two (Fung, 7.6).
+const HYSTERESIS_USUAL: f64 = 0.1;
+const CREEP_USUAL: f64 = 0.03;
+const RELAXATION_USUAL: f64 = 0.1;
+const RELAXATION_S: f64 = 0.4;
+const RELAXATION_DECADES: f64 = 0.5;
+/// Relaxation's time constants that are tried, s: half a decade in three.
+const TRIED_S: [f64; 13] = [0.03, 0.044, 0.065, 0.095, 0.14, 0.2, 0.3, 0.44, 0.65, 0.95, 1.4, 2.0, 4.0];
+/// Error of the model in a step's force: as a share of it, and of the largest.
+const FORCE_PART: f64 = 0.003;
+const LARGEST_PART: f64 = 0.0007;
+/// Unknowns of a press.
+const UNKNOWNS: usize = 5;
+
+/// Modulus of one press.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OfPress {
+    /// Young's modulus, kPa.
+    pub kpa: f64,
+    /// Its standard uncertainty from the residuals, kPa.
+    pub sigma_kpa: f64,
+    /// Travel at which the tip touches, mm.
+    pub touch_mm: f64,
+    /// What tip and ink remember.
+    pub memory: Memory,
+    /// Standard uncertainties of hysteresis, creep and relaxation.
+    pub memory_sigma: [f64; 3],
+    /// Root mean square residual as a share of the force.
+    pub misfit: f64,
+}
+
+/// Modulus of the tip.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Modulus {
+    /// Young's modulus, kPa.
+    pub kpa: f64,
+    /// Standard uncertainty, kPa.
+    pub sigma_kpa: f64,
+    /// Parts of the uncertainty, as shares of the modulus.
+    pub parts: Parts,
+    /// Each press by itself.
+    pub presses: Vec<OfPress>,
+    /// Poses and gains that it rests on.
+    pub gains: Gains,
+}
+
+/// Parts of the modulus' standard uncertainty, as shares.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parts {
+    /// Residuals of the presses.
+    pub residuals: f64,
+    /// Spread between the presses.
+    pub presses: f64,
+    /// Factor that all gains have in common.
+    pub gains: f64,
+    /// What is corrected for creep, relaxation and hysteresis, times what such a model is off by.
+    pub memory: f64,
+}
+
+/// Reason why there is no modulus.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoModulus {
+    /// No press counts.
+    #[error("{0}")]
+    Gains(#[from] NoGains),
+    /// The fit of force over travel has no solution for any of this number of presses.
+    #[error("force over travel of {0} presses does not follow the model")]
+    Fit(usize),
+}
+
+/// Young's modulus of presses of one tip.
+///
+/// # Errors
+/// See [`NoModulus`].
+pub fn modulus(presses: &[Press]) -> Result<Modulus, NoModulus> {
+    let Settled { presses, gains, creep } = settle(presses)?;
+    let mut found = Vec::new();
+    for (index, mut one) in
+        each(&presses, &gains).into_iter().enumerate().filter_map(|(index, one)| Some((index, one?)))
+    {
+        one.memory.creep += creep;
+        let posed = &gains.presses[index];
+        // A yield that was solved for leaves its uncertainty; one that was not, half of its effect.
+        let [yields, sigma] = posed.judgement.yields_mm_per_n;
+        let plate = if posed.pose.yields_mm_per_n.abs() > 1e-4 { 2.0 * sigma } else { yields.abs() };
+        let depth_mm = presses[index].deepest_mm() - one.touch_mm;
+        let force_n = posed.forces_n.iter().copied().fold(0.0, f64::max);
+        one.sigma_kpa = one.sigma_kpa.hypot(one.kpa * plate * force_n / depth_mm);
+        found.push(one);
+    }
+    if found.is_empty() {
+        return Err(NoModulus::Fit(presses.len()));
+    }
+    let weight = |one: &OfPress| (one.kpa / one.sigma_kpa).powi(2);
+    let weights: f64 = found.iter().map(weight).sum();
+    let kpa = (found.iter().map(|one| weight(one) * one.kpa.ln()).sum::<f64>() / weights).exp();
+    let scatter: f64 = found.iter().map(|one| weight(one) * (one.kpa / kpa).ln().powi(2)).sum();
+    let count = found.len() as f64;
+    let between = if found.len() > 1 { (scatter / weights / (count - 1.0)).sqrt() } else { 0.0 };
+    let mean = |part: fn(&OfPress) -> f64| found.iter().map(|one| weight(one) * part(one)).sum::<f64>() / weights;
+    let memory = mean(|one| one.memory.creep).hypot(0.1 * mean(|one| one.memory.relaxation));
+    let parts =
+        Parts { residuals: weights.sqrt().recip(), presses: between, gains: gains.common, memory: 0.3 * memory };
+    let sigma = parts.residuals.hypot(parts.presses).hypot(parts.gains).hypot(parts.memory);
+    Ok(Modulus { kpa, sigma_kpa: sigma * kpa, parts, presses: found, gains })
+}
+
+/// Each press by itself; None where its fit has no solution.
+pub(crate) fn each(presses: &[Press], gains: &Gains) -> Vec<Option<OfPress>> {
+    presses.iter().zip(&gains.presses).map(|(press, posed)| of_press(press, &posed.pose, &posed.forces_n)).collect()
+}
+
+fn of_press(press: &Press, pose: &Pose, measured: &[f64]) -> Option<OfPress> {
+    let (radius_mm, touch_mm) = (press.tip.radius_mm, pose.touch_mm);
+    // Travel into the tip: less what the plate yields.
+    let mut press = press.clone();
+    for (step, force_n) in press.steps.iter_mut().zip(measured) {
+        step.travel_mm.iter_mut().for_each(|travel_mm| *travel_mm -= pose.yields_mm_per_n * force_n);
+    }
+    let motion = Motion::new(&press, touch_mm);
+    let largest_n = measured.iter().copied().fold(0.0, f64::max);
+    let start_kpa = 1e3 * largest_n / (PI * (press.deepest_mm() - touch_mm).max(1e-3).powi(2));
+    let read = |x: &DVector<f64>, tau_s: f64| {
+        let memory = Memory { hysteresis: x[2].max(0.0), creep: x[3], relaxation: x[4].max(0.0), relaxation_s: tau_s };
+        (start_kpa * x[0].exp(), touch_mm + x[1] * radius_mm, memory)
+    };
+    let fits: Vec<(Fit, f64)> = TRIED_S
+        .into_iter()
+        .filter_map(|tau_s| {
+            let residuals = |x: &DVector<f64>| {
+                let (kpa, touch_mm, memory) = read(x, tau_s);
+                let model = motion.forces(kpa, radius_mm, touch_mm, &memory);
+                let off = model.iter().zip(measured).map(|(model, measured)| {
+                    (model - measured) / (FORCE_PART * measured).hypot(LARGEST_PART * largest_n)
+                });
+                let decades = (tau_s / RELAXATION_S).log10();
+                let usual = [
+                    x[2] / HYSTERESIS_USUAL,
+                    x[3] / CREEP_USUAL,
+                    x[4] / RELAXATION_USUAL,
+                    decades / RELAXATION_DECADES,
+                ];
+                DVector::from_iterator(measured.len() + usual.len(), off.chain(usual))
+            };
+            let start = [0.0, 0.0, 0.04, 0.02, 0.05];
+            minimise(&start, &[1e-4, 1e-5, 1e-4, 1e-4, 1e-4], residuals).map(|fit| (fit, tau_s))
+        })
+        .collect();
+    let cost = fits.iter().map(|(fit, _)| fit.cost).min_by(f64::total_cmp)?;
+    let freedom = measured.len().saturating_sub(UNKNOWNS).max(1) as f64;
+    let scale = (cost / freedom).max(1.0).sqrt();
+    // Each time constant counts by its likelihood: the mean and the spread of the unknowns over all of them are the result.
+    let weights = DVector::from_iterator(
+        fits.len(),
+        fits.iter().map(|(fit, _)| (-0.5 * (fit.cost - cost) / (scale * scale)).exp()),
+    );
+    let weights = &weights / weights.sum();
+    let mut mean = DVector::zeros(UNKNOWNS + 1);
+    let with_tau = |fit: &Fit, tau_s: f64| fit.unknowns.clone().insert_row(UNKNOWNS, tau_s.ln());
+    fits.iter().zip(&weights).for_each(|((fit, tau_s), weight)| mean += *weight * with_tau(fit, *tau_s));
+    let mut variance = [0.0; UNKNOWNS];
+    for ((fit, tau_s), weight) in fits.iter().zip(&weights) {
+        let off = with_tau(fit, *tau_s) - &mean;
+        for (unknown, variance) in variance.iter_mut().enumerate() {
+            *variance += weight * (scale * scale * fit.covariance[(unknown, unknown)] + off[unknown] * off[unknown]);
+        }
+    }
+    let (kpa, touch_mm, memory) = read(&mean, mean[UNKNOWNS].exp());
+    let [kpa_sigma, _, hysteresis, creep, relaxation] = variance.map(f64::sqrt);
+    Some(OfPress {
+        kpa,
+        sigma_kpa: kpa_sigma * kpa,
+        touch_mm,
+        memory,
+        memory_sigma: [hysteresis, creep, relaxation],
+        misfit: scale * FORCE_PART,
+    })
+}

@@ -1,0 +1,141 @@
+//! The record of a press, as the chip delivers it.
+//!
+//! The chip moves the tip into a flat plate and back, and averages frames over short stretches of time. It fits nothing
+//! and judges nothing. `docs/solve.md` lists the fields with their units, and the motion that gives them.
+
+use crate::model::At;
+
+/// Soft tip of the finger, as configured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tip {
+    /// Radius a, mm.
+    pub radius_mm: f64,
+    /// Young's modulus Y in the parameters, kPa. It is a start value: no result leans on it.
+    pub modulus_kpa: f64,
+}
+
+/// Tactile array: square taxels that touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Array {
+    /// Number of rows.
+    pub rows: usize,
+    /// Number of columns.
+    pub columns: usize,
+    /// Distance from taxel to taxel, mm.
+    pub pitch_mm: f64,
+    /// Codes above the tare for each kPa, at a gain of 1.
+    pub codes_per_kpa: f64,
+}
+
+impl Array {
+    /// Number of taxels.
+    pub fn taxels(&self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// Centre of a taxel from the array's middle: along the columns (x) and the rows (y), mm. Taxels count row by row.
+    pub fn place_mm(&self, taxel: usize) -> [f64; 2] {
+        let from_middle = |index: usize, count: usize| (index as f64 + 0.5 - 0.5 * count as f64) * self.pitch_mm;
+        [from_middle(taxel % self.columns, self.columns), from_middle(taxel / self.columns, self.rows)]
+    }
+}
+
+/// Half of a press in which a step was recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Branch {
+    /// On the way in, or held at the deepest place.
+    Loading,
+    /// On the way back.
+    Unloading,
+}
+
+/// Reading of a taxel over the frames of a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Mean, codes above the tare, row sag taken out, gains in force applied.
+    pub mean: f64,
+    /// Standard deviation of a frame, codes.
+    pub deviation: f64,
+    /// True if the chip counted the taxel as bad or saturated in any frame.
+    pub bad: bool,
+}
+
+/// Mean of consecutive frames.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// Times of the first and the last frame, s. The zero is the same for all presses of a session.
+    pub time_s: [f64; 2],
+    /// Travel at the first and the last frame by the encoder, mm; it grows towards the plate.
+    pub travel_mm: [f64; 2],
+    /// Number of frames.
+    pub frames: u32,
+    /// Way in or way back.
+    pub branch: Branch,
+    /// Readings of all taxels, row by row.
+    pub taxels: Vec<Reading>,
+    /// Mean voltage at the bridge, V.
+    pub bridge_v: f64,
+    /// Temperature of the microcontroller, degrees Celsius.
+    pub chip_c: f64,
+}
+
+impl Step {
+    /// Mean travel, mm.
+    pub fn middle_mm(&self) -> f64 {
+        0.5 * (self.travel_mm[0] + self.travel_mm[1])
+    }
+
+    /// Middle of its time, s.
+    pub fn middle_s(&self) -> f64 {
+        0.5 * (self.time_s[0] + self.time_s[1])
+    }
+
+    /// Where the press is.
+    pub fn at(&self, array: &Array) -> At {
+        let half_mm = 0.5 * (self.travel_mm[1] - self.travel_mm[0]).abs();
+        At { travel_mm: self.middle_mm(), half_mm, force_n: self.force_n(array) }
+    }
+
+    /// Force by the plain sum of the taxels that are not bad, N.
+    pub fn force_n(&self, array: &Array) -> f64 {
+        1e-3 * array.pitch_mm * array.pitch_mm * self.sum() / array.codes_per_kpa
+    }
+
+    /// Sum of the readings of all taxels that are not bad, codes.
+    pub fn sum(&self) -> f64 {
+        self.taxels.iter().filter(|taxel| !taxel.bad).map(|taxel| taxel.mean).sum()
+    }
+}
+
+/// A press: steps in order of time, from the air into the plate and back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Press {
+    /// Tip as configured.
+    pub tip: Tip,
+    /// Array.
+    pub array: Array,
+    /// Steps in order of time.
+    pub steps: Vec<Step>,
+}
+
+impl Press {
+    /// Steps of the way in, each deeper than the one before: all taxels load.
+    pub fn inward(&self) -> impl Iterator<Item = &Step> {
+        let mut before_mm = f64::NEG_INFINITY;
+        self.steps.iter().filter(move |step| {
+            let deeper = step.branch == Branch::Loading && step.middle_mm() > before_mm + 1e-3;
+            before_mm = step.middle_mm();
+            deeper
+        })
+    }
+
+    /// Deepest step.
+    pub fn deepest(&self) -> Option<&Step> {
+        self.steps.iter().max_by(|a, b| a.middle_mm().total_cmp(&b.middle_mm()))
+    }
+
+    /// Deepest travel, mm; 0 without steps.
+    pub fn deepest_mm(&self) -> f64 {
+        self.deepest().map_or(0.0, Step::middle_mm)
+    }
+}

@@ -1,0 +1,318 @@
+//! The drive from recorded strokes in the air: torque constant, time constant, friction.
+//!
+//! The controller makes strokes under steps of voltage and records encoder counts and the voltage really applied. In
+//! the air the motor obeys
+//!
+//! ```text
+//! J w' = k i - T_f(w)      i = (V - k w) / R
+//! a w' = V - k w - V_f(w)      a = R J / k      V_f = R T_f / k
+//! ```
+//!
+//! so k, a and the friction voltage V_f can be seen, and tau = a / k = R J / k^2; J = a k / R and T_f = V_f k / R
+//! need R. At a speed w only the sum k w + V_f(w) can be seen. Friction that grows in proportion to the speed
+//! (viscous, b) can therefore not be told from back-EMF: k + R b / k is found. Friction that falls with speed,
+//!
+//! ```text
+//! V_f(w) = V_c + V_s share(w / w_s)
+//! ```
+//!
+//! is separated from k by strokes at several speeds, because it is gone at high speed. Where the strokes were all
+//! slow it is not separated, and the standard uncertainty of k is as large as that leaves it.
+//!
+//! The parameters of all strokes are fitted together by nonlinear least squares over the samples, with Huber
+//! weights. Each stroke has its own angle and speed at its first fitted sample, so what happens at standstill is
+//! not part of the model. The encoder's steps are a noise of a count / sqrt(12).
+//!
+//! A standard uncertainty is the root of the sum of squares of
+//!
+//! 1. scatter: the covariance of the residuals, and that of the strokes' sums of residuals (which counts what is
+//!    common to a stroke's samples as one observation),
+//! 2. model: how far the values of the forms of friction are apart (the result is their mean, each weighted by how
+//!    well it fits), and how far the value changes with a k that differs between forward and back, and with a force that depends on the place,
+//! 3. reference: [`VOLTAGE`] for the supply's divider, [`TIMING_S`], and the uncertainty of R that the caller states.
+
+mod fit;
+mod model;
+
+pub use model::Form;
+
+use crate::Value;
+use core::fmt;
+use fit::Fit;
+use model::{Path, SPAN, index};
+use nalgebra::SVector;
+
+/// Relative standard uncertainty of a voltage: the supply's divider and reference.
+pub const VOLTAGE: f64 = 0.008;
+/// Standard uncertainty of the moment at which a voltage acts, s: the time constant of the winding, L / R, adds to tau.
+pub const TIMING_S: f64 = 20e-6;
+/// What friction may fall by beside its form, as a share of its voltage, up to the speed of the fastest stroke. Beyond
+/// [`SETTLED`] it is less by the square of the speed.
+pub const UNSEEN: f64 = 0.1;
+/// Speed beyond which friction of brushes and bearings hardly falls, rad/s.
+pub const SETTLED: f64 = 30.0;
+/// Strokes each way without which nothing is fitted.
+const STROKES_MIN: usize = 3;
+/// Counts of the longest stroke below which the motor counts as still.
+const STILL_COUNTS: i32 = 12;
+/// The fastest stroke must be this many times as fast as the slowest.
+const SPEEDS: f64 = 2.0;
+/// Share of the speed of the fastest stroke above which a stroke is fast.
+const FAST: f64 = 0.4;
+/// A force that depends on the place is refused above this, N, where it is this many times its uncertainty.
+const PUSH_N: f64 = 0.05;
+const PUSH_SIGMAS: f64 = 4.0;
+/// The count may jump by these counts, and by this many times what the voltage can make of the speed between samples.
+const JUMP_COUNTS: f64 = 3.0;
+const JUMP: f64 = 3.0;
+
+/// A sample of a stroke.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sample {
+    /// The encoder's count.
+    pub count: i32,
+    /// Mean of duty times supply since the sample before, V; positive presses.
+    pub voltage_v: f64,
+}
+
+/// One motion from rest to rest. The voltage goes one way, then the motor is shorted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stroke {
+    /// Evenly spaced samples. The first is taken as the voltage begins.
+    pub samples: Vec<Sample>,
+}
+
+impl Stroke {
+    /// True for a stroke forward; none without a voltage.
+    fn forward(&self) -> Option<bool> {
+        let sum: f64 = self.samples.iter().map(|sample| sample.voltage_v).sum();
+        (sum != 0.0).then_some(sum > 0.0)
+    }
+
+    /// Largest speed over a few samples, rad/s.
+    fn fastest(&self, record: &Record) -> f64 {
+        let gone = self.samples.windows(SPAN + 1).map(|part| (part[SPAN].count - part[0].count).abs()).max();
+        f64::from(gone.unwrap_or(0)) * core::f64::consts::TAU / record.counts_per_turn / (SPAN as f64 * record.sample_s)
+    }
+
+    /// Counts gone in the direction of the voltage.
+    fn gone(&self) -> i32 {
+        let (Some(first), Some(last)) = (self.samples.first(), self.samples.last()) else { return 0 };
+        let gone = last.count - first.count;
+        if self.forward() == Some(false) { -gone } else { gone }
+    }
+}
+
+/// What the controller delivers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Record {
+    /// Time between samples, s.
+    pub sample_s: f64,
+    /// From a sample's count to the moment at which the voltage made in the same frame acts, s.
+    pub delay_s: f64,
+    /// Encoder counts for a turn of the motor.
+    pub counts_per_turn: f64,
+    /// Motor angle for a travel of the tip, rad/mm.
+    pub rad_per_mm: f64,
+    /// The strokes, in order.
+    pub strokes: Vec<Stroke>,
+    /// What ended the motions early.
+    pub ended: Option<Refusal>,
+}
+
+/// Why there is no result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// The encoder did not count. The number is the voltage (V), or the counts of the longest stroke.
+    Still,
+    /// The encoder counts against the voltage: counts.
+    Reversed,
+    /// The encoder does not follow the motor: counts of a jump that no voltage makes. Or the tip left its bounds: mm.
+    Astray,
+    /// The array felt a touch: N.
+    Touched,
+    /// The motor felt a force that depends on the place: N.
+    Pushed,
+    /// The voltage requested was not applied: V missing.
+    HeldBack,
+    /// The tip did not come to rest: mm/s.
+    Restless,
+    /// Too few strokes can be used: their number.
+    Few,
+    /// The strokes' speeds are too close together to tell back-EMF from friction: the fastest over the slowest.
+    Slow,
+    /// The fit did not converge: rounds.
+    Unsolved,
+}
+
+/// A refusal with the number behind it, in the unit that its [`Reason`] states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Refusal {
+    /// Why.
+    pub reason: Reason,
+    /// The number that led to it.
+    pub value: f64,
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.value;
+        match self.reason {
+            Reason::Still => write!(f, "still: the encoder hardly counted ({value:.2})"),
+            Reason::Reversed => write!(f, "reversed: {value:.0} counts against the voltage"),
+            Reason::Astray => write!(f, "astray: the encoder does not follow the motor ({value:.2})"),
+            Reason::Touched => write!(f, "touched: the array felt {value:.3} N"),
+            Reason::Pushed => write!(f, "pushed: the motor felt {value:.3} N"),
+            Reason::HeldBack => write!(f, "held back: {value:.3} V of the requested voltage are missing"),
+            Reason::Restless => write!(f, "restless: the tip still moves at {value:.2} mm/s"),
+            Reason::Few => write!(f, "too few strokes: {value:.0} can be used"),
+            Reason::Slow => write!(f, "slow: the fastest stroke is only {value:.1} times as fast as the slowest"),
+            Reason::Unsolved => write!(f, "the fit did not converge in {value:.0} rounds"),
+        }
+    }
+}
+
+impl core::error::Error for Refusal {}
+
+/// Friction in one direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// V_c: its voltage at high speed, V.
+    pub voltage_v: Value,
+    /// V_s: what standstill adds, V.
+    pub standstill_v: Value,
+    /// Its torque at high speed, N m, with the caller's resistance.
+    pub torque_nm: Value,
+}
+
+/// A drive as measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// k, N m/A: the back-EMF constant in V s/rad.
+    pub torque_constant: Value,
+    /// tau = R J / k^2, s.
+    pub time_constant_s: Value,
+    /// J at the motor's shaft, kg m^2, with the caller's resistance.
+    pub inertia_kg_m2: Value,
+    /// Friction forward and back.
+    pub friction: [Friction; 2],
+    /// The form in which friction falls with speed that fits best.
+    pub form: Form,
+    /// w_s: the Stribeck speed of that form, rad/s.
+    pub stribeck_rad_per_s: Value,
+    /// Largest force at the foremost place that depends on the place, N.
+    pub force_n: Value,
+    /// Root mean square of the residuals, rad.
+    pub residual_rad: f64,
+    /// Speeds of the slowest and the fastest stroke, rad/s.
+    pub speeds_rad_per_s: [f64; 2],
+}
+
+/// Solves a record for the drive. `resistance` is that of the whole circuit, Ohm.
+///
+/// # Errors
+/// [`Refusal`] where the motions were ended early or the samples do not follow the model.
+pub fn solve(record: &Record, resistance: Value) -> Result<Drive, Refusal> {
+    let refuse = |reason, value| Err(Refusal { reason, value });
+    if let Some(refusal) = record.ended {
+        return Err(refusal);
+    }
+    let gone = || record.strokes.iter().map(Stroke::gone);
+    let (least, most) = (gone().min().unwrap_or(0), gone().max().unwrap_or(0));
+    if -least >= STILL_COUNTS {
+        return refuse(Reason::Reversed, f64::from(-least));
+    } else if most < STILL_COUNTS {
+        return refuse(Reason::Still, f64::from(most));
+    }
+    let places = || record.strokes.iter().flat_map(|stroke| &stroke.samples).map(|sample| f64::from(sample.count));
+    let rad = core::f64::consts::TAU / record.counts_per_turn;
+    let ends = [rad * places().fold(f64::MAX, f64::min), rad * places().fold(f64::MIN, f64::max)];
+    let fastest = record.strokes.iter().map(|stroke| stroke.fastest(record)).fold(0.0, f64::max);
+    let parts = |stroke| Path::parts(record, stroke, ends, FAST * fastest);
+    let paths: Vec<Vec<Path>> = (0..record.strokes.len()).map(parts).collect();
+    let slowest = paths.iter().flatten().map(|path| path.fastest).fold(f64::MAX, f64::min);
+    for side in 0..2 {
+        let strokes = paths.iter().flat_map(|parts| parts.first()).filter(|path| path.side == side).count();
+        if strokes < STROKES_MIN {
+            return refuse(Reason::Few, strokes as f64);
+        }
+    }
+    let paths: Vec<Path> = paths.into_iter().flatten().collect();
+    if fastest < SPEEDS * slowest {
+        return refuse(Reason::Slow, fastest / slowest);
+    }
+    let fits = Fit::all(&paths, record, slowest)?;
+    let best = &fits[0];
+    // The largest change of speed between samples, and what the largest voltage can make of it.
+    let jumps = record.strokes.iter().flat_map(|stroke| stroke.samples.windows(3));
+    let jump = jumps.map(|part| (part[2].count - 2 * part[1].count + part[0].count).abs()).max().unwrap_or(0);
+    let most_v = paths.iter().map(|path| path.voltage_v).fold(0.0, f64::max);
+    let most = most_v / best.p[index::A].exp() * record.sample_s.powi(2) / rad;
+    if f64::from(jump) > JUMP_COUNTS + JUMP * most {
+        return refuse(Reason::Astray, f64::from(jump));
+    }
+    let newtons = best.p[index::K].exp() / resistance.value * record.rad_per_mm * 1e3;
+    let pushes = [index::FRONT, index::SPRING].map(|force| {
+        let (value, sigma) = best.probed(force);
+        Value { value: newtons * value.abs(), sigma: newtons * sigma }
+    });
+    let force_n = if pushes[0].value > pushes[1].value { pushes[0] } else { pushes[1] };
+    if force_n.value > PUSH_N && force_n.value > PUSH_SIGMAS * force_n.sigma {
+        return refuse(Reason::Pushed, force_n.value);
+    }
+
+    // A friction that falls evenly with speed: k is found lower, and friction higher.
+    let volts = [0, 1].map(|side| best.p[index::COULOMB + side].exp());
+    let share = UNSEEN * (SETTLED / fastest).powi(2).min(1.0);
+    let slope = share * volts[0].max(volts[1]) / (fastest - slowest);
+    let mut unseen = fit::Vector::zeros();
+    unseen[index::K] = slope / best.p[index::K].exp();
+    for (side, volts) in volts.iter().enumerate() {
+        unseen[index::COULOMB + side] = -slope * 0.5 * (slowest + fastest) / volts;
+    }
+    // Values are functions of ln k, ln a, ln V_c...; each is given by its gradient.
+    let spread = |gradient: &[(usize, f64)], reference: f64| {
+        let gradient = gradient.iter().fold(SVector::zeros(), |mut all: fit::Vector, (at, factor)| {
+            all[*at] = *factor;
+            all
+        });
+        (best.variance(&gradient, &fits) + unseen.dot(&gradient).powi(2) + reference * reference).sqrt()
+    };
+    let weights = best.weights(&fits);
+    let p = |at: usize| fits.iter().zip(&weights).map(|(fit, weight)| weight * fit.p[at]).sum::<f64>();
+    let logarithm = |value: f64, gradient: &[(usize, f64)], reference: f64| Value {
+        value,
+        sigma: value * spread(gradient, reference),
+    };
+    let (k, a) = (p(index::K).exp(), p(index::A).exp());
+    let friction = [0, 1].map(|side| {
+        let (coulomb, stribeck) = (index::COULOMB + side, index::STRIBECK + side);
+        let standstill = |p: &model::Parameters| best.law.form.standstill_v(p, side, best.law.slowest);
+        let slope = |at: usize| {
+            let mut other = best.p;
+            other[at] += 1e-6;
+            (standstill(&other) - standstill(&best.p)) * 1e6
+        };
+        let (voltage_v, reference) = (p(coulomb).exp(), resistance.relative().hypot(2.0 * VOLTAGE));
+        Friction {
+            voltage_v: logarithm(voltage_v, &[(coulomb, 1.0)], VOLTAGE),
+            standstill_v: Value {
+                value: standstill(&best.p),
+                sigma: spread(&[(stribeck, slope(stribeck)), (index::SPEED, slope(index::SPEED))], 0.0),
+            },
+            torque_nm: logarithm(voltage_v * k / resistance.value, &[(coulomb, 1.0), (index::K, 1.0)], reference),
+        }
+    });
+    let both = [(index::A, 1.0), (index::K, 1.0)];
+    Ok(Drive {
+        torque_constant: logarithm(k, &[(index::K, 1.0)], VOLTAGE),
+        time_constant_s: logarithm(a / k, &[(index::A, 1.0), (index::K, -1.0)], TIMING_S * k / a),
+        inertia_kg_m2: logarithm(a * k / resistance.value, &both, resistance.relative().hypot(2.0 * VOLTAGE)),
+        friction,
+        form: best.law.form,
+        stribeck_rad_per_s: logarithm(p(index::SPEED).exp(), &[(index::SPEED, 1.0)], 0.0),
+        force_n,
+        residual_rad: best.residual_rad,
+        speeds_rad_per_s: [slowest, fastest],
+    })
+}

@@ -1,0 +1,351 @@
+//! A simulated finger that presses as the chip will: the tip is carried along a plan, and every frame goes through the
+//! effects of the scene. Hysteresis, creep and relaxation go on from press to press.
+
+use sim::effects::contact;
+use sim::effects::sensor::{self, Readout};
+use sim::effects::set::{Named, Set};
+use sim::mechanics::contact::Contact;
+use sim::scene::{Scene, controller, read};
+use sim::setup::Setup;
+use solve::press::{Array, Branch, Press, Reading, Step, Tip};
+
+const ROWS: usize = 10;
+const COLUMNS: usize = 10;
+/// Frames are 1 ms apart, where the chip's are 0.1 ms: fewer frames, hence more noise in a mean.
+pub const FRAME_S: f64 = 0.5e-3;
+const TARE_FRAMES: usize = 256;
+/// Length of a count of the encoder, mm.
+const COUNT_MM: f64 = 0.001095;
+
+/// What a finger is drawn as.
+#[derive(Clone, Debug)]
+pub struct Draw {
+    pub seed: u64,
+    pub modulus_kpa: f64,
+    pub noise_codes: f64,
+    pub gains_percent: f64,
+    pub creep_percent: f64,
+    pub hysteresis_percent: f64,
+    pub relaxation: f64,
+    pub relaxation_s: f64,
+    pub dead: Vec<[usize; 2]>,
+    pub extra: String,
+}
+
+impl Draw {
+    pub fn plain(modulus_kpa: f64) -> Self {
+        Self {
+            seed: 1,
+            modulus_kpa,
+            noise_codes: 1.0,
+            gains_percent: 0.0,
+            creep_percent: 0.0,
+            hysteresis_percent: 0.0,
+            relaxation: 0.0,
+            relaxation_s: 0.5,
+            dead: Vec::new(),
+            extra: String::new(),
+        }
+    }
+
+    /// Of the ranges that a tip and an array have, by a seed.
+    pub fn any(seed: u64, gains_percent: [f64; 2], dead: [usize; 2]) -> Self {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let mut broken: Vec<[usize; 2]> = (0..36).map(|taxel| [2 + taxel / 6, 2 + taxel % 6]).collect();
+        rng.shuffle(&mut broken);
+        broken.truncate(rng.usize(dead[0]..=dead[1]));
+        let mut within = |low: f64, high: f64| low + (high - low) * rng.f64();
+        Self {
+            seed,
+            modulus_kpa: 50.0 * 40.0_f64.powf(within(0.0, 1.0)),
+            noise_codes: within(0.0, 3.0),
+            gains_percent: within(gains_percent[0], gains_percent[1]),
+            creep_percent: within(0.5, 4.0),
+            hysteresis_percent: within(0.0, 10.0),
+            relaxation: within(0.0, 0.15),
+            relaxation_s: 0.05 * 40.0_f64.powf(within(0.0, 1.0)),
+            dead: broken,
+            extra: String::new(),
+        }
+    }
+
+    /// What each taxel reads of a pressure, as a factor; 0 for a dead one.
+    pub fn gains(&self) -> Vec<f64> {
+        use sim::effects::sensor::Stages;
+        let alone = Self { creep_percent: 0.0, hysteresis_percent: 0.0, extra: String::new(), ..self.clone() };
+        let mut sensor = Named::of(&alone.scene(&Place::default()), 0).sensor;
+        let mut gains = Vec::new();
+        for row in 0..ROWS {
+            let mut kpa = [100.0; COLUMNS];
+            sensor.pressure(row, 0.0, &mut kpa);
+            gains.extend(kpa.map(|kpa| kpa / 100.0));
+        }
+        self.dead.iter().for_each(|[row, column]| gains[row * COLUMNS + column] = 0.0);
+        gains
+    }
+
+    fn scene(&self, place: &Place) -> Scene {
+        let dead: Vec<String> = self.dead.iter().map(|[row, column]| format!("[{row}, {column}]")).collect();
+        let text = format!(
+            "about = \"a press\"\nduration_s = 1.0\nseed = {}\n[tip]\nmodulus_kpa = {:?}\n[object]\ndistance_mm = 5.0\n\
+             centre_x_mm = {:?}\ncentre_y_mm = {:?}\n[effects.tilted_plane]\nalong_columns_deg = {:?}\nalong_rows_deg = {:?}\n\
+             [effects.noise]\nrms_codes = {:?}\n[effects.gain_spread]\nrms_percent = {:?}\n\
+             [effects.creep]\nrate_percent_per_decade = {:?}\n[effects.hysteresis]\nwidth_percent = {:?}\n\
+             [effects.relaxation]\nshare = {:?}\ntau_s = {:?}\n[effects.broken_taxels]\ndead = [{}]\n{}",
+            self.seed,
+            self.modulus_kpa,
+            place.centre_mm[0],
+            place.centre_mm[1],
+            place.tilt_deg[0],
+            place.tilt_deg[1],
+            self.noise_codes,
+            self.gains_percent,
+            self.creep_percent,
+            self.hysteresis_percent,
+            self.relaxation,
+            self.relaxation_s,
+            dead.join(", "),
+            self.extra,
+        );
+        read("press.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+    }
+}
+
+/// Where the plate is met.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Place {
+    pub centre_mm: [f64; 2],
+    pub tilt_deg: [f64; 2],
+}
+
+impl Place {
+    pub fn any(rng: &mut fastrand::Rng, off_mm: f64, tilt_deg: f64) -> Self {
+        let mut within = |most: f64| most * (2.0 * rng.f64() - 1.0);
+        let centre_mm = [within(off_mm), within(off_mm)];
+        let (angle, tilt) = (within(std::f64::consts::PI), within(tilt_deg).abs());
+        Self { centre_mm, tilt_deg: [tilt * angle.cos(), tilt * angle.sin()] }
+    }
+}
+
+/// A part of the plan: to a travel from the contact at a speed, in a number of steps; or a hold with steps at these times.
+#[derive(Clone, Debug)]
+pub enum Part {
+    Ramp { to_mm: f64, mm_per_s: f64, step_mm: f64 },
+    Hold { ends_s: Vec<f64> },
+}
+
+/// A finger with its array.
+pub struct Finger {
+    draw: Draw,
+    setup: Setup,
+    sensor: sensor::Named,
+    readout: Readout,
+    contact: Contact<contact::Named>,
+    time_s: f64,
+    travel_mm: f64,
+    carried_mm_per_s: f64,
+    carried_mm: f64,
+    tare: [[f64; COLUMNS]; ROWS],
+}
+
+impl Finger {
+    pub fn new(draw: &Draw) -> Self {
+        let scene = draw.scene(&Place::default());
+        let parts = Named::of(&scene, 0);
+        let setup = controller::setup(&scene);
+        let (readout, contact) = (Readout::new(&setup.array), Contact::new(&setup, parts.contact));
+        let tare = [[0.0; COLUMNS]; ROWS];
+        Self {
+            draw: draw.clone(),
+            setup,
+            sensor: parts.sensor,
+            readout,
+            contact,
+            time_s: 0.0,
+            travel_mm: 0.0,
+            carried_mm_per_s: 0.0,
+            carried_mm: 0.0,
+            tare,
+        }
+    }
+
+    /// Puts the finger before the plate at another place.
+    pub fn go(&mut self, place: &Place) {
+        let scene = self.draw.scene(place);
+        self.setup = controller::setup(&scene);
+        self.contact = Contact::new(&self.setup, Named::of(&scene, 0).contact);
+        self.travel_mm = self.setup.wall.distance_mm - 0.5;
+    }
+
+    /// Moves the object's surface from now on, mm/s.
+    pub fn carry(&mut self, mm_per_s: f64) {
+        self.carried_mm_per_s = mm_per_s;
+    }
+
+    /// Carries the tip to a travel within a frame, and reads the array.
+    pub fn frame(&mut self, travel_mm: f64) -> [[f64; COLUMNS]; ROWS] {
+        let before = self.travel_mm - self.setup.wall.distance_mm - self.carried_mm;
+        self.carried_mm += FRAME_S * self.carried_mm_per_s;
+        let now = travel_mm - self.setup.wall.distance_mm - self.carried_mm;
+        self.contact.relax(0.5 * FRAME_S, before);
+        self.contact.relax(0.5 * FRAME_S, now);
+        self.travel_mm = travel_mm;
+        self.time_s += FRAME_S;
+        let place = self.contact.place(now);
+        core::array::from_fn(|row| {
+            let kpa = self.contact.row_kpa(&place, row);
+            let codes = self.readout.codes(&mut self.sensor, row, self.time_s, &kpa);
+            core::array::from_fn(|column| f64::from(codes[column]) - self.tare[row][column])
+        })
+    }
+
+    pub fn tare(&mut self) {
+        self.tare = [[0.0; COLUMNS]; ROWS];
+        let mut sums = [[0.0; COLUMNS]; ROWS];
+        for _ in 0..TARE_FRAMES {
+            let codes = self.frame(self.travel_mm);
+            sums.iter_mut().flatten().zip(codes.iter().flatten()).for_each(|(sum, code)| *sum += code);
+        }
+        self.tare = sums.map(|row| row.map(|sum| sum / TARE_FRAMES as f64));
+    }
+
+    /// Lets time go by in the air: the effects are exact for any time that nothing changes.
+    pub fn pause(&mut self, seconds: f64) {
+        for _ in 0..10 {
+            self.time_s += 0.1 * seconds;
+            self.frame(self.travel_mm);
+        }
+    }
+
+    /// Moves by a plan and records. The press goes no deeper where a taxel nears the converter's end or the force its bound.
+    pub fn press(&mut self, plan: &[Part], force_max_n: f64) -> Press {
+        let at_mm = self.setup.wall.distance_mm;
+        let mut steps = Vec::new();
+        let mut recorder = Recorder::default();
+        let mut depth_mm = self.travel_mm - at_mm;
+        let mut deepest: f64 = depth_mm;
+        let mut most_mm = f64::INFINITY;
+        for part in plan {
+            match part {
+                Part::Ramp { to_mm, mm_per_s, step_mm } => {
+                    let to_mm = to_mm.min(most_mm);
+                    let way = (to_mm - depth_mm).signum() * mm_per_s * FRAME_S;
+                    let branch = if way > 0.0 { Branch::Loading } else { Branch::Unloading };
+                    let mut mark = depth_mm;
+                    while (to_mm - depth_mm) * way > 0.0 {
+                        depth_mm += way;
+                        let codes = self.frame(at_mm + depth_mm);
+                        recorder.take(self, &codes);
+                        if (depth_mm - mark).abs() >= *step_mm {
+                            mark = depth_mm;
+                            steps.extend(recorder.step(branch));
+                        }
+                        deepest = deepest.max(depth_mm);
+                        let highest = codes.iter().flatten().copied().fold(0.0, f64::max);
+                        let force_n = self.contact.law().force_n(depth_mm);
+                        if way > 0.0 && (highest > 3_300.0 || force_n > force_max_n) {
+                            most_mm = depth_mm;
+                            break;
+                        }
+                    }
+                    steps.extend(recorder.step(branch));
+                }
+                Part::Hold { ends_s } => {
+                    let begin_s = self.time_s;
+                    for end_s in ends_s {
+                        while self.time_s < begin_s + end_s {
+                            let codes = self.frame(at_mm + depth_mm);
+                            recorder.take(self, &codes);
+                        }
+                        let branch = if depth_mm >= deepest { Branch::Loading } else { Branch::Unloading };
+                        steps.extend(recorder.step(branch));
+                    }
+                }
+            }
+        }
+        let tip = Tip { radius_mm: self.setup.tip.radius_mm, modulus_kpa: 250.0 };
+        let array = Array { rows: ROWS, columns: COLUMNS, pitch_mm: self.setup.array.pitch_mm, codes_per_kpa: 24.0 };
+        Press { tip, array, steps }
+    }
+
+    pub fn travel_mm(&self) -> f64 {
+        (self.travel_mm / COUNT_MM).floor() * COUNT_MM
+    }
+}
+
+/// Frames that are to make a step.
+#[derive(Default)]
+struct Recorder {
+    frames: u32,
+    time_s: [f64; 2],
+    travel_mm: [f64; 2],
+    sums: [[[f64; 2]; COLUMNS]; ROWS],
+}
+
+impl Recorder {
+    fn take(&mut self, finger: &Finger, codes: &[[f64; COLUMNS]; ROWS]) {
+        if self.frames == 0 {
+            (self.time_s[0], self.travel_mm[0]) = (finger.time_s, finger.travel_mm());
+        }
+        self.frames += 1;
+        (self.time_s[1], self.travel_mm[1]) = (finger.time_s, finger.travel_mm());
+        for (sums, code) in self.sums.iter_mut().flatten().zip(codes.iter().flatten()) {
+            *sums = [sums[0] + code, sums[1] + code * code];
+        }
+    }
+
+    fn step(&mut self, branch: Branch) -> Option<Step> {
+        let Self { frames, time_s, travel_mm, sums } = core::mem::take(self);
+        let count = f64::from(frames);
+        let reading = |[sum, square]: &[f64; 2]| {
+            let mean = sum / count;
+            // In sixteenths of a code, as the record has it.
+            let deviation = (square / count - mean * mean).max(0.0).sqrt();
+            Reading { mean: (16.0 * mean).round() / 16.0, deviation, bad: false }
+        };
+        let taxels = sums.iter().flatten().map(reading).collect();
+        (frames > 0).then_some(Step { time_s, travel_mm, frames, branch, taxels, bridge_v: 0.0, chip_c: 25.0 })
+    }
+}
+
+/// The press that the chip is to make: a quick cycle, then a slow one with a hold.
+pub fn plan() -> Vec<Part> {
+    let mut plan = cycle(10.0, 0.0);
+    plan.extend(cycle(2.0, 3.0));
+    plan
+}
+
+/// In at a speed, a hold at the deepest place, and back.
+pub fn cycle(mm_per_s: f64, hold_s: f64) -> Vec<Part> {
+    let ends_s = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.3].into_iter().filter(|end_s| *end_s < hold_s).chain([hold_s]);
+    vec![
+        Part::Ramp { to_mm: 3.0, mm_per_s, step_mm: 0.1 },
+        Part::Hold { ends_s: ends_s.collect() },
+        Part::Ramp { to_mm: -0.3, mm_per_s, step_mm: 0.1 },
+    ]
+}
+
+/// The same in stairs: short moves, each held for a while.
+pub fn stairs(mm_per_s: f64, held_s: f64) -> Vec<Part> {
+    let up = (0..=20).map(|step| 0.15 * f64::from(step));
+    let down = (0..=20).rev().map(|step| 0.15 * f64::from(step) - 0.15);
+    up.chain(down)
+        .flat_map(|to_mm| [Part::Ramp { to_mm, mm_per_s, step_mm: 9.0 }, Part::Hold { ends_s: vec![held_s] }])
+        .collect()
+}
+
+/// Pause in the air before a tare, s.
+const PAUSE_S: f64 = 10.0;
+
+/// Presses at places of a plate, each after a pause and a tare.
+pub fn presses(draw: &Draw, count: usize, plan: &[Part]) -> Vec<Press> {
+    let mut finger = Finger::new(draw);
+    let mut rng = fastrand::Rng::with_seed(draw.seed ^ 0x5eed);
+    let mut press = |_| {
+        finger.go(&Place::any(&mut rng, 1.5, 2.0));
+        finger.pause(PAUSE_S);
+        finger.tare();
+        finger.press(plan, 8.0)
+    };
+    (0..count).map(&mut press).collect()
+}

@@ -141,7 +141,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     pub fn follow(&mut self, pipeline: &Pipeline<ROWS, COLUMNS>) {
         let motion = pipeline.status().measure;
         let runs = motion.state == measure::State::Running;
-        let begins = runs && !core::mem::replace(&mut self.ran, runs);
+        let ran = core::mem::replace(&mut self.ran, runs);
+        let begins = runs && !ran;
         if begins && motion.task != Task::Jog && self.standing.state != State::Recording {
             let press = motion.task == Task::Press;
             self.series = Series {

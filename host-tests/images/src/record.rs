@@ -11,7 +11,7 @@ use fingertip::shipped::{COLUMNS, Frame, SLOTS};
 use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 
 /// The first bytes of a recording; the last one counts the versions of its layout.
-pub const MAGIC: [u8; 8] = *b"fingert\x06";
+pub const MAGIC: [u8; 8] = *b"fingert\x07";
 
 /// The temperature that was not measured.
 const UNMEASURED: i32 = i32::MIN;
@@ -29,7 +29,7 @@ pub struct Record {
 
 impl Record {
     /// Bytes of a record: 110 codes, the sequence number, the sense, the command.
-    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 17 + 18;
+    pub const BYTES: usize = 2 * 10 * SLOTS + 4 + 17 + 11;
 
     /// The fields in the order of their definition, little-endian.
     pub fn to_bytes(&self) -> [u8; Self::BYTES] {
@@ -51,16 +51,13 @@ impl Record {
         put(&[u8::from(*bridge_fault)]);
         put(&chip.map_or(UNMEASURED, Celsius::to_bits).to_le_bytes());
         put(&answer.0.to_le_bytes());
-        // A recording asks for no commissioning.
-        let Command { torque, goal, bus_watchdog_ms, fit_level, commission_request: _, .. } = command;
-        let Command { tare_request, clear_request, identify_request, .. } = command;
-        let Command { calibrate_request, forget_request, shown_request, shown_mn, .. } = command;
+        // Recordings are made of tared fingers: no tare is forced.
+        let Command { torque, goal, bus_watchdog_ms, fit_level, tare_forced: _, .. } = command;
+        let Command { tare_request, clear_request, measure_request, .. } = command;
         put(&[u8::from(*torque)]);
         put(&goal.to_bits().to_le_bytes());
         put(&bus_watchdog_ms.to_le_bytes());
-        put(&[*fit_level as u8, *tare_request, *clear_request, *identify_request]);
-        put(&[*calibrate_request, *forget_request, *shown_request]);
-        put(&shown_mn.to_le_bytes());
+        put(&[*fit_level as u8, *tare_request, *clear_request, *measure_request]);
         bytes
     }
 
@@ -86,13 +83,8 @@ impl Record {
             fit_level: FitLevel::from_number(u8::from_le_bytes(take(&mut rest))),
             tare_request: u8::from_le_bytes(take(&mut rest)),
             clear_request: u8::from_le_bytes(take(&mut rest)),
-            identify_request: u8::from_le_bytes(take(&mut rest)),
-            commission_request: 0,
+            measure_request: u8::from_le_bytes(take(&mut rest)),
             tare_forced: false,
-            calibrate_request: u8::from_le_bytes(take(&mut rest)),
-            forget_request: u8::from_le_bytes(take(&mut rest)),
-            shown_request: u8::from_le_bytes(take(&mut rest)),
-            shown_mn: i32::from_le_bytes(take(&mut rest)),
         };
         Self { frame, sense, command }
     }
@@ -141,7 +133,7 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fingertip::identify::{Identification, Modulus, Refusal};
+    use fingertip::measure::{Standing, Task};
     use fingertip::pipeline::Taring;
     use fingertip::state::{Fault, Limits, Mode};
     use fingertip::units::{Millimetres, MillimetresPerSecond};
@@ -152,7 +144,7 @@ mod tests {
         bytes.iter_mut().zip(1..=254).for_each(|(byte, value)| *byte = value);
         let record = Record::from_bytes(&bytes);
         assert_eq!(record.frame.code(0, 0), 0x0201);
-        assert_eq!(record.command.identify_request, 252);
+        assert_eq!(record.command.measure_request, 252);
         let again = record.to_bytes();
         assert_eq!(Record::from_bytes(&again), record);
         // Bytes differ where a truth value was neither 0 nor 1, where a fit level was none, and nowhere else.
@@ -200,10 +192,8 @@ mod tests {
             with(|status| status.tare = Taring::Running),
             with(|status| status.taken.tare = 1),
             with(|status| status.taken.clear = 1),
-            with(|status| status.taken.identify = 1),
-            with(|status| status.identification = Identification::Running),
-            with(|status| status.identification = Identification::Refused(Refusal::Span)),
-            with(|status| status.identification = Identification::Done(Modulus { points: 1, ..Modulus::default() })),
+            with(|status| status.taken.measure = 1),
+            with(|status| status.measure = Standing::running(Task::Press)),
         ];
         let count = values.len();
         values.sort_unstable();

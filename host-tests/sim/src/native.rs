@@ -4,7 +4,6 @@
 //! of a frame acts three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
 
 pub mod bench;
-pub mod calibrated;
 mod clock;
 mod digest;
 mod scan;

@@ -3,7 +3,6 @@
 use super::Mix;
 use fingertip::contact::Contact;
 use fingertip::control::profile::Reference;
-use fingertip::identify::{Modulus, Refusal};
 use fingertip::shipped::Picture;
 
 /// What the profile asks for.
@@ -34,17 +33,4 @@ pub fn add_contact(mix: &mut Mix, contact: &Contact) {
     mix.add(confidence);
     mix.add(doubt);
     mix.add(bad_taxels);
-}
-
-/// A modulus, or why there is none.
-pub fn add_modulus(mix: &mut Mix, result: Result<Modulus, Refusal>) {
-    match result {
-        Ok(Modulus { modulus, sigma, contact, points }) => {
-            mix.add(modulus.to_bits());
-            mix.add(sigma.to_bits());
-            mix.add(contact.to_bits());
-            mix.add(points);
-        }
-        Err(refusal) => mix.add(refusal as u8),
-    }
 }

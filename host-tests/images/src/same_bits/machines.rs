@@ -1,7 +1,7 @@
 //! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer,
-//! profile and drive, the least squares of the modulus.
+//! profile and drive.
 
-use super::answers::{add_contact, add_modulus, add_picture, add_reference};
+use super::answers::{add_contact, add_picture, add_reference};
 use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
@@ -15,8 +15,6 @@ use fingertip::control::profile::Reference;
 use fingertip::control::warmth::Warmth;
 use fingertip::control::winding::Winding;
 use fingertip::grip::{Goal, Grip};
-use fingertip::identify::{DepthFit, TravelFit};
-use fingertip::model::Tip;
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
 use fingertip::touch::{Felt, Touch};
@@ -26,8 +24,6 @@ use paper::{Relaxation, RelaxationState};
 
 /// A machine's name, and one step of it with what the step adds to its digest.
 pub type Step = (&'static str, fn(&mut Machines, &Sample, &mut Mix));
-/// Points of a fit before the next one begins; the least that gives a modulus is 20.
-const FIT_POINTS: u32 = 64;
 /// The largest braking of the profile: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i32 = 1_000_000 << 8;
 
@@ -43,7 +39,6 @@ pub struct Machines {
     motion: SpeedLoop,
     grip: Grip,
     touch: Touch,
-    press: Press,
     pictures: Pictures,
     fit: Fit,
     budget: Budget,
@@ -51,18 +46,9 @@ pub struct Machines {
     pub(super) array: Array,
 }
 
-/// A press that both fits follow.
-struct Press {
-    tip: Tip,
-    points: u32,
-    by_depth: DepthFit,
-    by_travel: TravelFit,
-}
-
 impl Machines {
     /// At rest, with a first configuration.
     pub fn new(config: Config) -> Self {
-        let press = Press::new(config.tip);
         Self {
             config,
             filter: None,
@@ -74,41 +60,12 @@ impl Machines {
             motion: SpeedLoop::new(),
             grip: Grip::default(),
             touch: Touch::default(),
-            press,
             pictures: Pictures::new(),
             fit: Fit::default(),
             budget: Budget::new(),
             frame: frames::plausible(),
             array: Array::new(),
         }
-    }
-}
-
-impl Press {
-    fn new(tip: Tip) -> Self {
-        let by_depth = DepthFit::new(tip.depth_max(), tip.force_max());
-        let by_travel = TravelFit::new(Millimetres::ZERO, tip.depth_max(), tip.force_max());
-        Self { tip, points: 0, by_depth, by_travel }
-    }
-
-    /// Begins anew after [`FIT_POINTS`] points.
-    fn advance(&mut self, sample: &Sample) {
-        self.points += 1;
-        if self.points > FIT_POINTS {
-            *self = Self { points: 1, ..Self::new(sample.tip) };
-        }
-    }
-
-    /// An indentation within the tip, with its force to 1.5 %; one in a thousand is nowhere near.
-    fn point(&self, sample: &Sample) -> (Millimetres, Newtons) {
-        let [noise, _, wild, wilder] = sample.words;
-        if wild == 0 && wilder == 0 {
-            return (sample.d, sample.force);
-        }
-        let top = i64::from(self.tip.depth_max().to_bits());
-        let depth = Millimetres::from_bits(((top * i64::from(sample.share_q32)) >> 32) as i32);
-        let exact = i64::from(self.tip.force(depth).to_bits());
-        (depth, Newtons::from_bits((exact + ((exact * i64::from(noise)) >> 37)) as i32))
     }
 }
 
@@ -149,7 +106,7 @@ pub const FRAMES: [Step; 6] = [
 ];
 
 /// One step of every other machine for each input.
-pub const STEPS: [Step; 22] = [
+pub const STEPS: [Step; 20] = [
     ("Relaxation::step", |m, s, mix| {
         if let Some(filter) = &m.filter {
             mix.add(filter.step(&mut m.memory, s.force).to_bits());
@@ -254,18 +211,6 @@ pub const STEPS: [Step; 22] = [
         let duty = m.motion.follow(reference, (s.words[2] & 0xffff) as u16, &m.config, &mut limits);
         mix.add(duty.0);
         mix.add(limits.0);
-    }),
-    ("DepthFit", |m, s, mix| {
-        m.press.advance(s);
-        let (depth, force) = m.press.point(s);
-        m.press.by_depth.add(depth, force);
-        add_modulus(mix, m.press.by_depth.modulus());
-    }),
-    ("TravelFit", |m, s, mix| {
-        let (travel, force) = m.press.point(s);
-        m.press.by_travel.add(travel, force);
-        add_modulus(mix, m.press.by_travel.modulus());
-        mix.add(m.press.by_travel.span().to_bits());
     }),
 ];
 

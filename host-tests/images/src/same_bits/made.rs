@@ -210,12 +210,17 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [brake_least, brake_usual, brake_most] {
         mix.add(*number);
     }
-    let Motions { half, farthest, jog, jog_frames, roll, beyond_mv, slow, time, run_up, span, .. } = motions;
-    let Motions { drop, still, rest, longest, touch, .. } = motions;
-    for number in [half, farthest, jog, slow, drop, &roll[0], &roll[1], &beyond_mv[0], &beyond_mv[1]] {
+    let Motions { felt, stroke, farthest, back, pulse, pulse_frames, jog_rise_uv, rise_uv, feel_uv, start_uv, .. } =
+        motions;
+    let Motions { fastest_uv, uv_per_count_q8, uv_per_newton, span_part, push, push_mn, roll_q8, .. } = motions;
+    let Motions { still, rest, longest, touch, .. } = motions;
+    for number in [felt, stroke, farthest, back, pulse, jog_rise_uv, rise_uv, feel_uv, start_uv, fastest_uv] {
         mix.add(*number);
     }
-    for frames in [jog_frames, time, run_up, span, still, rest, longest] {
+    for number in [uv_per_count_q8, uv_per_newton, push, push_mn, roll_q8] {
+        mix.add(*number);
+    }
+    for frames in [pulse_frames, span_part, still, rest, longest] {
         mix.add(*frames);
     }
     mix.add(touch.to_bits());

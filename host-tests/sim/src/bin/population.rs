@@ -9,7 +9,6 @@ fn main() -> ExitCode {
     let args = Args::parse();
     match args.board {
         Board::Native => cli::answer(&args, &native::board),
-        Board::Calibrated => cli::answer(&args, &native::calibrated::board),
         Board::Virtual => {
             output::say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",

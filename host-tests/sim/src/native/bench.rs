@@ -13,6 +13,7 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
+use fingertip::measure::Task;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
@@ -127,11 +128,10 @@ impl<E: Set> Bench<E> {
         largest_n
     }
 
-    /// Asks for a press that measures: for the taxels' gains, or for the modulus.
-    pub fn ask_press(&mut self, gains: bool) {
+    /// Requests a motion that measures, or its end.
+    pub fn request(&mut self, task: Task) {
         let command = self.command();
-        let request = if gains { &mut command.calibrate_request } else { &mut command.identify_request };
-        *request = request.wrapping_add(1);
+        command.measure_request = task.after(command.measure_request);
     }
 
     /// Torque off, a tare, torque on; nothing may touch.

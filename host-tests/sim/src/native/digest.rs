@@ -35,11 +35,11 @@ impl Digest {
     }
 }
 
-/// What a step takes beside the codes. Of the command all but the requests to commission and to calibrate: what becomes
-/// of them is in what the step gives.
+/// What a step takes beside the codes. Of the command all but whether a tare is forced: what
+/// becomes of that is in what the step gives.
 fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
     let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
-    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, identify_request, .. } =
+    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
         *command;
     [
         sequence,
@@ -54,7 +54,7 @@ fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
         fit_level as u32,
         tare_request.into(),
         clear_request.into(),
-        identify_request.into(),
+        measure_request.into(),
     ]
 }
 
@@ -86,7 +86,7 @@ mod tests {
             of(|step| step.1.answer = CoreCycles(1)),
             of(|step| step.2.torque = !step.2.torque),
             of(|step| step.2.goal = Newtons::from_bits(1)),
-            of(|step| step.2.identify_request = 1),
+            of(|step| step.2.measure_request = 1),
             of(|step| step.3 = Duty(1)),
             of(|step| step.4.sequence = 1),
             of(|step| step.4.contact.bad_taxels = 1),

@@ -124,9 +124,10 @@ impl<E: Set> Bus<E> {
                 device.capture.begin(&mut unit.pipeline);
             }
             let status = if scanned {
-                let status = unit.pipeline.step(&unit.frame, &sense, &command).1;
+                let (_, status) = unit.pipeline.step(&unit.frame, &sense, &command);
                 device.capture.record(&unit.frame, &sense, &command, status);
-                status
+                device.capture.follow(&unit.pipeline);
+                unit.pipeline.status()
             } else {
                 unit.pipeline.stop(Fault::LostFrames);
                 device.capture.end(Ended::Stopped);
@@ -188,7 +189,6 @@ impl<E: Set> Bus<E> {
                 taxels: &pipeline.array().picture().taxels,
                 pascals_per_sum_q32: pipeline.config().pascals_per_sum_q32,
                 tare: &tare,
-                proposal: pipeline.proposal(),
                 capture: Captured { standing: device.capture.standing(), data: device.capture.data() },
             };
             let taken = device.server.feed(bytes, &snapshot, &mut reply);

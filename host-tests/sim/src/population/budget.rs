@@ -28,7 +28,7 @@ pub struct Cause {
 pub const CAUSES: [Cause; 12] = [
     cause("taxels' gains, 0 to 10 % rms apart", &["effects.gain_spread.rms_percent"], "a better array"),
     cause("the array's gain, known to 2 % rms", &["gain_off"], "a press on a scale"),
-    cause("the modulus, known to 5 % rms", &["modulus_off"], "`identify`, or a scale"),
+    cause("the modulus, known to 5 % rms", &["modulus_off"], "a press, or a scale"),
     cause("the radius, known to 1 % rms", &["radius_off"], "a calliper"),
     cause("hysteresis, 0 to 10 %", &["effects.hysteresis.width_percent"], "nothing in the firmware"),
     cause(
@@ -76,23 +76,20 @@ pub struct Budget {
     pub left: Vec<Errors>,
     /// Without any.
     pub none: Errors,
-    /// With all causes, of fingers that were calibrated first.
-    pub calibrated: Errors,
 }
 
 impl Budget {
-    /// Runs the fingers with all causes, without each, and without any; and once on a board that calibrates them first.
+    /// Runs the fingers with all causes, without each, and without any.
     ///
     /// # Errors
     /// A finger does not run.
-    pub fn of(fingers: usize, board: Run, calibrated: Run) -> Result<Self, RunError> {
+    pub fn of(fingers: usize, board: Run) -> Result<Self, RunError> {
         let population = load(POPULATION)?;
-        let off_on = |board: Run, causes: &[Cause]| {
+        let off = |causes: &[Cause]| {
             let less = causes.iter().try_fold(population.clone(), |less, cause| less.without(cause.names))?;
             Ok::<Off, RunError>(errors(&run::fingers(&less, SEED, fingers, Shard::WHOLE, board)?))
         };
-        let off = |causes: &[Cause]| off_on(board, causes);
-        let (all, none, calibrated) = (off(&[])?, off(&CAUSES)?, off_on(calibrated, &[])?);
+        let (all, none) = (off(&[])?, off(&CAUSES)?);
         let (mut changes, mut left) = (Vec::new(), Vec::new());
         for cause in CAUSES {
             let without = off(&[cause])?;
@@ -102,7 +99,7 @@ impl Budget {
             changes.push(rms(&all.iter().zip(&without).map(pairs).collect()));
             left.push(rms(&without));
         }
-        Ok(Self { fingers, all: rms(&all), changes, left, none: rms(&none), calibrated: rms(&calibrated) })
+        Ok(Self { fingers, all: rms(&all), changes, left, none: rms(&none) })
     }
 
     /// The page of the documentation.
@@ -129,8 +126,6 @@ impl Budget {
         let mut causes: Vec<_> = CAUSES.iter().zip(self.changes.iter().zip(&self.left)).collect();
         causes.sort_by(|(_, (a, _)), (_, (b, _))| b[1].total_cmp(&a[1]));
         row("**all of them: the error**", &self.all, &self.none, "");
-        let minutes = "[a press for the modulus, three onto a plate, two holds on a scale](commissioning.md#the-array): a quarter of an hour, no cycles";
-        row("**the same, calibrated**", &self.calibrated, &self.none, minutes);
         for (cause, (changes, left)) in causes {
             row(cause.about, changes, left, cause.answer);
         }

@@ -10,7 +10,7 @@ const LIMITS: u32 = 32;
 
 /// A row's name, in its bit's order from the first one.
 const NAMES: [(u32, &str, &[&str]); 3] = [
-    (0, "mode", &["off", "tare", "approach", "force", "release", "fault", "identify", "commission"]),
+    (0, "mode", &["off", "tare", "approach", "force", "release", "fault", "press", "strokes"]),
     (
         FAULTS,
         "fault",

@@ -62,9 +62,7 @@ impl Run<'_> {
             Event::Torque(on) => command.torque = on,
             Event::Tare => add(&mut command.tare_request),
             Event::Clear => add(&mut command.clear_request),
-            Event::Identify => add(&mut command.identify_request),
-            Event::Calibrate => add(&mut command.calibrate_request),
-            Event::Commission(task) => command.commission_request = task.after(command.commission_request),
+            Event::Measure(task) => command.measure_request = task.after(command.measure_request),
             Event::Move { by_mm, mm_per_s } if self.object_mm < AWAY_MM => self.carry(by_mm, mm_per_s),
             Event::Remove => self.place(AWAY_MM),
             // In front of the tip, wherever that is by then.

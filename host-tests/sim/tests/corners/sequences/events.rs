@@ -3,7 +3,7 @@
 use crate::{log_uniform, object, uniform};
 use core::fmt;
 use fastrand::Rng;
-use fingertip::commission::Task;
+use fingertip::measure::Task;
 
 /// Something that the host or the surroundings do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,10 +13,8 @@ pub enum Event {
     Torque(bool),
     Tare,
     Clear,
-    Identify,
-    Calibrate,
-    /// To measure the drive, or to show its direction.
-    Commission(Task),
+    /// A motion that measures.
+    Measure(Task),
     /// The object's surface moves, towards the tip where `by_mm` is below 0.
     Move {
         by_mm: f64,
@@ -38,9 +36,8 @@ impl Event {
             11..15 => Self::Torque(true),
             15 => Self::Tare,
             16 => Self::Clear,
-            17 => Self::Identify,
-            18 => Self::Calibrate,
-            19 => Self::Commission(rng.choice([Task::Jog, Task::Measure]).expect("there are two")),
+            17..19 => Self::Measure(Task::Press),
+            19 => Self::Measure(rng.choice([Task::Jog, Task::Strokes]).expect("there are two")),
             20..22 => Self::Move { by_mm: uniform(rng, -2.0, 2.0), mm_per_s: uniform(rng, 5.0, 60.0) },
             22 => Self::Remove,
             _ => rng.choice([Self::PutBack, Self::Wait]).expect("there are two"),

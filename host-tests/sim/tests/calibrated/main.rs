@@ -1,5 +1,0 @@
-//! What the procedures that calibrate an array give, on arrays that were drawn.
-
-mod gains;
-mod ordinary;
-mod refused;

@@ -35,6 +35,9 @@ pub enum NoDrift {
     /// Duration of the hold, s.
     #[error("the hold lasts {0:.1} s; 5 s are needed")]
     Short(f64),
+    /// No step of a press has the chip's temperature.
+    #[error("the chip's temperature is unknown in one of the presses")]
+    Temperature,
     /// Difference of the chip's temperature between the presses, K.
     #[error("the presses differ by {0:.1} K; 3 K are needed")]
     Warming(f64),
@@ -87,23 +90,37 @@ pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
     })
 }
 
-/// Change of the array's gain with the chip's temperature, as a share for each K (FlexiForce A201: 0.0036), from two presses
-/// at the same place.
+/// Temperature coefficient of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Temperature {
+    /// Change of the gain for each K, as a share (`array_gain_ppm_per_k`).
+    pub per_k: Value,
+    /// Temperatures of the chip in the cold and the warm press, degrees Celsius.
+    pub chip_c: [f64; 2],
+}
+
+/// Change of the array's gain with the chip's temperature (FlexiForce A201: 0.36 %/K), from two presses at the same place.
 ///
 /// Both presses are solved for the modulus; what the two have in common, radius and gains, cancels in their ratio.
 ///
 /// # Errors
 /// See [`NoDrift`].
-pub fn temperature(cold: &Press, warm: &Press) -> Result<Value, NoDrift> {
-    let mean_c =
-        |press: &Press| press.steps.iter().map(|step| step.chip_c).sum::<f64>() / press.steps.len().max(1) as f64;
-    let warmer_k = mean_c(warm) - mean_c(cold);
+pub fn temperature(cold: &Press, warm: &Press) -> Result<Temperature, NoDrift> {
+    let mean_c = |press: &Press| {
+        let known: Vec<f64> = press.steps.iter().filter_map(|step| step.chip_c).collect();
+        if known.is_empty() { Err(NoDrift::Temperature) } else { Ok(known.iter().sum::<f64>() / known.len() as f64) }
+    };
+    let chip_c = [mean_c(cold)?, mean_c(warm)?];
+    let warmer_k = chip_c[1] - chip_c[0];
     if warmer_k.abs() < 3.0 {
         return Err(NoDrift::Warming(warmer_k));
     }
     let found = modulus(&[cold.clone(), warm.clone()])?;
+    if let [(_, why), ..] = found.gains.left_out.as_slice() {
+        return Err(NoModulus::Gains(*why).into());
+    }
     let [before, after] = found.presses.as_slice() else { return Err(NoDrift::Fit) };
     let ratio = after.kpa / before.kpa;
     let sigma = (before.sigma_kpa / before.kpa).hypot(after.sigma_kpa / after.kpa);
-    Ok(Value { value: (ratio - 1.0) / warmer_k, sigma: (sigma / warmer_k).abs() })
+    Ok(Temperature { per_k: Value { value: (ratio - 1.0) / warmer_k, sigma: (sigma / warmer_k).abs() }, chip_c })
 }

@@ -20,6 +20,7 @@ use crate::memory::without_creep;
 use crate::model::{Pose, UNKNOWNS};
 use crate::modulus::each;
 use crate::press::Press;
+use crate::record::{Ended, Reason};
 
 /// Condition of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +64,8 @@ pub struct Posed {
 /// Result for the whole array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gains {
+    /// Number of columns of the array.
+    pub columns: usize,
     /// Gains, row by row.
     pub taxels: Vec<Gain>,
     /// One pose for each press that counts, in order.
@@ -81,6 +84,12 @@ pub enum NoGains {
     /// No press was given.
     #[error("no press was given")]
     NoPress,
+    /// The chip ended the press early.
+    #[error("the press was ended early: {0}")]
+    Ended(#[from] Ended),
+    /// Rows and columns of the array of the press, and of the first press.
+    #[error("the press has an array of {0:?} rows and columns, the first press one of {1:?}")]
+    Shape([usize; 2], [usize; 2]),
     /// The judgement of a press.
     #[error("{0}")]
     Judged(Verdict),
@@ -120,7 +129,14 @@ pub fn gains(presses: &[Press]) -> Result<Gains, NoGains> {
 /// a yield that is always free would double the uncertainty of every press.
 pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     let (mut sum, mut weights) = (0.0, 1e-9);
-    for press in presses.chunks(1) {
+    let shape = |press: &Press| [press.array.rows, press.array.columns];
+    let first = shape(presses.first().ok_or(NoGains::NoPress)?);
+    // Faults of the record itself, before anything is solved.
+    let fault = |press: &Press| match press.ended {
+        Some(ended) if ended.reason != Reason::MemoryFull => Some(NoGains::Ended(ended)),
+        _ => (shape(press) != first).then(|| NoGains::Shape(shape(press), first)),
+    };
+    for press in presses.chunks(1).filter(|press| fault(&press[0]).is_none()) {
         let Ok(first) = joint(press, 0.0) else { continue };
         for one in each(press, &first).into_iter().flatten() {
             let weight = one.memory_sigma[1].powi(-2);
@@ -129,7 +145,12 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     }
     let creep = sum / weights;
     let (mut kept, mut left_out, mut soft) = (Vec::new(), Vec::new(), false);
-    for (index, press) in presses.iter().map(|press| without_creep(press, creep)).enumerate() {
+    for (index, press) in presses.iter().enumerate() {
+        if let Some(fault) = fault(press) {
+            left_out.push((index, fault));
+            continue;
+        }
+        let press = without_creep(press, creep);
         let alone = joint(std::slice::from_ref(&press), 0.0);
         match alone.map(|alone| alone.presses[0].judgement.verdict) {
             Ok(Verdict::Good) => kept.push(press),

@@ -351,7 +351,14 @@ impl<'a> Joint<'a> {
         let common = (variance / count).sqrt();
         let presses =
             (0..self.presses.len()).map(|index| self.posed(index, &residuals, &covariance, &change, &taxels)).collect();
-        Ok(Gains { taxels, presses, left_out: Vec::new(), spread: variance.sqrt(), common })
+        Ok(Gains {
+            columns: self.array.columns,
+            taxels,
+            presses,
+            left_out: Vec::new(),
+            spread: variance.sqrt(),
+            common,
+        })
     }
 
     /// Names taxels that do not follow the model, by the median of their residuals: no single step decides.

@@ -1,7 +1,7 @@
 //! The host's solver: Young's modulus, taxel gains, poses, scale, creep and temperature from recorded presses, and the drive
 //! from recorded strokes.
 //!
-//! The chip moves the tip and records; nothing is fitted there. On the host, in double precision:
+//! The chip moves the tip and records; nothing is fitted there. [`record`] reads its bytes. On the host, in double precision:
 //!
 //! | function | gives |
 //! | --- | --- |
@@ -33,6 +33,8 @@ pub mod memory;
 pub mod model;
 pub mod modulus;
 pub mod press;
+pub mod record;
+mod report;
 mod robust;
 pub mod scale;
 pub mod strokes;

@@ -4,6 +4,7 @@
 //! and judges nothing. `docs/solve.md` lists the fields with their units, and the motion that gives them.
 
 use crate::model::At;
+use crate::record::Ended;
 
 /// Soft tip of the finger, as configured.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -75,8 +76,8 @@ pub struct Step {
     pub taxels: Vec<Reading>,
     /// Mean voltage at the bridge, V.
     pub bridge_v: f64,
-    /// Temperature of the microcontroller, degrees Celsius.
-    pub chip_c: f64,
+    /// Temperature of the microcontroller, degrees Celsius; None where it is unknown.
+    pub chip_c: Option<f64>,
 }
 
 impl Step {
@@ -116,6 +117,8 @@ pub struct Press {
     pub array: Array,
     /// Steps in order of time.
     pub steps: Vec<Step>,
+    /// Early end of the press. Only a press that filled the memory counts nevertheless.
+    pub ended: Option<Ended>,
 }
 
 impl Press {

@@ -29,7 +29,7 @@
 //!    common to a stroke's samples as one observation),
 //! 2. model: how far the values of the forms of friction are apart (the result is their mean, each weighted by how
 //!    well it fits), and how far the value changes with a k that differs between forward and back, and with a force that depends on the place,
-//! 3. reference: [`VOLTAGE`] for the supply's divider, [`TIMING_S`], and the uncertainty of R that the caller states.
+//! 3. reference: [`VOLTAGE`] for the supply's divider, [`TIMING_S`], and the uncertainty of R.
 
 mod fit;
 mod model;
@@ -37,7 +37,7 @@ mod model;
 pub use model::Form;
 
 use crate::Value;
-use core::fmt;
+use crate::record::Ended;
 use fit::Fit;
 use model::{Path, SPAN, index};
 use nalgebra::SVector;
@@ -114,65 +114,44 @@ pub struct Record {
     pub counts_per_turn: f64,
     /// Motor angle for a travel of the tip, rad/mm.
     pub rad_per_mm: f64,
+    /// Resistance of the whole circuit, Ohm.
+    pub resistance: Value,
     /// The strokes, in order.
     pub strokes: Vec<Stroke>,
-    /// What ended the motions early.
-    pub ended: Option<Refusal>,
+    /// Early end of the motions.
+    pub ended: Option<Ended>,
 }
 
-/// Why there is no result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reason {
-    /// The encoder did not count. The number is the voltage (V), or the counts of the longest stroke.
-    Still,
-    /// The encoder counts against the voltage: counts.
-    Reversed,
-    /// The encoder does not follow the motor: counts of a jump that no voltage makes. Or the tip left its bounds: mm.
-    Astray,
-    /// The array felt a touch: N.
-    Touched,
-    /// The motor felt a force that depends on the place: N.
-    Pushed,
-    /// The voltage requested was not applied: V missing.
-    HeldBack,
-    /// The tip did not come to rest: mm/s.
-    Restless,
-    /// Too few strokes can be used: their number.
-    Few,
-    /// The strokes' speeds are too close together to tell back-EMF from friction: the fastest over the slowest.
-    Slow,
-    /// The fit did not converge: rounds.
-    Unsolved,
+/// Reason why there is no drive, with the number behind it.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum Refusal {
+    /// The chip ended the motions early.
+    #[error("the strokes were ended early: {0}")]
+    Ended(#[from] Ended),
+    /// Counts of the longest stroke.
+    #[error("the longest stroke has {0} counts; 12 are needed: check the encoder and the motor's cables")]
+    Still(i32),
+    /// Counts against the voltage.
+    #[error("a stroke went {0} counts against its voltage: exchange the leads of the motor or of the encoder")]
+    Reversed(i32),
+    /// Counts of a jump.
+    #[error("the count jumped by {0}, which no voltage of these strokes can do: check encoder and coupling")]
+    Astray(i32),
+    /// Largest force that depends on the place, N.
+    #[error("a force of {0:.3} N depends on the place of the tip: clear its way")]
+    Pushed(f64),
+    /// Number of strokes in one direction.
+    #[error("{0} strokes in one direction can be used; 3 are needed")]
+    Few(usize),
+    /// Speed of the fastest stroke over that of the slowest.
+    #[error(
+        "the fastest stroke is {0:.1} times as fast as the slowest; 2 times are needed to tell back-EMF from friction"
+    )]
+    Slow(f64),
+    /// Number of rounds.
+    #[error("the fit did not converge in {0} rounds: the samples do not follow the model of a motor with friction")]
+    Unsolved(usize),
 }
-
-/// A refusal with the number behind it, in the unit that its [`Reason`] states.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Refusal {
-    /// Why.
-    pub reason: Reason,
-    /// The number that led to it.
-    pub value: f64,
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let value = self.value;
-        match self.reason {
-            Reason::Still => write!(f, "still: the encoder hardly counted ({value:.2})"),
-            Reason::Reversed => write!(f, "reversed: {value:.0} counts against the voltage"),
-            Reason::Astray => write!(f, "astray: the encoder does not follow the motor ({value:.2})"),
-            Reason::Touched => write!(f, "touched: the array felt {value:.3} N"),
-            Reason::Pushed => write!(f, "pushed: the motor felt {value:.3} N"),
-            Reason::HeldBack => write!(f, "held back: {value:.3} V of the requested voltage are missing"),
-            Reason::Restless => write!(f, "restless: the tip still moves at {value:.2} mm/s"),
-            Reason::Few => write!(f, "too few strokes: {value:.0} can be used"),
-            Reason::Slow => write!(f, "slow: the fastest stroke is only {value:.1} times as fast as the slowest"),
-            Reason::Unsolved => write!(f, "the fit did not converge in {value:.0} rounds"),
-        }
-    }
-}
-
-impl core::error::Error for Refusal {}
 
 /// Friction in one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -208,21 +187,21 @@ pub struct Drive {
     pub speeds_rad_per_s: [f64; 2],
 }
 
-/// Solves a record for the drive. `resistance` is that of the whole circuit, Ohm.
+/// Drive of a record.
 ///
 /// # Errors
 /// [`Refusal`] where the motions were ended early or the samples do not follow the model.
-pub fn solve(record: &Record, resistance: Value) -> Result<Drive, Refusal> {
-    let refuse = |reason, value| Err(Refusal { reason, value });
-    if let Some(refusal) = record.ended {
-        return Err(refusal);
+pub fn solve(record: &Record) -> Result<Drive, Refusal> {
+    if let Some(ended) = record.ended {
+        return Err(ended.into());
     }
+    let resistance = record.resistance;
     let gone = || record.strokes.iter().map(Stroke::gone);
     let (least, most) = (gone().min().unwrap_or(0), gone().max().unwrap_or(0));
     if -least >= STILL_COUNTS {
-        return refuse(Reason::Reversed, f64::from(-least));
+        return Err(Refusal::Reversed(-least));
     } else if most < STILL_COUNTS {
-        return refuse(Reason::Still, f64::from(most));
+        return Err(Refusal::Still(most));
     }
     let places = || record.strokes.iter().flat_map(|stroke| &stroke.samples).map(|sample| f64::from(sample.count));
     let rad = core::f64::consts::TAU / record.counts_per_turn;
@@ -234,12 +213,12 @@ pub fn solve(record: &Record, resistance: Value) -> Result<Drive, Refusal> {
     for side in 0..2 {
         let strokes = paths.iter().flat_map(|parts| parts.first()).filter(|path| path.side == side).count();
         if strokes < STROKES_MIN {
-            return refuse(Reason::Few, strokes as f64);
+            return Err(Refusal::Few(strokes));
         }
     }
     let paths: Vec<Path> = paths.into_iter().flatten().collect();
     if fastest < SPEEDS * slowest {
-        return refuse(Reason::Slow, fastest / slowest);
+        return Err(Refusal::Slow(fastest / slowest));
     }
     let fits = Fit::all(&paths, record, slowest)?;
     let best = &fits[0];
@@ -249,7 +228,7 @@ pub fn solve(record: &Record, resistance: Value) -> Result<Drive, Refusal> {
     let most_v = paths.iter().map(|path| path.voltage_v).fold(0.0, f64::max);
     let most = most_v / best.p[index::A].exp() * record.sample_s.powi(2) / rad;
     if f64::from(jump) > JUMP_COUNTS + JUMP * most {
-        return refuse(Reason::Astray, f64::from(jump));
+        return Err(Refusal::Astray(jump));
     }
     let newtons = best.p[index::K].exp() / resistance.value * record.rad_per_mm * 1e3;
     let pushes = [index::FRONT, index::SPRING].map(|force| {
@@ -258,7 +237,7 @@ pub fn solve(record: &Record, resistance: Value) -> Result<Drive, Refusal> {
     });
     let force_n = if pushes[0].value > pushes[1].value { pushes[0] } else { pushes[1] };
     if force_n.value > PUSH_N && force_n.value > PUSH_SIGMAS * force_n.sigma {
-        return refuse(Reason::Pushed, force_n.value);
+        return Err(Refusal::Pushed(force_n.value));
     }
 
     // A friction that falls evenly with speed: k is found lower, and friction higher.

@@ -1,7 +1,7 @@
 //! The joint least squares over all strokes.
 
 use super::model::{ALL, FITTED, Form, Law, Parameters, Path, index};
-use super::{Reason, Record, Refusal};
+use super::{Record, Refusal};
 use nalgebra::{Cholesky, Matrix3, SMatrix, SVector, Vector3};
 
 /// A vector over all parameters.
@@ -146,7 +146,7 @@ impl Problem<'_> {
             loop {
                 rounds += 1;
                 if rounds > ROUNDS {
-                    return Err(Refusal { reason: Reason::Unsolved, value: ROUNDS as f64 });
+                    return Err(Refusal::Unsolved(ROUNDS));
                 }
                 let normal = Normal::new(&blocks, damping);
                 let (matrix, gradient) = self.equations(&normal, &at.p, damping);
@@ -228,7 +228,7 @@ impl Fit {
     ///
     /// First with one friction for all strokes. Where they do not agree on one, each path may have its own beside it.
     pub fn all(paths: &[Path], record: &Record, slowest: f64) -> Result<Vec<Self>, Refusal> {
-        let mut failed = Refusal { reason: Reason::Unsolved, value: 0.0 };
+        let mut failed = Refusal::Unsolved(0);
         for even in [true, false] {
             let mut fits = Vec::new();
             for form in Form::ALL {

@@ -1,6 +1,8 @@
 //! A simulated finger that presses as the chip will: the tip is carried along a plan, and every frame goes through the
 //! effects of the scene. Hysteresis, creep and relaxation go on from press to press.
 
+use crate::series;
+use fingertip::params::Params;
 use sim::effects::contact;
 use sim::effects::sensor::{self, Readout};
 use sim::effects::set::{Named, Set};
@@ -8,14 +10,14 @@ use sim::mechanics::contact::Contact;
 use sim::scene::{Scene, controller, read};
 use sim::setup::Setup;
 use solve::press::{Array, Branch, Press, Reading, Step, Tip};
+use solve::record;
 
 const ROWS: usize = 10;
 const COLUMNS: usize = 10;
-/// Frames are 1 ms apart, where the chip's are 0.1 ms: fewer frames, hence more noise in a mean.
+/// Frames are 0.5 ms apart, where the chip's are 0.1 ms: fewer frames, hence more noise in a mean.
 pub const FRAME_S: f64 = 0.5e-3;
+const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
-/// Length of a count of the encoder, mm.
-const COUNT_MM: f64 = 0.001095;
 
 /// What a finger is drawn as.
 #[derive(Clone, Debug)]
@@ -265,11 +267,12 @@ impl Finger {
         }
         let tip = Tip { radius_mm: self.setup.tip.radius_mm, modulus_kpa: 250.0 };
         let array = Array { rows: ROWS, columns: COLUMNS, pitch_mm: self.setup.array.pitch_mm, codes_per_kpa: 24.0 };
-        Press { tip, array, steps }
+        let press = Press { tip, array, steps, ended: None };
+        record::press(&series::press(&press, FRAME_NS, -777), &Params::DEFAULT).expect("a series")
     }
 
     pub fn travel_mm(&self) -> f64 {
-        (self.travel_mm / COUNT_MM).floor() * COUNT_MM
+        (self.travel_mm / series::mm_per_count()).floor() * series::mm_per_count()
     }
 }
 
@@ -299,16 +302,21 @@ impl Recorder {
         let count = f64::from(frames);
         let reading = |[sum, square]: &[f64; 2]| {
             let mean = sum / count;
-            // In sixteenths of a code, as the record has it.
             let deviation = (square / count - mean * mean).max(0.0).sqrt();
-            Reading { mean: (16.0 * mean).round() / 16.0, deviation, bad: false }
+            Reading { mean, deviation, bad: false }
         };
         let taxels = sums.iter().flatten().map(reading).collect();
-        (frames > 0).then_some(Step { time_s, travel_mm, frames, branch, taxels, bridge_v: 0.0, chip_c: 25.0 })
+        (frames > 0).then_some(Step { time_s, travel_mm, frames, branch, taxels, bridge_v: 0.0, chip_c: Some(25.0) })
     }
 }
 
-/// The press that the chip is to make: a quick cycle, then a slow one with a hold.
+/// Way of a press in the plans, from the air to the deepest place, mm, and its part in front of the contact.
+const WAY_MM: f64 = 3.5;
+const AIR_MM: f64 = 0.5;
+/// A step: this part of the way.
+const STEP_MM: f64 = WAY_MM / 30.0;
+
+/// The press that the chip makes: a quick cycle, then a slow one with a hold.
 pub fn plan() -> Vec<Part> {
     let mut plan = cycle(10.0, 0.0);
     plan.extend(cycle(2.0, 3.0));
@@ -317,11 +325,11 @@ pub fn plan() -> Vec<Part> {
 
 /// In at a speed, a hold at the deepest place, and back.
 pub fn cycle(mm_per_s: f64, hold_s: f64) -> Vec<Part> {
-    let ends_s = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.3].into_iter().filter(|end_s| *end_s < hold_s).chain([hold_s]);
+    let ends_s = [0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 1.3, 2.1, 3.0].into_iter().filter(|end_s| *end_s <= hold_s);
     vec![
-        Part::Ramp { to_mm: 3.0, mm_per_s, step_mm: 0.1 },
+        Part::Ramp { to_mm: WAY_MM - AIR_MM, mm_per_s, step_mm: STEP_MM },
         Part::Hold { ends_s: ends_s.collect() },
-        Part::Ramp { to_mm: -0.3, mm_per_s, step_mm: 0.1 },
+        Part::Ramp { to_mm: -AIR_MM, mm_per_s, step_mm: STEP_MM },
     ]
 }
 

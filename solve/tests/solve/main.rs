@@ -1,7 +1,10 @@
-//! The solver against a simulated finger. `-- --nocapture` prints the figures.
+//! The solver against simulated fingers and drives. `-- --nocapture` prints the figures.
 
 mod drift;
 mod finger;
 mod gains;
 mod modulus;
 mod plates;
+mod record;
+mod series;
+mod strokes;

@@ -13,12 +13,15 @@
 //! A pulse presses with what its voltage has beyond that of the easiest pulse, and no more than 40 um go by before it
 //! is shorted: a force of 0.17 N stops it whatever the array sees. Strokes stay within the way that was felt.
 
-use crate::drive::{DELAY_S, FRAME_S, Rig, View};
+use super::drive::{DELAY_S, FRAME_S, Rig, View};
+use crate::series;
 use core::f64::consts::TAU;
-use solve::strokes::{Reason, Record, Refusal, Sample, Stroke};
+use fingertip::params::Params;
+use solve::record::{self, Ended, Reason};
+use solve::strokes::{Record, Sample, Stroke};
 
 /// Frames for a sample.
-pub const DECIMATION: usize = 8;
+const DECIMATION: usize = record::SAMPLE_FRAMES as usize;
 /// Samples that 40 KiB hold: a count from the origin, and a mean voltage in quarters of a millivolt, 16 bits each.
 pub const SAMPLES: usize = 40 * 1024 / 4;
 /// The way is felt this far to each side, strokes rest here, and any motion beyond the last is shorted, mm.
@@ -87,8 +90,10 @@ struct Recorded {
     sum_v: f64,
 }
 
-fn refuse<T>(reason: Reason, value: f64) -> Result<T, Refusal> {
-    Err(Refusal { reason, value })
+/// The chip's number is in thousandths of the unit, but for counts.
+fn refuse<T>(reason: Reason, value: f64) -> Result<T, Ended> {
+    let factor = if reason == Reason::Reversed { 1.0 } else { 1e3 };
+    Err(Ended { reason, value: (factor * value) as i32 })
 }
 
 /// All motions of a commissioning, with strokes of these speeds.
@@ -96,6 +101,12 @@ pub fn measure(rig: &mut Rig, speeds: &[f64]) -> Record {
     let view = rig.view();
     let d = &rig.drive;
     let (counts_per_turn, rad_per_mm) = (d.counts_per_turn, d.rad_per_mm);
+    let params = Params {
+        encoder_counts_per_turn: counts_per_turn as i32,
+        reduction_mrad_per_mm: (1e3 * rad_per_mm).round() as i32,
+        resistance_mohm: (1e3 * d.ohmmeter_ohm).round() as i32,
+        ..Params::DEFAULT
+    };
     let mut chip = Chip {
         view,
         origin: view.count,
@@ -109,11 +120,13 @@ pub fn measure(rig: &mut Rig, speeds: &[f64]) -> Record {
     };
     let mut strokes = Vec::new();
     let ended = chip.motions(speeds, &mut strokes).err();
-    Record { sample_s: DECIMATION as f64 * FRAME_S, delay_s: DELAY_S, counts_per_turn, rad_per_mm, strokes, ended }
+    let [frame_ns, delay_ns] = [FRAME_S, DELAY_S].map(|time_s| (1e9 * time_s).round() as u32);
+    let bytes = series::strokes(&strokes, ended, frame_ns, delay_ns);
+    record::strokes(&bytes, &params).expect("a series")
 }
 
 impl Chip<'_> {
-    fn motions(&mut self, speeds: &[f64], strokes: &mut Vec<Stroke>) -> Result<(), Refusal> {
+    fn motions(&mut self, speeds: &[f64], strokes: &mut Vec<Stroke>) -> Result<(), Ended> {
         for rise in [JOG_N_PER_S / self.newtons_per_volt, self.rise()] {
             self.moved_v = [f64::INFINITY; 2];
             self.pulse(1.0, rise)?;
@@ -182,7 +195,7 @@ impl Chip<'_> {
     }
 
     /// What ends any motion.
-    fn danger(&self, begun: i32, sign: f64) -> Result<(), Refusal> {
+    fn danger(&self, begun: i32, sign: f64) -> Result<(), Ended> {
         let back = -sign as i32 * (self.view.count - begun);
         if self.view.force_n >= TOUCH_N {
             refuse(Reason::Touched, self.view.force_n)
@@ -196,7 +209,7 @@ impl Chip<'_> {
     }
 
     /// Shorts the motor until it rests.
-    fn rest(&mut self, mut outcome: Result<(), Refusal>) -> Result<(), Refusal> {
+    fn rest(&mut self, mut outcome: Result<(), Ended>) -> Result<(), Ended> {
         let mut still = 0.0;
         let mut counts = vec![self.view.count];
         while still < STILL_S / FRAME_S {
@@ -216,7 +229,7 @@ impl Chip<'_> {
     }
 
     /// The voltage rises until it moves; a little later the motor is shorted.
-    fn pulse(&mut self, sign: f64, rise_v_per_s: f64) -> Result<(), Refusal> {
+    fn pulse(&mut self, sign: f64, rise_v_per_s: f64) -> Result<(), Ended> {
         let side = usize::from(sign < 0.0);
         let begun = self.view.count;
         let easiest = self.moved_v[side];
@@ -224,8 +237,8 @@ impl Chip<'_> {
         let mut voltage = if easiest.is_finite() { BEGIN * easiest } else { 0.0 };
         let mut moving_s = 0.0;
         let outcome = loop {
-            if let Err(refusal) = self.danger(begun, sign) {
-                break Err(refusal);
+            if let Err(ended) = self.danger(begun, sign) {
+                break Err(ended);
             }
             let gone = sign as i32 * (self.view.count - begun);
             if gone >= MOVED {
@@ -246,7 +259,7 @@ impl Chip<'_> {
     }
 
     /// Pulses to the end of the way.
-    fn feel(&mut self, sign: f64) -> Result<(), Refusal> {
+    fn feel(&mut self, sign: f64) -> Result<(), Ended> {
         while sign * self.place_mm() < FELT_MM {
             self.pulse(sign, self.rise())?;
         }
@@ -254,14 +267,14 @@ impl Chip<'_> {
     }
 
     /// A stroke under one voltage that comes to rest at a place; the speed that it reached, mm/s.
-    fn go(&mut self, sign: f64, voltage: f64, end_mm: f64) -> Result<f64, Refusal> {
+    fn go(&mut self, sign: f64, voltage: f64, end_mm: f64) -> Result<f64, Ended> {
         let begun = self.view.count;
         // v = F tau / m: what a force takes of the speed.
         let push = PUSH_N / self.newtons_per_volt / self.volts_per_mm_per_s;
         let (mut counts, mut fastest, mut more_v, mut reached) = (Vec::new(), 0.0_f64, 0.0, 0.0);
         let outcome = loop {
-            if let Err(refusal) = self.danger(begun, sign) {
-                break Err(refusal);
+            if let Err(ended) = self.danger(begun, sign) {
+                break Err(ended);
             }
             counts.push(self.view.count);
             let speed = |span_s: f64| {

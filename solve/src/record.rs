@@ -1,0 +1,346 @@
+//! The bytes of a recorded series, as the chip delivers them.
+//!
+//! A series is a head of 32 bytes and a body of records, little-endian throughout. `docs/solve.md` has the layout. A damaged
+//! series gives a [`NoRecord`]; no bytes make this module panic.
+//!
+//! Lengths in millimetres, the tip and the array's scale are not in the series: they come from the controller's parameters.
+
+use crate::Value;
+use crate::press::{Array, Branch, Press, Reading, Step, Tip};
+use crate::strokes::{Record, Sample, Stroke};
+use fingertip::params::{ParamError, Params};
+use std::f64::consts::TAU;
+
+/// Version of the format.
+pub const VERSION: u8 = 1;
+/// First bytes of a series.
+pub const MAGIC: [u8; 3] = *b"FTS";
+/// Length of the head, bytes.
+pub const HEAD: usize = 32;
+/// Frames between two samples of a stroke.
+pub const SAMPLE_FRAMES: u32 = 8;
+/// Count that marks the start of a stroke.
+pub const START: i16 = i16::MIN;
+
+/// Length of a step's record before the taxels, bytes.
+const STEP: usize = 24;
+/// Codes of a mean: an eighth of a code, from -128 codes.
+const CODES_PER_LSB: f64 = 0.125;
+const LEAST_CODES: f64 = -128.0;
+/// Standard deviations are coded as variances in the square of this, codes.
+const DEVIATION_CODES: f64 = 0.25;
+/// Voltage of a sample's unit, V.
+const VOLTS_PER_LSB: f64 = 0.25e-3;
+/// Absolute zero, degrees Celsius.
+const ZERO_K: f64 = -273.15;
+/// Standard uncertainty of the resistance in the parameters, as a share: 1 % of an ohmmeter, and copper that is 5 K warmer
+/// than it was then (0.4 %/K).
+const RESISTANCE_PART: f64 = 0.022;
+
+/// Kind of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Steps of a press.
+    Press = 1,
+    /// Samples of strokes in the air.
+    Strokes = 2,
+}
+
+/// Reason for which the chip ended a series early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// A command stopped the motion.
+    Interrupted = 1,
+    /// The controller was not ready: it had a fault, no torque or no tare.
+    NotReady = 2,
+    /// Nobody has confirmed the motor's direction.
+    Unconfirmed = 3,
+    /// The encoder did not count under a voltage, mV.
+    Still = 4,
+    /// The encoder counted against the voltage, counts.
+    Reversed = 5,
+    /// The tip left its bounds, um.
+    Astray = 6,
+    /// The array felt a force in the air, mN.
+    Touched = 7,
+    /// The motor felt an external force, mN.
+    Pushed = 8,
+    /// Part of the requested voltage was not applied, mV.
+    HeldBack = 9,
+    /// The tip did not come to rest: way after the time allowed, um.
+    Restless = 10,
+    /// The tip touched nothing on its way, um.
+    NoContact = 11,
+    /// The tip stopped before it was deep enough: travel, um.
+    Stalled = 12,
+    /// The memory was full before the motion had ended.
+    MemoryFull = 13,
+}
+
+impl Reason {
+    const ALL: [Self; 13] = [
+        Self::Interrupted,
+        Self::NotReady,
+        Self::Unconfirmed,
+        Self::Still,
+        Self::Reversed,
+        Self::Astray,
+        Self::Touched,
+        Self::Pushed,
+        Self::HeldBack,
+        Self::Restless,
+        Self::NoContact,
+        Self::Stalled,
+        Self::MemoryFull,
+    ];
+}
+
+/// Early end of a series.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// Reason.
+    pub reason: Reason,
+    /// The number behind it, in the unit that the [`Reason`] states; 0 for those without a unit.
+    pub value: i32,
+}
+
+impl std::error::Error for Ended {}
+
+/// Reason why bytes are not a series, with the number behind it.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum NoRecord {
+    /// Number of bytes.
+    #[error("the series has {0} bytes; its head alone has 32")]
+    Short(usize),
+    /// First bytes.
+    #[error("the bytes begin with {0:02x?}, not with \"FTS\": they are not a series")]
+    Magic([u8; 3]),
+    /// Version of the format.
+    #[error("the series has format {0}; this program reads format 1")]
+    Version(u8),
+    /// Kind that was requested, and number of the kind in the series.
+    #[error("the series has kind {1} where {0:?} was expected (1 is a press, 2 are strokes)")]
+    Kind(Kind, u8),
+    /// Number of the reason.
+    #[error("the series ended early for reason {0}, which this program does not know")]
+    Reason(u8),
+    /// Rows and columns.
+    #[error("the array has {0} rows and {1} columns; both must be at least 1")]
+    Shape(u8, u8),
+    /// Bytes by the head, and bytes of the series.
+    #[error("the series has {1} bytes where its head says {0}: it was cut or joined")]
+    Length(u64, usize),
+    /// Check by the head, and check of the body.
+    #[error("the check of the body is {1:08x} where the head says {0:08x}: bytes were changed on the way")]
+    Check(u32, u32),
+    /// The frame time is 0.
+    #[error("the head says a frame time of 0")]
+    FrameTime,
+    /// Number of the step.
+    #[error("step {0} ends before it begins, or begins before the step before it ended")]
+    Order(usize),
+    /// Number of the step.
+    #[error("step {0} has no frames")]
+    Frames(usize),
+    /// Number of the step, and number of the branch.
+    #[error("step {0} has branch {1}; 0 (in or held) and 1 (back) are known")]
+    Branch(usize, u8),
+    /// Number of the record.
+    #[error("sample {0} belongs to no stroke, or marks the start of a stroke with a voltage")]
+    Stroke(usize),
+    /// Parameter out of its range.
+    #[error("the controller's parameters are not valid: {0}")]
+    Params(#[from] ParamError),
+}
+
+/// Press of a series.
+///
+/// # Errors
+/// See [`NoRecord`].
+pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
+    params.check()?;
+    let (head, body) = Head::of(bytes, Kind::Press)?;
+    let mm_per_count = TAU / f64::from(params.encoder_counts_per_turn) / rad_per_mm(params);
+    let array = Array {
+        rows: head.shape[0],
+        columns: head.shape[1],
+        pitch_mm: 1e-3 * f64::from(params.pitch_um),
+        codes_per_kpa: 1e-3 * f64::from(params.codes_per_kpa_milli),
+    };
+    let mut steps: Vec<Step> = Vec::new();
+    let mut before = 0;
+    for (index, record) in body.chunks_exact(head.record).enumerate() {
+        let mut cursor = Cursor(record);
+        let frames = [cursor.u32(), cursor.u32()];
+        let counts = [cursor.i32(), cursor.i32()];
+        let [averaged, branch] = [cursor.u16(), u16::from(cursor.u8())];
+        cursor.u8();
+        let (bridge_mv, chip) = (cursor.u16().cast_signed(), cursor.u16());
+        if frames[0] > frames[1] || frames[0] < before {
+            return Err(NoRecord::Order(index));
+        } else if averaged == 0 {
+            return Err(NoRecord::Frames(index));
+        }
+        before = frames[1];
+        let branch = match branch {
+            0 => Branch::Loading,
+            1 => Branch::Unloading,
+            other => return Err(NoRecord::Branch(index, other as u8)),
+        };
+        let mut taxels: Vec<Reading> = (0..array.taxels())
+            .map(|_| Reading { mean: CODES_PER_LSB * f64::from(cursor.u16()) + LEAST_CODES, ..Reading::default() })
+            .collect();
+        taxels.iter_mut().for_each(|taxel| taxel.deviation = deviation(cursor.u8()));
+        for taxels in taxels.chunks_mut(8) {
+            let bits = cursor.u8();
+            taxels.iter_mut().enumerate().for_each(|(bit, taxel)| taxel.bad = bits >> bit & 1 == 1);
+        }
+        steps.push(Step {
+            time_s: frames.map(|frame| f64::from(frame) * head.frame_s),
+            travel_mm: counts.map(|count| (f64::from(count) - f64::from(head.origin)) * mm_per_count),
+            frames: averaged.into(),
+            branch,
+            taxels,
+            bridge_v: 1e-3 * f64::from(bridge_mv),
+            chip_c: (chip > 0).then(|| 0.1 * f64::from(chip) + ZERO_K),
+        });
+    }
+    let tip =
+        Tip { radius_mm: 1e-3 * f64::from(params.tip_radius_um), modulus_kpa: 1e-3 * f64::from(params.modulus_pa) };
+    Ok(Press { tip, array, steps, ended: head.ended })
+}
+
+/// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %: who has measured it better
+/// overwrites it.
+///
+/// # Errors
+/// See [`NoRecord`].
+pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
+    params.check()?;
+    let (head, body) = Head::of(bytes, Kind::Strokes)?;
+    let mut strokes: Vec<Stroke> = Vec::new();
+    for (index, record) in body.chunks_exact(head.record).enumerate() {
+        let mut cursor = Cursor(record);
+        let [count, voltage] = [cursor.u16().cast_signed(), cursor.u16().cast_signed()];
+        if count == START && voltage == 0 {
+            strokes.push(Stroke::default());
+            continue;
+        }
+        let stroke = strokes.last_mut().filter(|_| count != START).ok_or(NoRecord::Stroke(index))?;
+        stroke.samples.push(Sample { count: count.into(), voltage_v: VOLTS_PER_LSB * f64::from(voltage) });
+    }
+    let ohm = 1e-3 * f64::from(params.resistance_mohm);
+    Ok(Record {
+        sample_s: f64::from(SAMPLE_FRAMES) * head.frame_s,
+        delay_s: 1e-9 * f64::from(head.delay_ns),
+        counts_per_turn: params.encoder_counts_per_turn.into(),
+        rad_per_mm: rad_per_mm(params),
+        resistance: Value { value: ohm, sigma: RESISTANCE_PART * ohm },
+        strokes,
+        ended: head.ended,
+    })
+}
+
+/// Check of a body: FNV-1a of 32 bits.
+pub fn check(body: &[u8]) -> u32 {
+    body.iter().fold(0x811C_9DC5, |check, byte| (check ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
+}
+
+/// Length of a press's record of a step, bytes.
+pub fn step_length(taxels: usize) -> usize {
+    (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
+}
+
+fn rad_per_mm(params: &Params) -> f64 {
+    1e-3 * f64::from(params.reduction_mrad_per_mm)
+}
+
+/// Standard deviation in codes from its byte: a variance with a mantissa of 3 bits and an exponent of 5.
+fn deviation(byte: u8) -> f64 {
+    if byte == 0 {
+        return 0.0;
+    }
+    let variance = ((8 + u64::from(byte & 7)) << (byte >> 3)) >> 3;
+    DEVIATION_CODES * (variance as f64).sqrt()
+}
+
+/// What the head says.
+struct Head {
+    shape: [usize; 2],
+    ended: Option<Ended>,
+    /// Length of a record, bytes.
+    record: usize,
+    frame_s: f64,
+    origin: i32,
+    delay_ns: u32,
+}
+
+impl Head {
+    /// Head and body of a series of this kind.
+    fn of(bytes: &[u8], kind: Kind) -> Result<(Self, &[u8]), NoRecord> {
+        let (head, body) = bytes.split_at_checked(HEAD).ok_or(NoRecord::Short(bytes.len()))?;
+        let mut cursor = Cursor(head);
+        let magic = [cursor.u8(), cursor.u8(), cursor.u8()];
+        let [version, number, rows, columns, ended] = [(); 5].map(|()| cursor.u8());
+        let [records, expected, frame_ns] = [(); 3].map(|()| cursor.u32());
+        let (origin, delay_ns, value) = (cursor.i32(), cursor.u32(), cursor.i32());
+        if magic != MAGIC {
+            return Err(NoRecord::Magic(magic));
+        } else if version != VERSION {
+            return Err(NoRecord::Version(version));
+        } else if number != kind as u8 {
+            return Err(NoRecord::Kind(kind, number));
+        } else if kind == Kind::Press && (rows == 0 || columns == 0) {
+            return Err(NoRecord::Shape(rows, columns));
+        } else if frame_ns == 0 {
+            return Err(NoRecord::FrameTime);
+        }
+        let reason = |number: u8| Reason::ALL.into_iter().find(|reason| *reason as u8 == number);
+        let ended = match ended {
+            0 => None,
+            number => Some(Ended { reason: reason(number).ok_or(NoRecord::Reason(number))?, value }),
+        };
+        let shape = [rows, columns].map(usize::from);
+        let record = match kind {
+            Kind::Press => step_length(shape[0] * shape[1]),
+            Kind::Strokes => 4,
+        };
+        let length = HEAD as u64 + u64::from(records) * record as u64;
+        if length != bytes.len() as u64 {
+            return Err(NoRecord::Length(length, bytes.len()));
+        }
+        let found = check(body);
+        if found != expected {
+            return Err(NoRecord::Check(expected, found));
+        }
+        Ok((Self { shape, ended, record, frame_s: 1e-9 * f64::from(frame_ns), origin, delay_ns }, body))
+    }
+}
+
+/// Bytes that are read from the front. Behind the end it reads zeros; the lengths were checked before.
+struct Cursor<'a>(&'a [u8]);
+
+impl Cursor<'_> {
+    fn take<const N: usize>(&mut self) -> [u8; N] {
+        let Some((bytes, rest)) = self.0.split_first_chunk() else { return [0; N] };
+        self.0 = rest;
+        *bytes
+    }
+
+    fn u8(&mut self) -> u8 {
+        let [byte] = self.take();
+        byte
+    }
+
+    fn u16(&mut self) -> u16 {
+        u16::from_le_bytes(self.take())
+    }
+
+    fn u32(&mut self) -> u32 {
+        u32::from_le_bytes(self.take())
+    }
+
+    fn i32(&mut self) -> i32 {
+        i32::from_le_bytes(self.take())
+    }
+}

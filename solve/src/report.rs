@@ -1,0 +1,194 @@
+//! Results and refusals in sentences.
+
+use crate::Value;
+use crate::drift::{Creep, Temperature};
+use crate::gains::{Condition, Gains};
+use crate::modulus::Modulus;
+use crate::record::{Ended, Reason};
+use crate::scale::Scale;
+use crate::strokes::Drive;
+use std::fmt::{Display, Formatter, Result};
+
+/// The uncertainty with two digits, the value with as many decimals.
+impl Display for Value {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self { value, sigma } = self;
+        if !(1e-12..1e12).contains(sigma) {
+            return write!(f, "{value:.4} +- {sigma:.1e}");
+        }
+        let decimals = (1.0 - sigma.log10().floor()).max(0.0) as usize;
+        write!(f, "{value:.decimals$} +- {sigma:.decimals$}")
+    }
+}
+
+/// The value in another unit.
+fn times(value: &Value, factor: f64) -> Value {
+    Value { value: factor * value.value, sigma: factor.abs() * value.sigma }
+}
+
+impl Display for Ended {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let value = self.value;
+        let thousandths = 1e-3 * f64::from(value);
+        match self.reason {
+            Reason::Interrupted => write!(f, "a command stopped the motion"),
+            Reason::NotReady => {
+                write!(f, "the controller was not ready: enable torque, tare, and see that there is no fault")
+            }
+            Reason::Unconfirmed => write!(f, "the motor's direction is not confirmed: confirm it first"),
+            Reason::Still => {
+                write!(f, "the encoder did not count at {thousandths:.2} V: check the motor's and the encoder's cables")
+            }
+            Reason::Reversed => {
+                write!(
+                    f,
+                    "the encoder counted {value} against the voltage: exchange the motor's or the encoder's leads"
+                )
+            }
+            Reason::Astray => {
+                write!(f, "the tip was {thousandths:.2} mm away, outside of its bounds: check the encoder")
+            }
+            Reason::Touched => write!(f, "the array measured {thousandths:.3} N in the air: clear the tip's way"),
+            Reason::Pushed => {
+                write!(f, "an external force of {thousandths:.3} N was estimated from the motor: clear the tip's way")
+            }
+            Reason::HeldBack => {
+                write!(
+                    f,
+                    "{thousandths:.2} V of the requested voltage were not applied: check the supply and the limits"
+                )
+            }
+            Reason::Restless => {
+                write!(f, "the tip did not come to rest: it still went {thousandths:.3} mm; hold the finger fast")
+            }
+            Reason::NoContact => {
+                write!(f, "the tip touched nothing within {thousandths:.2} mm: bring the plate nearer")
+            }
+            Reason::Stalled => {
+                write!(
+                    f,
+                    "the tip stopped at {thousandths:.2} mm before it was deep enough: check the supply and the limits"
+                )
+            }
+            Reason::MemoryFull => write!(f, "the memory was full after {value} records"),
+        }
+    }
+}
+
+impl Display for Gains {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let count = |condition| self.taxels.iter().filter(|gain| gain.condition == condition).count();
+        let (sound, spread) = (count(Condition::Sound), 100.0 * self.spread);
+        write!(f, "The gains of {sound} of {} taxels were measured; they spread by {spread:.1} %.", self.taxels.len())?;
+        match count(Condition::Unreached) {
+            0 => {}
+            unreached => write!(f, " No press reached {unreached} taxels: they keep their gain.")?,
+        }
+        for (taxel, gain) in self.taxels.iter().enumerate() {
+            let (row, column) = (taxel / self.columns, taxel % self.columns);
+            match gain.condition {
+                Condition::Dead => write!(f, " The taxel in row {row}, column {column} is dead.")?,
+                Condition::Odd => {
+                    write!(
+                        f,
+                        " The taxel in row {row}, column {column} does not follow the pressure: it was left out."
+                    )?;
+                }
+                Condition::Sound | Condition::Unreached => {}
+            }
+        }
+        for (press, why) in &self.left_out {
+            write!(f, " Press {} does not count: {why}.", press + 1)?;
+        }
+        for posed in &self.presses {
+            if let crate::judge::Verdict::Soft(_) = posed.judgement.verdict {
+                write!(f, " In one press {}.", posed.judgement.verdict)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Display for Modulus {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let Self { kpa, sigma_kpa, parts, presses, gains } = self;
+        let value = Value { value: *kpa, sigma: *sigma_kpa };
+        let [residuals, between, common, memory] =
+            [parts.residuals, parts.presses, parts.gains, parts.memory].map(|part| 100.0 * part);
+        write!(
+            f,
+            "Young's modulus is {value} kPa by {} presses. Its uncertainty: {residuals:.1} % residuals, {between:.1} % \
+             spread between presses, {common:.1} % common gain of the taxels, {memory:.1} % creep and relaxation.",
+            presses.len()
+        )?;
+        for (index, press) in presses.iter().enumerate() {
+            let memory = &press.memory;
+            let [hysteresis, creep, relaxation] =
+                [memory.hysteresis, memory.creep, memory.relaxation].map(|share| 100.0 * share);
+            write!(
+                f,
+                " Press {}: {:.1} kPa, contact at {:.3} mm, hysteresis {hysteresis:.1} %, creep {creep:.1} % a decade, \
+                 relaxation {relaxation:.1} % with a time constant of {:.2} s.",
+                index + 1,
+                press.kpa,
+                press.touch_mm,
+                memory.relaxation_s
+            )?;
+        }
+        write!(f, " {gains}")
+    }
+}
+
+impl Display for Scale {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        write!(f, "The force is {} times what the array reads.", self.factor)?;
+        if let Some(offset) = self.offset_n.filter(Value::differs) {
+            write!(f, " The scale shows {offset} N where the array reads nothing: was it set to zero?")?;
+        }
+        if let Some(curve) = self.curve.filter(Value::differs) {
+            let curve = times(&curve, 100.0);
+            write!(
+                f,
+                " The factor changes by {curve} % up to the largest force: the array's characteristic is not a line."
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for Creep {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let (share, decade, left) = (times(&self.share, 100.0), times(&self.per_decade, 100.0), 100.0 * self.left);
+        write!(
+            f,
+            "A held reading grows by {share} % with a time constant of {} s, which leaves {left:.2} % of this hold. By the \
+             logarithm of time it grows by {decade} % a decade.",
+            self.time_s
+        )
+    }
+}
+
+impl Display for Temperature {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let (per_k, [cold_c, warm_c]) = (times(&self.per_k, 100.0), self.chip_c);
+        write!(
+            f,
+            "The array's gain changes by {per_k} % for a kelvin, between {cold_c:.1} and {warm_c:.1} degrees Celsius."
+        )
+    }
+}
+
+impl Display for Drive {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        let [forward, back] = self.friction.each_ref().map(|friction| times(&friction.torque_nm, 1e6));
+        let [slowest, fastest] = self.speeds_rad_per_s;
+        write!(
+            f,
+            "The torque constant is {} mN m/A, the time constant {} ms, the inertia {} g cm^2, the friction {forward} uN m \
+             forward and {back} uN m back. The strokes had {slowest:.0} to {fastest:.0} rad/s.",
+            times(&self.torque_constant, 1e3),
+            times(&self.time_constant_s, 1e3),
+            times(&self.inertia_kg_m2, 1e7),
+        )
+    }
+}

@@ -88,6 +88,7 @@ fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
     let bytes = session.record(STROKES).unwrap_or_default();
     let mut record = solve::record::strokes(bytes, &session.before.params).map_err(|why| why.to_string())?;
     let mut found = Found::default();
+    found.row(DIRECTION, 1.0, None);
     if let Some(ohm) = args.resistance_ohm {
         record.resistance = Value { value: ohm, sigma: OHMMETER * ohm };
         found.row("resistance_mohm", 1e3 * ohm, Some(1e3 * OHMMETER * ohm));
@@ -107,7 +108,7 @@ fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
     row("friction_unm", 1e6, mean);
     let (tau, force) = (drive.time_constant_s, drive.force_n);
     found.more.insert("time_constant_s".into(), json!({ "value": tau.value, "sigma": tau.sigma }));
-    found.more.insert("friction_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
+    found.more.insert("friction_each_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
     found.notes.push(format!("time constant {tau} s; force that depends on the place {force} N"));
     Ok(found)
 }

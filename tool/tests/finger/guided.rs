@@ -2,6 +2,7 @@
 
 use crate::served::Served;
 use crate::stopped::{is_at_rest, patient};
+use fingertip::link::packet::instruction::REBOOT;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write as _;
@@ -104,6 +105,39 @@ fn a_killed_session_resumes_where_it_was() {
     fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
     let why = finger.refused(&calibrate);
     assert!(why.contains("press-1.fts: the series has"), "{why}");
+}
+
+/// KILL after each packet of a session that has all records: what is left are the write and the tare.
+#[test]
+fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
+    let finger = patient("wall");
+    let session = finger.file("written");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
+    let before = parameters(&finger);
+    let wanted = finger.json(&calibrate)["after"].clone();
+    let applied = [&calibrate[..], &["--apply"]].concat();
+    let mut seen = [0; 2];
+    for packets in 0.. {
+        if !finger.killed_after(packets, &applied) {
+            break;
+        }
+        let now = parameters(&finger);
+        let mut new = before.clone();
+        new["modulus_pa"] = wanted["modulus_pa"].clone();
+        assert!(now == before || now == new, "killed after {packets}: {now}");
+        seen[usize::from(now == new)] += 1;
+        if now == before && gains(&finger) == wanted["gains"] {
+            // The worst instant: the same session completes the write.
+            let done = finger.json(&applied);
+            assert_eq!((&done["applied"], &done["after"]), (&true.into(), &wanted), "killed after {packets}");
+            assert_eq!(parameters(&finger), new);
+        }
+        // Behind a reset there is what was saved.
+        finger.command(&format!("raw {REBOOT}"));
+        assert_eq!(parameters(&finger), before);
+    }
+    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+    assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
 }
 
 #[test]

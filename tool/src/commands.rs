@@ -3,6 +3,8 @@
 pub mod calibrate;
 pub mod capture;
 pub mod commission;
+mod guided;
+pub mod identify;
 pub mod info;
 pub mod latency;
 pub mod moving;

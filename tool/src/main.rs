@@ -4,8 +4,8 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use clap_complete::Shell;
 use fingertip_cli::client::Reach;
 use fingertip_cli::commands::{
-    calibrate, capture, commission, each, info, latency, params, press, record, recover, replay, scan, share, stop,
-    stream, tare, view,
+    calibrate, capture, commission, each, identify, info, latency, params, press, record, recover, replay, scan, share,
+    stop, stream, tare, view,
 };
 use fingertip_cli::{Client, Error};
 use serde_json::json;
@@ -66,16 +66,16 @@ enum Command {
     Params(params::Command),
     /// Measure the zero of every taxel; nothing may touch the tip
     Tare(tare::Args),
-    /// Prove the motor's direction, and measure the drive
-    #[command(subcommand)]
-    Commission(commission::Command),
+    /// Prove the motor's direction and measure the drive, by small motions in the air
+    Commission(commission::Args),
+    /// Measure Young's modulus of the tip, by presses onto a hard plate
+    Identify(identify::Args),
     /// Touch, hold a force for a while, let go
     Press(press::Args),
     /// Stop the finger in any mode: release, torque off, measurements aborted, bus watchdog off
     Stop(stop::Args),
-    /// Find the taxels' gains by presses onto a hard flat plate, and the scale of forces by a kitchen scale
-    #[command(subcommand)]
-    Calibrate(calibrate::Command),
+    /// Measure gains and modulus by presses onto a hard flat plate, and the scale of forces by a kitchen scale
+    Calibrate(calibrate::Args),
     /// Clear what stopped the motor, and say what stands in the way
     #[command(after_help = "Examples:\n  fingertip recover")]
     Recover,
@@ -145,10 +145,11 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Replay(args) => replay::run(args, cli.json),
         Command::Params(command) => params::run(command, &mut connect()?, cli.json),
         Command::Tare(args) => for_each(&|client| tare::run(args, client, cli.json)),
-        Command::Commission(command) => commission::run(command, &mut connect()?, cli.json),
+        Command::Commission(args) => commission::run(args, &mut connect()?, cli.json),
         Command::Press(args) => press::run(args, &mut connect()?, cli.json),
         Command::Stop(args) => stop::run(args, &cli.reach, cli.json),
-        Command::Calibrate(command) => calibrate::run(command, &mut connect()?, cli.json),
+        Command::Identify(args) => identify::run(args, &mut connect()?, cli.json),
+        Command::Calibrate(args) => calibrate::run(args, &mut connect()?, cli.json),
         Command::Recover => for_each(&|client| recover::run(client, cli.json)),
         Command::Latency(args) => latency::run(args, &mut connect()?, cli.json),
         Command::Completions { shell } => {

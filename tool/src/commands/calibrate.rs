@@ -1,164 +1,211 @@
 //! `fingertip calibrate`.
 
-use super::moving::Moving;
-use super::{Interrupt, no_fault, say, say_json, wait_for};
-use crate::{Client, Error, numbers, table};
-use fingertip::shipped::address;
+use super::guided::result::{self, Found};
+use super::guided::session::Session;
+use super::guided::{Options, Presses, Run, hold, motion, press};
+use crate::commands::press::direction_confirmed;
+use crate::{Client, Error, numbers};
 use serde_json::json;
+use solve::modulus::Modulus;
 use std::time::Duration;
 
-/// Of `CALIBRATE` and `SCALE`.
-const PRESS: i64 = 1;
-const FORGET: i64 = 2;
-const ACCEPT: i64 = 3;
-/// A status packet's error where something stands in the way.
-const RESULT: u8 = 1;
-/// Of `CALIBRATE_STATE`.
-const RUNNING: i64 = 1;
-const DONE: i64 = 2;
-/// Of `SCALE_POINTS`: the loop has not looked yet.
-const WAITS: i64 = 255;
-/// Of a proposed gain.
-const ONE: f64 = 16_384.0;
-const UNKNOWN: i64 = 255;
+/// Goals of the holds where none are given, N.
+const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
+/// Name of the press after the controller became warmer.
+const WARM: &str = "warm.fts";
 
-/// What to do.
-#[derive(Debug, clap::Subcommand)]
-#[command(after_help = "Examples, with a plate under the finger; docs/commissioning.md has all of it:\n  \
-        fingertip tare && fingertip calibrate press    (three times; move finger or plate between)\n  \
-        fingertip calibrate show\n  \
-        fingertip calibrate accept && fingertip params save\n  \
-        fingertip calibrate scale 1.47          (while `fingertip press` holds the force: the scale shows 150 g)\n  \
-        fingertip calibrate accept-scale && fingertip params save\n  \
-        fingertip calibrate forget")]
-pub enum Command {
-    /// Press once onto a hard flat plate, and take it into the proposal
-    Press {
-        /// How long it may take
-        #[arg(long, default_value_t = 30.0, value_parser = numbers::seconds)]
-        within_s: f64,
-    },
-    /// Show the gains that the presses propose
-    Show,
-    /// Make the proposed gains those in force; tare then
-    Accept,
-    /// While another program holds a force (both through `fingertip share`), tell what a scale under the plate shows
-    Scale {
-        /// What it shows, N; a gram is 0.00981
-        #[arg(value_name = "NEWTONS", value_parser = numbers::shown_mn)]
-        shown_mn: i64,
-    },
-    /// Multiply forces by the factor that the scale's numbers make
-    AcceptScale,
-    /// Forget all presses and all numbers of a scale
-    Forget,
+/// What to calibrate.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fingertip calibrate --session finger-1                  (leads through all of it; asks before it writes)\n  \
+    fingertip calibrate --scale-n 1,2.5,4 --save            (the scale shows three forces)\n  \
+    fingertip calibrate --no-scale --no-wait --apply --json (no questions, for programs)\n  \
+    fingertip calibrate --scale-n 1,2 --shown-n 1.04,2.07 --session finger-1 --no-wait --json")]
+pub struct Args {
+    /// Number of presses; finger or plate are moved between them
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=9))]
+    presses: u32,
+    /// Forces to hold on a scale under the plate, N; 1, 2.5 and 4 without it
+    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = numbers::goal_mn, conflicts_with = "no_scale")]
+    scale_n: Vec<i64>,
+    /// No scale: forces stay as wrong as the taxels' common gain
+    #[arg(long)]
+    no_scale: bool,
+    /// Numbers that the scale shows, N, in the order of --scale-n; asked for without it
+    #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = hold::newtons, conflicts_with = "no_scale")]
+    shown_n: Vec<f64>,
+    /// Also measure creep, by a weight that lies on the tip for this time
+    #[arg(long, value_name = "SECONDS", value_parser = numbers::seconds)]
+    creep_s: Option<f64>,
+    /// Also measure the temperature coefficient, by one more press once the controller is 5 K warmer
+    #[arg(long)]
+    warm: bool,
+    /// Longest wait for that
+    #[arg(long, default_value_t = 3600.0, value_parser = numbers::seconds)]
+    warm_within_s: f64,
+    #[command(flatten)]
+    how: Presses,
+    #[command(flatten)]
+    options: Options,
 }
 
-/// Does it.
+impl Args {
+    /// Goals to hold, smallest first, mN.
+    fn goals_mn(&self) -> Vec<i64> {
+        match (self.no_scale, self.scale_n.is_empty()) {
+            (true, _) => Vec::new(),
+            (false, true) => GOALS_N.iter().map(|goal| (1e3 * goal) as i64).collect(),
+            (false, false) => self.scale_n.clone(),
+        }
+    }
+
+    /// Refuses options that contradict each other, and with `--json` questions without an answer.
+    fn check(&self, json: bool) -> Result<(), Error> {
+        self.how.check(json)?;
+        let (goals, shown) = (self.goals_mn(), self.shown_n.len());
+        if !goals.is_sorted() {
+            return Err(Error::NotUnderstood("--scale-n: the smallest force comes first".into()));
+        }
+        if json && shown == 0 && !goals.is_empty() {
+            return Err(Error::NotUnderstood("--json asks no questions: give --shown-n, or --no-scale".into()));
+        }
+        if shown != 0 && shown != goals.len() {
+            let goals = goals.len();
+            return Err(Error::NotUnderstood(format!("--shown-n has {shown} numbers for {goals} forces of --scale-n")));
+        }
+        Ok(())
+    }
+}
+
+/// Measures gains and modulus by presses, the scale of forces by a kitchen scale, and on request creep and temperature.
 ///
 /// # Errors
-/// The controller refuses: the text says why.
-pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
-    match command {
-        Command::Press { within_s } => press(*within_s, client, json),
-        Command::Show => show(client, json),
-        Command::Accept => set(address::CALIBRATE, ACCEPT, "the proposed gains are in force; tare now", client, json),
-        Command::Scale { shown_mn } => scale(*shown_mn, client, json),
-        Command::AcceptScale => set(address::SCALE, ACCEPT, "forces are multiplied by the factor", client, json),
-        Command::Forget => set(address::CALIBRATE, FORGET, "all presses and numbers are forgotten", client, json),
+/// A motion ended early, no press counts, a number was refused, or the controller refused; nothing was changed then.
+pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
+    args.check(json)?;
+    direction_confirmed(client)?;
+    let run = Run::begin(&args.options, json)?;
+    let mut session = Session::open(args.options.session(), "calibrate", client)?;
+    result::same_settings(&session, client)?;
+    press::all(args.presses, &args.how, &mut session, &run, client)?;
+    let modulus = press::solved(args.presses, &mut session, &run)?;
+    let mut found = Found::default();
+    press::report(&modulus, &mut found);
+    press::gains(&modulus, &session, &mut found);
+    scale(args, &modulus, &mut found, &mut session, &run, client)?;
+    if let Some(seconds) = args.creep_s {
+        creep(seconds, args, &mut found, &mut session, &run, client)?;
     }
+    if args.warm {
+        temperature(args, &mut found, &mut session, &run, client)?;
+    }
+    result::finish(&found, &mut session, &run, client)
 }
 
-/// Sets a register and says what that did.
-fn set(register: u16, value: i64, done: &str, client: &mut Client, json: bool) -> Result<(), Error> {
-    client.set(register, value).map_err(|why| match why.refused_with(RESULT) {
-        true if register == address::CALIBRATE => {
-            format!("{why}: is torque off, and was there a `calibrate press`?").into()
-        }
-        true => format!("{why}: is torque off, and was there a `calibrate scale`?").into(),
-        false => why,
-    })?;
-    if json {
-        say_json(&json!({ (table::place(register)): value, "done": done }));
-    } else if value == ACCEPT {
-        say(format_args!("{done}; `fingertip params save` keeps them over a reset"));
-    } else {
-        say(done);
-    }
-    Ok(())
-}
-
-fn press(within_s: f64, client: &mut Client, json: bool) -> Result<(), Error> {
-    no_fault(client)?;
-    let interrupt = Interrupt::catch()?;
-    let moving = Moving::begin(client, &interrupt)?;
-    let state = press_once(within_s, moving.client, &interrupt);
-    let state = moving.finish(state)?;
-    interrupt.check()?;
-    no_fault(client)?;
-    if state != DONE {
-        let refusal = client.number(address::CALIBRATE_REFUSAL)?;
-        let why = table::meaning(address::CALIBRATE_REFUSAL, refusal);
-        return Err(format!("the press was not taken: {why} (docs/commissioning.md says what to do)").into());
-    }
-    let [presses, taxels] = [client.number(address::CALIBRATE_PRESSES)?, client.number(address::CALIBRATE_TAXELS)?];
-    if json {
-        say_json(&json!({ "presses": presses, "taxels": taxels }));
-    } else {
-        say(format_args!("{presses} presses reached {taxels} taxels"));
-    }
-    Ok(())
-}
-
-/// Begins a press and waits for its end, for a signal, or until the time is over: the last state.
-fn press_once(within_s: f64, client: &mut Client, interrupt: &Interrupt) -> Result<i64, Error> {
-    if let Err(why) = client.set(address::TORQUE_ENABLE, 1).and_then(|()| client.set(address::CALIBRATE, PRESS)) {
-        return no_fault(client).and(Err(why));
-    }
-    let ended = |state| state != RUNNING || interrupt.came();
-    wait_for(client, address::CALIBRATE_STATE, Duration::from_secs_f64(within_s), ended)
-}
-
-fn show(client: &mut Client, json: bool) -> Result<(), Error> {
-    let gains = client.block(address::PROPOSED_GAINS, address::PROPOSED_GAINS)?.numbers(address::PROPOSED_GAINS);
-    let sigmas = client.block(address::PROPOSED_SIGMAS, address::PROPOSED_SIGMAS)?.numbers(address::PROPOSED_SIGMAS);
-    let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
-    let taxel = |(gain, sigma): (&i64, &i64)| (*gain as f64 / ONE, (*sigma != UNKNOWN).then_some(*sigma as f64 * 1e-3));
-    let taxels: Vec<(f64, Option<f64>)> = gains.iter().zip(&sigmas).map(taxel).collect();
-    if json {
-        let all = taxels.iter().map(|(gain, sigma)| json!({ "gain": gain, "relative_sigma": sigma }));
-        say_json(&json!({ "taxels": all.collect::<Vec<_>>() }));
+/// Modulus, and with a scale the array's sensitivity: a press measures the product of modulus and common gain, a scale the
+/// common gain by itself.
+fn scale(
+    args: &Args,
+    modulus: &Modulus,
+    found: &mut Found,
+    session: &mut Session,
+    run: &Run<'_>,
+    client: &mut Client,
+) -> Result<(), Error> {
+    let goals_mn = args.goals_mn();
+    let share = modulus.sigma_kpa / modulus.kpa;
+    if goals_mn.is_empty() {
+        found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
+        found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * share }));
         return Ok(());
     }
-    for row in taxels.chunks(columns) {
-        let cells = row.iter().map(|(gain, sigma)| match sigma {
-            Some(_) => format!("{gain:6.3}"),
-            None => "     -".to_owned(),
-        });
-        say(cells.collect::<Vec<_>>().join(" "));
+    if session.step("holds").is_none() {
+        if !args.how.no_wait {
+            run.ask.enter("put a scale under the plate and zero it, the tip in the air", "--no-wait")?;
+        }
+        motion::pause(args.how.pause_s, run)?;
+        motion::tare(run, client)?;
     }
-    let known: Vec<f64> = taxels.iter().filter_map(|(_, sigma)| *sigma).collect();
-    let worst = known.iter().copied().fold(0.0, f64::max);
-    say(format_args!("{} taxels known, the worst to {:.1} %; - keeps its gain", known.len(), 100.0 * worst));
+    hold::all(&goals_mn, &args.shown_n, session, run, client)?;
+    let after = found.gains.iter().flat_map(|gains| gains.after.iter().flatten());
+    let factors =
+        after.zip(session.before.gains.iter().flatten()).map(|(after, before)| f64::from(*after) / f64::from(*before));
+    let held = hold::read(&factors.collect::<Vec<_>>(), &args.shown_n, session);
+    let scale = match solve::scale(&held) {
+        Ok(scale) => scale,
+        Err(why) => {
+            hold::forget(session)?;
+            found.block(format!("the numbers of the scale were refused: {why}; the next run holds again"));
+            return Ok(());
+        }
+    };
+    let (factor, part) = (scale.factor.value, scale.factor.relative());
+    let left = held.iter().map(|one| (factor * one.read_n / one.shown_n - 1.0).abs()).fold(0.0, f64::max);
+    let parts = modulus.parts;
+    let of_modulus = parts.residuals.hypot(parts.presses).hypot(parts.memory).hypot(part);
+    let codes = f64::from(session.before.params.codes_per_kpa_milli) / factor;
+    found.row("modulus_pa", 1e3 * modulus.kpa * factor, Some(1e3 * modulus.kpa * factor * of_modulus));
+    found.row("codes_per_kpa_milli", codes, Some(codes * part));
+    found.more.insert("scale".into(), json!({ "factor": factor, "sigma": scale.factor.sigma }));
+    found.more.insert("remaining".into(), json!({ "force_percent": 100.0 * part, "worst_hold_percent": 100.0 * left }));
+    found.notes.push(format!(
+        "forces times {}; after that the worst held force differs from the scale by {:.1} %",
+        scale.factor,
+        100.0 * left
+    ));
     Ok(())
 }
 
-fn scale(shown_mn: i64, client: &mut Client, json: bool) -> Result<(), Error> {
-    client.set(address::SCALE_SHOWS_MN, shown_mn)?;
-    let points = wait_for(client, address::SCALE_POINTS, Duration::from_secs(5), |points| points != WAITS)?;
-    let refusal = client.number(address::SCALE_REFUSAL)?;
-    if refusal != 0 {
-        let why = table::meaning(address::SCALE_REFUSAL, refusal);
-        return Err(format!("{shown_mn} mN was not taken: {why} (docs/commissioning.md says what to do)").into());
+fn creep(
+    seconds: f64,
+    args: &Args,
+    found: &mut Found,
+    session: &mut Session,
+    run: &Run<'_>,
+    client: &mut Client,
+) -> Result<(), Error> {
+    if session.step("weight").is_none() {
+        motion::pause(args.how.pause_s, run)?;
+        motion::tare(run, client)?;
     }
-    let [factor, sigma] = [
-        client.number(address::SCALE_FACTOR_PPM)? as f64 * 1e-6,
-        client.number(address::SCALE_SIGMA_PPM)? as f64 * 1e-6,
-    ];
-    if json {
-        say_json(&json!({ "factor": factor, "sigma": sigma, "numbers": points }));
-    } else {
-        say(format_args!("forces times {factor:.4} +- {sigma:.4} by {points} numbers"));
+    match solve::creep(&hold::weight(seconds, session, run, client)?) {
+        Ok(creep) => {
+            found.row("creep_permille", 1e3 * creep.share.value.max(0.0), Some(1e3 * creep.share.sigma));
+            found.row("creep_time_ms", 1e3 * creep.time_s.value, Some(1e3 * creep.time_s.sigma));
+            found.notes.push(format!("creep leaves {:.2} % of a held reading", 100.0 * creep.left));
+        }
+        Err(why) => {
+            session.forget("weight")?;
+            found.block(format!("the creep was not measured: {why}"));
+        }
+    }
+    Ok(())
+}
+
+fn temperature(
+    args: &Args,
+    found: &mut Found,
+    session: &mut Session,
+    run: &Run<'_>,
+    client: &mut Client,
+) -> Result<(), Error> {
+    let cold = press::read(&press::name(args.presses), session)?;
+    if session.record(WARM).is_none() {
+        let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
+        let chip_c = chip_c.ok_or("the controller does not measure its temperature: leave --warm out")?;
+        motion::warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s), run, client)?;
+    }
+    let question = "the controller is warm: leave finger and plate where they were in the last press";
+    press::one(WARM, question, &args.how, session, run, client)?;
+    match solve::temperature(&cold, &press::read(WARM, session)?) {
+        Ok(found_) => {
+            found.row("array_gain_ppm_per_k", 1e6 * found_.per_k.value, Some(1e6 * found_.per_k.sigma));
+            found.row("array_gain_at_c", found_.chip_c[0], None);
+        }
+        Err(why) => {
+            session.forget(WARM)?;
+            found.block(format!("the temperature coefficient was not measured: {why}"));
+        }
     }
     Ok(())
 }

@@ -187,8 +187,12 @@ fn keep(
     }
 }
 
-/// Reads what was kept.
-fn fetch(client: &mut Client, count: i64, say_on: &dyn Fn(&dyn std::fmt::Display)) -> Result<Vec<u8>, Error> {
+/// Reads what was kept: the bytes of the capture with this number.
+pub(super) fn fetch(
+    client: &mut Client,
+    count: i64,
+    say_on: &dyn Fn(&dyn std::fmt::Display),
+) -> Result<Vec<u8>, Error> {
     let length = client.number(address::CAPTURE_BYTES)? as usize;
     let window = table::register_at(address::CAPTURE_DATA).map_or(1, |register| register.count);
     let (mut bytes, mut said) = (Vec::with_capacity(length), Instant::now());

@@ -1,212 +1,114 @@
 //! `fingertip commission`.
 
-use super::moving::Moving;
-use super::{Interrupt, no_fault, say, say_json, wait_for};
-use crate::state::ANEW;
-use crate::{Client, Error, numbers, table};
-use fingertip::params::Params;
-use fingertip::shipped::address;
+use super::guided::ask::yes_or_no;
+use super::guided::result::{self, Found};
+use super::guided::session::Session;
+use super::guided::{Options, Run, motion};
+use super::params::set;
+use crate::{Client, Error, table};
+use fingertip::measure::Task;
 use serde_json::json;
-use std::time::Duration;
+use solve::Value;
 
-/// Of `COMMISSION`.
-const STOP: i64 = 0;
-const JOG: i64 = 1;
-const MEASURE: i64 = 2;
-/// Of `COMMISSION_STATE`.
-const RUNNING: i64 = 1;
-const JOGGED: i64 = 2;
-const MEASURED: i64 = 3;
-const REFUSED: i64 = 4;
-/// Why nothing else goes while the tip moves, whoever asked for it.
-const UNDER_WAY: &str =
-    "the tip is moving for a jog or a measurement: wait until it ends, or `fingertip commission stop`";
-/// Longest wait until a motion that was stopped has come to rest.
-const STOPS_WITHIN: Duration = Duration::from_secs(10);
-/// Of `COMMISSION_ACCEPT`.
-const DIRECTION: i64 = 1;
-const DRIVE: i64 = 2;
+/// Relative standard uncertainty of a resistance that an ohmmeter shows.
+const OHMMETER: f64 = 0.01;
+/// Steps of the session.
+const JOG: &str = "jog";
+const STROKES: &str = "strokes.fts";
+const DIRECTION: &str = "direction_confirmed";
 
-/// What to do; docs/commissioning.md has the order.
-#[derive(Debug, clap::Subcommand)]
-#[command(after_help = "Examples:\n  \
-    fingertip tare\n  \
-    fingertip commission jog             (watch: the tip must first go towards the object)\n  \
-    fingertip commission confirm         (it did: torque may be enabled from now on)\n  \
-    fingertip commission measure\n  \
-    fingertip commission accept\n  \
-    fingertip params save\n  \
-    fingertip commission stop            (ends a jog or a measurement that another host began)")]
-pub enum Command {
-    /// Move the tip a little, at 5 % of duty and for 100 ms at most, towards the object first: proves the direction
-    Jog(Within),
-    /// Say that the jog first moved the tip towards the object; torque is refused before
-    Confirm,
-    /// Measure torque constant, time constant, inertia and friction, by motions of 1 mm to both sides in the air
-    Measure(Within),
-    /// Take what was measured into the parameters
-    Accept,
-    /// Stop what is under way
-    Stop,
-}
-
-/// How long it may take.
+/// What to know before.
 #[derive(Debug, clap::Args)]
-pub struct Within {
-    /// How long to wait for the end; a real controller needs 10 s
-    #[arg(long, default_value_t = 600.0, value_parser = numbers::seconds)]
-    within_s: f64,
+#[command(after_help = "Examples:\n  \
+    fingertip commission                                    (watch the tip; asks before it writes)\n  \
+    fingertip commission --resistance-ohm 3.53 --save\n  \
+    fingertip commission --forward yes --apply --json       (no questions, for programs)")]
+pub struct Args {
+    /// Resistance of motor and bridge together, Ohm, by an ohmmeter; resistance_mohm without it
+    #[arg(long, value_name = "OHM", value_parser = ohm)]
+    resistance_ohm: Option<f64>,
+    /// Whether the jog first moves the tip towards the object: asked for without it
+    #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
+    forward: Option<bool>,
+    #[command(flatten)]
+    options: Options,
 }
 
-/// Does it, and tells what came of it.
+fn ohm(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.05..=200.0).contains(number));
+    number.ok_or_else(|| "a number from 0.05 to 200 is expected".into())
+}
+
+/// Proves the motor's direction, then measures the drive by strokes in the air.
 ///
 /// # Errors
-/// The controller refuses, with its reason.
-pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Error> {
-    match command {
-        Command::Jog(within) => {
-            carry_out(JOG, JOGGED, within, client)?;
-            if json {
-                say_json(&json!({ "direction_proven": true }));
-            } else {
-                say("motor and encoder go the same way");
-                say("did the tip first go towards the object? yes: `fingertip commission confirm`");
-                say("no: swap the motor's leads and the encoder's channels, both, and jog again");
-            }
-            Ok(())
-        }
-        Command::Measure(within) => {
-            carry_out(MEASURE, MEASURED, within, client)?;
-            tell(client, json)
-        }
-        Command::Confirm => accept(DIRECTION, "the direction is confirmed", "there is no jog to confirm", client, json),
-        Command::Accept => accept(DRIVE, "the parameters are set", "there is no measurement to accept", client, json),
-        Command::Stop => stop(client, json),
+/// A motion ended early, the strokes give no drive, or the controller refused; the drive's parameters are as before then.
+pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
+    if json && args.forward.is_none() {
+        return Err(Error::NotUnderstood("--json asks no questions: give --forward yes or --forward no".into()));
     }
+    let run = Run::begin(&args.options, json)?;
+    let mut session = Session::open(args.options.session(), "commission", client)?;
+    result::same_settings(&session, client)?;
+    if session.step(JOG).is_none() {
+        direction(args, &mut session, &run, client)?;
+    }
+    if session.record(STROKES).is_none() {
+        run.report("strokes: 1 mm to both sides, some 10 s");
+        let bytes = motion::motion(Task::Strokes, &run, client)?;
+        solve::record::strokes(&bytes, &session.before.params).map_err(|why| why.to_string())?;
+        session.recorded(STROKES, bytes)?;
+    }
+    let found = solved(args, &mut session)?;
+    result::finish(&found, &mut session, &run, client)
 }
 
-fn carry_out(task: i64, done: i64, within: &Within, client: &mut Client) -> Result<(), Error> {
-    free(client)?;
-    let interrupt = Interrupt::catch()?;
-    let moving = Moving::begin(client, &interrupt)?;
-    let state = strokes(task, within, moving.client, &interrupt);
-    let state = moving.finish(state)?;
-    interrupt.check()?;
-    if state == RUNNING {
-        return Err("stopped before its end; the parameters are as they were".into());
-    }
-    if state == REFUSED {
-        let refusal = client.number(address::COMMISSION_REFUSAL)?;
-        no_fault(client)?;
-        return Err(format!("refused: {}", reason(refusal)).into());
-    }
-    // Only what came to its end counts: a controller that started anew knows of no task.
-    if state == done { Ok(()) } else { Err(format!("it came to no end: {ANEW}, or its parameters were set").into()) }
-}
-
-/// Begins a task and waits for its end, for a signal, or until the time is over: the last state.
-fn strokes(task: i64, within: &Within, client: &mut Client, interrupt: &Interrupt) -> Result<i64, Error> {
-    client.set(address::COMMISSION, task).map_err(|why| {
-        Error::from(format!("{why}: tare first (`fingertip tare`), with torque off and nothing at the tip"))
-    })?;
-    let ended = |state| state != RUNNING || interrupt.came();
-    wait_for(client, address::COMMISSION_STATE, Duration::from_secs_f64(within.within_s), ended)
-}
-
-/// Stops a jog or a measurement, and nothing else.
-fn stop(client: &mut Client, json: bool) -> Result<(), Error> {
-    let runs = client.number(address::COMMISSION_STATE)? == RUNNING;
-    client.set(address::COMMISSION, STOP)?;
-    if runs && wait_for(client, address::COMMISSION_STATE, STOPS_WITHIN, |state| state != RUNNING)? == RUNNING {
-        return Err("the tip does not come to rest: `fingertip stop` turns torque off".into());
-    }
-    let mode = client.number(address::PRESENT_MODE)?;
-    if client.number(address::TORQUE_ENABLE)? != 0 {
-        let mode = table::meaning(address::PRESENT_MODE, mode);
-        return Err(format!(
-            "no jog and no measurement of the drive was under way, so nothing was stopped; torque is on, mode {mode}: \
-             `fingertip stop` stops the finger"
-        )
-        .into());
-    }
-    if json {
-        say_json(&json!({ "stopped": runs }));
-    } else if runs {
-        say("the motion is stopped; the parameters are as they were");
-    } else {
-        say("no jog and no measurement of the drive was under way; torque is off (`fingertip stop` stops all else)");
-    }
-    Ok(())
-}
-
-/// Fails where the motor is stopped, or the tip is moving already.
-fn free(client: &mut Client) -> Result<(), Error> {
-    no_fault(client)?;
-    if client.number(address::COMMISSION_STATE)? == RUNNING { Err(UNDER_WAY.into()) } else { Ok(()) }
-}
-
-/// What the refusal's number means, and what to do.
-fn reason(refusal: i64) -> String {
-    use fingertip::commission::Refusal::{
-        Astray, Blocked, HeldBack, Interrupted, NotReady, Range, Restless, Reversed, Still, Touched, Unconfirmed,
-        Unsteady,
+/// The jog shows which way the motor goes; a person says whether that is towards the object.
+fn direction(args: &Args, session: &mut Session, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    motion::tare(run, client)?;
+    run.report("jog: watch the tip. It moves by 0.8 mm and back, with 8 % of duty at most");
+    motion::motion(Task::Jog, run, client)?;
+    let forward = match args.forward {
+        Some(forward) => forward,
+        None => run.ask.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
     };
-    let all = [
-        Interrupted,
-        NotReady,
-        Unconfirmed,
-        Still,
-        Reversed,
-        Astray,
-        Touched,
-        Blocked,
-        HeldBack,
-        Restless,
-        Unsteady,
-        Range,
-    ];
-    let found = all.into_iter().find(|known| *known as i64 == refusal);
-    found.map_or_else(|| table::meaning(address::COMMISSION_REFUSAL, refusal), |known| known.to_string())
+    let confirmed = i64::from(forward);
+    set::set(&[(table::find(DIRECTION)?, confirmed)], client)?;
+    if !forward {
+        return Err(
+            "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, \
+                    then run it again. Torque is refused until then"
+                .into(),
+        );
+    }
+    session.done(JOG, json!({ "forward": true }))
 }
 
-/// What was measured beside what the parameters hold.
-fn tell(client: &mut Client, json: bool) -> Result<(), Error> {
-    let rows = [
-        ("torque_constant_unm_per_a", address::MEASURED_TORQUE_CONSTANT, address::TORQUE_CONSTANT_SIGMA),
-        ("time_constant_us", address::MEASURED_TIME_CONSTANT, address::TIME_CONSTANT_SIGMA),
-        ("inertia_ug_m2", address::MEASURED_INERTIA, address::INERTIA_SIGMA),
-        ("friction_forward_unm", address::MEASURED_FRICTION_FORWARD, address::FRICTION_FORWARD_SIGMA),
-        ("friction_back_unm", address::MEASURED_FRICTION_BACK, address::FRICTION_BACK_SIGMA),
-    ];
-    let mut all = serde_json::Map::new();
-    for (name, register, sigma) in rows {
-        let (value, sigma) = (client.number(register)?, client.number(sigma)? as f64 * 0.1);
-        let place = Params::RANGES.iter().position(|(known, ..)| *known == name);
-        let now = place.map(|place| client.number(address::PARAMS + 4 * place as u16)).transpose()?;
-        if json {
-            all.insert(name.into(), json!({ "value": value, "sigma_percent": sigma, "now": now }));
-        } else {
-            let now = now.map_or(String::new(), |now| format!(", the parameter is {now}"));
-            say(format_args!("{name:26} {value:>7} +- {sigma:.1} %{now}"));
+fn solved(args: &Args, session: &mut Session) -> Result<Found, Error> {
+    let bytes = session.record(STROKES).unwrap_or_default();
+    let mut record = solve::record::strokes(bytes, &session.before.params).map_err(|why| why.to_string())?;
+    let mut found = Found::default();
+    found.row(DIRECTION, 1.0, None);
+    if let Some(ohm) = args.resistance_ohm {
+        record.resistance = Value { value: ohm, sigma: OHMMETER * ohm };
+        found.row("resistance_mohm", 1e3 * ohm, Some(1e3 * OHMMETER * ohm));
+    }
+    let drive = match solve::strokes::solve(&record) {
+        Ok(drive) => drive,
+        Err(why) => {
+            session.forget(STROKES)?;
+            return Err(format!("the strokes give no drive: {why}. The next run makes them again").into());
         }
-    }
-    if json {
-        say_json(&all.into());
-        return Ok(());
-    }
-    say("inertia and friction hold where resistance_mohm does: nothing on the board tells the current, so resistance \
-         cannot be");
-    say("measured here, nor the gear's play: docs/commissioning.md says why. Next: `fingertip commission accept`");
-    Ok(())
-}
-
-fn accept(what: i64, done: &str, nothing: &str, client: &mut Client, json: bool) -> Result<(), Error> {
-    free(client)?;
-    client.set(address::COMMISSION_ACCEPT, what).map_err(|why| Error::from(format!("{nothing}: {why}")))?;
-    if json {
-        say_json(&json!({ "accepted": what, "done": done }));
-    } else {
-        say(format_args!("{done} until the next reset; `fingertip params save` keeps it"));
-    }
-    Ok(())
+    };
+    let mut row = |name, unit: f64, value: Value| found.row(name, unit * value.value, Some(unit * value.sigma));
+    row("torque_constant_unm_per_a", 1e6, drive.torque_constant);
+    row("inertia_ug_m2", 1e9, drive.inertia_kg_m2);
+    let [forward, back] = drive.friction.map(|friction| friction.torque_nm);
+    let mean = Value { value: (forward.value + back.value) / 2.0, sigma: forward.sigma.max(back.sigma) };
+    row("friction_unm", 1e6, mean);
+    let (tau, force) = (drive.time_constant_s, drive.force_n);
+    found.more.insert("time_constant_s".into(), json!({ "value": tau.value, "sigma": tau.sigma }));
+    found.more.insert("friction_each_unm".into(), json!({ "forward": 1e6 * forward.value, "back": 1e6 * back.value }));
+    found.notes.push(format!("time constant {tau} s; force that depends on the place {force} N"));
+    Ok(found)
 }

@@ -3,6 +3,7 @@
 use super::{Interrupt, aside, wait_for};
 use crate::state::{Clock, State};
 use crate::{Client, Error};
+use fingertip::measure::Task;
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use std::time::{Duration, Instant};
@@ -15,6 +16,8 @@ const WATCHDOG: i64 = WATCHDOG_MS / 20;
 const RELEASE_S: f64 = 10.0;
 /// Longest wait for the controller, for example where no frames come and its clock stands still.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// `MEASURE`: stops the motion.
+const STOP: i64 = Task::Stop as i64;
 /// Time between two reads of the state.
 const LOOK: Duration = Duration::from_millis(10);
 /// A released tip below this speed and this force is clear of the object.
@@ -58,7 +61,7 @@ impl<'a> Moving<'a> {
 
     fn stop(&mut self) -> Result<(), Error> {
         let Some(watchdog) = self.watchdog.take() else { return Ok(()) };
-        let released = take_off(RELEASE_S, self.client);
+        let released = release(RELEASE_S, self.client).map(drop);
         if matches!(released, Err(Error::Silent { .. })) {
             // A line that stalled would deliver torque off together with the goal 0, and friction would keep most of the
             // force. The bus watchdog releases the object, then turns torque off.
@@ -82,29 +85,22 @@ impl Drop for Moving<'_> {
     }
 }
 
-/// Takes the tip off the object; [`halt`] must follow, whatever comes of it. Only torque off ends a press that measures,
-/// and friction would keep most of its force: torque then goes on once more, with the goal of 0 that torque off leaves.
-pub(super) fn take_off(within_s: f64, client: &mut Client) -> Result<(), Error> {
-    if release(within_s, client)?.mode == Mode::Press as i64 {
-        halt(client)?;
-        client.again(|client| client.set(address::TORQUE_ENABLE, 1))?;
-        wait_for(client, address::PRESENT_MODE, PATIENCE, |mode| mode != Mode::Off as i64)?;
-        release(within_s, client)?;
-    }
-    Ok(())
-}
-
-/// Ends a grip by the goal 0 and waits until the tip is clear of the object, at most for this time. Returns the last
-/// state, which in other modes is the first.
+/// Ends a motion that measures by `MEASURE` 0 and a grip by the goal 0, then waits until the tip is clear of the object, at
+/// most for this time. Returns the last state, which in other modes is the first. A press that was ended is a grip.
 pub(super) fn release(within_s: f64, client: &mut Client) -> Result<State, Error> {
     let (begun, mut clock) = (Instant::now(), Clock::default());
     loop {
         let state = client.again(State::read)?;
-        let grips = [Mode::Approach, Mode::Force, Mode::Release].iter().any(|mode| *mode as i64 == state.mode);
+        let is = |mode: Mode| mode as i64 == state.mode;
+        let measures = is(Mode::Press) || is(Mode::Strokes);
+        let grips = measures || is(Mode::Approach) || is(Mode::Force) || is(Mode::Release);
         let rests = state.speed_um_per_s.abs() < REST_UM_PER_S && state.force_mn < CLEAR_MN;
         let late = clock.time_s(&state).is_none_or(|time_s| time_s > within_s) || begun.elapsed() > PATIENCE;
-        if !grips || late || state.mode == Mode::Release as i64 && rests {
+        if !grips || late || is(Mode::Release) && rests {
             return Ok(state);
+        }
+        if measures {
+            client.again(|client| client.set(address::MEASURE, STOP))?;
         }
         if state.goal_mn != 0 {
             client.again(|client| client.set(address::GOAL_FORCE_MN, 0))?;

@@ -1,8 +1,8 @@
 //! `fingertip params`: what outlives a reset.
 
 mod file;
-mod gains;
-mod set;
+pub(super) mod gains;
+pub(super) mod set;
 
 use super::{say, say_json};
 use crate::state::ANEW;
@@ -177,7 +177,7 @@ fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> 
     Ok(())
 }
 
-fn save(client: &mut Client, json: bool) -> Result<(), Error> {
+pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     let meant = read_all(client)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
     // The core stands while the flash is written, and may stay silent for that long.

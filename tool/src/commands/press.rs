@@ -122,7 +122,7 @@ pub(super) fn direction_confirmed(client: &mut Client) -> Result<(), Error> {
     if client.number(table::find("direction_confirmed")?.address)? != 0 {
         return Ok(());
     }
-    Err("nobody confirmed yet which way the motor goes: `fingertip commission jog`, and watch the tip".into())
+    Err("nobody confirmed yet which way the motor goes: `fingertip commission`, and watch the tip".into())
 }
 
 /// Turns torque on and sets the goal.

@@ -193,7 +193,7 @@ impl Bus {
         if self.commander.as_ref().is_none_or(|commander| commander.from != from) && is_stop(packet) {
             let stopped = self.commander.take().map(|commander| commander.from);
             self.stopped.extend(stopped);
-        } else if !READS.contains(&packet.instruction) && !covers(packet, address::SCALE_SHOWS_MN) {
+        } else if !READS.contains(&packet.instruction) {
             let new = || Commander { from, ids: BTreeSet::new(), watchdog: None, heard: Instant::now() };
             let may = !self.stopped.contains(&from) && !covers(packet, address::BAUD_RATE);
             let commander = if may { Some(self.commander.get_or_insert_with(new)) } else { None };
@@ -240,9 +240,9 @@ fn stop(client: &mut Client) -> Result<bool, Error> {
         if moving::is_idle(client.again(|client| client.number(address::PRESENT_MODE))?) {
             return Ok(false);
         }
-        let released = moving::take_off(RELEASE_S, client);
+        let released = moving::release(RELEASE_S, client);
         moving::halt(client)?;
-        return released.map(|()| true);
+        return released.map(|_| true);
     }
     let drives = client.again(|client| client.number(address::TORQUE_ENABLE))? != 0;
     if drives {

@@ -29,20 +29,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }
-    client.set(address::TARE, 1)?;
-    let within = Duration::from_secs_f64(args.within_s);
-    let state = wait_for(client, address::TARE_STATE, within, |state| state != RUNNING)?;
-    match state {
-        DONE => {}
-        RUNNING => {
-            return Err(format!("the tare is still running after {} s: do frames come in?", args.within_s).into());
-        }
-        _ => return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()),
-    }
-    let limits = client.number(address::LIMITS)? as u16;
-    let touched = Limits(limits).has(Limits::TARED_TOUCHING);
-    let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);
-    let (least, most) = (codes.iter().min().copied().unwrap_or(0), codes.iter().max().copied().unwrap_or(0));
+    let Tared { touched, least, most } = measure(Duration::from_secs_f64(args.within_s), client)?;
     if json {
         say_json(
             &json!({ "id": client.id, "tared": true, "touched": touched, "least_codes": least, "most_codes": most }),
@@ -54,4 +41,31 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
         return Err(TOUCHED.into());
     }
     Ok(())
+}
+
+/// Result of a tare.
+pub(super) struct Tared {
+    /// Something seemed to touch the tip meanwhile.
+    pub touched: bool,
+    /// Lowest and highest zero, codes.
+    least: i64,
+    most: i64,
+}
+
+/// Measures the zeros, with torque off.
+pub(super) fn measure(within: Duration, client: &mut Client) -> Result<Tared, Error> {
+    client.set(address::TARE, 1)?;
+    let state = wait_for(client, address::TARE_STATE, within, |state| state != RUNNING)?;
+    match state {
+        DONE => {}
+        RUNNING => {
+            let within_s = within.as_secs_f64();
+            return Err(format!("the tare is still running after {within_s} s: do frames come in?").into());
+        }
+        _ => return Err(format!("the tare came to nothing: {}", table::meaning(address::TARE_STATE, state)).into()),
+    }
+    let touched = Limits(client.number(address::LIMITS)? as u16).has(Limits::TARED_TOUCHING);
+    let codes = client.block(address::TARE_CODES, address::TARE_CODES)?.numbers(address::TARE_CODES);
+    let (least, most) = (codes.iter().min().copied().unwrap_or(0), codes.iter().max().copied().unwrap_or(0));
+    Ok(Tared { touched, least, most })
 }

@@ -69,7 +69,7 @@ fn what_cannot_be_captured_is_told() {
     let file = finger.file("press.mcap");
     finger.done(&["params", "set", "direction_confirmed=0"]);
     let why = finger.refused(&["capture", "--press", "0.5", "--out", &file]);
-    assert!(why.contains("`fingertip commission jog`"), "{why}");
+    assert!(why.contains("`fingertip commission`"), "{why}");
     finger.done(&["params", "set", "direction_confirmed=1"]);
     finger.done(&["tare"]);
     client(&finger).set(address::TORQUE_ENABLE, 1).expect("it obeys");

@@ -137,30 +137,24 @@ fn a_release_that_arrives_late_leaves_no_force() {
 #[test]
 fn a_controller_that_starts_anew_was_not_commissioned() {
     let finger = Served::begin("wall");
-    for task in ["jog", "measure"] {
-        finger.done(&["tare"]);
-        finger.command(&format!("trap Commission {REBOOT}"));
-        let why = finger.refused(&["commission", task]);
-        assert!(why.contains("it came to no end") && why.contains("started anew"), "{task}: {why}");
-    }
+    finger.command(&format!("trap Strokes {REBOOT}"));
+    let why = finger.refused(&["commission", "--forward", "yes"]);
+    assert!(why.contains("came to no end") && why.contains("started anew"), "{why}");
 }
 
 #[test]
-fn a_motion_that_somebody_else_began_is_told() {
+fn a_motion_that_somebody_else_began_is_left_alone() {
     let finger = Served::begin("wall");
     finger.done(&["tare"]);
-    client(&finger).set(address::COMMISSION, 2).expect("it obeys");
-    finger.until_alone("Commission");
-    for command in ["jog", "measure", "confirm", "accept"] {
-        let why = finger.refused(&["commission", command]);
-        assert!(why.contains("the tip is moving") && why.contains("`fingertip commission stop`"), "{command}: {why}");
+    client(&finger).set(address::MEASURE, 2).expect("it obeys");
+    finger.until_alone("Strokes");
+    for command in [&["commission", "--forward", "yes"][..], &["identify", "--no-wait", "--pause-s", "0"]] {
+        let why = finger.refused(command);
+        assert!(why.contains("another motion that measures is under way"), "{command:?}: {why}");
     }
-    assert!(finger.command("state").contains("Commission"), "it was left alone");
-    let said = finger.done(&["commission", "stop"]);
-    assert!(said.contains("the motion is stopped"), "{said}");
+    assert!(finger.command("state").contains("Strokes"), "it was left alone");
+    finger.done(&["stop"]);
     finger.command("fault supply-low");
-    for command in ["jog", "measure", "confirm", "accept"] {
-        let why = finger.refused(&["commission", command]);
-        assert!(why.contains("fault 9 (supply low)"), "{command}: {why}");
-    }
+    let why = finger.refused(&["commission", "--forward", "yes"]);
+    assert!(why.contains("fault 9 (supply low)"), "{why}");
 }

@@ -4,6 +4,7 @@
 mod attacked;
 mod captured;
 mod exits;
+mod guided;
 mod killed;
 mod recorded;
 #[path = "../served/mod.rs"]
@@ -77,33 +78,6 @@ fn several_ids_are_asked_one_after_the_other() {
     assert!(said.starts_with("ID 1:\ntared: ") && said.contains("\nID 2:\ntared: "), "{said}");
     let said = finger.done(&["--id", "all", "--timeout-ms", "1000", "stop"]);
     assert!(said.contains("ID 1: mode ") && said.contains("ID 2: mode "), "{said}");
-}
-
-#[test]
-fn a_drive_is_commissioned() {
-    let finger = Served::begin("wall");
-    finger.done(&["params", "set", "direction_confirmed=0"]);
-    let why = finger.refused(&["commission", "jog"]);
-    assert!(why.contains("`fingertip tare`"), "{why}");
-    finger.done(&["tare"]);
-    let why = finger.refused(&["press", "1"]);
-    assert!(why.contains("`fingertip commission jog`"), "{why}");
-    let why = finger.refused(&["commission", "confirm"]);
-    assert!(why.contains("no jog to confirm"), "{why}");
-    let why = finger.refused(&["commission", "measure"]);
-    assert!(why.contains("jog first"), "{why}");
-    let jogged = finger.done(&["commission", "jog"]);
-    assert!(jogged.contains("the same way") && jogged.contains("`fingertip commission confirm`"), "{jogged}");
-    finger.done(&["commission", "confirm"]);
-    let measured = finger.json(&["commission", "measure"]);
-    let constant = &measured["torque_constant_unm_per_a"];
-    let (found, now) = (constant["value"].as_f64().expect("a number"), constant["now"].as_f64().expect("a number"));
-    assert!((found / now - 1.0).abs() < 0.03 && constant["sigma_percent"].as_f64() > Some(0.0), "{measured}");
-    let accepted = finger.done(&["commission", "accept"]);
-    assert!(accepted.contains("`fingertip params save`"), "{accepted}");
-    let why = finger.refused(&["commission", "accept"]);
-    assert!(why.contains("no measurement to accept"), "{why}");
-    finger.done(&["commission", "stop"]);
 }
 
 #[test]

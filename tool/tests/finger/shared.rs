@@ -195,8 +195,6 @@ fn who_was_stopped_does_not_take_the_command_from_who_stopped_it() {
     first.set(address::BUS_WATCHDOG, 25).expect_err("it was stopped");
     second.set(address::BUS_WATCHDOG, 0).expect("it obeys");
     second.set(address::BAUD_RATE, 4).expect_err("the broker would not follow");
-    let shown = first.set(address::SCALE_SHOWS_MN, 1_000);
-    assert!(!shown.is_err_and(|why| why.refused_with(7)), "anyone reads a scale");
 }
 
 #[test]

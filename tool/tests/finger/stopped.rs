@@ -1,6 +1,7 @@
 //! A signal, a kill or `fingertip stop` in the middle of each motion: the finger is at rest afterwards.
 
 use crate::served::Served;
+use fingertip::measure::Ended;
 use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::Reach;
@@ -12,15 +13,14 @@ use std::process::Child;
 /// A force that a stopped finger may still show, N.
 const RESIDUAL_N: f64 = 0.05;
 
-/// A calibration press ends by itself at 7 N: below this something else ended it.
+/// A press that measures ends by itself at 6 N: below this something else ended it.
 const CUT_SHORT_N: f64 = 4.0;
 
-/// The commands that move the finger, each with the mode in which it is caught. A jog takes the way of a measurement, and
-/// is too short to be caught.
+/// The commands that move the finger, each with the mode in which it is caught. `commission` is caught in its jog.
 const MOTIONS: [(&[&str], &str); 4] = [
     (&["press", "1", "--seconds", "1000000", "--within-s", "3600"], "Force:"),
-    (&["calibrate", "press", "--within-s", "3600"], "Identify:"),
-    (&["commission", "measure"], "Commission:"),
+    (&["identify", "--no-wait", "--pause-s", "0", "--within-s", "3600", "--apply"], "Press:"),
+    (&["commission", "--forward", "yes", "--within-s", "3600", "--apply"], "Strokes:"),
     (&["capture", "--press", "1", "--within-s", "3600", "--force", "--out"], "Force:"),
 ];
 
@@ -36,20 +36,20 @@ fn caught(finger: &Served, arguments: &[&str], mode: &str) -> Child {
     let out: &[&str] = if arguments[0] == "capture" { &[&file] } else { &[] };
     let child = finger.start(&[arguments, out].concat());
     finger.until(mode);
-    while mode == "Identify:" && finger.true_force_n() < 0.5 {
+    while mode == "Press:" && finger.true_force_n() < 0.5 {
         std::thread::sleep(Served::LOOK);
     }
     child
 }
 
 /// A finger that does not outrun its host on a loaded machine.
-fn patient(scene: &str) -> Served {
+pub fn patient(scene: &str) -> Served {
     let finger = Served::begin(scene);
     finger.command("patient on");
     finger
 }
 
-fn is_at_rest(finger: &Served, what: &str) {
+pub fn is_at_rest(finger: &Served, what: &str) {
     let info = finger.json(&["info"]);
     let now = (&info["torque_enable"], &info["goal_mn"], &info["bus_watchdog_ms"], info["mode_name"].as_str());
     assert_eq!(now, (&0.into(), &0.into(), &0.into(), Some("off")), "{what}");
@@ -61,6 +61,7 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
     for (arguments, mode) in MOTIONS {
         for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
             let what = format!("{arguments:?} {signal:?}");
+            let parameters = finger.json(&["params", "get"]);
             let mut child = caught(&finger, arguments, mode);
             Served::signal(&child, signal);
             let mut most_n = 0.0_f64;
@@ -75,13 +76,10 @@ fn a_signal_leaves_every_motion_at_rest_and_clear_of_the_object() {
             assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
             is_at_rest(&finger, &what);
             assert!(most_n < CUT_SHORT_N, "{what}: {most_n} N after the signal");
-            let refused = match mode {
-                "Identify:" => Some((address::CALIBRATE_REFUSAL, 9)),
-                "Commission:" => Some((address::COMMISSION_REFUSAL, 1)),
-                _ => None,
-            };
-            if let Some((register, interrupted)) = refused {
-                assert_eq!(client(&finger).number(register).expect("it answers"), interrupted, "{what}");
+            assert_eq!(finger.json(&["params", "get"]), parameters, "{what}");
+            if ["Press:", "Strokes:"].contains(&mode) {
+                let ended = client(&finger).number(address::MEASURE_ENDED).expect("it answers");
+                assert_eq!(ended, Ended::Interrupted as i64, "{what}");
             }
         }
     }
@@ -176,13 +174,12 @@ fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
 fn stop_stops_every_mode() {
     let finger = patient("wall");
     let press: &[(u16, i64)] = &[(address::TORQUE_ENABLE, 1), (address::GOAL_FORCE_MN, 1_000)];
-    for (writes, mode, releases) in [
-        (&[][..], "Off:", true),
-        (press, "Approach:", true),
-        (press, "Force:", true),
-        (&[(address::TORQUE_ENABLE, 1), (address::IDENTIFY, 1)], "Identify:", false),
-        (&[(address::TORQUE_ENABLE, 1), (address::CALIBRATE, 1)], "Identify:", false),
-        (&[(address::COMMISSION, 2)], "Commission:", true),
+    for (writes, mode) in [
+        (&[][..], "Off:"),
+        (press, "Approach:"),
+        (press, "Force:"),
+        (&[(address::TORQUE_ENABLE, 1), (address::MEASURE, 3)], "Press:"),
+        (&[(address::MEASURE, 2)], "Strokes:"),
     ] {
         finger.done(&["tare"]);
         let mut bus = client(&finger);
@@ -195,7 +192,7 @@ fn stop_stops_every_mode() {
         let stopped = finger.json(&["stop"]);
         assert_eq!((&stopped["mode"], &stopped["at_rest"]), (&"off".into(), &true.into()), "{mode} {stopped}");
         assert!(!stopped["mode_before"].is_null() && !stopped["force_before_mn"].is_null(), "{stopped}");
-        assert!(!releases || finger.true_force_n() < RESIDUAL_N, "{mode} {}", finger.command("state"));
+        assert!(finger.true_force_n() < RESIDUAL_N, "{mode} {}", finger.command("state"));
         is_at_rest(&finger, mode);
     }
 }
@@ -259,31 +256,4 @@ fn one_packet_stops_all_fingers() {
     finger.command(&format!("deaf after 1 for {}", u64::MAX));
     let why = finger.refused(&["--timeout-ms", "50", "stop", "--all"]);
     assert!(both("Off:"), "{why} {}", finger.command("state"));
-}
-
-#[test]
-fn commands_say_what_they_did_and_did_not_do() {
-    let finger = patient("wall");
-    let said = finger.done(&["commission", "stop"]);
-    assert!(said.contains("no jog and no measurement") && said.contains("`fingertip stop`"), "{said}");
-    assert!(finger.done(&["calibrate", "forget"]).contains("all presses and numbers are forgotten"));
-    finger.done(&["tare"]);
-    for (register, mode) in [(address::CALIBRATE, "mode identify"), (address::CLEAR_FAULT, "torque is on")] {
-        let mut bus = client(&finger);
-        bus.set(address::TORQUE_ENABLE, 1).expect("it obeys");
-        bus.set(register, 1).expect("it obeys");
-        drop(bus);
-        finger.until_alone(if register == address::CALIBRATE { "Identify:" } else { "Release:" });
-        let why = finger.refused(&["commission", "stop"]);
-        assert!(why.contains("nothing was stopped") && why.contains(mode) && why.contains("`fingertip stop`"), "{why}");
-        finger.done(&["stop"]);
-    }
-    finger.done(&["tare"]);
-    for (command, hint) in [("accept", "`calibrate press`"), ("accept-scale", "`calibrate scale`")] {
-        let why = finger.refused(&["calibrate", command]);
-        assert!(why.contains(hint), "{why}");
-    }
-    finger.done(&["calibrate", "press", "--within-s", "3600"]);
-    let said = finger.done(&["calibrate", "accept"]);
-    assert!(said.contains("the proposed gains are in force") && said.contains("`fingertip params save`"), "{said}");
 }

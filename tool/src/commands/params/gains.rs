@@ -4,7 +4,7 @@ use crate::{Client, Error};
 use fingertip::shipped::address;
 
 /// All of them, in rows.
-pub(super) fn read(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
+pub(in crate::commands) fn read(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
     let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
     let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
     // The registers have 16 bits.
@@ -12,7 +12,7 @@ pub(super) fn read(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
 }
 
 /// Sets them, all or none, with torque off. What they were, where that is something else: a tare is needed then.
-pub(super) fn set(gains: &[Vec<u16>], client: &mut Client) -> Result<Option<Vec<Vec<u16>>>, Error> {
+pub(in crate::commands) fn set(gains: &[Vec<u16>], client: &mut Client) -> Result<Option<Vec<Vec<u16>>>, Error> {
     let before = read(client)?;
     let shape = |rows: &[Vec<u16>]| rows.iter().map(Vec::len).collect::<Vec<_>>();
     if shape(gains) != shape(&before) {

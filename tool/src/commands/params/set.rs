@@ -12,14 +12,14 @@ use fingertip::shipped::{Config, address};
 use fingertip::store::BAUD_RATES;
 
 /// A register, what it was, and what it is now.
-pub(super) type Changed = (&'static Register, i64, i64);
+pub(in crate::commands) type Changed = (&'static Register, i64, i64);
 
 /// Sets them; what changed.
 ///
 /// # Errors
 /// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says how
 /// it stands.
-pub(super) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
+pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
     let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
     if !wrong.is_empty() {
         return Err(format!("{}; nothing was changed", wrong.join("; ")).into());

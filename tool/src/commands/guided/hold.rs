@@ -1,0 +1,202 @@
+//! Forces that are held on a scale, and a weight that lies on the tip.
+
+use super::Run;
+use super::session::Session;
+use crate::commands::moving::Moving;
+use crate::commands::{press, stopped};
+use crate::state::State;
+use crate::{Client, Error, numbers};
+use fingertip::shipped::address;
+use fingertip::state::Mode;
+use serde_json::{Value, json};
+use solve::drift::HeldSeries;
+use solve::scale::Held;
+use std::time::{Duration, Instant};
+
+/// Time for a force to be reached, and within its tolerance before the scale is read.
+const REACHED_S: f64 = 30.0;
+const SETTLED: Duration = Duration::from_secs(1);
+/// Time over which readings are averaged.
+const AVERAGED: Duration = Duration::from_millis(500);
+/// Largest difference between goal and settled force: this share, at least this.
+const NEAR: f64 = 0.05;
+const NEAR_MN: f64 = 20.0;
+const LOOK: Duration = Duration::from_millis(10);
+/// Step of the session.
+const STEP: &str = "holds";
+/// A weight on the tip: least force, and time to lay it there.
+const WEIGHT_MN: i64 = 100;
+const WEIGHT_WITHIN: Duration = Duration::from_secs(60);
+
+/// Reading of a held force.
+#[derive(Default)]
+struct Reading {
+    count: f64,
+    force_mn: f64,
+    pressures_pa: Vec<f64>,
+}
+
+impl Reading {
+    /// Adds a state; creep and temperature drift are taken off its force.
+    fn add(&mut self, client: &mut Client) -> Result<(), Error> {
+        let state = client.again(State::read_picture)?;
+        let creep_mn = client.again(|client| client.number(address::PRESENT_CREEP_MN))?;
+        let drift_mn = client.again(|client| client.number(address::PRESENT_DRIFT_MN))?;
+        self.count += 1.0;
+        self.force_mn += (state.force_mn - creep_mn - drift_mn) as f64;
+        self.pressures_pa.resize(state.pressures_pa.len(), 0.0);
+        self.pressures_pa.iter_mut().zip(state.pressures_pa).for_each(|(sum, one)| *sum += one as f64);
+        Ok(())
+    }
+}
+
+/// Holds each force in turn, each larger than the one before: an array with hysteresis reads more on the way back. The tip
+/// is at rest and clear of the plate afterwards.
+pub fn all(
+    goals_mn: &[i64],
+    shown_n: &[f64],
+    session: &mut Session,
+    run: &Run<'_>,
+    client: &mut Client,
+) -> Result<(), Error> {
+    if session.step(STEP).is_some() {
+        return Ok(());
+    }
+    let moving = Moving::begin(client, &run.interrupt)?;
+    let held = hold(goals_mn, shown_n, run, moving.client);
+    let held = moving.finish(held)?;
+    session.done(STEP, held.into())
+}
+
+fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -> Result<Vec<Value>, Error> {
+    let mut held = Vec::new();
+    for (index, goal_mn) in goals_mn.iter().enumerate() {
+        let goal_n = *goal_mn as f64 * 1e-3;
+        run.report(format_args!("holding {goal_n} N"));
+        press::begin(*goal_mn, client)?;
+        reach(*goal_mn, run, client)?;
+        let shown = match shown_n.get(index) {
+            Some(shown) => *shown,
+            None => {
+                let question = format!("{goal_n} N are held: what does the scale show, in N (1 g is 0.00981 N)?");
+                run.ask.parsed(&question, "--shown-n", newtons, &mut || same_goal(*goal_mn, client))?
+            }
+        };
+        let (until, mut reading) = (Instant::now() + AVERAGED, Reading::default());
+        while Instant::now() < until || reading.count == 0.0 {
+            run.interrupt.check()?;
+            same_goal(*goal_mn, client)?;
+            reading.add(client)?;
+            std::thread::sleep(LOOK);
+        }
+        let Reading { count, force_mn, pressures_pa } = reading;
+        let pressures: Vec<f64> = pressures_pa.iter().map(|sum| (sum / count).round()).collect();
+        held.push(json!({
+            "goal_n": goal_n, "shown_n": shown, "read_n": force_mn / count * 1e-3, "pressures_pa": pressures,
+        }));
+    }
+    Ok(held)
+}
+
+/// A number in N.
+pub fn newtons(text: &str) -> Result<f64, String> {
+    numbers::shown_mn(text).map(|shown_mn| shown_mn as f64 * 1e-3)
+}
+
+/// Waits until the force has been held for a second.
+fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    let (begun, mut near_since) = (Instant::now(), None);
+    loop {
+        run.interrupt.check()?;
+        let state = same_goal_state(goal_mn, client)?;
+        let tolerance_mn = (NEAR * goal_mn as f64).max(NEAR_MN);
+        let near = state.mode == Mode::Force as i64 && ((state.force_mn - goal_mn) as f64).abs() <= tolerance_mn;
+        near_since = if near { near_since.or(Some(Instant::now())) } else { None };
+        if near_since.is_some_and(|since| since.elapsed() >= SETTLED) {
+            return Ok(());
+        }
+        if begun.elapsed().as_secs_f64() > REACHED_S {
+            let (mode, force_mn) = (state.mode_name(), state.force_mn);
+            return Err(format!(
+                "{goal_mn} mN are not held within {REACHED_S} s: mode {mode}, {force_mn} mN. Is the plate on the scale within reach?"
+            )
+            .into());
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+fn same_goal(goal_mn: i64, client: &mut Client) -> Result<(), Error> {
+    same_goal_state(goal_mn, client).map(drop)
+}
+
+/// Fails in a fault, and where another program stopped the finger. Reading the state also feeds the bus watchdog.
+fn same_goal_state(goal_mn: i64, client: &mut Client) -> Result<State, Error> {
+    let state = client.again(State::read)?;
+    if state.fault != 0 {
+        return Err(stopped(state.fault));
+    }
+    if state.goal_mn != goal_mn {
+        return Err("another program stopped the finger while the force was held".into());
+    }
+    Ok(state)
+}
+
+/// Shown and read forces. The controller read them with the gains before; `factors` are gains to write over gains before,
+/// by which each taxel's part of the force changes. Numbers of the command line replace those of the session.
+pub fn read(factors: &[f64], shown_n: &[f64], session: &Session) -> Vec<Held> {
+    let holds = session.step(STEP).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let replaced = |index: usize| shown_n.get(index).copied().filter(|_| shown_n.len() == holds.len());
+    let one = |(index, hold): (usize, &Value)| {
+        let pressures = hold["pressures_pa"].as_array()?.iter().filter_map(Value::as_f64);
+        let (mut sum, mut after) = (0.0, 0.0);
+        for (pressure, factor) in pressures.zip(factors) {
+            (sum, after) = (sum + pressure, after + pressure * factor);
+        }
+        let change = if sum > 0.0 { after / sum } else { 1.0 };
+        let shown_n = replaced(index).or(hold["shown_n"].as_f64())?;
+        Some(Held { shown_n, read_n: hold["read_n"].as_f64()? * change })
+    };
+    holds.iter().enumerate().filter_map(one).collect()
+}
+
+/// Forgets what a scale showed, so that the next run holds again.
+pub fn forget(session: &mut Session) -> Result<(), Error> {
+    session.forget(STEP)
+}
+
+/// Step of the session with a weight's readings.
+const WEIGHT: &str = "weight";
+
+/// Readings under a weight that a person lays on the tip, with torque off. A force that the loop holds would not do: the
+/// loop keeps the reading constant, and creep would be in the force.
+pub fn weight(seconds: f64, session: &mut Session, run: &Run<'_>, client: &mut Client) -> Result<HeldSeries, Error> {
+    if session.step(WEIGHT).is_none() {
+        run.report(format_args!(
+            "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
+        ));
+        let until = Instant::now() + WEIGHT_WITHIN;
+        while client.again(State::read)?.force_mn < WEIGHT_MN {
+            run.interrupt.check()?;
+            if Instant::now() > until {
+                return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
+            }
+            std::thread::sleep(LOOK);
+        }
+        run.interrupt.pause(Instant::now() + AVERAGED);
+        let (begun, mut readings) = (Instant::now(), Vec::new());
+        while begun.elapsed().as_secs_f64() < seconds {
+            run.interrupt.check()?;
+            let force_mn = client.again(State::read)?.force_mn;
+            if force_mn < WEIGHT_MN / 2 {
+                return Err(format!("the weight was taken off after {:.1} s", begun.elapsed().as_secs_f64()).into());
+            }
+            readings.push(json!([begun.elapsed().as_secs_f64(), force_mn as f64 * 1e-3]));
+            std::thread::sleep(10 * LOOK);
+        }
+        session.done(WEIGHT, readings.into())?;
+    }
+    let readings = session.step(WEIGHT).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
+    let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);
+    Ok(HeldSeries { readings: readings.iter().filter_map(pair).collect() })
+}

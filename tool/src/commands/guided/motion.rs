@@ -1,0 +1,197 @@
+//! Motions that measure: begins one, waits for its end, and reads its record.
+
+use super::Run;
+use crate::commands::moving::Moving;
+use crate::commands::{TOUCHED, capture, no_fault, tare};
+use crate::state::ANEW;
+use crate::{Client, Error, table};
+use fingertip::capture::State as Kept;
+use fingertip::measure::{Ended, State, Task};
+use fingertip::shipped::address;
+use std::time::{Duration, Instant};
+
+/// Time between two looks at the motion.
+const LOOK: Duration = Duration::from_millis(10);
+/// Time between two reports of progress.
+const REPORT: Duration = Duration::from_secs(1);
+/// Longest time for a tare.
+const TARE: Duration = Duration::from_secs(5);
+
+/// Reasons of `MEASURE_ENDED`: number, reason, unit of `MEASURE_VALUE`, and what to do.
+const REASONS: [(Ended, &str, &str, &str); 12] = [
+    (Ended::Interrupted, "a stop, torque, a fault, a tare or new parameters ended the motion", "", "run it again"),
+    (
+        Ended::NotReady,
+        "not tared, something touches the tip, or torque is not as needed",
+        "",
+        "free the tip and run it again",
+    ),
+    (Ended::Unconfirmed, "the direction is not confirmed", "", "`fingertip commission`"),
+    (
+        Ended::Still,
+        "the encoder did not count",
+        "mV at the motor",
+        "is the motor connected, the encoder supplied, the tip free?",
+    ),
+    (
+        Ended::Reversed,
+        "the encoder counts against the voltage",
+        "counts",
+        "swap the motor's leads if the tip went back first, else the encoder's channels",
+    ),
+    (Ended::Astray, "the tip left the path of the strokes", "um", "is a channel of the encoder open?"),
+    (Ended::Touched, "the array measured a touch", "mN", "leave the tip 2 mm of air to both sides"),
+    (Ended::Pushed, "the motor felt a force that the array did not", "mN", "leave the tip 2 mm of air to both sides"),
+    (Ended::Restless, "the tip did not come to rest", "counts in the last half of the time", "hold the finger still"),
+    (Ended::NoContact, "the travel ended without a contact", "um", "bring the plate nearer"),
+    (
+        Ended::Stalled,
+        "the tip did not move for a second",
+        "um of travel",
+        "is current_max_ma too small, or the way blocked?",
+    ),
+    (Ended::Full, "the memory of the record is full", "rows", "lower modulus or force_max_mn make a shorter press"),
+];
+
+/// Words for an early end: reason, number with its unit, and what to do.
+pub fn ended_early(task: Task, number: i64, value: i64) -> Error {
+    let what = match task {
+        Task::Stop => "motion",
+        Task::Jog => "jog",
+        Task::Strokes => "strokes",
+        Task::Press => "press",
+    };
+    let Some((_, why, unit, hint)) = REASONS.iter().find(|(ended, ..)| *ended as i64 == number) else {
+        let why = table::meaning(address::MEASURE_ENDED, number);
+        return format!("{what} ended early: {why} (measure_ended {number}, value {value})").into();
+    };
+    let value = if unit.is_empty() { String::new() } else { format!(": {value} {unit}") };
+    format!("{what} ended early: {why}{value} (measure_ended {number}); {hint}").into()
+}
+
+/// Fails where a motion cannot begin, and says why.
+pub fn ready(client: &mut Client) -> Result<(), Error> {
+    no_fault(client)?;
+    if client.number(address::MEASURE_STATE)? == State::Running as i64 {
+        return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
+    }
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: turn it off first, by `fingertip stop`".into());
+    }
+    Ok(())
+}
+
+/// Tares with torque off.
+pub fn tare(run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    ready(client)?;
+    run.report("tare: nothing may touch the tip");
+    if tare::measure(TARE, client)?.touched { Err(TOUCHED.into()) } else { Ok(()) }
+}
+
+/// Carries out a motion. Whatever ends it, the finger is at rest with torque off afterwards. Returns the record, which a
+/// jog does not have.
+pub fn motion(task: Task, run: &Run<'_>, client: &mut Client) -> Result<Vec<u8>, Error> {
+    ready(client)?;
+    run.interrupt.check()?;
+    let count = client.number(address::CAPTURE_COUNT)?;
+    let moving = Moving::begin(client, &run.interrupt)?;
+    let ended = carry_out(task, run, moving.client);
+    moving.finish(ended)?;
+    if task == Task::Jog {
+        return Ok(Vec::new());
+    }
+    let kept = client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
+    let now = kept.number(address::CAPTURE_COUNT);
+    if kept.number(address::CAPTURE_STATE) != Kept::Done as i64 || now == count {
+        return Err(
+            format!("the controller has no record of the motion: {ANEW}, or another host began a capture").into()
+        );
+    }
+    capture::fetch(client, now, &|text| run.report(text))
+}
+
+fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    if task == Task::Press {
+        client.set(address::TORQUE_ENABLE, 1)?;
+    }
+    if let Err(why) = client.set(address::MEASURE, task as i64) {
+        no_fault(client)?;
+        return Err(Error::Other(format!("{why}: is a capture under way?")));
+    }
+    let (until, mut reported) = (Instant::now() + Duration::from_secs_f64(run.options.within_s), Instant::now());
+    loop {
+        let block = client.again(|client| client.block(address::MEASURE_STATE, address::MEASURE_TASK))?;
+        let [state, ended, value, of] =
+            [address::MEASURE_STATE, address::MEASURE_ENDED, address::MEASURE_VALUE, address::MEASURE_TASK]
+                .map(|register| block.number(register));
+        run.interrupt.check()?;
+        if state != State::Running as i64 {
+            no_fault(client)?;
+            let full = task == Task::Press && ended == Ended::Full as i64;
+            return if state == State::None as i64 || of != task as i64 {
+                Err(format!("the motion came to no end: {ANEW}").into())
+            } else if state == State::Done as i64 || full {
+                Ok(())
+            } else {
+                Err(ended_early(task, ended, value))
+            };
+        }
+        if Instant::now() > until {
+            let within_s = run.options.within_s;
+            return Err(
+                format!("the motion takes longer than {within_s} s: it was stopped; --within-s allows more").into()
+            );
+        }
+        if reported.elapsed() >= REPORT {
+            reported = Instant::now();
+            run.report(format_args!("{:3} % of the motion", block.number(address::MEASURE_PROGRESS)));
+        }
+        std::thread::sleep(LOOK);
+    }
+}
+
+/// Waits in the air with torque off.
+pub fn pause(seconds: f64, run: &Run<'_>) -> Result<(), Error> {
+    run.report(format_args!(
+        "pause of {seconds} s in the air: after a press the sensor's creep needs that time to decay"
+    ));
+    run.interrupt.pause(Instant::now() + Duration::from_secs_f64(seconds));
+    run.interrupt.check()
+}
+
+/// Waits until the controller's chip has this temperature.
+pub fn warm(chip_c: f64, within: Duration, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    let (until, mut reported) = (Instant::now() + within, None);
+    loop {
+        let now_c = client.again(|client| client.number(address::CHIP_MC))? as f64 * 1e-3;
+        if now_c >= chip_c {
+            return Ok(());
+        }
+        run.interrupt.check()?;
+        if Instant::now() > until {
+            return Err(format!(
+                "the controller has {now_c:.1} C, {chip_c:.1} C are needed: --warm-within-s waits longer"
+            )
+            .into());
+        }
+        if reported.is_none_or(|at: Instant| at.elapsed() >= 10 * REPORT) {
+            reported = Some(Instant::now());
+            run.report(format_args!("warm the finger: the controller has {now_c:.1} C, {chip_c:.1} C are needed"));
+        }
+        run.interrupt.pause(Instant::now() + REPORT);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_early_end_names_reason_number_and_unit() {
+        let said = ended_early(Task::Strokes, 5, -12).to_string();
+        assert!(said.contains("against the voltage: -12 counts (measure_ended 5)"), "{said}");
+        for number in (1..=13).filter(|number| *number != 9) {
+            assert!(REASONS.iter().any(|(ended, ..)| *ended as i64 == number), "{number}");
+        }
+    }
+}

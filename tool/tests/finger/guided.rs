@@ -1,0 +1,193 @@
+//! The guided procedures: `commission`, `identify` and `calibrate` against a served finger.
+
+use crate::served::Served;
+use crate::stopped::{is_at_rest, patient};
+use fingertip::link::packet::instruction::REBOOT;
+use serde_json::{Value, json};
+use std::fs;
+use std::io::Write as _;
+use std::process::{Output, Stdio};
+
+/// Options of a calibration without questions and without the pause of a real sensor.
+const QUICK: [&str; 6] = ["calibrate", "--no-wait", "--pause-s", "0", "--within-s", "3600"];
+
+fn output(finger: &Served, arguments: &[&str]) -> (Option<i32>, Value, String) {
+    let output = finger.fingertip(&[arguments, &["--json"]].concat()).output().expect("it starts");
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap_or(Value::Null), text)
+}
+
+/// Runs a command whose questions get these lines as answers.
+fn answered(finger: &Served, arguments: &[&str], answers: &str) -> Output {
+    let mut command = finger.fingertip(arguments);
+    let command = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().expect("it starts");
+    child.stdin.take().expect("a pipe").write_all(answers.as_bytes()).expect("it reads");
+    child.wait_with_output().expect("it ends")
+}
+
+fn parameters(finger: &Served) -> Value {
+    finger.json(&["params", "get"])
+}
+
+fn gains(finger: &Served) -> Value {
+    finger.json(&["params", "diff"])["gains"]["now"].clone()
+}
+
+/// True if a number is this close to another, as a share.
+fn near(number: &Value, wanted: f64, part: f64) -> bool {
+    number.as_f64().is_some_and(|number| (number / wanted - 1.0).abs() < part)
+}
+
+#[test]
+fn a_program_commissions_and_calibrates_a_finger() {
+    let finger = patient("wall");
+    finger.done(&["params", "set", "direction_confirmed=0", "torque_constant_unm_per_a=5000"]);
+    let session = finger.file("drive");
+    let commission = ["commission", "--forward", "yes", "--resistance-ohm", "3.53", "--apply", "--session", &session];
+    let drive = finger.json(&commission);
+    let [before, after, sigma] = ["before", "after", "sigma"].map(|part| &drive[part]["torque_constant_unm_per_a"]);
+    assert!(near(after, 5_350.0, 0.03) && *before == 5_000 && near(sigma, 50.0, 0.9), "{drive}");
+    assert_eq!((&drive["applied"], &drive["refused"], &drive["session"]), (&true.into(), &json!([]), &json!(session)));
+    let now = parameters(&finger);
+    assert_eq!((&now["torque_constant_unm_per_a"], &now["direction_confirmed"]), (after, &1.into()));
+    assert_eq!(finger.json(&commission), drive, "a session that is complete gives the same again");
+
+    let session = finger.file("array");
+    let scale = ["--presses", "2", "--scale-n", "1,2", "--shown-n", "1.1,2.2", "--apply", "--session", &session];
+    let calibrate = [&QUICK[..], &scale].concat();
+    let array = finger.json(&calibrate);
+    let after = &array["after"];
+    // The scale shows 1.1 times what is read: less codes for each kPa, and a harder tip.
+    assert!(near(&after["codes_per_kpa_milli"], 24_000.0 / 1.1, 0.02), "{array}");
+    assert!(near(&after["modulus_pa"], 250_000.0 * 1.1, 0.05), "{array}");
+    assert!(array["sigma"]["gains"][5][5].as_f64() > Some(0.0) && array["sigma"]["gains"][0][0].is_null(), "{array}");
+    assert_eq!((&array["dead"], &array["odd"], &array["applied"]), (&json!([]), &json!([]), &true.into()));
+    let now = parameters(&finger);
+    assert_eq!(
+        [&now["modulus_pa"], &now["codes_per_kpa_milli"]],
+        [&after["modulus_pa"], &after["codes_per_kpa_milli"]]
+    );
+    assert_eq!(gains(&finger), after["gains"]);
+    is_at_rest(&finger, "calibrated");
+    let heard = finger.heard();
+    assert_eq!(finger.json(&calibrate), array, "a session that is complete gives the same again");
+    assert!(finger.heard() - heard < 60, "nothing moves");
+    finger.done(&["params", "set", "tip_radius_um=9000"]);
+    let why = finger.refused(&calibrate);
+    assert!(why.contains("tip_radius_um changed since this session began"), "{why}");
+    let why = finger.refused(&["commission", "--forward", "yes", "--session", &session]);
+    assert!(why.contains("a session of the command \"calibrate\""), "{why}");
+}
+
+#[test]
+fn a_killed_session_resumes_where_it_was() {
+    let finger = patient("wall");
+    let (session, record) = (finger.file("killed"), finger.file("killed/press-1.fts"));
+    let calibrate = [&QUICK[..], &["--presses", "2", "--no-scale", "--session", &session]].concat();
+    let before = parameters(&finger);
+    let listed = || fs::read_to_string(finger.file("killed/session.json")).is_ok_and(|text| text.contains("press-1"));
+    let mut child = finger.start(&[&calibrate[..], &["--json"]].concat());
+    while !listed() {
+        std::thread::sleep(Served::LOOK);
+    }
+    child.kill().expect("it runs");
+    child.wait().expect("it ends");
+    finger.done(&["stop"]);
+    finger.done(&["recover"]);
+    let bytes = fs::read(&record).expect("it was kept");
+    let resumed = finger.json(&calibrate);
+    assert_eq!(fs::read(&record).expect("it is there"), bytes, "the first press was not repeated");
+    assert_eq!(finger.json(&calibrate), resumed, "the same records give the same numbers");
+    assert_eq!((&resumed["applied"], parameters(&finger)), (&false.into(), before), "{resumed}");
+    assert!(near(&resumed["after"]["modulus_pa"], 250_000.0, 0.05), "{resumed}");
+    // A damaged record is not solved.
+    fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
+    let why = finger.refused(&calibrate);
+    assert!(why.contains("press-1.fts: the series has"), "{why}");
+}
+
+/// KILL after each packet of a session that has all records: what is left are the write and the tare.
+#[test]
+fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
+    let finger = patient("wall");
+    let session = finger.file("written");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--no-scale", "--session", &session]].concat();
+    let before = parameters(&finger);
+    let wanted = finger.json(&calibrate)["after"].clone();
+    let applied = [&calibrate[..], &["--apply"]].concat();
+    let mut seen = [0; 2];
+    for packets in 0.. {
+        if !finger.killed_after(packets, &applied) {
+            break;
+        }
+        let now = parameters(&finger);
+        let mut new = before.clone();
+        new["modulus_pa"] = wanted["modulus_pa"].clone();
+        assert!(now == before || now == new, "killed after {packets}: {now}");
+        seen[usize::from(now == new)] += 1;
+        if now == before && gains(&finger) == wanted["gains"] {
+            // The worst instant: the same session completes the write.
+            let done = finger.json(&applied);
+            assert_eq!((&done["applied"], &done["after"]), (&true.into(), &wanted), "killed after {packets}");
+            assert_eq!(parameters(&finger), new);
+        }
+        // Behind a reset there is what was saved.
+        finger.command(&format!("raw {REBOOT}"));
+        assert_eq!(parameters(&finger), before);
+    }
+    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+    assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
+}
+
+#[test]
+fn a_wrong_answer_changes_nothing() {
+    let finger = patient("wall");
+    let before = parameters(&finger);
+    let said = answered(&finger, &["commission"], "perhaps\nyes\n");
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(text.contains("`perhaps`: yes or no is expected") && text.contains("give --apply"), "{text}");
+    assert_eq!(parameters(&finger), before);
+    let said = answered(&finger, &["commission"], "no\n");
+    let text = String::from_utf8_lossy(&said.stderr).into_owned();
+    assert!(text.contains("swap the motor's leads") && said.status.code() == Some(1), "{text}");
+    assert_eq!(parameters(&finger)["direction_confirmed"], 0, "torque is refused from here on");
+    let why = finger.refused(&["identify", "--no-wait"]);
+    assert!(why.contains("`fingertip commission`"), "{why}");
+    finger.done(&["params", "set", "direction_confirmed=1"]);
+
+    // What the scale shows is ten times what is read.
+    let session = finger.file("scale");
+    let calibrate = [&QUICK[..], &["--presses", "1", "--scale-n", "1", "--apply", "--session", &session]].concat();
+    let (code, found, why) = output(&finger, &[&calibrate[..], &["--shown-n", "10"]].concat());
+    assert!(why.contains("a half to two is allowed") && code == Some(1), "{why}");
+    assert_eq!((&found["applied"], found["refused"].as_array().map(Vec::len)), (&false.into(), Some(1)), "{found}");
+    assert_eq!(parameters(&finger), before);
+
+    // A signal while the force is held.
+    let child = finger.start(&[&calibrate[..], &["--shown-n", "1"]].concat());
+    finger.until("Force:");
+    Served::interrupt(&child);
+    let ended = child.wait_with_output().expect("it ends");
+    assert_eq!(ended.status.code(), Some(130), "{ended:?}");
+    assert!(finger.true_force_n() < 0.05, "{}", finger.command("state"));
+    is_at_rest(&finger, "interrupted");
+    assert_eq!(parameters(&finger), before);
+    let found = finger.json(&[&calibrate[..], &["--shown-n", "1.1"]].concat());
+    assert_eq!(found["applied"], true, "{found}");
+}
+
+#[test]
+fn a_program_is_asked_nothing() {
+    let finger = patient("wall");
+    for (arguments, option) in [
+        (&["commission"][..], "--forward yes"),
+        (&["identify"], "--no-wait"),
+        (&["calibrate", "--no-wait"], "--shown-n"),
+        (&["calibrate", "--no-wait", "--scale-n", "1,2", "--shown-n", "1"], "has 1 numbers for 2"),
+        (&["calibrate", "--no-wait", "--scale-n", "2,1", "--shown-n", "1,2"], "the smallest force comes first"),
+    ] {
+        let (code, found, why) = output(&finger, arguments);
+        assert!(code == Some(2) && found.is_null() && why.contains(option), "{arguments:?}: {why}");
+    }
+}

@@ -8,7 +8,7 @@
 //!
 //! Nothing is fitted and nothing is judged here but whether to go on: each motion has limits of travel, force, speed and
 //! time, beside those of guard and monitor. [`crate::capture`] keeps the rows in the memory of a capture, and a host
-//! reads them the same way; [`series`] has the layout. `docs/measure.md` tells what a host makes of them.
+//! reads them the same way; [`series`] has the layout. `docs/solve.md` tells what a host makes of them.
 
 pub mod press;
 pub mod series;

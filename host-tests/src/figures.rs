@@ -4,7 +4,6 @@
 //! 10 x 10 array: simulated, as are the readings of figure 11, to which noise is added. Nothing here was measured.
 
 use fastrand::Rng;
-use fingertip::identify::{DepthFit, Modulus, Refusal};
 use fingertip::model::Tip;
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
@@ -83,12 +82,8 @@ fn figure_10(tip: &Tip) -> Result<String, PlotError> {
 /// Force over indentation: the model, and readings of the noisy array with the modulus that fits them.
 fn figure_11(tip: &Tip) -> Result<String, PlotError> {
     let readings = readings(tip);
-    let fitted = match fit(tip, &readings) {
-        Ok(Modulus { modulus, sigma, .. }) => {
-            format!("Y = {:.1} kPa, standard uncertainty {:.1} kPa, by these readings", modulus.0, sigma.0)
-        }
-        Err(refusal) => format!("no modulus by these readings: {refusal}"),
-    };
+    let Modulus { kpa, sigma_kpa } = fit(tip, &readings);
+    let fitted = format!("Y = {kpa:.1} kPa, standard uncertainty {sigma_kpa:.1} kPa, by these readings");
     let depth = |n: i32| 1.05 * DEEPEST_MM * f64::from(n) / f64::from(POINTS);
     let theory = (0..=POINTS).map(|n| (depth(n), tip.force(mm(depth(n))).0.to_num())).collect();
     let points = readings.iter().map(|(d, force)| (d.0.to_num(), force.0.to_num())).collect();
@@ -131,14 +126,26 @@ pub fn readings(tip: &Tip) -> Vec<(Millimetres, Newtons)> {
     (1..=READINGS).map(&mut read).collect()
 }
 
-/// The modulus that the core fits to readings.
-///
-/// # Errors
-/// The core refuses them.
-pub fn fit(tip: &Tip, readings: &[(Millimetres, Newtons)]) -> Result<Modulus, Refusal> {
-    let mut fit = DepthFit::new(tip.depth_max(), tip.force_max());
-    fit.extend(readings.iter().copied());
-    fit.modulus()
+/// A modulus fitted to readings.
+pub struct Modulus {
+    /// The modulus.
+    pub kpa: f64,
+    /// Its standard uncertainty.
+    pub sigma_kpa: f64,
+}
+
+/// Least squares of the model's force, which is proportional to the modulus. `tip` has a modulus of 250 kPa.
+pub fn fit(tip: &Tip, readings: &[(Millimetres, Newtons)]) -> Modulus {
+    let [mut squares, mut products, mut read] = [0.0; 3];
+    for (d, force) in readings {
+        let (per_kpa, force) = (tip.force(*d).0.to_num::<f64>() / 250.0, force.0.to_num::<f64>());
+        squares += per_kpa * per_kpa;
+        products += per_kpa * force;
+        read += force * force;
+    }
+    let kpa = products / squares;
+    let variance = (read - kpa * products) / (readings.len() as f64 - 1.0);
+    Modulus { kpa, sigma_kpa: (variance / squares).sqrt() }
 }
 
 fn mm(value: f64) -> Millimetres {

@@ -83,11 +83,7 @@ pub fn items() -> Vec<Item> {
     let mut items = Vec::new();
     for register in REGISTERS.iter().filter(|register| !indirect::begins(register.address)) {
         match register.address {
-            address::RAW_CODES
-            | address::TARE_CODES
-            | address::GAINS
-            | address::PROPOSED_GAINS
-            | address::PROPOSED_SIGMAS => {}
+            address::RAW_CODES | address::TARE_CODES | address::GAINS => {}
             address::PRESSURES => {
                 for place in 0..register.count {
                     let (row, column) = (usize::from(place) / COLUMNS + 1, usize::from(place) % COLUMNS + 1);

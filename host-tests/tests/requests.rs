@@ -2,7 +2,7 @@
 //! torque.
 
 use fingertip::config::newtons;
-use fingertip::identify::{Identification, Refusal};
+use fingertip::measure::{Ended, Standing, State, Task};
 use fingertip::pipeline::{Bridge, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::TARE_FRAMES;
@@ -12,7 +12,8 @@ use images::record::Record;
 use sim::native::bench::Bench;
 use sim::plant::Taxel;
 
-const NOT_READY: Identification = Identification::Refused(Refusal::NotReady);
+const NOT_READY: Standing = Standing::refused(Task::Press, Ended::NotReady, 0);
+const RUNNING: Standing = Standing::running(Task::Press);
 
 /// With the object so far away.
 fn at(distance_mm: f64) -> Bench {
@@ -183,76 +184,77 @@ fn new_parameters_during_a_tare_begin_it_anew() {
 }
 
 #[test]
-fn identify_in_the_frame_of_a_fault_leaves_no_old_outcome() {
+fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
     for (spoil, fault) in EARLY_AND_LATE {
         let mut board = ready();
-        board.command().identify_request += 1;
+        board.request(Task::Press);
         let status = board.step_with(spoil);
-        let interrupted = Identification::Refused(Refusal::Interrupted);
-        assert_eq!((status.mode, status.fault, status.identification), (Mode::Fault, Some(fault), interrupted));
+        let interrupted = Standing::refused(Task::Press, Ended::Interrupted, 0);
+        assert_eq!((status.mode, status.fault, status.measure), (Mode::Fault, Some(fault), interrupted));
     }
 }
 
 #[test]
-fn identify_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
+fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     let mut board = Bench::default();
     board.command().tare_request += 1;
     board.step();
     board.command().torque = true;
-    board.command().identify_request += 1;
+    board.request(Task::Press);
     let mut frames = 0;
     while board.step().mode != Mode::Press {
         frames += 1;
         assert!(frames < TARE_FRAMES + 5);
-        assert_eq!(board.status().identification, Identification::None);
+        assert_eq!(board.status().measure, Standing::default());
     }
-    assert_eq!(board.step().identification, Identification::Running);
+    assert_eq!(board.step().measure, RUNNING);
 
     let mut board = ready();
     board.command().torque = false;
     board.step();
     board.command().torque = true;
-    board.command().identify_request += 1;
+    board.request(Task::Press);
     assert_eq!(board.step().mode, Mode::Press);
 }
 
 #[test]
-fn identify_that_waits_is_refused_once_torque_is_off() {
+fn a_press_that_waits_is_refused_once_torque_is_off() {
     let mut board = Bench::default();
     board.command().tare_request += 1;
     board.command().torque = true;
-    board.command().identify_request += 1;
+    board.request(Task::Press);
     board.step();
-    assert_eq!(board.step().identification, Identification::None);
+    assert_eq!(board.step().measure, Standing::default());
     board.command().torque = false;
     let status = board.step();
-    assert_eq!((status.mode, status.identification), (Mode::Tare, NOT_READY));
+    assert_eq!((status.mode, status.measure), (Mode::Tare, NOT_READY));
 }
 
 #[test]
-fn identify_without_a_tare_is_refused() {
+fn a_press_without_a_tare_is_refused() {
     let mut board = Bench::default();
     board.command().torque = true;
     board.step();
-    board.command().identify_request += 1;
-    assert_eq!(board.step().identification, NOT_READY);
+    board.request(Task::Press);
+    assert_eq!(board.step().measure, NOT_READY);
 }
 
 /// A request while a measurement runs is answered by its outcome, also in its last frame; the next one begins another.
 #[test]
-fn identify_in_the_frame_in_which_another_ends_has_its_outcome() {
+fn a_press_in_the_frame_in_which_another_ends_has_its_outcome() {
     let refused_at = {
         let mut board = measuring();
-        (1..20_000).find(|_| board.step().identification != Identification::Running).expect("an end")
+        (1..20_000).find(|_| board.step().measure.state != State::Running).expect("an end")
     };
     let mut board = measuring();
     for _ in 1..refused_at {
-        assert_eq!(board.step().identification, Identification::Running);
+        assert_eq!(board.step().measure, RUNNING);
     }
-    for outcome in [Identification::Refused(Refusal::NoContact), Identification::Running] {
-        board.command().identify_request += 1;
+    for outcome in [(State::Ended, Ended::NoContact), (State::Running, Ended::Complete)] {
+        board.request(Task::Press);
         let status = board.step();
-        assert_eq!((status.identification, status.taken.identify), (outcome, board.command().identify_request));
+        assert_eq!((status.measure.state, status.measure.ended), outcome);
+        assert_eq!(status.taken.measure, board.command().measure_request);
     }
 }
 
@@ -261,8 +263,8 @@ fn measuring() -> Bench {
     let mut board = at(40.0);
     board.tare();
     board.step();
-    board.command().identify_request += 1;
-    assert_eq!(board.step().identification, Identification::Running);
+    board.request(Task::Press);
+    assert_eq!(board.step().measure, RUNNING);
     board
 }
 

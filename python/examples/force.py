@@ -18,7 +18,7 @@ from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, PacketHandler, PortHandle
 from fingertip import registers as reg
 
 BAUD = 1_000_000
-MODES = ["off", "tare", "approach", "force", "release", "fault", "identify", "commission"]
+MODES = ["off", "tare", "approach", "force", "release", "fault", "press", "strokes"]
 TARING, TARED = 1, 2  # of the register TARE_STATE
 WATCHDOG = 25  # in units of 20 ms
 SIGNALS = [getattr(signal, name) for name in ["SIGTERM", "SIGHUP"] if hasattr(signal, name)]

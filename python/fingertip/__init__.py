@@ -14,28 +14,25 @@ The end of the `with`, an exception and the end of the program let go too. Times
 
 from . import registers
 from .bus import Bus, Fingertip
-from .calibration import ArrayCalibration, Gain, Scale
-from .drive import Drive
 from .finger import Finger
 from .line import FingertipError, NoAnswer, PortLost, Refused
+from .program import program, run
 from .state import Fault, Limits, Mode, Restarted, State
 
 __all__ = [
-    "ArrayCalibration",
     "Bus",
-    "Drive",
     "Fault",
     "Finger",
     "Fingertip",
     "FingertipError",
-    "Gain",
     "Limits",
     "Mode",
     "NoAnswer",
     "PortLost",
     "Refused",
     "Restarted",
-    "Scale",
     "State",
+    "program",
     "registers",
+    "run",
 ]

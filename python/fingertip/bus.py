@@ -285,11 +285,10 @@ class Bus:
         missed = dict.fromkeys(ids, 0)  # reads in a row without an answer, of the fingers that may still press
         failed: Dict[int, FingertipError] = {}
         begun_s: Dict[int, float] = {}
-        measured: Set[int] = set()
         goals = list(missed)
         while missed and time.monotonic() < until:
             self._tell(reg.GOAL_FORCE_MN, dict.fromkeys(goals, 0))
-            goals, off, on = [], [], []
+            goals, measuring = [], []
             for device_id, state in self._look(missed).items():
                 if isinstance(state, FingertipError) and not isinstance(state, Restarted):
                     missed[device_id] += 1
@@ -300,21 +299,16 @@ class Bus:
                 missed[device_id] = 0
                 if isinstance(state, FingertipError):
                     del missed[device_id]  # it started anew: torque is off
-                elif state.mode == Mode.IDENTIFY:
-                    # Only torque off ends a press that measures, and friction would keep most of its force: torque goes
-                    # on once more with the goal 0, which takes the tip off.
-                    measured.add(device_id)
-                    off.append(device_id)
+                elif state.mode == Mode.PRESS:
+                    measuring.append(device_id)  # the end of a press that measures releases, with the goal 0
                     begun_s[device_id] = state.time_s
                 elif state.mode in _GRIPS and state.goal_n:
                     goals.append(device_id)  # the first packet was lost: the release has not begun
                 elif state.time_s - begun_s.setdefault(device_id, state.time_s) > within_s:
                     del missed[device_id]
-                elif state.mode == Mode.OFF and device_id in measured:
-                    on.append(device_id)
                 elif state.mode not in _GRIPS or _is_clear(state):
                     del missed[device_id]
-            self._tell(reg.TORQUE_ENABLE, {**dict.fromkeys(off, 0), **dict.fromkeys(on, 1)})
+            self._tell(reg.MEASURE, dict.fromkeys(measuring, 0))
             if missed:
                 time.sleep(0.01)
         return failed

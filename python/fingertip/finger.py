@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Dict, Iterator, Mapping, Optional, Tuple
 
 from . import registers as reg
 from .device import Device, numbers
-from .drive import JOG, MEASURE, RUNNING, Drive, carry_out, measured
 from .line import FingertipError, NoAnswer, Refused
 from .state import FIRST, Fault, Limits, Restarted, State, length, number
 
@@ -109,34 +108,6 @@ class Finger(Device):
         if self.read(reg.LIMITS) & Limits.TARED_TOUCHING:
             raise FingertipError("something seemed to touch the tip while it was tared: free it and tare again")
 
-    def jog(self) -> None:
-        """Moves the tip a little, towards the object first: proves that motor and encoder go the same way."""
-        self._carry_out(JOG)
-
-    def confirm_direction(self) -> None:
-        """Says that somebody saw the jog go towards the object first: torque is refused before."""
-        self.write(reg.COMMISSION_ACCEPT, 1)
-
-    def measure_drive(self) -> Drive:
-        """Measures the drive by motions of 1 mm to both sides in the air. The parameters stay until it is accepted."""
-        self._carry_out(MEASURE)
-        return measured(self)
-
-    def _carry_out(self, task: int) -> None:
-        if self.read(reg.COMMISSION_STATE) == RUNNING:
-            raise FingertipError("the tip is moving for a jog or a measurement: wait until it ends")
-        self.bus.watch([self.device_id], 0.5)
-        try:
-            carry_out(self, task)
-        finally:
-            self.stop()
-
-    def accept_drive(self, save: bool = False) -> None:
-        """Takes what was measured into the parameters."""
-        self.write(reg.COMMISSION_ACCEPT, 2)
-        if save:
-            self.save()
-
     def enable_torque(self, silence_s: Optional[float] = 0.5) -> None:
         """Turns torque on under the bus watchdog: the controller stops the motor after `silence_s` without a packet.
 
@@ -160,7 +131,7 @@ class Finger(Device):
         if self.read(reg.LIMITS) & Limits.NOT_TARED:
             raise FingertipError("the tip is not tared since the controller started: free it and call tare()")
         if not self.read(reg.DIRECTION_CONFIRMED):
-            raise FingertipError("nobody confirmed yet which way the motor goes: jog(), watch, confirm_direction()")
+            raise FingertipError("nobody confirmed yet which way the motor goes: run `fingertip commission`")
         if goal_mn > self.read(reg.FORCE_MAX_MN):
             raise Refused(f"press with {goal_mn} mN", 6)
         return self.read(reg.TORQUE_ENABLE) == 1

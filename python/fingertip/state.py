@@ -36,7 +36,7 @@ class _Open(IntEnum):
 class Mode(_Open):
     """What the controller is doing."""
 
-    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, IDENTIFY, COMMISSION = range(8)
+    OFF, TARE, APPROACH, FORCE, RELEASE, FAULT, PRESS, STROKES = range(8)
 
 
 class Fault(_Open):

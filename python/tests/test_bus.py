@@ -212,9 +212,8 @@ class Broken(OnServed):
         def methods(bus: Bus) -> List[Any]:
             finger = bus.fingers[1]
             return [
-                bus.states, lambda: bus.press(0.2), bus.release, bus.stop, bus.scan, finger.state, finger.tare, finger.jog,
-                finger.measure_drive, finger.confirm_direction, lambda: finger.accept_drive(True), finger.enable_torque,
-                finger.recover, finger.parameters, lambda: finger.set_parameters({"contact_on_mn": 50}, True),
+                bus.states, lambda: bus.press(0.2), bus.release, bus.stop, bus.scan, finger.state, finger.tare,
+                finger.enable_torque, finger.recover, finger.parameters, lambda: finger.set_parameters({"contact_on_mn": 50}, True),
                 lambda: list(finger.stream(0, 0.05)), bus.close,
             ]  # fmt: skip
 

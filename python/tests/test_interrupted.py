@@ -16,11 +16,10 @@ from served import PYTHON, Cable, OnServed
 
 CHILD = """
 import sys
-from fingertip import ArrayCalibration, Bus, registers
+from fingertip import Bus, registers
 bus = Bus(sys.argv[1], timeout_ms=60_000)
 finger = bus.finger(1)
 finger.tare()
-array = ArrayCalibration(finger)
 while True:
     {}
 """
@@ -30,17 +29,12 @@ METHODS = {
     "press of a group": "bus.press(0.8); bus.states()",
     "release": "finger.press(0.8); list(finger.stream(100, 0.3)); finger.release()",
     "stop": "finger.press(0.8); list(finger.stream(100, 0.3)); bus.stop()",
-    "jog": "finger.jog()",
-    "measure_drive": "finger.measure_drive()",
-    "modulus": "array.modulus(); finger.tare()",
-    "calibration": "array.press(); finger.tare()",
+    "a press that measures": "finger.enable_torque(); finger.write(registers.MEASURE, 3); list(finger.stream(100, 9.0)); finger.release(); finger.tare()",
 }
 EXAMPLES = {
     "force.py": ["--readings", "1000000"],
     "stream_to_csv.py": ["--seconds", "1000", "--press", "1.0", str(Path(tempfile.gettempdir()) / "interrupted.csv")],
     "recovery.py": ["--seconds", "1000"],
-    "commission.py": ["--yes"],
-    "calibrate.py": ["--modulus", "--presses", "3", "--no-wait", "--holds", "1.5", "--shown", "160"],
 }
 PROGRAMS: Dict[str, List[str]] = {
     **{name: ["-c", CHILD.format(call), "PORT"] for name, call in METHODS.items()},

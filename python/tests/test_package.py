@@ -1,7 +1,6 @@
 """The package as a whole: its types, and its wheel. Nothing is fetched: `cargo xtask test` has installed what it takes."""
 
 import os
-import shutil
 import subprocess
 import sys
 import sysconfig
@@ -29,15 +28,21 @@ class Package(OnServed):
     def test_wheel(self) -> None:
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            source, python = folder / "source", folder / "venv" / "bin" / "python"
-            # `setuptools` builds beside the source.
-            shutil.copytree(PYTHON, source, ignore=shutil.ignore_patterns("__pycache__"))
+            python = folder / "venv" / "bin" / "python"
             pip, offline = [sys.executable, "-m", "pip"], ["--quiet", "--no-index", "--no-deps"]
-            self.done(*pip, "wheel", *offline, "--no-build-isolation", "--wheel-dir", folder, source)
+            # With the profile of the other tests, so that little is compiled.
+            maturin = [sys.executable, "-m", "maturin", "build", "--quiet", "--profile", "host", "--offline", "--locked"]
+            self.done(*maturin, "--out", folder, cwd=PYTHON)
             self.done(sys.executable, "-m", "venv", "--without-pip", folder / "venv")
             self.done(*pip, "--python", python, "install", *offline, "--no-compile", *folder.glob("*.whl"))
             [installed] = folder.glob("venv/lib/*/site-packages/fingertip")
-            files = [sorted(path.name for path in place.iterdir()) for place in [source / "fingertip", installed]]
+            files = [sorted(path.name for path in place.glob("*.*")) for place in [PYTHON / "fingertip", installed]]
             self.assertEqual(files[0], files[1])
             shown = self.done(python, PYTHON / "examples" / "parameters.py", "--port", self.served.port)
             self.assertIn("modulus_pa", shown)
+            # The program of the wheel, run by the package of the wheel.
+            asks = f"from fingertip import run; print(run('info', port={self.served.port!r})['model'])"
+            self.assertIn("fingertip", self.done(python, "-c", asks))
+            wrong = f"from fingertip import run; run('press', '99', port={self.served.port!r})"
+            told = subprocess.run([python, "-c", wrong], env={**os.environ, "PYTHONPATH": sysconfig.get_path("purelib")}, stderr=subprocess.PIPE, text=True)
+            self.assertIn("FingertipError", told.stderr)

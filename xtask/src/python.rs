@@ -21,8 +21,8 @@ pub struct Environment {
 
 const BUS: Environment = Environment {
     folder: "venv",
-    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1", "mypy==2.4.1", "setuptools==80.10.2"],
-    imports: "dynamixel_sdk, rustypot, mypy",
+    packages: &["dynamixel-sdk==4.1.0", "rustypot==1.13.1", "mypy==2.4.1", "maturin==1.9.4"],
+    imports: "dynamixel_sdk, rustypot, mypy, maturin",
     does: "tests talk to the board by the first two, and check and build the Python package by the others",
 };
 

@@ -38,12 +38,7 @@ const UNASKED: Command = Command {
     tare_request: 0,
     tare_forced: false,
     clear_request: 0,
-    identify_request: 0,
-    commission_request: 0,
-    calibrate_request: 0,
-    forget_request: 0,
-    shown_request: 0,
-    shown_mn: 0,
+    measure_request: 0,
 };
 
 /// How the force answered to a goal.

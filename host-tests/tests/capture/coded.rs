@@ -28,7 +28,7 @@ fn step(spread: u16) -> impl Strategy<Value = Step> {
     let codes = prop::collection::vec(0..=spread, SLOTS * COLUMNS);
     let sense = (any::<i32>(), any::<u16>(), any::<u16>(), any::<bool>(), any::<u32>(), any::<bool>());
     let command =
-        (any::<[u8; 7]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<i32>(), any::<bool>());
+        (any::<[u8; 3]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<bool>());
     let answer = (any::<i16>(), any::<bool>(), any::<bool>(), any::<u32>());
     (codes, sense, command, answer).prop_map(move |(codes, sense, command, (duty, force, faulted, sequence))| {
         let mut frame = Frame { sequence, ..Frame::EMPTY };
@@ -42,8 +42,7 @@ fn step(spread: u16) -> impl Strategy<Value = Step> {
         } else {
             Sense { encoder: encoder & 3, supply_mv: 6_000 | supply_mv & 7, ..Sense::default() }
         };
-        let ([tare, clear, identify, commission, calibrate, forget, shown], bools, goal, watchdog, level, mn, wild) =
-            command;
+        let ([tare, clear, measure], bools, goal, watchdog, level, wild) = command;
         let [torque, tare_forced] = bools;
         let command = Command {
             torque,
@@ -53,12 +52,7 @@ fn step(spread: u16) -> impl Strategy<Value = Step> {
             tare_request: tare,
             tare_forced,
             clear_request: clear,
-            identify_request: identify,
-            commission_request: commission,
-            calibrate_request: calibrate,
-            forget_request: forget,
-            shown_request: shown,
-            shown_mn: mn,
+            measure_request: measure,
         };
         let status = Status {
             duty: Duty(duty),

@@ -4,6 +4,7 @@ use super::burst::{Finger, gains};
 use fingertip::capture::{Ended, State};
 use fingertip::command::Command;
 use fingertip::config::newtons;
+use fingertip::measure::Task;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, TARE_FRAMES};
@@ -43,12 +44,10 @@ fn what_the_finger_did_before_does_not_matter() {
     let mut finger = Finger::<{ 8 << 10 }>::new();
     finger.native.tare();
     finger.native.command().goal = newtons(1_500);
-    finger.native.command().shown_mn = 1_400;
     (0..3_000).for_each(|_| {
         finger.native.step();
     });
-    finger.native.command().calibrate_request += 1;
-    finger.native.command().shown_request += 1;
+    finger.native.request(Task::Press);
     (0..3_000).for_each(|_| {
         finger.native.step();
     });

@@ -10,7 +10,7 @@ use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
 use fingertip::shipped::Record;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, Proposal, REGISTERS, ROWS, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 
 /// The ID of the device under test.
@@ -39,7 +39,6 @@ pub struct Bench {
     tare: [[i32; COLUMNS]; ROWS],
     /// The time, which stands.
     pub tick_ms: u32,
-    pub proposal: Proposal,
     /// The made-up capture, and its bytes.
     pub capture: Standing,
     pub captured: Vec<u8>,
@@ -63,7 +62,6 @@ impl Bench {
             taxels: by_place(|place| 20_000 + place),
             tare: by_place(|place| (300 + place) << TARE_BITS),
             tick_ms: 0x1_8123,
-            proposal: Proposal::NONE,
             capture: Standing::default(),
             captured: Vec::new(),
         }
@@ -80,9 +78,7 @@ impl Bench {
         let Command {
             tare_request: tare,
             clear_request: clear,
-            identify_request: identify,
-            commission_request: commission,
-            forget_request: forget,
+            measure_request: measure,
             torque,
             ..
         } = self.server.command();
@@ -92,7 +88,7 @@ impl Bench {
         if tare != self.status.taken.tare {
             self.status.tare = if self.status.fault.is_some() { Taring::Refused } else { Taring::Done };
         }
-        self.status.taken = Taken { tare, clear, identify, commission, forget, ..self.status.taken };
+        self.status.taken = Taken { tare, clear, measure };
     }
 
     /// What the bus sends in return, packet by packet.
@@ -120,7 +116,6 @@ impl Bench {
             taxels: &self.taxels,
             pascals_per_sum_q32: 10 << 32,
             tare: &self.tare,
-            proposal: &self.proposal,
             capture: Captured { standing: self.capture, data: &self.captured },
         };
         let mut reply = Reply::new();
@@ -152,12 +147,6 @@ impl Bench {
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, u8> {
         let answer = self.ask(0x02, &[address.to_le_bytes(), length.to_le_bytes()].concat());
         if answer.number() == 0 { Ok(answer.data) } else { Err(answer.number()) }
-    }
-
-    /// Writes a parameter.
-    pub fn write_parameter(&mut self, name: &str, value: i32) {
-        let register = REGISTERS.iter().find(|register| register.name == name).expect("a parameter");
-        self.write(register.address, &value.to_le_bytes()).expect("a write");
     }
 
     /// Writes bytes.

@@ -1,11 +1,11 @@
 //! Requests on the bus: what cannot be done is answered with error 1, what is accepted is passed on, and how it went
 //! can be read.
 
-use fingertip::calibrate::{Refusal as Unfit, Standing, State, scale};
+use fingertip::capture::State;
 use fingertip::command::Command;
-use fingertip::identify::{Identification, Refusal};
+use fingertip::measure::{Ended, Standing, Task};
 use fingertip::pipeline::Taring;
-use fingertip::shipped::{Gains, address};
+use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
 
 use crate::bench::{Bench, ID, packet};
@@ -99,23 +99,62 @@ fn torque_and_goals_wait_until_the_fault_is_seen_to_be_cleared() {
     assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_000);
 }
 
+/// What the link knows to be impossible is refused at once; what a tare under way may make possible is passed on.
 #[test]
-fn identify_is_refused_without_torque_or_tare() {
+fn a_motion_is_refused_where_it_cannot_begin() {
+    const JOG: u8 = 1;
+    const STROKES: u8 = 2;
+    const PRESS: u8 = 3;
+    let ask = |bench: &mut Bench, task: u8| bench.write(address::MEASURE, &[task]);
+    let all = |bench: &mut Bench| [JOG, STROKES, PRESS].map(|task| ask(bench, task).is_ok());
     let mut bench = Bench::new();
-    assert_eq!(bench.write(address::IDENTIFY, &[1]), RESULT);
     bench.status.limits.set(Limits::NOT_TARED);
-    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), Ok(()));
-    assert_eq!(bench.write(address::IDENTIFY, &[1]), RESULT);
-    assert_eq!(bench.write(address::IDENTIFY, &[0]), Ok(()), "0 asks for nothing");
-
-    // A tare is under way, or accepted: the measurement waits for its end.
-    bench.status.mode = Mode::Tare;
-    assert_eq!(bench.write(address::IDENTIFY, &[1]), Ok(()));
-    bench.status.mode = Mode::Off;
-    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
-    bench.write(address::TARE, &[1]).expect("a tare");
+    assert_eq!(all(&mut bench), [false; 3], "not tared, torque off");
     bench.write(address::TORQUE_ENABLE, &[1]).expect("on");
-    assert_eq!(bench.write(address::IDENTIFY, &[1]), Ok(()));
+    assert_eq!(all(&mut bench), [false; 3], "not tared");
+    bench.status.mode = Mode::Tare;
+    assert_eq!(all(&mut bench), [false, false, true], "a press waits for the tare");
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
+    assert_eq!(all(&mut bench), [false; 3], "during a tare, torque off");
+    let mut bench = Bench::new();
+    bench.write(address::TARE, &[1]).expect("a tare");
+    assert_eq!(all(&mut bench), [false; 3], "a tare that the loop has not seen, torque off");
+    let mut bench = Bench::new();
+    assert_eq!(all(&mut bench), [true, true, false], "tared, torque off");
+    let mut bench = Bench::new();
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("on");
+    assert_eq!(all(&mut bench), [false, false, true], "torque on");
+    bench.set_fault(Some(Fault::Bridge));
+    assert_eq!(all(&mut bench), [false; 3], "a fault");
+    let mut bench = Bench::new();
+    bench.capture.state = State::Recording;
+    assert_eq!(all(&mut bench), [true, false, false], "the capture's memory is in use");
+    bench.write(address::TORQUE_ENABLE, &[1]).expect_err("a jog was accepted");
+    // Stopping is never refused.
+    for bench in [&mut Bench::new(), &mut faulted(), &mut bench] {
+        let before = bench.server.command().measure_request;
+        assert_eq!(ask(bench, 0), Ok(()));
+        let after = bench.server.command().measure_request;
+        assert!(after != before && Task::of(after) == Task::Stop);
+    }
+    let before = bench.server.command();
+    assert_eq!(ask(&mut bench, 4), Err(4));
+    assert_eq!(bench.server.command(), before);
+}
+
+#[test]
+fn an_old_outcome_is_never_taken_for_that_of_a_new_motion() {
+    let mut bench = Bench::new();
+    bench.status.measure = Standing::refused(Task::Press, Ended::NoContact, -1_234);
+    let read = |bench: &mut Bench| {
+        [address::MEASURE_STATE, address::MEASURE_ENDED, address::MEASURE_TASK].map(|place| bench.number(place, 1))
+    };
+    assert_eq!((read(&mut bench), bench.number(address::MEASURE_VALUE, 4)), ([3, 11, 3], -1_234_i32 as u32));
+    bench.write(address::MEASURE, &[1]).expect("a jog");
+    assert_eq!(bench.number(address::MEASURE_STATE, 1), 1, "before the loop has looked");
+    bench.status.measure = Standing::refused(Task::Jog, Ended::Complete, 0);
+    bench.take_up();
+    assert_eq!((read(&mut bench), bench.number(address::MEASURE_PROGRESS, 1)), ([2, 0, 1], 100));
 }
 
 #[test]
@@ -164,89 +203,3 @@ fn how_an_unanswered_request_went_can_be_read() {
     assert_eq!((bench.number(address::TARE_STATE, 1), bench.number(address::RESULT_ERRORS, 2)), (3, 1));
 }
 
-#[test]
-fn an_old_outcome_is_never_taken_for_that_of_a_new_request() {
-    let mut bench = Bench::new();
-    bench.status.identification = Identification::Refused(Refusal::NoContact);
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque");
-    assert_eq!(bench.number(address::IDENTIFY_STATE, 1), 3);
-    assert_eq!(bench.write(address::IDENTIFY, &[1]), Ok(()));
-    assert_eq!(bench.number(address::IDENTIFY_STATE, 1), 1);
-    bench.take_up();
-    assert_eq!(bench.number(address::IDENTIFY_STATE, 1), 3);
-}
-
-/// A press needs torque and a tare, as a measurement of the modulus; what it proposes is accepted with torque off, where
-/// there is something.
-#[test]
-fn a_calibration_is_asked_for_and_accepted_where_that_can_be() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.write(address::CALIBRATE, &[1]), RESULT, "no torque");
-    assert_eq!(bench.write(address::CALIBRATE, &[3]), RESULT, "no proposal");
-    assert_eq!(bench.write(address::SCALE, &[3]), RESULT, "no number");
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("a write");
-    assert_eq!(bench.write(address::CALIBRATE, &[1]), Ok(()));
-    assert_eq!((bench.server.command().calibrate_request, bench.number(address::CALIBRATE_STATE, 1)), (1, 1));
-    bench.status.calibration =
-        Standing { state: State::Refused(Unfit::Soft), presses: 1, reached: 70, ..Standing::default() };
-    bench.status.taken.calibrate = 1;
-    bench.status.scale = scale::Standing { points: 2, factor_ppm: 1_250_000, sigma_ppm: 900, refusal: None };
-    assert_eq!((bench.number(address::CALIBRATE_STATE, 1), bench.number(address::CALIBRATE_REFUSAL, 1)), (3, 1));
-    assert_eq!(bench.number(address::CALIBRATE_TAXELS, 2), 70);
-    for place in 0..100 {
-        assert!(bench.proposal.gains.set(place, 12_000 + 50 * place as u16));
-        bench.proposal.sigmas[place / 10][place % 10] = place as u8;
-    }
-    assert_eq!(bench.number(address::PROPOSED_GAINS + 2 * 99, 2), 12_000 + 50 * 99);
-    assert_eq!(bench.number(address::PROPOSED_SIGMAS + 42, 1), 42);
-    // With torque on neither is accepted, nor while a press is worked out.
-    assert_eq!(bench.write(address::CALIBRATE, &[3]), Err(7));
-    assert_eq!(bench.write(address::SCALE, &[3]), Err(7));
-    bench.write(address::TORQUE_ENABLE, &[0]).expect("a write");
-    bench.server.take_actions();
-    let standing = bench.status.calibration;
-    bench.status.calibration.state = State::Running;
-    assert_eq!(bench.write(address::CALIBRATE, &[3]), RESULT);
-    bench.status.calibration = standing;
-    let params = bench.server.settings().record.params;
-    assert_eq!(bench.server.settings().record.gains, Gains::ONE);
-    assert_eq!(bench.write(address::CALIBRATE, &[3]), Ok(()));
-    assert_eq!(bench.server.settings().record.gains, bench.proposal.gains);
-    assert_eq!((bench.server.settings().record.params, bench.number(address::SAVED_STATE, 1)), (params, 1));
-    let actions = bench.server.take_actions();
-    assert!(actions.calibrate && !actions.configure);
-    bench.take_up();
-    // A quarter more force for each code: fewer codes for a kPa, and a tip that is harder by that.
-    assert_eq!(bench.write(address::SCALE, &[3]), Ok(()));
-    let after = bench.server.settings().record.params;
-    assert_eq!((after.codes_per_kpa_milli, after.modulus_pa), (19_200, 312_500));
-    assert!(bench.server.take_actions().configure);
-}
-
-/// What the factor would make of a parameter must be in its range.
-#[test]
-fn a_factor_that_leads_out_of_range_changes_nothing() {
-    let mut bench = Bench::new();
-    bench.write_parameter("modulus_pa", 1_900_000);
-    bench.take_up();
-    bench.status.scale = scale::Standing { points: 1, factor_ppm: 1_100_000, sigma_ppm: 900, refusal: None };
-    let before = *bench.server.settings();
-    assert_eq!(bench.write(address::SCALE, &[3]), Err(4));
-    assert_eq!(*bench.server.settings(), before);
-}
-
-#[test]
-fn a_scale_s_number_is_passed_on_and_waits_for_the_loop() {
-    let mut bench = Bench::new();
-    assert_eq!(bench.number(address::SCALE_POINTS, 1), 0);
-    bench.write(address::SCALE_SHOWS_MN, &1_234i32.to_le_bytes()).expect("a write");
-    let command = bench.server.command();
-    assert_eq!((command.shown_request, command.shown_mn, bench.number(address::SCALE_POINTS, 1)), (1, 1_234, 255));
-    bench.status.taken.shown = 1;
-    bench.status.scale.refusal = Some(scale::Refusal::Contradiction);
-    assert_eq!((bench.number(address::SCALE_POINTS, 1), bench.number(address::SCALE_REFUSAL, 1)), (0, 5));
-    for address in [address::CALIBRATE, address::SCALE] {
-        bench.write(address, &[2]).expect("a write");
-    }
-    assert_eq!(bench.server.command().forget_request, 2);
-}

@@ -83,7 +83,7 @@ pub struct Input {
     pub torque: bool,
     pub goal_bits: i32,
     pub bus_watchdog_ms: u16,
-    /// Added to the numbers of the requests: tare, clear, identify.
+    /// Added to the numbers of the requests: tare, clear, measure.
     pub requests: [u8; 3],
 }
 
@@ -118,14 +118,13 @@ impl Arguments {
         command.torque = input.torque;
         command.goal = Newtons::from_bits(input.goal_bits);
         command.bus_watchdog_ms = input.bus_watchdog_ms;
-        let [tare, clear, identify] = input.requests;
+        let [tare, clear, measure] = input.requests;
         command.tare_request = command.tare_request.wrapping_add(tare);
         // One of four tares is forced.
         command.tare_forced = command.tare_request.is_multiple_of(4);
         command.clear_request = command.clear_request.wrapping_add(clear);
-        command.identify_request = command.identify_request.wrapping_add(identify);
         // Its lowest bits name a task.
-        command.commission_request = command.commission_request.wrapping_add(identify.wrapping_mul(5));
+        command.measure_request = command.measure_request.wrapping_add(measure);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::inputs::{Arguments, Input, any_inputs};
 use crate::params::{any_params, config};
+use fingertip::measure::{Ended, State, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taring};
 use fingertip::shipped::{Pipeline, TARE_FRAMES};
@@ -28,7 +29,7 @@ struct Run {
     seen: Seen,
 }
 
-/// The numbers of the modes, faults, outcomes and refusals that runs came to.
+/// The numbers of the modes, faults, tasks and ends of motions that runs came to.
 type Seen = [BTreeSet<u8>; 4];
 
 impl Run {
@@ -65,8 +66,9 @@ impl Run {
     fn step(&mut self) -> Status {
         let clear_before = core::mem::replace(&mut self.clear_seen, self.arguments.command.clear_request);
         let tares = self.arguments.command.tare_request != self.before.taken.tare;
-        let identifies = self.arguments.command.identify_request != self.before.taken.identify;
-        let commissions = self.arguments.command.commission_request != self.before.taken.commission;
+        let measures = self.arguments.command.measure_request != self.before.taken.measure;
+        let task = Task::of(self.arguments.command.measure_request);
+        let strokes = measures && matches!(task, Task::Jog | Task::Strokes);
         let Arguments { frame, sense, command } = &self.arguments;
         let (duty, &status) = self.pipeline.step(frame, sense, command);
         self.digest.add(duty, &status);
@@ -84,10 +86,10 @@ impl Run {
             let cleared = command.clear_request != clear_before && !command.torque;
             let sound = match status.mode {
                 // What is requested in the same frame may find the next fault.
-                Mode::Fault if cleared => tares || commissions,
+                Mode::Fault if cleared => tares || strokes,
                 Mode::Fault => status.fault == self.before.fault,
                 Mode::Tare => cleared && tares,
-                Mode::Strokes => cleared && commissions,
+                Mode::Strokes => cleared && strokes,
                 Mode::Off => cleared && (!tares || status.tare == Taring::Refused),
                 _ => false,
             };
@@ -113,16 +115,27 @@ impl Run {
         let least = self.pipeline.config().contact_on;
         self.touched = status.mode != Mode::Tare && (self.touched || status.contact.force >= least);
         assert_eq!(status.tare == Taring::Running, status.mode == Mode::Tare);
-        if identifies && status.taken.identify != command.identify_request {
-            let faulted = status.mode == Mode::Fault && self.before.mode == Mode::Fault;
-            assert!(command.torque && !faulted, "waits in {:?}", status.mode);
-        } else if identifies {
-            let number = status.identification.number();
-            // A press that ends in this very frame has its answer; the grip comes with the next one.
-            assert!(if status.mode == Mode::Press { number > 0 } else { number == 3 }, "{status:?}");
+        let was_running = self.before.measure.state == State::Running;
+        let runs = status.measure.state == State::Running;
+        if measures && status.taken.measure != command.measure_request {
+            // For torque, or for the frame after the one in which a motion was interrupted.
+            let torque = task == Task::Press && command.torque;
+            let interrupted = was_running && status.measure.ended == Ended::Interrupted;
+            assert!(torque || interrupted, "{task:?} waits in {:?}", status.mode);
+        } else if measures && task != Task::Stop && !was_running {
+            assert_eq!(status.measure.task, task);
+            // Accepted or refused; a fault may end it in its first frame.
+            assert!(runs || status.measure.state == State::Ended, "{status:?}");
         }
-        if status.mode == Mode::Press && !identifies && command.calibrate_request == 0 {
-            assert_eq!(self.before.identification.number(), 1, "a press goes on after its answer: {status:?}");
+        assert!(!runs || status.measure.task == if status.mode == Mode::Press { Task::Press } else { status.measure.task });
+        assert!(!runs || matches!(status.mode, Mode::Press | Mode::Strokes), "{status:?}");
+        assert!(runs || status.mode != Mode::Strokes);
+        assert_eq!(status.measure.value != 0 || status.measure.ended != Ended::Complete, status.measure.state == State::Ended);
+        if was_running && runs {
+            assert_eq!((status.mode, status.measure.task), (self.before.mode, self.before.measure.task), "another began");
+        }
+        if status.mode == Mode::Press && !measures {
+            assert!(was_running, "a press goes on after its answer: {status:?}");
         }
         // Enabling torque begins with what the goal and the touch are, whatever was requested before; a measurement
         // begins only with its request.
@@ -135,7 +148,7 @@ impl Run {
                     let vanished = status.contact.force < self.pipeline.config().contact_on;
                     command.goal <= Newtons::ZERO || silent || vanished
                 }
-                _ => identifies,
+                _ => measures,
             };
             assert!(sound, "{:?} first after {:?}", status.mode, self.before.mode);
         }
@@ -144,9 +157,8 @@ impl Run {
         assert!(contact.force >= Newtons::ZERO);
         assert!((0..=tip.depth_max().to_bits()).contains(&contact.indentation.to_bits()));
         assert!((0..=100).contains(&contact.bad_taxels));
-        let identification = status.identification;
         let fault = status.fault.map_or(0, |fault| fault as u8);
-        let numbers = [status.mode as u8, fault, identification.number(), identification.refusal()];
+        let numbers = [status.mode as u8, fault, status.measure.task as u8, status.measure.ended as u8];
         for (seen, number) in self.seen.iter_mut().zip(numbers) {
             seen.insert(number);
         }
@@ -240,12 +252,10 @@ fn the_runs_come_everywhere() {
         Ok(())
     });
     outcome.expect("the rules hold");
-    let [modes, faults, outcomes, refusals] = all.into_inner();
+    let [modes, faults, tasks, ends] = all.into_inner();
     assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6, 7]);
-    assert!(
-        outcomes.contains(&1) && [10, 11].iter().all(|number| refusals.contains(number)),
-        "{outcomes:?} {refusals:?}"
-    );
+    assert_eq!(Vec::from_iter(tasks), [0, 1, 2, 3]);
+    assert!([0, 1, 2, 3, 5, 7, 12].iter().all(|number| ends.contains(number)), "{ends:?}");
     // Frames that do not come, damaged parameters, late steps and crashes are found outside the step.
     assert_eq!(Vec::from_iter(faults), [0, 2, 3, 4, 5, 6, 7, 9, 10, 11, 14, 15]);
 }

@@ -283,7 +283,7 @@ fn takes_anything<const ROWS: usize, const COLUMNS: usize>(cases: u32) {
                 assert_eq!(duty, status.duty);
                 command.torque = status.fault.is_none();
                 command.clear_request += u8::from(status.fault.is_some());
-                command.identify_request = command.identify_request.wrapping_add(fit_level % 2);
+                command.measure_request = command.measure_request.wrapping_add(fit_level % 4);
             }
         }
         Ok(())

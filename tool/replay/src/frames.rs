@@ -201,11 +201,6 @@ fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
         fit_level: FitLevel::from_number(byte(bits)?),
         tare_request: byte(bits)?,
         clear_request: byte(bits)?,
-        identify_request: byte(bits)?,
-        commission_request: byte(bits)?,
-        calibrate_request: byte(bits)?,
-        forget_request: byte(bits)?,
-        shown_request: byte(bits)?,
-        shown_mn: bits.get(32)?.cast_signed(),
+        measure_request: byte(bits)?,
     })
 }

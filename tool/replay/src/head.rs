@@ -32,7 +32,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Hea
     let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
     let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
     let missed_frames = u32::from_le_bytes(next()?);
-    let taken = Taken::from_words([next()?, next()?].map(u32::from_le_bytes)).filter(|_| zero == 0);
+    let taken = Taken::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
     let taken = taken.ok_or(Refusal::Damaged)?;
     let frame_ns = u32::from_le_bytes(next()?);
     let mut winding = [0; winding::WORDS];

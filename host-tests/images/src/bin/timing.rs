@@ -79,7 +79,7 @@ enum When {
 use When::{Always, Driving, Edge};
 
 const STEP: usize = 1;
-const KERNELS: [(&str, Kernel, When); 26] = [
+const KERNELS: [(&str, Kernel, When); 24] = [
     ("an empty call", nothing, Always),
     ("pipeline step", step, Always),
     ("frame pass", frame_pass, Always),
@@ -102,10 +102,8 @@ const KERNELS: [(&str, Kernel, When); 26] = [
     ("contact, over the edge, one", read_one, Edge),
     ("contact, over the edge, two", read_two, Edge),
     ("contact, over the edge, full", read_full, Edge),
-    ("calibration, a frame's readings", press::gather, Always),
-    ("calibration, a taxel for the pose", press::find_pose, Always),
-    ("calibration, a ninth of a taxel's expectation", press::expect, Always),
-    ("calibration, a taxel's gain", press::propose, Always),
+    ("press, a frame added to a step", press::add, Always),
+    ("press, a step's row written", press::write, Always),
 ];
 
 extern "C" fn nothing(_: &mut Bench) {}

@@ -1,59 +1,40 @@
-//! What a calibration's press is worked out to, piece by piece.
+//! What a press adds to a frame: its share of the step, and the row that a complete step makes.
 
 use super::Bench;
-use fingertip::calibrate::parts::{Equations, Line, Pose, Readings, STEPS, Series, Sums, add_part};
-use fingertip::shipped::{COLUMNS, Proposal, ROWS};
+use fingertip::config::newtons;
+use fingertip::measure::press::{Press as Motion, Step, View};
+use fingertip::measure::series::{CHECK, Out, step_bytes};
+use fingertip::measure::{Row, Standing, Task};
+use fingertip::shipped::{COLUMNS, ROWS};
 
-/// What a press left, as it is evaluated.
+/// A press that holds the tip, and the memory of a row.
 pub struct Press {
-    readings: Readings<ROWS, COLUMNS>,
-    travel: [Option<i64>; STEPS],
-    reading: Series,
-    expected: Series,
-    pose: Pose,
-    equations: Equations,
-    proposal: Proposal,
+    motion: Option<Motion>,
+    step: Step<ROWS, COLUMNS>,
+    standing: Standing,
+    bytes: [u8; step_bytes(ROWS * COLUMNS)],
 }
 
 impl Press {
-    /// A taxel a third of the radius off the axis, in Q30.
-    const PLACE: [i64; 2] = [1 << 28, 1 << 28];
-    const PITCH: i64 = (1 << 30) * 15 / 100;
-    const STEP: i64 = 12_500_000;
-
-    /// A press of made up readings.
+    /// Not begun.
     pub fn new() -> Self {
-        let mut travel = [None; STEPS];
-        let mut reading = [0; STEPS];
-        for (step, (x, u)) in (1..).zip(travel.iter_mut().zip(&mut reading)) {
-            (*x, *u) = (Some(step * Self::STEP), (step * Self::STEP - (1 << 26)).max(0));
-        }
-        let (readings, proposal) = (Readings::NONE, Proposal::NONE);
-        let (pose, equations) = (Pose::default(), Equations::NONE);
-        Self { readings, travel, reading, expected: [0; STEPS], pose, equations, proposal }
+        let standing = Standing::running(Task::Press);
+        Self { motion: None, step: Step::NONE, standing, bytes: [0; step_bytes(ROWS * COLUMNS)] }
     }
 }
 
-pub extern "C" fn gather(bench: &mut Bench) {
-    bench.press.readings.take(1 << 24, 3 << 24, &bench.picture);
+/// A frame of the press. The first frames find the touch; every later one belongs to a step.
+pub extern "C" fn add(bench: &mut Bench) {
+    let Bench { press, picture, contact, motion, record, config, .. } = bench;
+    let Press { motion: press, step, standing, .. } = &mut **press;
+    let press = press.get_or_insert_with(|| Motion::begin(motion));
+    contact.force = newtons(1_000);
+    let (sequence, encoder) = (record.frame.sequence, record.sense.encoder);
+    let chip = record.sense.chip;
+    press.observe(&View { sequence, picture, contact, encoder, motion, applied_mv: 900, chip }, step, standing, config);
 }
 
-pub extern "C" fn find_pose(bench: &mut Bench) {
-    let Press { pose, travel, reading, equations, .. } = &mut *bench.press;
-    let Some(zero) = pose.zero(Press::PLACE, Press::PITCH) else { return };
-    if let Some(line) = Line::of(&zero, travel, reading) {
-        equations.take(&zero, &line);
-    }
-}
-
-pub extern "C" fn expect(bench: &mut Bench) {
-    let Press { pose, travel, expected, .. } = &mut *bench.press;
-    *expected = [0; STEPS];
-    add_part(expected, pose, Press::PLACE, Press::PITCH, 1, travel, Press::STEP);
-}
-
-pub extern "C" fn propose(bench: &mut Bench) {
-    let Press { travel, reading, expected, proposal, .. } = &mut *bench.press;
-    let sums = Sums::of(reading, expected, travel);
-    proposal.set(44, &sums, 16_384, bench.config);
+pub extern "C" fn write(bench: &mut Bench) {
+    let Press { step, bytes, .. } = &mut *bench.press;
+    Out::new(bytes, CHECK).row(&Row::Step(step));
 }

@@ -4,6 +4,7 @@
 
 use super::{Begun, Board, SimError, Unit};
 use crate::bridge::Bridge;
+use crate::effects::contact::Stages as _;
 use crate::effects::sensor::Stages as _;
 use crate::effects::set::Set;
 use crate::mechanics::finger::Finger;
@@ -28,6 +29,8 @@ pub struct Bench<E: Set = Reference> {
 
 /// Frames within which every motion that measures ends: 30 s.
 const MEASURE_FRAMES: usize = 300_000;
+/// Time between two frames of a rest.
+const REST_STEP_S: f64 = 0.02;
 
 impl<E: Set> Bench<E> {
     /// At rest, torque off, not tared.
@@ -38,14 +41,22 @@ impl<E: Set> Bench<E> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
-    /// Exchanges the world and the array's effects; the controller stays as it is.
+    /// Exchanges the world around the finger. Controller, tip and array stay: their effects remember what was before, and
+    /// time goes on.
     ///
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
-        let before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
-        if let (Some(now), Some(before)) = (self.board.units.first_mut(), before.units.into_iter().next()) {
+        let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
+        let now = &mut self.board;
+        (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
+        let finger = &mut now.world.fingers_mut()[0];
+        let finger_before = &mut before.world.fingers_mut()[0];
+        finger.resume(&finger_before.motion());
+        finger.contact.effects.remember(&mut finger_before.contact.effects);
+        if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
+            (now.sensor, now.next) = (before.sensor, before.next);
         }
         Ok(())
     }
@@ -135,6 +146,16 @@ impl<E: Set> Bench<E> {
             largest_n = largest_n.max(self.truth().force_n);
         }
         largest_n
+    }
+
+    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the array's temperature
+    /// changes. Torque must be off.
+    pub fn rest(&mut self, seconds: f64) {
+        for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
+            self.finger_mut().contact.effects.relax(REST_STEP_S, None);
+            self.board.clock.go_on(REST_STEP_S);
+            self.step();
+        }
     }
 
     /// Makes a motion that measures and calls `each` after every frame; returns how the motion ended.

@@ -164,8 +164,8 @@ impl<'a> Out<'a> {
             let at = |all: &[[i32; COLUMNS]; ROWS]| all.as_flattened().get(place).copied().unwrap_or(0);
             // Mean of what it differed by from the first frame, quarters.
             let mean = (at(&step.sums) / taken).saturating_sub(at(&step.first)) >> 2;
-            let mean = mean.max(-65_535).min(65_535);
-            let variance = (square / taken.cast_unsigned()).saturating_sub((mean * mean).cast_unsigned());
+            let mean = mean.unsigned_abs().min(65_535);
+            let variance = (square / taken.cast_unsigned()).saturating_sub(mean * mean);
             self.put(coded(variance));
         }
         let bad = |place: usize| step.bad.get(place / COLUMNS).is_some_and(|row| row >> (place % COLUMNS) & 1 != 0);

@@ -201,4 +201,3 @@ fn how_an_unanswered_request_went_can_be_read() {
     sync_write(&mut bench);
     assert_eq!((bench.number(address::TARE_STATE, 1), bench.number(address::RESULT_ERRORS, 2)), (3, 1));
 }
-

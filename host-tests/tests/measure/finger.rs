@@ -48,7 +48,11 @@ impl<const BYTES: usize> Finger<BYTES> {
         }
         self.bench.request(task);
         let status = self.frame();
-        assert_eq!((status.measure.task, status.measure.state), (task, fingertip::measure::State::Running), "{status:?}");
+        assert_eq!(
+            (status.measure.task, status.measure.state),
+            (task, fingertip::measure::State::Running),
+            "{status:?}"
+        );
     }
 
     pub fn frame(&mut self) -> Status {
@@ -96,7 +100,10 @@ impl<const BYTES: usize> Finger<BYTES> {
         if task != Task::Jog {
             let record = self.record();
             assert_eq!((record.ended, record.value), (ended as u8, measure.value));
-            assert_eq!((record.kind, record.rows), (if task == Task::Press { 1 } else { 2 }, self.capture.standing().frames));
+            assert_eq!(
+                (record.kind, record.rows),
+                (if task == Task::Press { 1 } else { 2 }, self.capture.standing().frames)
+            );
         }
     }
 }

@@ -15,8 +15,15 @@ fn a_press_is_recorded_whole() {
     // In and back twice, and a hold that stands.
     let turns = record.steps.windows(2).filter(|pair| pair[0].back != pair[1].back).count();
     assert_eq!(turns, 3);
-    let held = record.steps.windows(2).filter(|pair| pair[1].counts[0].abs_diff(pair[0].counts[1]) < 20 && !pair[1].back
-        && pair[1].counts[0].abs_diff(pair[1].counts[1]) < 20).count();
+    let held = record
+        .steps
+        .windows(2)
+        .filter(|pair| {
+            pair[1].counts[0].abs_diff(pair[0].counts[1]) < 20
+                && !pair[1].back
+                && pair[1].counts[0].abs_diff(pair[1].counts[1]) < 20
+        })
+        .count();
     assert!(held + 1 >= HOLDS_MS.len(), "{held} rows of a hold");
     for pair in record.steps.windows(2) {
         assert_eq!(pair[0].frames[1].wrapping_add(1), pair[1].frames[0], "no frame is missing");

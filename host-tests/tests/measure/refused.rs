@@ -24,51 +24,79 @@ fn every_state_has_its_answer() {
     let states: [(&str, fn() -> Made, [Option<Ended>; 3]); 9] = [
         ("not tared", || Finger::with(&params()), [NO; 3]),
         ("tared", Finger::tared, [None, None, NO]),
-        ("unconfirmed", || {
-            let mut finger = Finger::with(&Params::DEFAULT);
-            finger.bench.tare();
-            finger.bench.command().torque = false;
-            finger
-        }, [None, Some(Ended::Unconfirmed), NO]),
-        ("torque on", || {
-            let mut finger = Made::tared();
-            finger.bench.command().torque = true;
-            finger.frame();
-            finger
-        }, [NO, NO, None]),
-        ("taring", || {
-            let mut finger = Made::tared();
-            finger.bench.command().tare_request += 1;
-            finger.frame();
-            finger
-        }, [NO; 3]),
-        ("touching", || {
-            let mut finger = Made::tared();
-            pressed(&mut finger);
-            finger
-        }, [NO; 3]),
-        ("tared while touching", || {
-            let mut finger = Made::with(&params());
-            pressed(&mut finger);
-            finger.bench.command().tare_request += 1;
-            (0..700).for_each(|_| _ = finger.frame());
-            finger
-        }, [NO; 3]),
-        ("gains changed", || {
-            let mut finger = Made::tared();
-            finger.bench.pipeline().calibrate(&Calibration::NONE);
-            finger
-        }, [NO; 3]),
-        ("fault", || {
-            let mut finger = Made::tared();
-            finger.bench.command().torque = true;
-            finger.frame();
-            finger.frame_with(|record| record.sense.bridge_fault = true);
-            finger.bench.command().torque = false;
-            finger.frame();
-            assert_eq!(finger.bench.status().mode, Mode::Fault);
-            finger
-        }, [NO; 3]),
+        (
+            "unconfirmed",
+            || {
+                let mut finger = Finger::with(&Params::DEFAULT);
+                finger.bench.tare();
+                finger.bench.command().torque = false;
+                finger
+            },
+            [None, Some(Ended::Unconfirmed), NO],
+        ),
+        (
+            "torque on",
+            || {
+                let mut finger = Made::tared();
+                finger.bench.command().torque = true;
+                finger.frame();
+                finger
+            },
+            [NO, NO, None],
+        ),
+        (
+            "taring",
+            || {
+                let mut finger = Made::tared();
+                finger.bench.command().tare_request += 1;
+                finger.frame();
+                finger
+            },
+            [NO; 3],
+        ),
+        (
+            "touching",
+            || {
+                let mut finger = Made::tared();
+                pressed(&mut finger);
+                finger
+            },
+            [NO; 3],
+        ),
+        (
+            "tared while touching",
+            || {
+                let mut finger = Made::with(&params());
+                pressed(&mut finger);
+                finger.bench.command().tare_request += 1;
+                (0..700).for_each(|_| _ = finger.frame());
+                finger
+            },
+            [NO; 3],
+        ),
+        (
+            "gains changed",
+            || {
+                let mut finger = Made::tared();
+                finger.bench.pipeline().calibrate(&Calibration::NONE);
+                finger
+            },
+            [NO; 3],
+        ),
+        (
+            "fault",
+            || {
+                let mut finger = Made::tared();
+                finger.bench.command().torque = true;
+                finger.frame();
+                finger.frame_with(|record| record.sense.bridge_fault = true);
+                finger.bench.command().torque = false;
+                finger.frame();
+                assert_eq!(finger.bench.status().mode, Mode::Fault);
+                finger
+            },
+            [NO; 3],
+        ),
     ];
     for (name, made, answers) in states {
         for (task, answer) in [Task::Jog, Task::Strokes, Task::Press].into_iter().zip(answers) {

@@ -130,9 +130,8 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
                 core::array::from_fn(|_| core::array::from_fn(|_| random.i32(-1_600..60_000)));
             let noise = [0, 16, 160, 1_600][number % 4];
             let count = 1 + number * number;
-            let frames: Vec<_> = (0..count)
-                .map(|_| level.map(|row| row.map(|taxel| taxel + random.i32(-noise..=noise))))
-                .collect();
+            let frames: Vec<_> =
+                (0..count).map(|_| level.map(|row| row.map(|taxel| taxel + random.i32(-noise..=noise)))).collect();
             let mut step = sums(&frames);
             (step.frames, step.counts) = ([random.u32(..), random.u32(..)], [random.i32(..), random.i32(..)]);
             (step.back, step.voltage_mv) = (number % 2 == 1, random.i32(-6_000..6_000) * count as i32);
@@ -146,7 +145,10 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
     assert_eq!((record.kind, record.shape, record.ended), (1, [ROWS, COLUMNS], 12));
     assert_eq!((record.frame_ns, record.origin, record.delay_ns, record.value), (99_762, -77_000, 33_000, -5));
     for ((step, frames), read) in steps.iter().zip(&record.steps) {
-        assert_eq!((read.frames, read.counts, read.taken, read.back), (step.frames, step.counts, step.taken, step.back));
+        assert_eq!(
+            (read.frames, read.counts, read.taken, read.back),
+            (step.frames, step.counts, step.taken, step.back)
+        );
         assert_eq!(i32::from(read.voltage_mv), step.voltage_mv / i32::from(step.taken));
         let kelvin = step.chip.map_or(0.0, |chip| chip.0.to_num::<f64>() + 273.15);
         assert!((f64::from(read.tenths_k) / 10.0 - kelvin).abs() <= 0.15, "{} {kelvin}", read.tenths_k);

@@ -232,8 +232,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
             Activity::Strokes(run) => {
                 let force = contact.force.max(picture.force(config));
-                let view =
-                    strokes::View { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
+                let view = strokes::View { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
                 run.observe(&view, &mut status.measure, config);
                 let voltage = config.push(run.voltage_mv());
                 if !run.running() {

@@ -43,16 +43,8 @@ pub enum Mode {
 
 impl Mode {
     /// All of them; the first has the number 0.
-    pub const ALL: [Self; 8] = [
-        Self::Off,
-        Self::Tare,
-        Self::Approach,
-        Self::Force,
-        Self::Release,
-        Self::Fault,
-        Self::Press,
-        Self::Strokes,
-    ];
+    pub const ALL: [Self; 8] =
+        [Self::Off, Self::Tare, Self::Approach, Self::Force, Self::Release, Self::Fault, Self::Press, Self::Strokes];
 }
 
 /// Why the motor was stopped.

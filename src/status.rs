@@ -97,9 +97,7 @@ impl Status {
             Mode::Fault => Bridge::Brakes,
             Mode::Off | Mode::Tare if self.braking => Bridge::Brakes,
             Mode::Off | Mode::Tare => Bridge::Open,
-            Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => {
-                Bridge::Driven(self.duty)
-            }
+            Mode::Approach | Mode::Force | Mode::Release | Mode::Press | Mode::Strokes => Bridge::Driven(self.duty),
         }
     }
 }

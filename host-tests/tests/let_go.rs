@@ -91,7 +91,7 @@ fn goal_0_during_a_press<E: Set>(board: &mut Bench<E>) -> Option<String> {
     board.step();
     board.request(Task::Press);
     board.run(0.05);
-    kept(board, 6.0)
+    kept(board, 16.0)
 }
 
 /// A press asked for during the first approach; the host takes the goal back while it presses.
@@ -128,7 +128,7 @@ fn a_press_from_a_released_tip_ends_at_the_clearance() {
     board.run(0.7);
     carry(&mut board, 10.0, 7.5);
     board.request(Task::Press);
-    board.run(6.0);
+    board.run(16.0);
     if board.truth().force_n > 0.0 {
         failed.push(format!("nearer: {}", told(&mut board)));
     }

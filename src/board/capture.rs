@@ -83,8 +83,9 @@ impl Keeper {
         if !runs && !self.measures {
             return;
         }
-        // The link may be reading what was kept before: then in the next frame.
-        if self.standing.state == State::Done && !self.measures && CAPTURE.take(|_| ()).is_none() {
+        // The link may be reading what was kept before: then in the next frame. A motion whose record was ended early
+        // ends in the capture too, or the next one would have no record.
+        if self.standing.state == State::Done && runs != self.measures && CAPTURE.take(|_| ()).is_none() {
             return;
         }
         self.work(|capture| capture.follow(pipeline));

@@ -68,6 +68,8 @@ pub struct Press {
     complete: bool,
     /// The next frame begins a step.
     fresh: bool,
+    /// Steps of this way that are complete.
+    steps: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,6 +193,7 @@ impl Press {
             bad_frames: 0,
             complete: false,
             fresh: true,
+            steps: 0,
         }
     }
 
@@ -305,16 +308,18 @@ impl Press {
         step.take(view, self.fresh, matches!(self.phase, Phase::Back(_)));
         let gone = at.0.saturating_sub(self.step_from.0).saturating_abs().to_bits();
         let whole = depth_goal(config).to_bits().saturating_add(BEFORE);
-        self.complete = turns || gone >= STEP.max(whole / STEPS as i32);
+        // A tip that goes to and fro makes the last step longer, not the record.
+        let more = usize::from(self.steps) <= STEPS;
+        self.complete = turns || more && gone >= STEP.max(whole / STEPS as i32);
         self.fresh = self.complete;
         if self.complete {
-            self.step_from = at;
+            (self.step_from, self.steps) = (at, self.steps.saturating_add(1));
         }
     }
 
     /// The next part of the press; the place of the turn is where its first step begins, and where a hold holds.
     fn next(&mut self, phase: Phase, at: Millimetres, standing: &mut Standing) {
-        (self.phase, self.step_from, self.fresh) = (phase, at, true);
+        (self.phase, self.step_from, self.fresh, self.steps) = (phase, at, true, 0);
         standing.progress = match phase {
             Phase::In(Pace::Quick) => 10,
             Phase::Back(Pace::Quick) => 20,

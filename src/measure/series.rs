@@ -99,7 +99,7 @@ impl Head {
 
 /// Bytes put one after the other, with their check sum; what does not fit shows in [`Out::full`].
 pub struct Out<'a> {
-    room: core::slice::IterMut<'a, u8>,
+    room: &'a mut [u8],
     /// The check sum so far.
     pub check: u32,
     /// How many were put.
@@ -111,34 +111,30 @@ pub struct Out<'a> {
 impl<'a> Out<'a> {
     /// Into this room, after bytes with this check sum.
     pub fn new(room: &'a mut [u8], check: u32) -> Self {
-        Self { room: room.iter_mut(), check, count: 0, full: false }
+        Self { room, check, count: 0, full: false }
     }
 
-    fn put(&mut self, byte: u8) {
-        let Some(place) = self.room.next() else {
+    // Inlined, as all of a row's loops: a row must fit into a frame beside its step.
+    #[inline(always)]
+    fn put<const BYTES: usize>(&mut self, bytes: [u8; BYTES]) {
+        let Some((place, rest)) = core::mem::take(&mut self.room).split_first_chunk_mut() else {
             self.full = true;
             return;
         };
-        *place = byte;
-        self.check = (self.check ^ u32::from(byte)).wrapping_mul(PRIME);
-        self.count += 1;
-    }
-
-    fn half(&mut self, value: u16) {
-        value.to_le_bytes().into_iter().for_each(|byte| self.put(byte));
-    }
-
-    fn word(&mut self, value: u32) {
-        value.to_le_bytes().into_iter().for_each(|byte| self.put(byte));
+        (*place, self.room) = (bytes, rest);
+        for byte in bytes {
+            self.check = (self.check ^ u32::from(byte)).wrapping_mul(PRIME);
+        }
+        self.count += BYTES;
     }
 
     /// A row.
     pub fn row<const ROWS: usize, const COLUMNS: usize>(&mut self, row: &Row<'_, ROWS, COLUMNS>) {
         match row {
-            Row::Stroke => self.word(0x8000),
+            Row::Stroke => self.put(0x8000_u32.to_le_bytes()),
             Row::Sample { count, voltage } => {
-                self.half(count.cast_unsigned());
-                self.half(voltage.cast_unsigned());
+                self.put(count.to_le_bytes());
+                self.put(voltage.to_le_bytes());
             }
             Row::Step(step) => self.step(step),
         }
@@ -146,48 +142,59 @@ impl<'a> Out<'a> {
 
     fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
         let taken = i32::from(step.taken.max(1));
-        step.frames.into_iter().for_each(|frame| self.word(frame));
-        step.counts.into_iter().for_each(|count| self.word(count.cast_unsigned()));
-        self.half(step.taken);
-        self.put(step.back.into());
-        self.put(0);
+        step.frames.into_iter().for_each(|frame| self.put(frame.to_le_bytes()));
+        step.counts.into_iter().for_each(|count| self.put(count.to_le_bytes()));
+        self.put(step.taken.to_le_bytes());
+        self.put([step.back.into(), 0]);
         let voltage = (step.voltage_mv / taken).max(i16::MIN.into()).min(i16::MAX.into()) as i16;
-        self.half(voltage.cast_unsigned());
+        self.put(voltage.to_le_bytes());
         // Degrees Celsius with 16 fractional bits.
         let kelvin = step.chip.map_or(0, |chip| ((i64::from(chip.to_bits()) * 10) >> 16) + 2_731);
-        self.half(kelvin.max(0).min(u16::MAX.into()) as u16);
+        self.put((kelvin.max(0).min(u16::MAX.into()) as u16).to_le_bytes());
+        // The offset makes all that counts positive: rounded to the nearest, without a remainder's sign.
+        let zero = taken / 2 + OFFSET * taken;
         for sum in step.sums.as_flattened() {
-            let eighths = (sum / 2 + taken.div_euclid(2)).div_euclid(taken).saturating_add(OFFSET);
-            self.half(eighths.max(0).min(u16::MAX.into()) as u16);
+            let eighths = (sum / 2 + zero) / taken;
+            self.put((eighths.max(0).min(u16::MAX.into()) as u16).to_le_bytes());
         }
-        for (place, square) in step.squares.as_flattened().iter().enumerate() {
-            let at = |all: &[[i32; COLUMNS]; ROWS]| all.as_flattened().get(place).copied().unwrap_or(0);
+        let sums = step.sums.as_flattened().iter().zip(step.first.as_flattened());
+        for (square, (sum, first)) in step.squares.as_flattened().iter().zip(sums) {
             // Mean of what it differed by from the first frame, quarters.
-            let mean = (at(&step.sums) / taken).saturating_sub(at(&step.first)) >> 2;
-            let mean = mean.max(-65_535).min(65_535);
-            let variance = (square / taken.cast_unsigned()).saturating_sub((mean * mean).cast_unsigned());
-            self.put(coded(variance));
+            let mean = (sum / taken).saturating_sub(*first) >> 2;
+            let mean = mean.unsigned_abs().min(65_535);
+            self.put([coded((square / taken.cast_unsigned()).saturating_sub(mean * mean))]);
         }
-        let bad = |place: usize| step.bad.get(place / COLUMNS).is_some_and(|row| row >> (place % COLUMNS) & 1 != 0);
-        for first in (0..ROWS * COLUMNS).step_by(8) {
-            let bits = (0..8).filter(|bit| first + bit < ROWS * COLUMNS && bad(first + bit));
-            self.put(bits.fold(0, |byte, bit| byte | 1 << bit));
+        let (mut byte, mut bits) = (0, 0);
+        for row in step.bad {
+            for column in 0..COLUMNS {
+                byte |= ((row >> column) as u8 & 1) << bits;
+                bits += 1;
+                if bits == 8 {
+                    self.put([byte]);
+                    (byte, bits) = (0, 0);
+                }
+            }
+        }
+        if bits > 0 {
+            self.put([byte]);
         }
         while !self.count.is_multiple_of(4) && !self.full {
-            self.put(0);
+            self.put([0]);
         }
     }
 }
 
 /// A variance in a byte, as the layout tells.
+#[inline(always)]
 fn coded(variance: u32) -> u8 {
     if variance == 0 {
         return 0;
     }
     // The exponent of 8 + mantissa, which are the upper four bits.
     let exponent = 31 - variance.leading_zeros();
-    let mantissa = ((u64::from(variance) << 3) >> exponent) as u32 & 7;
-    (exponent << 3 | mantissa).min(255) as u8
+    // Shifted up until the highest bit is the uppermost one: the next three are the mantissa.
+    let mantissa = (variance << (31 - exponent)) >> 28 & 7;
+    (exponent << 3 | mantissa) as u8
 }
 
 #[cfg(test)]

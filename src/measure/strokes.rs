@@ -52,9 +52,7 @@ pub struct View {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     /// A pulse; quick ones prove the direction.
-    Pulse {
-        quick: bool,
-    },
+    Pulse { quick: bool },
     /// Pulses until the end of the way.
     Feel,
     /// Under one voltage to a place.
@@ -322,7 +320,10 @@ impl Strokes {
                 wanted.max(self.least(plan))
             }
         }
-        .min(of_supply(view, if matches!(self.part, Part::Go | Part::Stroke(_)) { STROKE_SUPPLY } else { PULSE_SUPPLY }));
+        .min(of_supply(
+            view,
+            if matches!(self.part, Part::Go | Part::Stroke(_)) { STROKE_SUPPLY } else { PULSE_SUPPLY },
+        ));
         self.phase = Phase::Moving;
     }
 

@@ -44,6 +44,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     #[inline(never)]
     pub(super) fn serve(&mut self, command: &Command, sense: &Sense, contact: &Contact) {
         let before = self.status.taken;
+        let ran = self.status.measure.state == State::Running;
         if let Activity::Press(press) = &self.activity
             && !press.running()
         {
@@ -68,7 +69,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 self.serve_torque(sense.encoder);
             }
         }
-        if command.measure_request != before.measure {
+        // A motion that this command ends closes its record with this frame: the next one begins after it.
+        let ended = ran && self.status.measure.state != State::Running;
+        if command.measure_request != before.measure && !ended {
             self.serve_measure(command, sense.encoder, contact);
         }
     }

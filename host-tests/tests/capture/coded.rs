@@ -27,8 +27,7 @@ struct Step {
 fn step(spread: u16) -> impl Strategy<Value = Step> {
     let codes = prop::collection::vec(0..=spread, SLOTS * COLUMNS);
     let sense = (any::<i32>(), any::<u16>(), any::<u16>(), any::<bool>(), any::<u32>(), any::<bool>());
-    let command =
-        (any::<[u8; 3]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<bool>());
+    let command = (any::<[u8; 3]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<bool>());
     let answer = (any::<i16>(), any::<bool>(), any::<bool>(), any::<u32>());
     (codes, sense, command, answer).prop_map(move |(codes, sense, command, (duty, force, faulted, sequence))| {
         let mut frame = Frame { sequence, ..Frame::EMPTY };

@@ -75,13 +75,8 @@ impl Bench {
 
     /// The made-up loop takes up what it is asked, and carries out a tare and a clear at once.
     pub fn take_up(&mut self) {
-        let Command {
-            tare_request: tare,
-            clear_request: clear,
-            measure_request: measure,
-            torque,
-            ..
-        } = self.server.command();
+        let Command { tare_request: tare, clear_request: clear, measure_request: measure, torque, .. } =
+            self.server.command();
         if clear != self.status.taken.clear && !torque {
             self.set_fault(None);
         }

@@ -93,12 +93,7 @@ const fn after(cell: &Cell) -> u16 {
 /// As their documentation has them.
 pub(super) const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
     let cells = cells::<ROWS, COLUMNS>();
-    [
-        register(0, &cells),
-        register(1, &cells),
-        register(2, &cells),
-        register(3, &cells),
-    ]
+    [register(0, &cells), register(1, &cells), register(2, &cells), register(3, &cells)]
 }
 
 const fn register(picture: usize, cells: &[Cell; COUNT]) -> Register {

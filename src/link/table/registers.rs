@@ -25,8 +25,8 @@ use crate::link::snapshot::hardware_error;
 use crate::store;
 
 use super::values::{
-    bump, permille, set_capture, set_goal, set_measure, set_recover, set_tare,
-    set_torque, set_watchdog, short, watchdog,
+    bump, permille, set_capture, set_goal, set_measure, set_recover, set_tare, set_torque, set_watchdog, short,
+    watchdog,
 };
 /// The defaults go by no shape.
 type Record = store::Record<3, 3>;

@@ -2,12 +2,12 @@
 
 use crate::capture;
 use crate::contact::Contact;
-use crate::measure;
 use crate::link::packet::StatusError;
 use crate::link::server::{Counters, State};
 use crate::link::settings::Settings;
 use crate::link::snapshot::Snapshot;
 use crate::link::stand::Stand;
+use crate::measure;
 use crate::pipeline::Taring;
 use crate::state::Limits;
 

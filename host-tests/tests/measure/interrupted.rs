@@ -1,0 +1,127 @@
+//! What ends a motion before its time: the motor rests, the motion and its record say so, and the next one works.
+
+use crate::finger::Finger;
+use fingertip::capture::{Ended as CaptureEnded, State as Kept};
+use fingertip::measure::{Ended, State, Task};
+use fingertip::shipped::Config;
+use fingertip::state::Mode;
+
+type Made = Finger<{ 44 << 10 }>;
+type Act = fn(&mut Made);
+
+const ENDS: [(&str, Act); 6] = [
+    ("stop", |finger| finger.bench.request(Task::Stop)),
+    // Off in a press, on in strokes.
+    ("torque", |finger| finger.bench.command().torque ^= true),
+    ("tare", |finger| {
+        finger.bench.command().tare_request += 1;
+        finger.bench.command().tare_forced = true;
+    }),
+    ("fault", |finger| _ = finger.frame_with(|record| record.sense.bridge_fault = true)),
+    ("stopped", |finger| finger.bench.pipeline().stop(fingertip::state::Fault::LostFrames)),
+    ("parameters", |finger| {
+        let config = Config::shipped(&crate::finger::params()).expect("allowed");
+        finger.bench.pipeline().configure(&config);
+    }),
+];
+
+/// Frames of a whole motion.
+fn frames(task: Task) -> u32 {
+    let mut finger = Made::begun(task);
+    let mut frames = 1;
+    while finger.frame().measure.state == State::Running {
+        frames += 1;
+    }
+    finger.assert_ended(task, Ended::Complete);
+    frames
+}
+
+#[test]
+fn a_motion_ends_at_any_moment_and_the_next_one_works() {
+    for task in [Task::Jog, Task::Strokes, Task::Press] {
+        let frames = frames(task);
+        for (number, (name, act)) in ENDS.into_iter().enumerate() {
+            for part in 0..7 {
+                let at = 1 + (frames - 40) * part / 6 + number as u32;
+                let mut finger = Made::begun(task);
+                (0..at).for_each(|_| _ = finger.frame());
+                assert_eq!(finger.bench.status().measure.state, State::Running, "{name} at {at}");
+                act(&mut finger);
+                let mut waited = 0;
+                while finger.bench.status().measure.state == State::Running {
+                    finger.frame();
+                    waited += 1;
+                    assert!(waited < 5_000, "{name} at {at}: {:?}", finger.bench.status());
+                }
+                finger.frame();
+                finger.assert_ended(task, Ended::Interrupted);
+                // Goal 0: a press that was stopped releases.
+                (0..15_000).for_each(|_| _ = finger.frame());
+                let status = *finger.bench.status();
+                assert!(!matches!(status.mode, Mode::Press | Mode::Strokes), "{name} at {at}: {status:?}");
+                let speed = finger.bench.truth().speed_mm_per_s;
+                assert!(speed.abs() < 0.05, "{task:?}, {name} at {at}: {speed} mm/s");
+
+                let command = finger.bench.command();
+                command.torque = false;
+                command.clear_request += 1;
+                finger.frame();
+                finger.bench.place(0.0);
+                finger.bench.command().tare_request += 1;
+                (0..2_000).for_each(|_| _ = finger.frame());
+                finger.begin(Task::Strokes);
+                (0..2_000).for_each(|_| _ = finger.frame());
+                assert_eq!(finger.bench.status().measure.state, State::Running, "{name} at {at}");
+            }
+        }
+    }
+}
+
+/// Torque off and strokes in one write, while a press moves: the press ends with its own record, the strokes are not
+/// rows of it.
+#[test]
+fn a_motion_that_replaces_another_is_one_of_its_own() {
+    let mut finger = Made::begun(Task::Press);
+    while finger.capture.standing().frames < 3 {
+        finger.frame();
+    }
+    finger.bench.command().torque = false;
+    finger.bench.request(Task::Strokes);
+    finger.frame();
+    finger.assert_ended(Task::Press, Ended::Interrupted);
+    (0..20_000).for_each(|_| _ = finger.frame());
+    let measure = finger.bench.status().measure;
+    assert_eq!(measure.task, Task::Strokes, "{measure:?}");
+    // And a tare with a jog.
+    let mut finger = Made::begun(Task::Strokes);
+    (0..3_000).for_each(|_| _ = finger.frame());
+    finger.bench.command().tare_request += 1;
+    finger.bench.request(Task::Jog);
+    finger.frame();
+    finger.assert_ended(Task::Strokes, Ended::Interrupted);
+    finger.frame();
+    let measure = finger.bench.status().measure;
+    assert_eq!((measure.task, measure.ended), (Task::Jog, Ended::NotReady));
+}
+
+/// The host ends the record in the middle: the motion goes on without one, the next motion has one again.
+#[test]
+fn a_record_ended_by_the_host_is_whole() {
+    let mut finger = Made::begun(Task::Press);
+    while finger.capture.standing().frames < 3 {
+        finger.frame();
+    }
+    finger.capture.end(CaptureEnded::Asked);
+    let bytes = finger.capture.data().to_vec();
+    let record = finger.record();
+    assert_eq!((record.ended, record.rows), (Ended::Interrupted as u8, 3));
+    assert_eq!(finger.ends().measure.state, State::Done);
+    assert!(finger.capture.data() == bytes && finger.capture.standing().count == 1, "it changes no more");
+    finger.bench.place(0.0);
+    finger.begin(Task::Strokes);
+    assert_eq!(finger.capture.standing().state, Kept::Recording);
+    assert!(finger.capture.data().is_empty(), "nothing can be read of a record that is not closed");
+    finger.ends();
+    finger.assert_ended(Task::Strokes, Ended::Complete);
+    assert_eq!(finger.capture.standing().count, 2);
+}

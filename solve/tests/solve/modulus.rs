@@ -57,8 +57,8 @@ fn one_press_gives_the_modulus() {
 
 #[test]
 #[ignore = "takes minutes"]
-fn one_press_gives_the_modulus_of_four_hundred_tips() {
-    one_press(0..400);
+fn one_press_gives_the_modulus_of_a_hundred_tips() {
+    one_press(0..100);
 }
 
 #[test]

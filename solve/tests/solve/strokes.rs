@@ -136,6 +136,10 @@ impl Figures {
         assert!(self.measured >= measured, "{} measured", self.measured);
         assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= chip::SAMPLES as f64);
         assert_eq!(worst(&self.forces), 0.0);
+        // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
+        if measured >= 20 {
+            assert!((0.1..5.0).contains(&worst(&self.errors[0])), "{}", worst(&self.errors[0]));
+        }
     }
 }
 

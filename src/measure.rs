@@ -17,6 +17,7 @@ pub mod strokes;
 pub use press::Press;
 pub use strokes::Strokes;
 
+use crate::units::Newtons;
 use press::Step;
 
 /// What is asked for. The numbers are stable.
@@ -70,7 +71,7 @@ pub enum Ended {
     Reversed = 5,
     /// The tip left the way of the strokes (um).
     Astray = 6,
-    /// The array felt a touch (mN).
+    /// The array measured a touch, or in a press more than the largest goal (mN).
     Touched = 7,
     /// The motor felt a force that the array did not (mN).
     Pushed = 8,
@@ -148,6 +149,11 @@ pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
         /// Mean voltage since the sample before, quarters of a mV.
         voltage: i16,
     },
+}
+
+/// A force in mN, as [`Standing::value`] has it.
+fn millinewtons(force: Newtons) -> i32 {
+    ((i64::from(force.to_bits()) * 1_000) >> 16) as i32
 }
 
 #[cfg(test)]

@@ -62,12 +62,10 @@ pub fn joint(presses: &[Press], yield_usual: f64) -> Result<Gains, NoGains> {
         used.extend(steps.into_iter().map(|step| Used { press: index, step, at: step.at(&array) }));
     }
     let mut fit = Joint::new(presses, &array, used, yield_usual.max(1e-6))?;
-    let (mut change, mut residuals) = (f64::INFINITY, fit.residuals());
-    for _ in 0..ROUNDS {
-        if change < CLOSE {
-            break;
-        }
-        (change, residuals) = fit.step(residuals)?;
+    let mut change = fit.settle()?;
+    // The first pose is far off where the contact lies partly off the array: then sound taxels at its rim looked dead.
+    if fit.revive() {
+        change = fit.settle()?;
     }
     if change > APART {
         return Err(NoGains::Unsettled(change));
@@ -90,6 +88,8 @@ struct Joint<'a> {
     array: Array,
     used: Vec<Used<'a>>,
     now: Unknowns,
+    /// Taxels that the chip counted as bad in most steps.
+    bad: Vec<bool>,
     conditions: Vec<Condition>,
     /// Standard deviation of the residuals, in what is expected of them.
     scale: f64,
@@ -110,11 +110,12 @@ impl<'a> Joint<'a> {
     fn new(presses: &'a [Press], array: &Array, used: Vec<Used<'a>>, yield_usual: f64) -> Result<Self, NoGains> {
         let steps = || presses.iter().flat_map(|press| &press.steps);
         let bad = |taxel: usize| 2 * steps().filter(|step| step.taxels[taxel].bad).count() > steps().count();
-        let conditions =
-            (0..array.taxels()).map(|taxel| if bad(taxel) { Condition::Dead } else { Condition::Sound }).collect();
+        let bad: Vec<bool> = (0..array.taxels()).map(bad).collect();
+        let conditions = bad.iter().map(|bad| if *bad { Condition::Dead } else { Condition::Sound }).collect();
         let poses = presses.iter().map(first_pose).collect();
         let now = Unknowns { poses, stiffness: vec![0.0; used.len()], gains: vec![1.0; array.taxels()] };
-        let mut fit = Self { presses, array: *array, used, now, conditions, scale: 1.0, damping: 1e-4, yield_usual };
+        let mut fit =
+            Self { presses, array: *array, used, now, bad, conditions, scale: 1.0, damping: 1e-4, yield_usual };
         let pressed = fit.find_dead();
         if pressed < 8 {
             return Err(NoGains::Taxels(pressed));
@@ -165,6 +166,40 @@ impl<'a> Joint<'a> {
             }
         }
         pressed
+    }
+
+    /// Rounds until the poses rest; the last change of a pose, in tip radii.
+    fn settle(&mut self) -> Result<f64, NoGains> {
+        let (mut change, mut residuals) = (f64::INFINITY, self.residuals());
+        for _ in 0..ROUNDS {
+            if change < CLOSE {
+                break;
+            }
+            (change, residuals) = self.step(residuals)?;
+        }
+        Ok(change)
+    }
+
+    /// Counts taxels as sound again that follow the fitted pose; true if there were any.
+    fn revive(&mut self) -> bool {
+        let squares = self.squares();
+        let mut sums = vec![[0.0; 2]; self.array.taxels()];
+        for (used, stiffness) in self.used.iter().zip(&self.now.stiffness) {
+            for ((sums, square), reading) in sums.iter_mut().zip(&squares[used.press]).zip(&used.step.taxels) {
+                let share = square.share(&used.at);
+                sums[0] += reading.mean / self.array.codes_per_kpa * share;
+                sums[1] += stiffness * share * share;
+            }
+        }
+        let mut revived = false;
+        for (taxel, [read, model]) in sums.into_iter().enumerate() {
+            if self.conditions[taxel] == Condition::Dead && !self.bad[taxel] && read >= DEAD * model {
+                self.conditions[taxel] = Condition::Sound;
+                self.now.gains[taxel] = if model > 0.0 { (read / model).clamp(0.3, 3.0) } else { 1.0 };
+                revived = true;
+            }
+        }
+        revived
     }
 
     fn residuals(&self) -> Vec<Residual> {

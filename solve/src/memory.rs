@@ -11,7 +11,7 @@
 //! - creep, linear in the logarithm of time (Interlink FSR 400 integration guide: under 5 % a decade), as a series with a
 //!   term for each decade: `y' = y + c sum of x_k`, `tau_k dx_k/dt = y - x_k`.
 
-use crate::press::Press;
+use crate::press::{Press, Step};
 use std::f64::consts::PI;
 
 /// The creep's time constants, s. The reading that `codes_per_kpa` stands for is the one within the first millisecond.
@@ -41,6 +41,8 @@ pub struct Motion {
     places: Vec<[f64; 2]>,
     /// Places before the first step's.
     lead: usize,
+    /// Coefficients of the creep's terms for the time before each place.
+    creep: Vec<[Coefficients; CREEP_S.len()]>,
 }
 
 impl Motion {
@@ -64,7 +66,12 @@ impl Motion {
                 [step.time_s[1], step.travel_mm[1]],
             ]);
         }
-        Self { places, lead }
+        let before = places.iter().take(1).chain(&places);
+        let coefficients = |([time_s, _], [before_s, _]): (&[f64; 2], &[f64; 2])| {
+            CREEP_S.map(|tau_s| Coefficients::new(time_s - before_s, tau_s))
+        };
+        let creep = places.iter().zip(before).map(coefficients).collect();
+        Self { places, lead, creep }
     }
 
     /// Mean force of each step by the model, N: modulus in kPa, radius and touch in mm.
@@ -73,24 +80,24 @@ impl Motion {
         let depth = |travel_mm: f64| ((travel_mm - touch_mm) / radius_mm).clamp(0.0, 0.95);
         let deepest = self.places.iter().map(|[_, x]| depth(*x)).fold(0.0, f64::max);
         let rim2 = deepest * (2.0 - deepest);
-        let lengths: [f64; RINGS] =
-            core::array::from_fn(|ring| (1.0 - rim2 * (ring as f64 + 0.5) / RINGS as f64).sqrt());
+        let per_length: [f64; RINGS] =
+            core::array::from_fn(|ring| (1.0 - rim2 * (ring as f64 + 0.5) / RINGS as f64).sqrt().recip());
         let mut held = [0.0_f64; RINGS];
         let mut relaxed = LowPass::default();
         let mut crept = [LowPass::default(); CREEP_S.len()];
         let mut before_s = self.places.first().map_or(0.0, |[time_s, _]| *time_s);
         let mut forces = Vec::with_capacity(self.places.len());
-        for [time_s, travel_mm] in &self.places {
+        for ([time_s, travel_mm], creep) in self.places.iter().zip(&self.creep) {
             let step_s = time_s - before_s;
             before_s = *time_s;
             let d = depth(*travel_mm);
             let elastic = d * d;
-            let forgotten = memory.relaxation * relaxed.take(elastic, step_s, memory.relaxation_s);
+            let forgotten = memory.relaxation * relaxed.take(elastic, &Coefficients::new(step_s, memory.relaxation_s));
             let left = if elastic > 0.0 { (1.0 - forgotten / elastic).max(0.0) } else { 0.0 };
             // Rings' shares of the force sum to d^2 to 1 %; scaling by it keeps eq. 14 exact.
             let (mut sum, mut plain) = (0.0, 0.0);
-            for (held, length) in held.iter_mut().zip(lengths) {
-                let elastic = (1.0 - (1.0 - d) / length).max(0.0);
+            for (held, per_length) in held.iter_mut().zip(per_length) {
+                let elastic = (1.0 - (1.0 - d) * per_length).max(0.0);
                 let pressure = elastic * left;
                 let half = 0.5 * memory.hysteresis;
                 *held = held.max(pressure * (1.0 - half)).min(pressure * (1.0 + half));
@@ -98,7 +105,7 @@ impl Motion {
                 plain += elastic;
             }
             let force = if plain > 0.0 { sum / plain * elastic } else { 0.0 };
-            let creep: f64 = crept.iter_mut().zip(CREEP_S).map(|(term, tau_s)| term.take(force, step_s, tau_s)).sum();
+            let creep: f64 = crept.iter_mut().zip(creep).map(|(term, by)| term.take(force, by)).sum();
             forces.push(n_per_mm2 * radius_mm * radius_mm * (force + memory.creep * creep));
         }
         forces[self.lead..].chunks_exact(3).map(|at| (at[0] + 4.0 * at[1] + at[2]) / 6.0).collect()
@@ -112,23 +119,25 @@ impl Motion {
 /// in time between the middles of steps.
 pub fn without_creep(press: &Press, creep: f64) -> Press {
     let mut press = press.clone();
+    let mut before_s = f64::INFINITY;
+    let coefficients = |step: &Step| {
+        let step_s = (step.middle_s() - before_s).max(0.0);
+        before_s = step.middle_s();
+        CREEP_S.map(|tau_s| Coefficients::new(step_s, tau_s))
+    };
+    let all: Vec<_> = press.steps.iter().map(coefficients).collect();
     for taxel in 0..press.array.taxels() {
         let mut crept = [LowPass::default(); CREEP_S.len()];
-        let mut before_s = f64::INFINITY;
-        for step in &mut press.steps {
-            let time_s = step.middle_s();
-            let step_s = (time_s - before_s).max(0.0);
-            before_s = time_s;
+        for (step, all) in press.steps.iter_mut().zip(&all) {
             let reading = &mut step.taxels[taxel].mean;
             // Each term is a line in the reading of now.
             let (mut rest, mut slope) = (0.0, 0.0);
-            for (term, tau_s) in crept.iter().zip(CREEP_S) {
-                let [still, part] = term.ahead(step_s, tau_s);
-                (rest, slope) = (rest + still, slope + part);
+            for (term, by) in crept.iter().zip(all) {
+                (rest, slope) = (rest + term.rest(by), slope + by.straight);
             }
             let pressed = (*reading - creep * rest) / (1.0 + creep * slope);
-            crept.iter_mut().zip(CREEP_S).for_each(|(term, tau_s)| {
-                term.take(pressed, step_s, tau_s);
+            crept.iter_mut().zip(all).for_each(|(term, by)| {
+                term.take(pressed, by);
             });
             *reading = pressed;
         }
@@ -143,21 +152,34 @@ struct LowPass {
     input: f64,
 }
 
+/// What a low-pass does in a step, whatever its input.
+#[derive(Clone, Copy, Debug)]
+struct Coefficients {
+    /// Share of the way to a constant input.
+    gone: f64,
+    /// Share of the input at the end of the step.
+    straight: f64,
+}
+
+impl Coefficients {
+    fn new(step_s: f64, tau_s: f64) -> Self {
+        if step_s <= 0.0 {
+            return Self { gone: 0.0, straight: 0.0 };
+        }
+        let gone = -(-step_s / tau_s).exp_m1();
+        Self { gone, straight: 1.0 - gone * tau_s / step_s }
+    }
+}
+
 impl LowPass {
-    fn take(&mut self, input: f64, step_s: f64, tau_s: f64) -> f64 {
-        let [rest, slope] = self.ahead(step_s, tau_s);
-        self.output = rest + slope * input;
+    fn take(&mut self, input: f64, by: &Coefficients) -> f64 {
+        self.output = self.rest(by) + by.straight * input;
         self.input = input;
         self.output
     }
 
-    /// The output after a step as a line in its input: the output for an input of 0, and the slope.
-    fn ahead(&self, step_s: f64, tau_s: f64) -> [f64; 2] {
-        if step_s <= 0.0 {
-            return [self.output, 0.0];
-        }
-        let gone = -(-step_s / tau_s).exp_m1();
-        let straight = 1.0 - gone * tau_s / step_s;
-        [self.output + gone * (self.input - self.output) - straight * self.input, straight]
+    /// The output after a step that ends with an input of 0.
+    fn rest(&self, by: &Coefficients) -> f64 {
+        self.output + by.gone * (self.input - self.output) - by.straight * self.input
     }
 }

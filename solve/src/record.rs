@@ -119,7 +119,7 @@ pub enum NoRecord {
     #[error("the series has format {0}; this program reads format 1")]
     Version(u8),
     /// Kind that was requested, and number of the kind in the series.
-    #[error("the series has kind {1} where {0:?} was expected (1 is a press, 2 are strokes)")]
+    #[error("the series does not hold {0}: its kind is {1} (1 is a press, 2 are strokes)")]
     Kind(Kind, u8),
     /// Number of the reason.
     #[error("the series ended early for reason {0}, which this program does not know")]

@@ -4,7 +4,7 @@ use crate::Value;
 use crate::drift::{Creep, Temperature};
 use crate::gains::{Condition, Gains};
 use crate::modulus::Modulus;
-use crate::record::{Ended, Reason};
+use crate::record::{Ended, Kind, Reason};
 use crate::scale::Scale;
 use crate::strokes::Drive;
 use std::fmt::{Display, Formatter, Result};
@@ -24,6 +24,15 @@ impl Display for Value {
 /// The value in another unit.
 fn times(value: &Value, factor: f64) -> Value {
     Value { value: factor * value.value, sigma: factor.abs() * value.sigma }
+}
+
+impl Display for Kind {
+    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+        f.write_str(match self {
+            Self::Press => "a press",
+            Self::Strokes => "strokes",
+        })
+    }
 }
 
 impl Display for Ended {
@@ -117,9 +126,10 @@ impl Display for Modulus {
             [parts.residuals, parts.presses, parts.gains, parts.memory].map(|part| 100.0 * part);
         write!(
             f,
-            "Young's modulus is {value} kPa by {} presses. Its uncertainty: {residuals:.1} % residuals, {between:.1} % \
+            "Young's modulus is {value} kPa, from {} press{}. Its uncertainty: {residuals:.1} % residuals, {between:.1} % \
              spread between presses, {common:.1} % common gain of the taxels, {memory:.1} % creep and relaxation.",
-            presses.len()
+            presses.len(),
+            if presses.len() == 1 { "" } else { "es" }
         )?;
         for (index, press) in presses.iter().enumerate() {
             let memory = &press.memory;
@@ -127,7 +137,7 @@ impl Display for Modulus {
                 [memory.hysteresis, memory.creep, memory.relaxation].map(|share| 100.0 * share);
             write!(
                 f,
-                " Press {}: {:.1} kPa, contact at {:.3} mm, hysteresis {hysteresis:.1} %, creep {creep:.1} % a decade, \
+                " Press {}: {:.1} kPa, contact at {:.3} mm, hysteresis {hysteresis:.1} %, creep {creep:.1} % per decade, \
                  relaxation {relaxation:.1} % with a time constant of {:.2} s.",
                 index + 1,
                 press.kpa,
@@ -162,7 +172,7 @@ impl Display for Creep {
         write!(
             f,
             "A held reading grows by {share} % with a time constant of {} s, which leaves {left:.2} % of this hold. By the \
-             logarithm of time it grows by {decade} % a decade.",
+             logarithm of time it grows by {decade} % per decade.",
             self.time_s
         )
     }
@@ -173,7 +183,7 @@ impl Display for Temperature {
         let (per_k, [cold_c, warm_c]) = (times(&self.per_k, 100.0), self.chip_c);
         write!(
             f,
-            "The array's gain changes by {per_k} % for a kelvin, between {cold_c:.1} and {warm_c:.1} degrees Celsius."
+            "The array's gain changes by {per_k} % per kelvin, between {cold_c:.1} and {warm_c:.1} degrees Celsius."
         )
     }
 }

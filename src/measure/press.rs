@@ -222,6 +222,11 @@ impl Press {
         let at_end = config.travel_max.0.saturating_sub(travel.0).to_bits() < END;
         let force = view.contact.force;
         let measured = view.motion.observer.measured(view.encoder, config);
+        // Something pushes back: the grip that follows releases it faster than a way back would.
+        if force > config.force_max && matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
+            self.phase = Phase::Over;
+            return standing.end(Ended::Touched, super::millinewtons(force));
+        }
         match self.phase {
             Phase::Over => {}
             Phase::Retreat if force < config.contact_off => self.phase = Phase::Seek,

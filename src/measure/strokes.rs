@@ -228,7 +228,7 @@ impl Strokes {
     fn danger(&self, view: &View, plan: &Motions) -> Option<(Ended, i32)> {
         let place = self.place(view.encoder);
         if view.force >= plan.touch {
-            Some((Ended::Touched, millinewtons(view.force)))
+            Some((Ended::Touched, super::millinewtons(view.force)))
         } else if place.saturating_abs() > plan.farthest {
             Some((Ended::Astray, plan.um(place)))
         } else if self.gone(view.encoder) < -plan.back {
@@ -248,7 +248,7 @@ impl Strokes {
     fn rest(&mut self, ended: Option<(Ended, i32)>, view: &View, standing: &mut Standing, plan: &Motions) {
         self.frames = self.frames.saturating_add(1);
         let ended = match ended {
-            None if view.force >= plan.touch => Some((Ended::Touched, millinewtons(view.force))),
+            None if view.force >= plan.touch => Some((Ended::Touched, super::millinewtons(view.force))),
             ended => ended,
         };
         self.phase = Phase::Rest(ended);
@@ -407,8 +407,4 @@ impl Strokes {
 
 fn of_supply(view: &View, [part, of]: [i32; 2]) -> i32 {
     i32::from(view.supply_mv) * 1_000 / of * part
-}
-
-fn millinewtons(force: Newtons) -> i32 {
-    ((i64::from(force.to_bits()) * 1_000) >> 16) as i32
 }

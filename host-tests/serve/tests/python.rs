@@ -76,17 +76,6 @@ fn the_examples_stream_show_set_and_recover() {
         example(&served, "parameters.py", &["--set", "modulus_pa=300000", "--set", "contact_on_mn=50", "--save"]);
     assert!(shown.contains("300000  (was 250000)") && shown.contains("50  (was 40)"), "{shown}");
 
-    let drive = example(&served, "commission.py", &["--yes", "--save"]);
-    assert!(drive.contains("torque_constant_unm_per_a ") && drive.ends_with("accepted\n"), "{drive}");
-    // A wall is a plate, and its finger has no spread: what is proposed is near to 1.
-    let arguments = ["--modulus", "--presses", "2", "--no-wait", "--holds", "1.5", "--shown", "160", "--save"];
-    let calibrated = example(&served, "calibrate.py", &arguments);
-    assert!(
-        calibrated.contains("press 2: ") && calibrated.ends_with("done: tare before the next press\n"),
-        "{calibrated}"
-    );
-    assert!(calibrated.contains("forces times 1.04") || calibrated.contains("forces times 1.05"), "{calibrated}");
-
     served.ask("fault supply-low");
     served.ask("mend");
     let recovered = example(&served, "recovery.py", &["--seconds", "0.5", "--newtons", "0.5"]);

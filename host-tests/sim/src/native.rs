@@ -4,6 +4,8 @@
 //! of a frame acts three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
 
 pub mod bench;
+#[cfg(feature = "calibrated")]
+pub mod calibrated;
 mod clock;
 mod digest;
 mod scan;

@@ -35,7 +35,7 @@ impl Board {
             bus.action(ID)?;
             bus.write_u32(ID, address::PARAMS, bus_default())?;
             // Refused, as it is not tared: that takes its way too.
-            let _ = bus.write_u8(ID, address::IDENTIFY, 1);
+            let _ = bus.write_u8(ID, address::MEASURE, 3);
             bus.write_u8(ID, address::TARE, 1)
         })?;
         warmed.map_err(silent)?;

@@ -79,19 +79,6 @@ fn the_python_example_touches_holds_and_lets_go() {
 }
 
 #[test]
-fn the_python_package_commissions_the_drive() {
-    let link = std::env::temp_dir().join(format!("fingertip-drive-{}", std::process::id()));
-    let board = Board::serve(&["--pty", link.to_str().expect("a plain path")]);
-    let said = example("commission.py", &link, &["--yes", "--save", "--timeout-ms", "7200000"]);
-    // The simulated motor's: 5350 uN m/A.
-    let line = said.lines().find_map(|line| line.strip_prefix("torque_constant_unm_per_a ")).expect(&said);
-    let found: f64 = line.split(' ').next().and_then(|number| number.parse().ok()).expect(line);
-    assert!((found / 5_350.0 - 1.0).abs() < 0.03, "{said}");
-    assert!(said.ends_with("accepted\n"), "{said}");
-    assert!(board.interrupt());
-}
-
-#[test]
 fn a_tcp_client_pings() {
     let board = Board::serve(&["--tcp", "0"]);
     // A client that goes away makes room for the next.

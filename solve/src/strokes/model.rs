@@ -203,6 +203,8 @@ impl Path {
         let slowness = (-p[index::SPEED]).exp();
         let placed = p[index::FRONT] != 0.0 || p[index::SPRING] != 0.0;
         let (mut x, mut w) = (own[0], own[1]);
+        // Most steps are as long as the step before.
+        let (mut length_s, mut half) = (0.0, 1.0);
         angles.clear();
         angles.push(x);
         for step in &self.steps {
@@ -212,7 +214,10 @@ impl Path {
             }
             let end = |w: f64| (drive - stribeck * form.share(w.max(0.0) * slowness)) / k;
             if w > 0.0 || end(0.0) > 0.0 {
-                let half = (-0.5 * step.length_s / tau).exp();
+                if step.length_s != length_s {
+                    length_s = step.length_s;
+                    half = (-0.5 * length_s / tau).exp();
+                }
                 let towards = end(w);
                 let towards = end(towards + (w - towards) * half);
                 let next = towards + (w - towards) * half * half;

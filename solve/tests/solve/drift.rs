@@ -18,7 +18,7 @@ fn a_scale_gives_factor_offset_and_curve() {
             .collect()
     };
     let plain = scale(&held(1.1, 0.0, 0.0, &mut rng)).expect("a scale");
-    println!("{plain:?}");
+    println!("{plain}");
     assert!((plain.factor.value - 1.1).abs() < 2.0 * plain.factor.sigma && plain.factor.sigma < 0.01);
     assert!(!plain.offset_n.expect("five forces").differs() && !plain.curve.expect("five forces").differs());
     let offset = scale(&held(1.1, 0.3, 0.0, &mut rng)).expect("a scale").offset_n.expect("five forces");
@@ -48,7 +48,7 @@ fn a_hold_shows_the_creep() {
             finger.press(&[Part::Ramp { to_mm: 2.0, mm_per_s: 10.0, step_mm: 9.0 }, Part::Hold { ends_s }], 8.0);
         let readings = press.steps[1..].iter().map(|step| [step.middle_s(), step.force_n(&press.array)]).collect();
         let found = creep(&HeldSeries { readings }).expect("a hold");
-        println!("{percent} % a decade: {found:?}");
+        println!("{found}");
         assert!((100.0 * found.per_decade.value / percent - 1.0).abs() < 0.15, "{found:?}");
         assert!(found.share.value > 0.005 * percent && found.left < 0.002 * percent, "{found:?}");
     }

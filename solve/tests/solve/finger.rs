@@ -16,7 +16,7 @@ const ROWS: usize = 10;
 const COLUMNS: usize = 10;
 /// Frames are 0.5 ms apart, where the chip's are 0.1 ms: fewer frames, hence more noise in a mean.
 pub const FRAME_S: f64 = 0.5e-3;
-const FRAME_NS: u32 = 500_000;
+pub const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
 
 /// What a finger is drawn as.

@@ -6,8 +6,18 @@ use solve::gains::Condition;
 
 #[test]
 fn three_presses_give_the_gains() {
+    drawn_arrays(100..104);
+}
+
+#[test]
+#[ignore = "takes a minute"]
+fn three_presses_give_the_gains_of_thirty_arrays() {
+    drawn_arrays(100..130);
+}
+
+fn drawn_arrays(seeds: std::ops::Range<u64>) {
     let mut all = Vec::new();
-    for seed in 100..112 {
+    for seed in seeds {
         let draw = Draw::any(seed, [15.0, 25.0], [1, 3]);
         let truth = draw.gains();
         let found = gains(&presses(&draw, 3, &plan())).unwrap_or_else(|why| panic!("{why:?} {draw:?}"));
@@ -40,7 +50,8 @@ fn three_presses_give_the_gains() {
     all.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let (median, worst) = (all[all.len() / 2][0], all[all.len() - 1][0]);
     println!("rms: median {median:.2} %, worst {worst:.2} %");
-    assert!(median < 0.4 && worst < 1.5, "{median} {worst}");
+    // A finger whose noise is 1 code cannot be better than 0.05 %.
+    assert!((0.05..0.4).contains(&median) && worst < 1.5, "{median} {worst}");
     assert!(all.iter().all(|[_, sigmas]| *sigmas < 2.5));
 }
 

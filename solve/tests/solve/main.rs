@@ -6,5 +6,6 @@ mod gains;
 mod modulus;
 mod plates;
 mod record;
+mod report;
 mod series;
 mod strokes;

@@ -1,5 +1,6 @@
 //! The bytes of a series: read to the last bit, and never a panic.
 
+use crate::finger::{Draw, FRAME_NS, cycle, presses};
 use crate::series::{self, Head, deviation, sealed};
 use fingertip::params::Params;
 use proptest::prelude::*;
@@ -149,6 +150,28 @@ fn good_with(body: &[u8], at: usize, byte: u8) -> Vec<u8> {
     body
 }
 
+/// A press with wrong numbers in any place, under a right check.
+#[test]
+fn a_press_with_changed_bytes_is_solved_or_refused() {
+    let taken = presses(&Draw::plain(250.0), 1, &cycle(5.0, 3.0)).remove(0);
+    let (length, records) = (solve::record::step_length(100), taken.steps.len() as u32);
+    let bytes = series::press(&taken, FRAME_NS, 0);
+    for seed in 0..8 {
+        let mut rng = fastrand::Rng::with_seed(seed);
+        let mut body = bytes[HEAD..].to_vec();
+        for _ in 0..10 << seed {
+            // The frames' numbers and the branch stay, or the series would be refused before.
+            let at = length * rng.usize(..records as usize) + rng.usize(8..length);
+            if !(16..20).contains(&(at % length)) {
+                body[at] = rng.u8(..);
+            }
+        }
+        let read = press(&sealed(&Head { frame_ns: FRAME_NS, ..press_head([10, 10], records) }, &body), PARAMS);
+        assert!(read.is_ok(), "{read:?}");
+        solved(read);
+    }
+}
+
 /// Solves what can be read of a press: the result does not matter, a panic would.
 fn solved(read: Result<Press, NoRecord>) {
     if let Ok(read) = read {
@@ -189,7 +212,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(60) })]
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
 
     /// Any numbers in a series whose lengths and check are right.
     #[test]

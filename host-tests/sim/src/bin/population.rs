@@ -1,18 +1,35 @@
 //! `population`: many drawn fingers on the native board.
 
 use clap::Parser;
+use output::say;
 use sim::native;
+use sim::native::calibrated::unlike;
 use sim::population::cli::{self, Args, Board};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     let args = Args::parse();
     match args.board {
+        Board::Native if args.name() == Some("unlike") => errors(&args),
         Board::Native => cli::answer(&args, &native::board),
         Board::Virtual => {
-            output::say::aside(
+            say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",
             );
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Prints the error of the force before and after calibration.
+fn errors(args: &Args) -> ExitCode {
+    match unlike::fingers(args.seed, args.fingers as usize) {
+        Ok(fingers) => {
+            say::text(unlike::text(&fingers));
+            ExitCode::SUCCESS
+        }
+        Err(why) => {
+            say::aside(why);
             ExitCode::from(2)
         }
     }

@@ -120,6 +120,8 @@ pub trait Stages {
     }
     /// See [`Memory::relax`].
     fn relax(&mut self, _dt_s: f64, _elastic_n: Option<f64>) {}
+    /// Takes over the tip's memory from the effects of another scene.
+    fn remember(&mut self, _before: &mut Self) {}
     /// The sum of [`Series`].
     fn mm_per_n(&mut self) -> f64 {
         0.0
@@ -192,6 +194,10 @@ impl Stages for Named {
 
     fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
         self.memory.iter_mut().for_each(|effect| effect.call(|part| part.relax(dt_s, elastic_n)));
+    }
+
+    fn remember(&mut self, before: &mut Self) {
+        self.memory = core::mem::take(&mut before.memory);
     }
 
     fn mm_per_n(&mut self) -> f64 {

@@ -4,6 +4,7 @@
 
 use super::{Begun, Board, SimError, Unit};
 use crate::bridge::Bridge;
+use crate::effects::contact::Stages as _;
 use crate::effects::sensor::Stages as _;
 use crate::effects::set::Set;
 use crate::mechanics::finger::Finger;
@@ -13,17 +14,23 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::measure::Task;
+use fingertip::measure::{Standing, State, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{COLUMNS, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
+use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
 
 /// The first finger of a scene, or the plant's.
 pub struct Bench<E: Set = Reference> {
     board: Board<E>,
     sense: Sense,
+    capture: Box<Capture>,
 }
+
+/// Frames within which every motion that measures ends: 30 s.
+const MEASURE_FRAMES: usize = 300_000;
+/// Time between two frames of a rest.
+const REST_STEP_S: f64 = 0.02;
 
 impl<E: Set> Bench<E> {
     /// At rest, torque off, not tared.
@@ -31,17 +38,25 @@ impl<E: Set> Bench<E> {
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
-        Ok(Self { board: Board::new(&scene.without_events(), Begun::default())?, sense: Sense::default() })
+        Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
-    /// Exchanges the world and the array's effects; the controller stays as it is.
+    /// Exchanges the world around the finger. Controller, tip and array stay: their effects remember what was before, and
+    /// time goes on.
     ///
     /// # Errors
     /// What the scene asks for cannot be simulated.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
-        let before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
-        if let (Some(now), Some(before)) = (self.board.units.first_mut(), before.units.into_iter().next()) {
+        let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
+        let now = &mut self.board;
+        (now.clock, now.start, now.bridges) = (before.clock, before.start, before.bridges);
+        let finger = &mut now.world.fingers_mut()[0];
+        let finger_before = &mut before.world.fingers_mut()[0];
+        finger.resume(&finger_before.motion());
+        finger.contact.effects.remember(&mut finger_before.contact.effects);
+        if let (Some(now), Some(before)) = (now.units.first_mut(), before.units.into_iter().next()) {
             (now.pipeline, now.frame, now.command) = (before.pipeline, before.frame, before.command);
+            (now.sensor, now.next) = (before.sensor, before.next);
         }
         Ok(())
     }
@@ -63,6 +78,10 @@ impl<E: Set> Bench<E> {
         (to.clock, to.start) = (from.clock, from.start);
         fork.sense = self.sense;
         Ok(fork)
+    }
+
+    fn around(board: Board<E>) -> Self {
+        Self { board, sense: Sense::default(), capture: Box::new(Capture::NEW) }
     }
 
     fn unit(&self) -> &Unit<E> {
@@ -114,7 +133,8 @@ impl<E: Set> Bench<E> {
         let unit = &mut self.board.units[0];
         let (_, status) = unit.pipeline.step(&record.frame, &record.sense, &record.command);
         unit.next = Bridge::of(status);
-        *status
+        self.capture.follow(&unit.pipeline);
+        *self.status()
     }
 
     /// Steps for so long; the largest true force on the way, N.
@@ -126,6 +146,38 @@ impl<E: Set> Bench<E> {
             largest_n = largest_n.max(self.truth().force_n);
         }
         largest_n
+    }
+
+    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the array's temperature
+    /// changes. Torque must be off.
+    pub fn rest(&mut self, seconds: f64) {
+        for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
+            self.finger_mut().contact.effects.relax(REST_STEP_S, None);
+            self.board.clock.go_on(REST_STEP_S);
+            self.step();
+        }
+    }
+
+    /// Makes a motion that measures and calls `each` after every frame; returns how the motion ended.
+    ///
+    /// # Panics
+    /// The motion does not end within 30 s.
+    pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> Standing {
+        self.request(task);
+        let request = self.command().measure_request;
+        for _ in 0..MEASURE_FRAMES {
+            let Status { taken, measure, .. } = self.step();
+            each(self);
+            if taken.measure == request && measure.state != State::Running {
+                return measure;
+            }
+        }
+        panic!("{task:?} does not end: {:?}", self.status().measure);
+    }
+
+    /// The record of the last motion that measured, as it is read over the bus.
+    pub fn kept(&self) -> &[u8] {
+        self.capture.data()
     }
 
     /// Requests a motion that measures, or its end.
@@ -207,7 +259,7 @@ impl Bench {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));
         let board = Board::of(&scene, Begun::default(), config, setup, parts);
-        Self { board: board.unwrap_or_else(|error| panic!("{error}")), sense: Sense::default() }
+        Self::around(board.unwrap_or_else(|error| panic!("{error}")))
     }
 
     /// Breaks something or mends it.

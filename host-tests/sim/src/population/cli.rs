@@ -24,21 +24,23 @@ use std::time::Instant;
     after_help = "Examples:\n  \
         population ordinary --fingers 1000 --seed 1 --json ordinary.json\n  \
         population ordinary --fingers 100 --worst 5 --out worst    (then: sim with a file it wrote)\n  \
+        population unlike --fingers 40    (the error of the force before and after calibration)\n  \
         population ordinary --fingers 1000 --shard 2/4 --json 2.json    (on the second of four machines)\n  \
         population merge 1.json 2.json 3.json 4.json --json all.json    (the same, byte for byte, as without --shard)"
 )]
 pub struct Args {
     #[command(subcommand)]
     merge: Option<Merge>,
-    /// The population: a file, or one of those that come with the project: careful, handled, ordinary, rough
+    /// The population: a file, or one of those that come with the project: careful, handled, ordinary, rough,
+    /// unlike
     #[arg(required = true)]
     population: Option<String>,
     /// How many fingers the whole has
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
-    fingers: u32,
+    pub fingers: u32,
     /// Of the draws
     #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    pub seed: u64,
     /// Runs only the I-th of N shares of the fingers, for `merge`
     #[arg(long, value_name = "I/N", requires = "json")]
     shard: Option<Shard>,
@@ -54,6 +56,13 @@ pub struct Args {
     /// Where the scenes of the worst fingers go
     #[arg(long, value_name = "DIR", requires = "worst")]
     out: Option<PathBuf>,
+}
+
+impl Args {
+    /// The population as it was named.
+    pub fn name(&self) -> Option<&str> {
+        self.population.as_deref()
+    }
 }
 
 /// What runs the controller.

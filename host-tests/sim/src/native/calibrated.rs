@@ -1,0 +1,187 @@
+//! A finger calibrated by the host, as a user does it: presses at three places of a plate that is not quite level, the
+//! modulus and the taxels' gains solved from their records, and the scale from three forces on a kitchen scale. All
+//! effects of the finger act meanwhile, and tip and array remember one press in the next.
+
+pub mod unlike;
+
+use super::bench::Bench;
+use crate::effects::set::Named;
+use crate::run::RunError;
+use crate::scene::text::{set, write};
+use crate::scene::{Scene, controller, read};
+use fingertip::config::newtons;
+use fingertip::measure::{State, Task};
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::pressure::GAIN_ONE;
+use fingertip::shipped::{Calibration, Config, Gains};
+use fingertip::state::Mode;
+use solve::gains::Condition;
+use solve::modulus::Modulus;
+use solve::record;
+use solve::scale::Held;
+
+/// A place on the plate: centre of the contact from the array's middle, mm, and inclination of the plate, degrees.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Place {
+    /// Along the columns and along the rows.
+    pub centre_mm: [f64; 2],
+    /// Along the columns and along the rows.
+    pub tilt_deg: [f64; 2],
+}
+
+/// Places of the three presses.
+const PLACES: [Place; 3] = [
+    Place { centre_mm: [0.3, -0.2], tilt_deg: [1.0, -1.5] },
+    Place { centre_mm: [-1.5, 1.0], tilt_deg: [2.0, 0.5] },
+    Place { centre_mm: [1.4, 1.2], tilt_deg: [-1.0, 1.0] },
+];
+/// Pause after a press, s: creep and relaxation recover.
+const PAUSE_S: f64 = 10.0;
+/// Forces held on the scale, in rising order: hysteresis then has one sign.
+const HOLDS_N: [f64; 3] = [1.0, 2.5, 4.0];
+/// Duration of a hold, and the last part of it, in which scale and array are read, s.
+const HOLD_S: f64 = 0.7;
+const READ_S: f64 = 0.2;
+/// Step of a kitchen scale, N.
+const SCALE_STEP_N: f64 = 0.005;
+/// Time in which the finger releases the plate, s.
+const RELEASE_S: f64 = 0.4;
+
+/// Result of a calibration, to be stored in the controller.
+#[derive(Clone, Debug)]
+pub struct Calibrated {
+    /// Parameters with modulus and scale.
+    pub params: Params,
+    /// Gains of the taxels.
+    pub gains: Gains,
+    /// Steps of the procedure that failed, each with its reason. The finger keeps its values there.
+    pub refused: Vec<String>,
+}
+
+/// Calibrates a finger that stands before the plate of its scene; the finger has the result in the end.
+///
+/// # Errors
+/// The scene cannot be simulated, or the parameters found are not valid.
+pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, RunError> {
+    let mut params = controller::params(scene);
+    let (mut presses, mut refused) = (Vec::new(), Vec::new());
+    for place in PLACES {
+        bench.exchange(&plate(scene, place)?)?;
+        bench.tare();
+        bench.run(0.02);
+        let standing = bench.measure(Task::Press, |_| {});
+        if standing.state == State::Done {
+            presses.push(record::press(bench.kept(), &params)?);
+        } else {
+            refused.push(format!("press: {:?} {}, {:?}", standing.ended, standing.value, bench.status().fault));
+        }
+        release(bench);
+        bench.rest(PAUSE_S);
+    }
+    let mut gains = Gains::ONE;
+    match solve::modulus(&presses) {
+        Ok(found) => {
+            params.modulus_pa = (1e3 * found.kpa).round() as i32;
+            gains = gains_of(&found);
+            let left_out = &found.gains.left_out;
+            refused.extend(left_out.iter().map(|(number, why)| format!("press {number}: {why}")));
+        }
+        Err(why) => refused.push(format!("modulus: {why}")),
+    }
+    bench.pipeline().configure(&Config::shipped(&params)?);
+    bench.pipeline().calibrate(&Calibration::of(&gains));
+    bench.exchange(&plate(scene, PLACES[0])?)?;
+    bench.tare();
+    let mut held = Vec::new();
+    for goal_n in HOLDS_N {
+        let Hold { true_n, read_n } = hold(bench, goal_n, HOLD_S);
+        let Status { mode, fault, .. } = *bench.status();
+        if mode == Mode::Force {
+            held.push(Held { shown_n: (true_n / SCALE_STEP_N).round() * SCALE_STEP_N, read_n });
+        } else {
+            refused.push(format!("{goal_n} N on the scale: {mode:?}, {fault:?}"));
+        }
+    }
+    release(bench);
+    bench.rest(PAUSE_S);
+    match solve::scale(&held) {
+        Ok(scale) => {
+            let factor = scale.factor.value;
+            params.codes_per_kpa_milli = (f64::from(params.codes_per_kpa_milli) / factor).round() as i32;
+            params.modulus_pa = (f64::from(params.modulus_pa) * factor).round() as i32;
+        }
+        Err(why) => refused.push(format!("scale: {why}")),
+    }
+    bench.pipeline().configure(&Config::shipped(&params)?);
+    Ok(Calibrated { params, gains, refused })
+}
+
+/// The scene's finger before a level or inclined plate, with the contact at a place.
+///
+/// # Errors
+/// The place is out of the scene's range.
+pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
+    let Place { centre_mm: [x, y], tilt_deg: [along_columns, along_rows] } = place;
+    let number = |path, value: f64| (path, format!("{value:?}"));
+    changed(
+        scene,
+        &[
+            number("object.centre_x_mm", x),
+            number("object.centre_y_mm", y),
+            number("effects.tilted_plane.along_columns_deg", along_columns),
+            number("effects.tilted_plane.along_rows_deg", along_rows),
+            number("effects.sphere.curvature_per_mm", 0.0),
+            number("effects.cylinder.curvature_per_mm", 0.0),
+            number("effects.object_stiffness.yield_mm_per_n", 0.0),
+        ],
+    )
+}
+
+/// A scene with other values.
+fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunError> {
+    let bare = Scene { bounds: Vec::new(), ..scene.clone() };
+    let text = changes.iter().try_fold(write(&bare), |text, (path, value)| set(&text, path, value))?;
+    Ok(Scene { bounds: scene.bounds.clone(), ..read("finger.toml", &text, &[])? })
+}
+
+/// Means over the end of a hold, N.
+struct Hold {
+    true_n: f64,
+    read_n: f64,
+}
+
+/// Holds a force, from whatever is held.
+fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
+    bench.command().goal = newtons((goal_n * 1e3) as i32);
+    bench.run(seconds - READ_S);
+    let until_s = bench.time_s() + READ_S;
+    let (mut true_n, mut read_n, mut count) = (0.0, 0.0, 0.0);
+    while bench.time_s() < until_s {
+        let status = bench.step();
+        true_n += bench.truth().force_n;
+        read_n += f64::from(status.contact.force.0);
+        count += 1.0;
+    }
+    Hold { true_n: true_n / count, read_n: read_n / count }
+}
+
+/// Releases the object, then torque off.
+fn release(bench: &mut Bench<Named>) {
+    bench.command().goal = newtons(0);
+    bench.run(RELEASE_S);
+    bench.command().torque = false;
+    bench.run(0.05);
+}
+
+/// Gains to store: the inverse of what the taxels read; 1 for taxels without a reading that follows the model.
+fn gains_of(found: &Modulus) -> Gains {
+    let mut gains = Gains::ONE;
+    for (place, taxel) in found.gains.taxels.iter().enumerate() {
+        if taxel.condition == Condition::Sound {
+            let gain = (f64::from(GAIN_ONE) / taxel.reads).round();
+            gains.set(place, gain.clamp(f64::from(Gains::MIN), f64::from(Gains::MAX)) as u16);
+        }
+    }
+    gains
+}

@@ -1,0 +1,96 @@
+//! Jog, strokes and a press over the bus, on the flash image: each completes, and its record is read and parsed by the
+//! host's solver.
+//!
+//! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
+
+use crate::common::{
+    away, let_go, on_bus, read_u8, read_u16, read_u32, running, write_goal, write_param, write_u8,
+};
+use fingertip::measure::{State, Task};
+use fingertip::params::Params;
+use fingertip::shipped::address;
+use fingertip::state::Mode;
+use solve::record;
+use virtual_board::{Options, Rig};
+
+/// Bytes of a read.
+const WINDOW: u16 = 248;
+/// The longest motion, ms.
+const LONGEST_MS: u64 = 20_000;
+
+/// Makes a motion; returns its end and the value behind it.
+fn measure(rig: &mut Rig, task: Task) -> (u8, u8, i32) {
+    write_u8(rig, address::MEASURE, task as u8);
+    rig.run_ms(2).expect("it runs");
+    for _ in 0..LONGEST_MS / 20 {
+        let mode = read_u8(rig, address::PRESENT_MODE);
+        let state = read_u8(rig, address::MEASURE_STATE);
+        if state != State::Running as u8 {
+            let value = read_u32(rig, address::MEASURE_VALUE).cast_signed();
+            return (state, read_u8(rig, address::MEASURE_ENDED), value);
+        }
+        assert_eq!(mode, if task == Task::Press { Mode::Press } else { Mode::Strokes } as u8);
+        rig.run_ms(20).expect("it runs");
+    }
+    panic!("it does not end: {} %", read_u8(rig, address::MEASURE_PROGRESS));
+}
+
+fn fetch(rig: &mut Rig) -> Vec<u8> {
+    let length = read_u32(rig, address::CAPTURE_BYTES) as usize;
+    let mut bytes = Vec::new();
+    while bytes.len() < length {
+        let offset = bytes.len() as u32;
+        bytes.extend(on_bus(rig, move |bus| {
+            bus.write_u32(1, address::CAPTURE_OFFSET, offset)?;
+            bus.read(1, address::CAPTURE_DATA, WINDOW).map(|reply| reply.data.to_vec())
+        }));
+    }
+    bytes.truncate(length);
+    bytes
+}
+
+fn tare(rig: &mut Rig) {
+    write_u8(rig, address::TARE, 1);
+    rig.run_ms(20).expect("it runs");
+    assert_eq!(read_u8(rig, address::TARE_STATE), 2);
+}
+
+#[test]
+fn jog_strokes_and_press_complete_and_their_records_are_parsed() {
+    let setup = away(2.0);
+    let mut rig = running(&setup, &Options::default());
+    tare(&mut rig);
+    let before_us = read_u16(&mut rig, address::LOOP_TIME_MAX_US);
+    let done = (State::Done as u8, 0, 0);
+    assert_eq!(measure(&mut rig, Task::Jog), done);
+    write_param(&mut rig, "direction_confirmed", 1);
+    tare(&mut rig);
+    let missed = read_u32(&mut rig, address::MISSED_FRAMES);
+    assert_eq!(measure(&mut rig, Task::Strokes), done);
+    let strokes = record::strokes(&fetch(&mut rig), &Params::DEFAULT).expect("strokes");
+    assert_eq!((strokes.strokes.len(), strokes.ended), (32, None));
+    let found = solve::strokes::solve(&strokes).expect("a drive");
+    let k = found.torque_constant.value;
+    println!("torque constant {k}, true {}", setup.motor.torque_nm_per_a);
+    assert!((k / setup.motor.torque_nm_per_a - 1.0).abs() < 0.03, "{k}");
+
+    tare(&mut rig);
+    write_u8(&mut rig, address::TORQUE_ENABLE, 1);
+    rig.run_ms(2).expect("it runs");
+    assert_eq!(measure(&mut rig, Task::Press), done);
+    let press = record::press(&fetch(&mut rig), &Params::DEFAULT).expect("a press");
+    let kpa = solve::modulus(&[press]).expect("a modulus").kpa;
+    println!("modulus {kpa} kPa, true {}", setup.tip.modulus_kpa);
+    assert!((kpa / setup.tip.modulus_kpa - 1.0).abs() < 0.03, "{kpa}");
+    println!(
+        "loop time at most {before_us} us before, {} us with all three",
+        read_u16(&mut rig, address::LOOP_TIME_MAX_US)
+    );
+    assert_eq!((read_u8(&mut rig, address::FAULT), read_u32(&mut rig, address::MISSED_FRAMES)), (0, missed));
+    // The finger holds forces afterwards.
+    write_goal(&mut rig, 500);
+    rig.run_ms(300).expect("it runs");
+    assert_eq!(read_u8(&mut rig, address::PRESENT_MODE), Mode::Force as u8);
+    let_go(&mut rig);
+    rig.check_gaps().expect("no unknown gap");
+}

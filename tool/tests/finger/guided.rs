@@ -116,7 +116,7 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
     let before = parameters(&finger);
     let wanted = finger.json(&calibrate)["after"].clone();
     let applied = [&calibrate[..], &["--apply"]].concat();
-    let mut seen = [0; 2];
+    let (mut seen, mut completed) = ([0; 2], 0);
     for packets in 0.. {
         if !finger.killed_after(packets, &applied) {
             break;
@@ -131,12 +131,13 @@ fn a_write_that_is_killed_leaves_old_or_new_parameters_and_is_completed() {
             let done = finger.json(&applied);
             assert_eq!((&done["applied"], &done["after"]), (&true.into(), &wanted), "killed after {packets}");
             assert_eq!(parameters(&finger), new);
+            completed += 1;
         }
         // Behind a reset there is what was saved.
         finger.command(&format!("raw {REBOOT}"));
         assert_eq!(parameters(&finger), before);
     }
-    assert!(seen.iter().all(|count| *count > 0), "{seen:?}");
+    assert!(seen.iter().all(|count| *count > 0) && completed > 0, "{seen:?}, {completed} completed");
     assert_eq!((&parameters(&finger)["modulus_pa"], gains(&finger)), (&wanted["modulus_pa"], wanted["gains"].clone()));
 }
 

@@ -138,8 +138,8 @@ impl Standing {
 /// What a frame adds to the record of a motion.
 #[derive(Clone, Copy, Debug)]
 pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// A step of a press is complete.
-    Step(&'a Step<ROWS, COLUMNS>),
+    /// A part of a complete step of a press, of [`press::PARTS`].
+    Step(&'a Step<ROWS, COLUMNS>, u8),
     /// A stroke begins with the next frame.
     Stroke,
     /// A sample of a stroke.
@@ -154,6 +154,16 @@ pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
 /// A force in mN, as [`Standing::value`] has it.
 fn millinewtons(force: Newtons) -> i32 {
     ((i64::from(force.to_bits()) * 1_000) >> 16) as i32
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Row<'_, ROWS, COLUMNS> {
+    /// Whether a row of the record begins with it, and whether one ends.
+    pub const fn ends(&self) -> [bool; 2] {
+        match self {
+            Self::Step(_, part) => [*part == 0, *part + 1 >= press::PARTS],
+            Self::Stroke | Self::Sample { .. } => [true; 2],
+        }
+    }
 }
 
 #[cfg(test)]

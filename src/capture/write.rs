@@ -20,6 +20,8 @@ pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> 
     /// The head of a record of a motion, while one is kept, and its bytes so far.
     series: Series,
     length: usize,
+    /// Bytes and check sum of the row under way.
+    row: (usize, u32),
     /// A motion was under way in the step before.
     ran: bool,
     bytes: [u8; BYTES],
@@ -39,6 +41,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         last: Last::NONE,
         series: Series::NONE,
         length: 0,
+        row: (0, 0),
         ran: false,
         bytes: [0; BYTES],
     };
@@ -160,20 +163,25 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
             let count = self.standing.count.wrapping_add(1);
             self.standing = Standing { state: State::Recording, count, ..Standing::default() };
         }
-        let Self { series: head, length, bytes, .. } = self;
+        let Self { series: head, length, bytes, row: begun, .. } = self;
         if head.kind == 0 {
             return;
         }
         if let Some(row) = pipeline.row() {
-            let mut out = Out::new(bytes.get_mut(*length..).unwrap_or_default(), head.check);
+            let [begins, ends] = row.ends();
+            let (count, check) = if begins { (0, head.check) } else { *begun };
+            let mut out = Out::new(bytes.get_mut(*length..).unwrap_or_default(), count, check);
             out.row(&row);
             if out.full {
                 let rows = head.rows.cast_signed();
                 return self.end_series(measure::Ended::Full, rows);
             }
-            *length += out.count;
-            (head.check, head.rows) = (out.check, head.rows + 1);
-            self.standing.frames = head.rows;
+            *begun = (out.count, out.check);
+            if ends {
+                *length += out.count;
+                (head.check, head.rows) = (out.check, head.rows + 1);
+                self.standing.frames = head.rows;
+            }
         }
         if !runs {
             self.end_series(motion.ended, motion.value);

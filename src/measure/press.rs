@@ -43,6 +43,8 @@ const BAD_FRAMES: u8 = 4;
 /// A taxel's code is held to this, and what it differs by from the step's first frame: sixteenths and quarters.
 const CODE_MAX: i32 = 1 << 17;
 const CHANGE_MAX: i32 = 1_023;
+/// A complete step is handed over in so many parts, one a frame: to write all of it takes as long as the step of the loop.
+pub const PARTS: u8 = 4;
 /// More frames than this are not taken into a step: the sums then have 31 bits.
 const FRAMES_MAX: u16 = 16_383;
 
@@ -64,8 +66,8 @@ pub struct Press {
     /// The most taxels that were bad in the air, and frames in turn with more.
     bad_before: u16,
     bad_frames: u8,
-    /// A step is complete with this frame.
-    complete: bool,
+    /// The part of a complete step that is handed over with this frame.
+    part: Option<u8>,
     /// The next frame begins a step.
     fresh: bool,
     /// Steps of this way that are complete.
@@ -83,6 +85,8 @@ enum Phase {
     In(Pace),
     Hold,
     Back(Pace),
+    /// The last step is handed over.
+    Last,
     /// Nothing is left to do.
     Over,
 }
@@ -191,7 +195,7 @@ impl Press {
             still_ns: 0,
             bad_before: 0,
             bad_frames: 0,
-            complete: false,
+            part: None,
             fresh: true,
             steps: 0,
         }
@@ -202,9 +206,9 @@ impl Press {
         self.phase != Phase::Over
     }
 
-    /// Whether a step is complete with this frame.
-    pub fn complete(&self) -> bool {
-        self.complete
+    /// The part of a complete step that is handed over with this frame.
+    pub fn part(&self) -> Option<u8> {
+        self.part
     }
 
     /// Takes a frame.
@@ -216,7 +220,11 @@ impl Press {
         standing: &mut Standing,
         config: &Config,
     ) {
-        self.complete = false;
+        // Meanwhile the motion goes on as it was, and no frame is taken.
+        self.part = self.part.and_then(|part| (part + 1 < PARTS).then_some(part + 1));
+        if self.part.is_some() {
+            return;
+        }
         let travel = view.motion.observer.travel;
         if self.stalled(travel, config) {
             return self.end(standing, Ended::Stalled, travel);
@@ -232,6 +240,7 @@ impl Press {
         }
         match self.phase {
             Phase::Over => {}
+            Phase::Last => self.end(standing, Ended::Complete, Millimetres::ZERO),
             Phase::Retreat if force < config.contact_off => self.phase = Phase::Seek,
             Phase::Retreat => {}
             Phase::Seek if force >= config.contact_on => {
@@ -259,7 +268,7 @@ impl Press {
                 let over = |holds: u8| HOLDS_MS.get(usize::from(holds)).is_none_or(|ms| self.held_ns >= ms * 1_000_000);
                 let complete = over(self.holds);
                 step.take(view, self.fresh, false);
-                (self.fresh, self.complete) = (complete, complete);
+                (self.fresh, self.part) = (complete, complete.then_some(0));
                 self.holds += u8::from(complete);
                 if usize::from(self.holds) >= HOLDS_MS.len() {
                     self.next(Phase::Back(Pace::Slow), measured, standing);
@@ -271,7 +280,7 @@ impl Press {
                 match (turns, pace) {
                     (false, _) => {}
                     (true, Pace::Quick) => self.next(Phase::In(Pace::Slow), measured, standing),
-                    (true, Pace::Slow) => self.end(standing, Ended::Complete, Millimetres::ZERO),
+                    (true, Pace::Slow) => self.phase = Phase::Last,
                 }
             }
         }
@@ -282,7 +291,7 @@ impl Press {
         let back = Millimetres(-FAR.0);
         let of = |pace| config.approach.min(if pace == Pace::Quick { QUICK } else { SLOW });
         let (way, speed) = match self.phase {
-            Phase::Over => (Millimetres::ZERO, config.approach),
+            Phase::Over | Phase::Last => (Millimetres::ZERO, config.approach),
             Phase::Retreat => (back, config.approach),
             Phase::Before => (back, of(Pace::Quick)),
             Phase::Seek => (motion.within_travel(FAR, config, limits), config.approach),
@@ -310,9 +319,9 @@ impl Press {
         let whole = depth_goal(config).to_bits().saturating_add(BEFORE);
         // A tip that goes to and fro makes the last step longer, not the record.
         let more = usize::from(self.steps) <= STEPS;
-        self.complete = turns || more && gone >= STEP.max(whole / STEPS as i32);
-        self.fresh = self.complete;
-        if self.complete {
+        self.fresh = turns || more && gone >= STEP.max(whole / STEPS as i32);
+        self.part = self.fresh.then_some(0);
+        if self.fresh {
             (self.step_from, self.steps) = (at, self.steps.saturating_add(1));
         }
     }

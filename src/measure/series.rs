@@ -109,12 +109,13 @@ pub struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// Into this room, after bytes with this check sum.
-    pub fn new(room: &'a mut [u8], check: u32) -> Self {
-        Self { room, check, count: 0, full: false }
+    /// Into this room, behind bytes of the same row; with the check sum of all that stands before.
+    pub fn new(room: &'a mut [u8], count: usize, check: u32) -> Self {
+        let full = room.len() < count;
+        Self { room: room.get_mut(count..).unwrap_or_default(), check, count, full }
     }
 
-    // Inlined, as all of a row's loops: a row must fit into a frame beside its step.
+    // Inlined, as all of a row's loops: a part of it must fit into a frame beside its step.
     #[inline(always)]
     fn put<const BYTES: usize>(&mut self, bytes: [u8; BYTES]) {
         let Some((place, rest)) = core::mem::take(&mut self.room).split_first_chunk_mut() else {
@@ -136,12 +137,30 @@ impl<'a> Out<'a> {
                 self.put(count.to_le_bytes());
                 self.put(voltage.to_le_bytes());
             }
-            Row::Step(step) => self.step(step),
+            Row::Step(step, part) => self.step(step, *part),
         }
     }
 
-    fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
+    /// A part: the numbers and half of the means, the other means, half of the variances, the others and the bits.
+    fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, part: u8) {
         let taken = i32::from(step.taken.max(1));
+        let (sums, first) = (step.sums.as_flattened(), step.first.as_flattened());
+        let half = ROWS / 2 * COLUMNS;
+        match part {
+            0 => {
+                self.numbers(step, taken);
+                self.means(sums.get(..half).unwrap_or_default(), taken);
+            }
+            1 => self.means(sums.get(half..).unwrap_or_default(), taken),
+            2 => self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).take(half), taken),
+            _ => {
+                self.variances(step.squares.as_flattened().iter().zip(sums.iter().zip(first)).skip(half), taken);
+                self.bits(step);
+            }
+        }
+    }
+
+    fn numbers<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, taken: i32) {
         step.frames.into_iter().for_each(|frame| self.put(frame.to_le_bytes()));
         step.counts.into_iter().for_each(|count| self.put(count.to_le_bytes()));
         self.put(step.taken.to_le_bytes());
@@ -151,19 +170,28 @@ impl<'a> Out<'a> {
         // Degrees Celsius with 16 fractional bits.
         let kelvin = step.chip.map_or(0, |chip| ((i64::from(chip.to_bits()) * 10) >> 16) + 2_731);
         self.put((kelvin.max(0).min(u16::MAX.into()) as u16).to_le_bytes());
+    }
+
+    fn means(&mut self, sums: &[i32], taken: i32) {
         // The offset makes all that counts positive: rounded to the nearest, without a remainder's sign.
         let zero = taken / 2 + OFFSET * taken;
-        for sum in step.sums.as_flattened() {
+        for sum in sums {
             let eighths = (sum / 2 + zero) / taken;
             self.put((eighths.max(0).min(u16::MAX.into()) as u16).to_le_bytes());
         }
-        let sums = step.sums.as_flattened().iter().zip(step.first.as_flattened());
-        for (square, (sum, first)) in step.squares.as_flattened().iter().zip(sums) {
+    }
+
+    /// Of squares, sums and first readings.
+    fn variances<'t>(&mut self, taxels: impl Iterator<Item = (&'t u32, (&'t i32, &'t i32))>, taken: i32) {
+        for (square, (sum, first)) in taxels {
             // Mean of what it differed by from the first frame, quarters.
             let mean = (sum / taken).saturating_sub(*first) >> 2;
             let mean = mean.unsigned_abs().min(65_535);
             self.put([coded((square / taken.cast_unsigned()).saturating_sub(mean * mean))]);
         }
+    }
+
+    fn bits<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
         let (mut byte, mut bits) = (0, 0);
         for row in step.bad {
             for column in 0..COLUMNS {

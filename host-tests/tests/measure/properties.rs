@@ -49,7 +49,7 @@ fn a_press_has_no_more_rows_than_stated() {
                 chip,
             };
             press.observe(&view, &mut step, &mut standing, &config);
-            rows += usize::from(press.complete());
+            rows += usize::from(press.part() == Some(0));
         }
         most = most.max(rows);
         assert!(rows <= ROWS_MAX, "seed {seed}: {rows} rows");

@@ -1,6 +1,6 @@
 //! The layout of a record, read by a decoder of its own: it knows only the documentation of `fingertip::measure::series`.
 
-use fingertip::measure::press::Step;
+use fingertip::measure::press::{PARTS, Step};
 use fingertip::measure::series::{CHECK, Head, Out, step_bytes};
 use fingertip::measure::{Ended, Row};
 use fingertip::units::Celsius;
@@ -89,10 +89,22 @@ fn step(from: &mut &[u8], taxels: usize) -> Read {
 /// The bytes of these rows behind a head.
 fn written<const ROWS: usize, const COLUMNS: usize>(rows: &[Row<'_, ROWS, COLUMNS>], kind: u8) -> Vec<u8> {
     let mut body = vec![0; rows.len() * step_bytes(ROWS * COLUMNS)];
-    let mut out = Out::new(&mut body, CHECK);
-    rows.iter().for_each(|row| out.row(row));
-    let (count, check) = (out.count, out.check);
-    assert!(!out.full);
+    let (mut length, mut check) = (0, CHECK);
+    let mut count = 0;
+    for row in rows {
+        let mut put = |row: &Row<'_, ROWS, COLUMNS>| {
+            let [begins, ends] = row.ends();
+            let mut out = Out::new(&mut body[length..], if begins { 0 } else { count }, check);
+            out.row(row);
+            assert!(!out.full);
+            (count, check) = (out.count, out.check);
+            length += if ends { count } else { 0 };
+        };
+        match row {
+            Row::Step(step, _) => (0..PARTS).for_each(|part| put(&Row::Step(step, part))),
+            other => put(other),
+        }
+    }
     let head = Head {
         kind,
         shape: [ROWS as u8, COLUMNS as u8],
@@ -104,7 +116,7 @@ fn written<const ROWS: usize, const COLUMNS: usize>(rows: &[Row<'_, ROWS, COLUMN
         delay_ns: 33_000,
         value: -5,
     };
-    [&head.bytes(), &body[..count]].concat()
+    [&head.bytes(), &body[..length]].concat()
 }
 
 /// A step from the readings of its frames, in sixteenths of a code; what a press sums up.
@@ -140,7 +152,7 @@ fn comes_back<const ROWS: usize, const COLUMNS: usize>() {
             (step, frames)
         })
         .collect();
-    let rows: Vec<_> = steps.iter().map(|(step, _)| Row::Step(step)).collect();
+    let rows: Vec<_> = steps.iter().map(|(step, _)| Row::Step(step, 0)).collect();
     let record = decode(&written(&rows, 1));
     assert_eq!((record.kind, record.shape, record.ended), (1, [ROWS, COLUMNS], 12));
     assert_eq!((record.frame_ns, record.origin, record.delay_ns, record.value), (99_762, -77_000, 33_000, -5));
@@ -201,7 +213,7 @@ fn the_ends_of_the_sums_are_written() {
                         chip: Some(Celsius::from_bits(i32::MIN)),
                         ..Step::NONE
                     };
-                    let read = &decode(&written(&[Row::Step(&step)], 1)).steps[0];
+                    let read = &decode(&written(&[Row::Step(&step, 0)], 1)).steps[0];
                     let mean = if taken == 0 { 0.0 } else { f64::from(reading) / 16.0 };
                     assert_eq!(read.means[14], mean.clamp(-128.0, (65_535.0 - 1_024.0) / 8.0));
                     assert_eq!(read.tenths_k, 0);

@@ -138,8 +138,8 @@ impl Standing {
 /// What a frame adds to the record of a motion.
 #[derive(Clone, Copy, Debug)]
 pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// A step of a press is complete.
-    Step(&'a Step<ROWS, COLUMNS>),
+    /// A part of the row of a step of a press, from 0 to [`series::PARTS`]: a whole row takes longer than a frame leaves.
+    Step(&'a Step<ROWS, COLUMNS>, u8),
     /// A stroke begins with the next frame.
     Stroke,
     /// A sample of a stroke.

@@ -372,7 +372,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// What the last step adds to the record of a motion that measures.
     pub fn row(&self) -> Option<Row<'_, ROWS, COLUMNS>> {
         match &self.activity {
-            Activity::Press(press) if press.complete() => Some(Row::Step(&self.step)),
+            Activity::Press(press) => press.part().map(|part| Row::Step(&self.step, part)),
             Activity::Strokes(run) => run.row().map(|kept| match kept {
                 Kept::Stroke => Row::Stroke,
                 Kept::Sample(count, voltage) => Row::Sample { count, voltage },

@@ -4,8 +4,8 @@ use super::bits::{Place, Writer};
 use super::{Ended, Head, Last, Standing, State, digest, width};
 use crate::command::Command;
 use crate::frame::{Frame, Sense};
-use crate::measure::series::{CHECK, HEAD, Head as Series, Out};
-use crate::measure::{self, Task};
+use crate::measure::series::{CHECK, HEAD, Head as Series, Out, PARTS};
+use crate::measure::{self, Row, Task};
 use crate::pipeline::{Pipeline, Status};
 use crate::pressure::Gains;
 use crate::state::Mode;
@@ -20,6 +20,9 @@ pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> 
     /// The head of a record of a motion, while one is kept, and its bytes so far.
     series: Series,
     length: usize,
+    /// Bytes of a row that is not whole, and the check sum before it.
+    part_of: usize,
+    whole: u32,
     /// A motion was under way in the step before.
     ran: bool,
     bytes: [u8; BYTES],
@@ -39,6 +42,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         last: Last::NONE,
         series: Series::NONE,
         length: 0,
+        part_of: 0,
+        whole: 0,
         ran: false,
         bytes: [0; BYTES],
     };
@@ -156,7 +161,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
                 delay_ns: if press { 0 } else { measure::strokes::DELAY_NS },
                 value: 0,
             };
-            self.length = HEAD;
+            (self.length, self.part_of, self.whole) = (HEAD, 0, CHECK);
             let count = self.standing.count.wrapping_add(1);
             self.standing = Standing { state: State::Recording, count, ..Standing::default() };
         }
@@ -172,7 +177,12 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
                 return self.end_series(measure::Ended::Full, rows);
             }
             *length += out.count;
-            (head.check, head.rows) = (out.check, head.rows + 1);
+            head.check = out.check;
+            if matches!(row, Row::Step(_, part) if part + 1 < PARTS) {
+                self.part_of += out.count;
+            } else {
+                (head.rows, self.part_of, self.whole) = (head.rows + 1, 0, head.check);
+            }
             self.standing.frames = head.rows;
         }
         if !runs {
@@ -181,7 +191,10 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     }
 
     fn end_series(&mut self, ended: measure::Ended, value: i32) {
-        let head = Series { ended, value, ..core::mem::replace(&mut self.series, Series::NONE) }.bytes();
+        // A row that is not whole is not kept.
+        self.length -= self.part_of;
+        let check = self.whole;
+        let head = Series { ended, value, check, ..core::mem::replace(&mut self.series, Series::NONE) }.bytes();
         self.bytes.iter_mut().zip(head).for_each(|(to, byte)| *to = byte);
         let ended = if ended == measure::Ended::Full { Ended::Full } else { Ended::Asked };
         self.standing = Standing { state: State::Done, ended, bytes: self.length as u32, ..self.standing };

@@ -9,6 +9,7 @@
 //! range of the paper's measurement), at 7/8 of the largest force, at the travel's end, or where one more taxel than in
 //! the air is dead or saturated.
 
+use super::series::PARTS;
 use super::{Ended, Standing};
 use crate::config::Config;
 use crate::contact::Contact;
@@ -64,8 +65,10 @@ pub struct Press {
     /// The most taxels that were bad in the air, and frames in turn with more.
     bad_before: u16,
     bad_frames: u8,
-    /// A step is complete with this frame.
-    complete: bool,
+    /// Parts of the last step's row that are handed over with this frame and before, from 1 on; 0 when all are.
+    part: u8,
+    /// The row that is handed over is the last one.
+    ends: bool,
     /// The next frame begins a step.
     fresh: bool,
 }
@@ -189,7 +192,8 @@ impl Press {
             still_ns: 0,
             bad_before: 0,
             bad_frames: 0,
-            complete: false,
+            part: 0,
+            ends: false,
             fresh: true,
         }
     }
@@ -199,9 +203,9 @@ impl Press {
         self.phase != Phase::Over
     }
 
-    /// Whether a step is complete with this frame.
-    pub fn complete(&self) -> bool {
-        self.complete
+    /// The part of a row that this frame gives the record.
+    pub fn part(&self) -> Option<u8> {
+        self.part.checked_sub(1)
     }
 
     /// Takes a frame.
@@ -213,9 +217,9 @@ impl Press {
         standing: &mut Standing,
         config: &Config,
     ) {
-        self.complete = false;
         let travel = view.motion.observer.travel;
         if self.stalled(travel, config) {
+            self.part = 0;
             return self.end(standing, Ended::Stalled, travel);
         }
         let bad = self.one_more_bad(view.picture.bad_count);
@@ -224,8 +228,21 @@ impl Press {
         let measured = view.motion.observer.measured(view.encoder, config);
         // Something pushes back: the grip that follows releases it faster than a way back would.
         if force > config.force_max && matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
-            self.phase = Phase::Over;
+            (self.phase, self.part) = (Phase::Over, 0);
             return standing.end(Ended::Touched, super::millinewtons(force));
+        }
+        if self.part > 0 {
+            self.part += 1;
+            if self.part <= PARTS {
+                if self.phase == Phase::Hold {
+                    self.held_ns = self.held_ns.saturating_add(config.timing.frame_ns);
+                }
+                return;
+            }
+            self.part = 0;
+            if self.ends {
+                return self.end(standing, Ended::Complete, Millimetres::ZERO);
+            }
         }
         match self.phase {
             Phase::Over => {}
@@ -256,7 +273,7 @@ impl Press {
                 let over = |holds: u8| HOLDS_MS.get(usize::from(holds)).is_none_or(|ms| self.held_ns >= ms * 1_000_000);
                 let complete = over(self.holds);
                 step.take(view, self.fresh, false);
-                (self.fresh, self.complete) = (complete, complete);
+                (self.fresh, self.part) = (complete, complete.into());
                 self.holds += u8::from(complete);
                 if usize::from(self.holds) >= HOLDS_MS.len() {
                     self.next(Phase::Back(Pace::Slow), measured, standing);
@@ -268,7 +285,7 @@ impl Press {
                 match (turns, pace) {
                     (false, _) => {}
                     (true, Pace::Quick) => self.next(Phase::In(Pace::Slow), measured, standing),
-                    (true, Pace::Slow) => self.end(standing, Ended::Complete, Millimetres::ZERO),
+                    (true, Pace::Slow) => self.ends = true,
                 }
             }
         }
@@ -305,9 +322,9 @@ impl Press {
         step.take(view, self.fresh, matches!(self.phase, Phase::Back(_)));
         let gone = at.0.saturating_sub(self.step_from.0).saturating_abs().to_bits();
         let whole = depth_goal(config).to_bits().saturating_add(BEFORE);
-        self.complete = turns || gone >= STEP.max(whole / STEPS as i32);
-        self.fresh = self.complete;
-        if self.complete {
+        let complete = turns || gone >= STEP.max(whole / STEPS as i32);
+        (self.fresh, self.part) = (complete, complete.into());
+        if complete {
             self.step_from = at;
         }
     }

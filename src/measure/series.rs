@@ -36,6 +36,10 @@ const STEP: usize = 24;
 /// What is added to a mean, eighths of a code.
 const OFFSET: i32 = 1_024;
 
+/// Parts of a step's row, one in a frame: what is before the taxels, fifths of the means, fifths of the variances, bits.
+pub const PARTS: u8 = 2 * FIFTHS + 2;
+const FIFTHS: u8 = 5;
+
 /// Bytes of a step.
 pub const fn step_bytes(taxels: usize) -> usize {
     (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
@@ -140,11 +144,21 @@ impl<'a> Out<'a> {
                 self.half(count.cast_unsigned());
                 self.half(voltage.cast_unsigned());
             }
-            Row::Step(step) => self.step(step),
+            Row::Step(step, part) => self.step(step, *part),
         }
     }
 
-    fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
+    fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, part: u8) {
+        let fifth = (ROWS * COLUMNS).div_ceil(FIFTHS.into());
+        match part {
+            0 => self.before(step),
+            1..=FIFTHS => self.means(step, usize::from(part - 1) * fifth, fifth),
+            part if part < PARTS - 1 => self.variances(step, usize::from(part - 1 - FIFTHS) * fifth, fifth),
+            _ => self.bad(step),
+        }
+    }
+
+    fn before<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
         let taken = i32::from(step.taken.max(1));
         step.frames.into_iter().for_each(|frame| self.word(frame));
         step.counts.into_iter().for_each(|count| self.word(count.cast_unsigned()));
@@ -156,11 +170,24 @@ impl<'a> Out<'a> {
         // Degrees Celsius with 16 fractional bits.
         let kelvin = step.chip.map_or(0, |chip| ((i64::from(chip.to_bits()) * 10) >> 16) + 2_731);
         self.half(kelvin.max(0).min(u16::MAX.into()) as u16);
-        for sum in step.sums.as_flattened() {
+    }
+
+    fn means<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, from: usize, count: usize) {
+        let taken = i32::from(step.taken.max(1));
+        for sum in step.sums.as_flattened().iter().skip(from).take(count) {
             let eighths = (sum / 2 + taken.div_euclid(2)).div_euclid(taken).saturating_add(OFFSET);
             self.half(eighths.max(0).min(u16::MAX.into()) as u16);
         }
-        for (place, square) in step.squares.as_flattened().iter().enumerate() {
+    }
+
+    fn variances<const ROWS: usize, const COLUMNS: usize>(
+        &mut self,
+        step: &Step<ROWS, COLUMNS>,
+        from: usize,
+        count: usize,
+    ) {
+        let taken = i32::from(step.taken.max(1));
+        for (place, square) in step.squares.as_flattened().iter().enumerate().skip(from).take(count) {
             let at = |all: &[[i32; COLUMNS]; ROWS]| all.as_flattened().get(place).copied().unwrap_or(0);
             // Mean of what it differed by from the first frame, quarters.
             let mean = (at(&step.sums) / taken).saturating_sub(at(&step.first)) >> 2;
@@ -168,14 +195,16 @@ impl<'a> Out<'a> {
             let variance = (square / taken.cast_unsigned()).saturating_sub((mean * mean).cast_unsigned());
             self.put(coded(variance));
         }
+    }
+
+    fn bad<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>) {
         let bad = |place: usize| step.bad.get(place / COLUMNS).is_some_and(|row| row >> (place % COLUMNS) & 1 != 0);
         for first in (0..ROWS * COLUMNS).step_by(8) {
             let bits = (0..8).filter(|bit| first + bit < ROWS * COLUMNS && bad(first + bit));
             self.put(bits.fold(0, |byte, bit| byte | 1 << bit));
         }
-        while !self.count.is_multiple_of(4) && !self.full {
-            self.put(0);
-        }
+        let taxels = ROWS * COLUMNS;
+        (STEP + 3 * taxels + taxels.div_ceil(8)..step_bytes(taxels)).for_each(|_| self.put(0));
     }
 }
 

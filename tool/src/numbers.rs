@@ -51,7 +51,7 @@ pub fn goal_mn(text: &str) -> Result<i64, String> {
 /// Force in mN that a scale shows, of a number in N.
 ///
 /// # Errors
-/// No force that the register can hold.
+/// Below 0 or above 150 N.
 pub fn shown_mn(text: &str) -> Result<i64, String> {
     within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }

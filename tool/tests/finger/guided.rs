@@ -5,7 +5,7 @@ use crate::stopped::{is_at_rest, patient};
 use fingertip::link::packet::instruction::REBOOT;
 use serde_json::{Value, json};
 use std::fs;
-use std::io::Write as _;
+use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Output, Stdio};
 
 /// Options of a calibration without questions and without the pause of a real sensor.
@@ -101,6 +101,25 @@ fn a_killed_session_resumes_where_it_was() {
     assert_eq!(finger.json(&calibrate), resumed, "the same records give the same numbers");
     assert_eq!((&resumed["applied"], parameters(&finger)), (&false.into(), before), "{resumed}");
     assert!(near(&resumed["after"]["modulus_pa"], 250_000.0, 0.05), "{resumed}");
+    // A weight that lies on the tip: the object comes to it, and goes.
+    let creep = [&calibrate[..], &["--creep-s", "6"]].concat();
+    let mut command = finger.fingertip(&creep);
+    let mut child =
+        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut asked = 0;
+    for line in BufReader::new(child.stderr.take().expect("a pipe")).lines() {
+        let line = line.expect("text");
+        for (words, place) in [("lay a weight", "move -0.5"), ("take the weight off", "move 5")] {
+            if line.contains(words) {
+                finger.command(place);
+                asked += 1;
+            }
+        }
+    }
+    child.wait().expect("it ends");
+    assert_eq!(asked, 2);
+    let weighed = finger.json(&creep);
+    assert_eq!((&weighed["after"]["creep_permille"], &weighed["refused"]), (&0.into(), &json!([])), "{weighed}");
     // A damaged record is not solved.
     fs::write(&record, &bytes[..bytes.len() - 4]).expect("a file");
     let why = finger.refused(&calibrate);

@@ -165,6 +165,19 @@ pub fn forget(session: &mut Session) -> Result<(), Error> {
     session.forget(STEP)
 }
 
+/// Waits for a force on the tip, with torque off. Returns false if it does not come in time.
+fn force_within(wanted: impl Fn(i64) -> bool, run: &Run<'_>, client: &mut Client) -> Result<bool, Error> {
+    let until = Instant::now() + WEIGHT_WITHIN;
+    while !wanted(client.again(State::read)?.force_mn) {
+        run.interrupt.check()?;
+        if Instant::now() > until {
+            return Ok(false);
+        }
+        std::thread::sleep(LOOK);
+    }
+    Ok(true)
+}
+
 /// Step of the session with a weight's readings.
 const WEIGHT: &str = "weight";
 
@@ -175,15 +188,11 @@ pub fn weight(seconds: f64, session: &mut Session, run: &Run<'_>, client: &mut C
         run.report(format_args!(
             "lay a weight of 50 to 500 g on the tip within 60 s, and leave it there for {seconds} s"
         ));
-        let until = Instant::now() + WEIGHT_WITHIN;
-        while client.again(State::read)?.force_mn < WEIGHT_MN {
-            run.interrupt.check()?;
-            if Instant::now() > until {
-                return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
-            }
-            std::thread::sleep(LOOK);
+        if !force_within(|force_mn| force_mn >= WEIGHT_MN, run, client)? {
+            return Err("no weight of 100 mN was laid on the tip within 60 s: run without --creep-s".into());
         }
-        run.interrupt.pause(Instant::now() + AVERAGED);
+        let settled = Instant::now() + SETTLED;
+        force_within(|_| Instant::now() > settled, run, client)?;
         let (begun, mut readings) = (Instant::now(), Vec::new());
         while begun.elapsed().as_secs_f64() < seconds {
             run.interrupt.check()?;
@@ -195,6 +204,10 @@ pub fn weight(seconds: f64, session: &mut Session, run: &Run<'_>, client: &mut C
             std::thread::sleep(10 * LOOK);
         }
         session.done(WEIGHT, readings.into())?;
+        run.report("take the weight off the tip within 60 s");
+        if !force_within(|force_mn| force_mn < WEIGHT_MN / 2, run, client)? {
+            return Err("the weight still lies on the tip: take it off and run again".into());
+        }
     }
     let readings = session.step(WEIGHT).and_then(Value::as_array).map(Vec::as_slice).unwrap_or_default();
     let pair = |pair: &Value| Some([pair[0].as_f64()?, pair[1].as_f64()?]);

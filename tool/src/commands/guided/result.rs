@@ -113,7 +113,8 @@ pub fn finish(found: &Found, session: &mut Session, run: &Run<'_>, client: &mut 
     }
     if wanted && !is_set && found.gains.is_some() {
         // The zeros of the old gains are wrong under new ones.
-        motion::tare(run, client)?;
+        motion::tare(run, client)
+            .map_err(|why| format!("the values are written, but the tare that new gains need failed: {why}"))?;
     }
     let saved = wanted && run.options.save;
     if saved {

@@ -85,6 +85,11 @@ impl Halt {
     /// The motor was driven just now.
     pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: Some(0) };
 
+    /// Whether the tip is at rest, and the bridge open.
+    pub fn rests(&self) -> bool {
+        self.still_ns.is_none()
+    }
+
     /// Takes a frame; whether the motor is shorted.
     pub fn brakes(&mut self, motion: &SpeedLoop, config: &Config) -> bool {
         let Some(still_ns) = &mut self.still_ns else { return false };

@@ -6,7 +6,7 @@
 //! | tare | in every activity but fault, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
 //! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced) | the finger stays off; limits 6 and 10 give the reason |
 //! | torque off | in every activity | |
-//! | jog, strokes | in off, with torque off, the array tared and nothing at the tip | refused: [`Ended`] |
+//! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
 //! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
 //! | stop | a jog, strokes or a press under way | |
 
@@ -123,17 +123,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.monitor.restart(self.array.picture(), &self.motion);
     }
 
-    /// A motion that measures, or its end. A press waits for torque that is being taken up.
+    /// A motion that measures, or its end. A press waits for torque that is being taken up, the others until the tip is
+    /// at rest.
     #[inline(never)]
     fn serve_measure(&mut self, command: &Command, encoder: i32, contact: &Contact) {
         let task = Task::of(command.measure_request);
         let may_drive = self.may_drive(command.tare_forced);
-        let waits = match &self.activity {
-            Activity::Tare { .. } => command.torque,
-            Activity::Off(_) | Activity::Strokes(_) => command.torque && may_drive,
+        let waits = match (task, &self.activity) {
+            (Task::Press, Activity::Tare { .. }) => command.torque,
+            (Task::Press, Activity::Off(_) | Activity::Strokes(_)) => command.torque && may_drive,
+            (Task::Jog | Task::Strokes, Activity::Off(halt)) => !command.torque && may_drive && !halt.rests(),
             _ => false,
         };
-        if task == Task::Press && waits {
+        if waits {
             return;
         }
         self.status.taken.measure = command.measure_request;

@@ -156,10 +156,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
     fn take(&mut self, view: &View<ROWS, COLUMNS>, fresh: bool, back: bool) {
         if fresh {
             (self.frames[0], self.counts[0]) = (view.sequence, view.encoder);
-            (self.taken, self.voltage_mv, self.back) = (0, 0, back);
-            (self.first, self.bad) = (view.picture.taxels, [0; ROWS]);
-            self.sums = [[0; COLUMNS]; ROWS];
+            (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
+            (self.taken, self.voltage_mv, self.back) = (1, view.applied_mv, back);
+            (self.first, self.bad) = (view.picture.taxels, view.picture.bad);
+            // The first frame is copied, not added: no frame both clears a step and adds to it.
+            self.sums = view.picture.taxels;
             self.squares = [[0; COLUMNS]; ROWS];
+            return;
         }
         (self.frames[1], self.counts[1], self.chip) = (view.sequence, view.encoder, view.chip);
         if self.taken >= FRAMES_MAX {

@@ -77,7 +77,6 @@ fn jog_and_strokes_complete_and_the_drive_is_solved() {
 }
 
 #[test]
-#[ignore = "fails with LostFrames: keeping a row of a press takes longer than is left of its frame"]
 fn a_press_completes_and_the_modulus_is_solved() {
     let setup = away(0.5);
     let mut rig = running(&setup, &Options::confirmed());

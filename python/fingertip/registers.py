@@ -85,13 +85,6 @@ LIMIT_ERRORS = Register("limit_errors", 340, 2, 1, False, 1, False, 0, 65535)
 ACCESS_ERRORS = Register("access_errors", 342, 2, 1, False, 1, False, 0, 65535)
 FRAMING_ERRORS = Register("framing_errors", 344, 2, 1, False, 1, False, 0, 65535)
 GOOD_PACKETS = Register("good_packets", 346, 4, 1, False, 1, False, 0, 4294967295)
-IDENTIFY = Register("identify", 350, 1, 1, False, 1, False, 0, 1)
-IDENTIFY_STATE = Register("identify_state", 351, 1, 1, False, 1, False, 0, 3)
-IDENTIFIED_MODULUS_PA = Register("identified_modulus_pa", 352, 4, 1, False, 1, False, 0, 2000000)
-IDENTIFIED_SIGMA_PA = Register("identified_sigma_pa", 356, 4, 1, False, 1, False, 0, 2000000)
-IDENTIFIED_CONTACT_UM = Register("identified_contact_um", 360, 4, 1, True, 1, False, -128000, 128000)
-IDENTIFIED_POINTS = Register("identified_points", 364, 2, 1, False, 1, False, 0, 4096)
-IDENTIFY_REFUSAL = Register("identify_refusal", 366, 1, 1, False, 1, False, 0, 11)
 FIT_LEVEL = Register("fit_level", 367, 1, 1, False, 1, True, 0, 5)
 FIT_LEVEL_IN_USE = Register("fit_level_in_use", 368, 1, 1, False, 1, False, 0, 5)
 TARE_STATE = Register("tare_state", 369, 1, 1, False, 1, False, 0, 3)
@@ -182,35 +175,12 @@ PRESSURES = Register("pressures", 768, 2, 100, False, 10, False, 0, 65535)
 RAW_CODES = Register("raw_codes", 1024, 2, 110, False, 1, False, 0, 4095)
 TARE_CODES = Register("tare_codes", 1280, 2, 100, False, 1, False, 0, 4095)
 GAINS = Register("gains", 1536, 2, 100, False, 1, True, 8192, 32767)
-CALIBRATE = Register("calibrate", 1736, 1, 1, False, 1, False, 0, 3)
-CALIBRATE_STATE = Register("calibrate_state", 1737, 1, 1, False, 1, False, 0, 3)
-CALIBRATE_REFUSAL = Register("calibrate_refusal", 1738, 1, 1, False, 1, False, 0, 11)
-CALIBRATE_PROGRESS = Register("calibrate_progress", 1739, 1, 1, False, 1, False, 0, 100)
-CALIBRATE_PRESSES = Register("calibrate_presses", 1740, 1, 1, False, 1, False, 0, 200)
-CALIBRATE_TAXELS = Register("calibrate_taxels", 1742, 2, 1, False, 1, False, 0, 512)
-SCALE_SHOWS_MN = Register("scale_shows_mn", 1744, 4, 1, True, 1, False, 0, 150000)
-SCALE_REFUSAL = Register("scale_refusal", 1748, 1, 1, False, 1, False, 0, 6)
-SCALE_POINTS = Register("scale_points", 1749, 1, 1, False, 1, False, 0, 255)
-SCALE = Register("scale", 1750, 1, 1, False, 1, False, 0, 3)
-SCALE_FACTOR_PPM = Register("scale_factor_ppm", 1752, 4, 1, False, 1, False, 0, 4000000)
-SCALE_SIGMA_PPM = Register("scale_sigma_ppm", 1756, 4, 1, False, 1, False, 0, 1000000)
-PROPOSED_GAINS = Register("proposed_gains", 1792, 2, 100, False, 1, False, 0, 32767)
-PROPOSED_SIGMAS = Register("proposed_sigmas", 1992, 1, 100, False, 1, False, 0, 255)
-COMMISSION = Register("commission", 4224, 1, 1, False, 1, False, 0, 2)
-COMMISSION_STATE = Register("commission_state", 4225, 1, 1, False, 1, False, 0, 4)
-COMMISSION_PROGRESS = Register("commission_progress", 4226, 1, 1, False, 1, False, 0, 100)
-COMMISSION_REFUSAL = Register("commission_refusal", 4227, 1, 1, False, 1, False, 0, 12)
-COMMISSION_ACCEPT = Register("commission_accept", 4228, 1, 1, False, 1, False, 0, 2)
-MEASURED_TORQUE_CONSTANT = Register("measured_torque_constant", 4232, 4, 1, False, 1, False, 0, 200000)
-MEASURED_TIME_CONSTANT = Register("measured_time_constant", 4236, 4, 1, False, 1, False, 0, 4294967295)
-MEASURED_INERTIA = Register("measured_inertia", 4240, 4, 1, False, 1, False, 0, 20000)
-MEASURED_FRICTION_FORWARD = Register("measured_friction_forward", 4244, 2, 1, False, 1, False, 0, 20000)
-MEASURED_FRICTION_BACK = Register("measured_friction_back", 4246, 2, 1, False, 1, False, 0, 20000)
-TORQUE_CONSTANT_SIGMA = Register("torque_constant_sigma", 4248, 2, 1, False, 1, False, 0, 65535)
-TIME_CONSTANT_SIGMA = Register("time_constant_sigma", 4250, 2, 1, False, 1, False, 0, 65535)
-INERTIA_SIGMA = Register("inertia_sigma", 4252, 2, 1, False, 1, False, 0, 65535)
-FRICTION_FORWARD_SIGMA = Register("friction_forward_sigma", 4254, 2, 1, False, 1, False, 0, 65535)
-FRICTION_BACK_SIGMA = Register("friction_back_sigma", 4256, 2, 1, False, 1, False, 0, 65535)
+MEASURE = Register("measure", 4224, 1, 1, False, 1, False, 0, 3)
+MEASURE_STATE = Register("measure_state", 4225, 1, 1, False, 1, False, 0, 3)
+MEASURE_PROGRESS = Register("measure_progress", 4226, 1, 1, False, 1, False, 0, 100)
+MEASURE_ENDED = Register("measure_ended", 4227, 1, 1, False, 1, False, 0, 13)
+MEASURE_VALUE = Register("measure_value", 4228, 4, 1, True, 1, False, -2147483647, 2147483647)
+MEASURE_TASK = Register("measure_task", 4232, 1, 1, False, 1, False, 0, 3)
 CAPTURE = Register("capture", 4260, 1, 1, False, 1, False, 0, 1)
 CAPTURE_STATE = Register("capture_state", 4261, 1, 1, False, 1, False, 0, 3)
 CAPTURE_ENDED = Register("capture_ended", 4262, 1, 1, False, 1, False, 0, 5)
@@ -289,13 +259,6 @@ ALL = (
     ACCESS_ERRORS,
     FRAMING_ERRORS,
     GOOD_PACKETS,
-    IDENTIFY,
-    IDENTIFY_STATE,
-    IDENTIFIED_MODULUS_PA,
-    IDENTIFIED_SIGMA_PA,
-    IDENTIFIED_CONTACT_UM,
-    IDENTIFIED_POINTS,
-    IDENTIFY_REFUSAL,
     FIT_LEVEL,
     FIT_LEVEL_IN_USE,
     TARE_STATE,
@@ -386,35 +349,12 @@ ALL = (
     RAW_CODES,
     TARE_CODES,
     GAINS,
-    CALIBRATE,
-    CALIBRATE_STATE,
-    CALIBRATE_REFUSAL,
-    CALIBRATE_PROGRESS,
-    CALIBRATE_PRESSES,
-    CALIBRATE_TAXELS,
-    SCALE_SHOWS_MN,
-    SCALE_REFUSAL,
-    SCALE_POINTS,
-    SCALE,
-    SCALE_FACTOR_PPM,
-    SCALE_SIGMA_PPM,
-    PROPOSED_GAINS,
-    PROPOSED_SIGMAS,
-    COMMISSION,
-    COMMISSION_STATE,
-    COMMISSION_PROGRESS,
-    COMMISSION_REFUSAL,
-    COMMISSION_ACCEPT,
-    MEASURED_TORQUE_CONSTANT,
-    MEASURED_TIME_CONSTANT,
-    MEASURED_INERTIA,
-    MEASURED_FRICTION_FORWARD,
-    MEASURED_FRICTION_BACK,
-    TORQUE_CONSTANT_SIGMA,
-    TIME_CONSTANT_SIGMA,
-    INERTIA_SIGMA,
-    FRICTION_FORWARD_SIGMA,
-    FRICTION_BACK_SIGMA,
+    MEASURE,
+    MEASURE_STATE,
+    MEASURE_PROGRESS,
+    MEASURE_ENDED,
+    MEASURE_VALUE,
+    MEASURE_TASK,
     CAPTURE,
     CAPTURE_STATE,
     CAPTURE_ENDED,

@@ -38,12 +38,31 @@ pub enum Condition {
 /// Gain of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
-    /// What the taxel reads too much, as a factor. The gain to set is the one in force over this.
+    /// What the taxel reads too much, as a factor; see [`Gain::factor`].
     pub reads: f64,
     /// Standard uncertainty of `reads`, apart from the factor that all have in common.
     pub sigma: f64,
     /// Condition.
     pub condition: Condition,
+    /// Its highest reading, codes.
+    pub highest: f64,
+}
+
+impl Gain {
+    /// What the gain in force is to be multiplied by, with the array's characteristic (`curve_permille` of the parameters).
+    ///
+    /// The gain acts on codes before the characteristic makes u (1 + p u / 4096) / (1 + p) of them. So it is the ratio of
+    /// two codes: at three quarters of the highest reading, where most of the weight is.
+    pub fn factor(&self, curve_permille: i32) -> f64 {
+        let p = 1e-3 * f64::from(curve_permille);
+        if p == 0.0 {
+            return 1.0 / self.reads;
+        }
+        // p times the code behind a reading, as shares of the full range.
+        let before = |reading: f64| (0.25 + p * (1.0 + p) * (reading / 4_096.0).max(1e-3)).sqrt() - 0.5;
+        let usual = 0.75 * self.highest;
+        before(usual / self.reads) / before(usual)
+    }
 }
 
 /// Pose of a press, with what it rests on.
@@ -168,4 +187,21 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     let mut gains = joint(&kept, if soft { YIELD_USUAL } else { 0.0 })?;
     gains.left_out = left_out;
     Ok(Settled { presses: kept, gains, creep })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With the factor, a code that the chip multiplies and then puts through the characteristic reads what it should.
+    #[test]
+    fn the_factor_goes_through_the_characteristic() {
+        for (curve_permille, reads) in [(0, 1.2), (500, 1.2), (3_000, 0.8), (8_000, 1.2)] {
+            let p = 1e-3 * f64::from(curve_permille);
+            let reading = |code: f64| code * (1.0 + p * code / 4_096.0) / (1.0 + p);
+            let gain = Gain { reads, sigma: 0.01, condition: Condition::Sound, highest: reading(1_500.0) / 0.75 };
+            let corrected = reading(1_500.0 * gain.factor(curve_permille));
+            assert!((corrected * reads / reading(1_500.0) - 1.0).abs() < 1e-9, "{curve_permille}: {corrected}");
+        }
+    }
 }

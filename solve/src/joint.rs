@@ -369,15 +369,17 @@ impl<'a> Joint<'a> {
         let all: f64 = rows.iter().zip(&sound).filter(|(_, sound)| **sound).map(|(row, _)| row).sum();
         let gain = |taxel: usize| {
             let reads = self.now.gains[taxel] / mean;
+            let means = self.presses.iter().flat_map(|press| &press.steps).map(|step| step.taxels[taxel].mean);
+            let highest = means.fold(0.0, f64::max);
             let part = reads / count;
             let variance = own[(taxel, taxel)] - 2.0 * part * rows[taxel] + part * part * all;
             match self.conditions[taxel] {
                 Condition::Sound if reached[taxel] => {
                     let sigma = (variance.max(0.0) / (mean * mean) + FLOOR * FLOOR).sqrt();
-                    Gain { reads, sigma, condition: Condition::Sound }
+                    Gain { reads, sigma, condition: Condition::Sound, highest }
                 }
-                Condition::Sound => Gain { reads: 1.0, sigma: GAIN_USUAL, condition: Condition::Unreached },
-                condition => Gain { reads: 1.0, sigma: GAIN_USUAL, condition },
+                Condition::Sound => Gain { reads: 1.0, sigma: GAIN_USUAL, condition: Condition::Unreached, highest },
+                condition => Gain { reads: 1.0, sigma: GAIN_USUAL, condition, highest },
             }
         };
         let taxels: Vec<Gain> = (0..self.now.gains.len()).map(gain).collect();

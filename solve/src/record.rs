@@ -165,7 +165,8 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
         rows: head.shape[0],
         columns: head.shape[1],
         pitch_mm: 1e-3 * f64::from(params.pitch_um),
-        codes_per_kpa: 1e-3 * f64::from(params.codes_per_kpa_milli),
+        // The chip takes the characteristic out of the codes, which leaves those of the full range.
+        codes_per_kpa: f64::from(params.codes_per_kpa_milli) / f64::from(1_000 + params.curve_permille),
     };
     let mut steps: Vec<Step> = Vec::new();
     let mut before = 0;

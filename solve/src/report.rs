@@ -57,7 +57,10 @@ impl Display for Ended {
             Reason::Astray => {
                 write!(f, "the tip was {thousandths:.2} mm away, outside of its bounds: check the encoder")
             }
-            Reason::Touched => write!(f, "the array measured {thousandths:.3} N in the air: clear the tip's way"),
+            Reason::Touched => write!(
+                f,
+                "the array measured {thousandths:.3} N, more than allowed here: clear the tip's way, hold the plate fast"
+            ),
             Reason::Pushed => {
                 write!(f, "an external force of {thousandths:.3} N was estimated from the motor: clear the tip's way")
             }

@@ -83,7 +83,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
     match solve::modulus(&presses) {
         Ok(found) => {
             params.modulus_pa = (1e3 * found.kpa).round() as i32;
-            gains = gains_of(&found);
+            gains = gains_of(&found, params.curve_permille);
             let left_out = &found.gains.left_out;
             refused.extend(left_out.iter().map(|(number, why)| format!("press {number}: {why}")));
         }
@@ -175,11 +175,11 @@ fn release(bench: &mut Bench<Named>) {
 }
 
 /// Gains to store: the inverse of what the taxels read; 1 for taxels without a reading that follows the model.
-fn gains_of(found: &Modulus) -> Gains {
+fn gains_of(found: &Modulus, curve_permille: i32) -> Gains {
     let mut gains = Gains::ONE;
     for (place, taxel) in found.gains.taxels.iter().enumerate() {
         if taxel.condition == Condition::Sound {
-            let gain = (f64::from(GAIN_ONE) / taxel.reads).round();
+            let gain = (f64::from(GAIN_ONE) * taxel.factor(curve_permille)).round();
             gains.set(place, gain.clamp(f64::from(Gains::MIN), f64::from(Gains::MAX)) as u16);
         }
     }

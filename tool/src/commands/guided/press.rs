@@ -101,7 +101,7 @@ pub fn gains(modulus: &Modulus, session: &Session, found: &mut Found) {
     let [least, most] = [f64::from(GAIN_ONE) / 2.0, f64::from(GAIN_MAX)];
     for (row, (gains, taxels)) in after.iter_mut().zip(modulus.gains.taxels.chunks(columns)).enumerate() {
         let one = |(column, (gain, taxel)): (usize, (&mut u16, &solve::gains::Gain))| {
-            let wanted = (f64::from(*gain) / taxel.reads).round();
+            let wanted = (f64::from(*gain) * taxel.factor(session.before.params.curve_permille)).round();
             if taxel.condition != Condition::Sound {
                 return None;
             }

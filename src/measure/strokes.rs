@@ -381,7 +381,7 @@ impl Strokes {
         let roll = ((i64::from(quarter) * i64::from(plan.roll_q8)) >> 8) as i32;
         if self.place(view.encoder).saturating_add(roll) >= end || self.frames >= plan.longest {
             if let Part::Stroke(0 | 1) = self.part {
-                let back_emf = i64::from(span) * i64::from(plan.uv_per_count_q8) >> 8;
+                let back_emf = (i64::from(span) * i64::from(plan.uv_per_count_q8)) >> 8;
                 let friction = i64::from(self.voltage_uv + self.more_uv) - back_emf;
                 if let Some(place) = self.friction_uv.get_mut(usize::from(self.sign < 0)) {
                     *place = friction.max(0) as i32;

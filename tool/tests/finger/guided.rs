@@ -1,8 +1,9 @@
 //! The guided procedures: `commission`, `identify` and `calibrate` against a served finger.
 
 use crate::served::Served;
-use crate::stopped::{is_at_rest, patient};
+use crate::stopped::{RESIDUAL_N, is_at_rest, patient};
 use fingertip::link::packet::instruction::REBOOT;
+use rustix::process::Signal;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -210,4 +211,103 @@ fn a_program_is_asked_nothing() {
         let (code, found, why) = output(&finger, arguments);
         assert!(code == Some(2) && found.is_null() && why.contains(option), "{arguments:?}: {why}");
     }
+}
+
+/// How a procedure ends before its end: by a signal, a cable that is pulled out, or a controller without power.
+#[derive(Clone, Copy, Debug)]
+enum End {
+    Signal(Signal),
+    Cable,
+    Power,
+}
+
+const ENDS: [End; 6] = [
+    End::Signal(Signal::INT),
+    End::Signal(Signal::TERM),
+    End::Signal(Signal::HUP),
+    End::Signal(Signal::KILL),
+    End::Cable,
+    End::Power,
+];
+
+/// An instant of an end of each procedure, drawn with a fixed seed: no force is left, the parameters are those before or
+/// all of the new ones, and the same session gives the same result. All ends, at more instants, with
+/// `INSTANTS=42 cargo test -p fingertip-cli --profile host --test finger ends_at_any -- --nocapture`.
+#[test]
+fn a_procedure_that_ends_at_any_instant_resumes() {
+    let instants = std::env::var("INSTANTS").ok().map(|text| text.parse::<usize>().expect("a number of instants"));
+    let mut random = fastrand::Rng::with_seed(30);
+    let calibrate = [&QUICK[..], &["--presses", "2", "--no-scale", "--apply"]].concat();
+    for procedure in [vec!["commission", "--forward", "yes", "--within-s", "3600", "--apply"], calibrate] {
+        let finger = patient("wall");
+        let begun = finger.heard();
+        let reference = finger.json(&procedure)["after"].clone();
+        let packets = finger.heard() - begun;
+        let (mut before, mut after, mut worst) = (0, 0, 0.0_f64);
+        for number in 0..instants.map_or(1, |instants| instants * ENDS.len()) {
+            let end = if instants.is_some() { ENDS[number % ENDS.len()] } else { ENDS[random.usize(0..ENDS.len())] };
+            let (kept, off) = resumes(&procedure, end, random.u64(1..packets), &reference);
+            *(if kept { &mut before } else { &mut after }) += 1;
+            worst = worst.max(off);
+        }
+        println!(
+            "{}: {before} ends before the write, {after} behind it, none within; resumed, at most {:.2} % off",
+            procedure[0],
+            100.0 * worst
+        );
+    }
+}
+
+/// Ends a procedure behind so many packets and resumes it: whether the parameters were those before, and by how much the
+/// result is off.
+fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bool, f64) {
+    let finger = patient("wall");
+    let (old, session, what) =
+        (parameters(&finger), finger.file("session"), format!("{end:?} after {packets} packets"));
+    let arguments = [procedure, &["--session", &session]].concat();
+    let begun = finger.heard();
+    let mut child = if matches!(end, End::Cable) {
+        finger.command(&format!("deaf after {packets} for {}", u64::MAX));
+        finger.start(&[&arguments[..], &["--json", "--timeout-ms", "100"]].concat())
+    } else {
+        finger.start(&[&arguments[..], &["--json"]].concat())
+    };
+    while finger.heard() - begun < packets && child.try_wait().expect("it was started").is_none() {
+        std::thread::yield_now();
+    }
+    match end {
+        End::Signal(signal) if child.try_wait().expect("it was started").is_none() => Served::signal(&child, signal),
+        End::Signal(_) | End::Cable => {}
+        End::Power => {
+            finger.command(&format!("raw {REBOOT}"));
+        }
+    }
+    child.wait().expect("it ends");
+    let ended_s = finger.now_s();
+    while finger.now_s() < ended_s + 1.0 {
+        finger.command("state");
+    }
+    assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
+    finger.command("deaf no more");
+    for command in ["recover", "stop"] {
+        finger.fingertip(&[command]).output().expect("it starts");
+    }
+    let now = parameters(&finger);
+    let mut new = old.clone();
+    for (name, value) in reference.as_object().expect("names and values").iter().filter(|(name, _)| *name != "gains") {
+        new[name] = value.clone();
+    }
+    let off = |now: &Value| {
+        let names = reference.as_object().expect("names and values").keys().filter(|name| *name != "gains");
+        let off =
+            names.map(|name| now[name].as_f64().unwrap_or(0.0) / new[name].as_f64().unwrap_or(0.0).max(1e-9) - 1.0);
+        off.map(f64::abs).fold(0.0, f64::max)
+    };
+    // Of the first motion of a commissioning the direction counts by itself.
+    let kept = now == old;
+    assert!(kept || off(&now) < 0.02, "{what}: {now} of {old} and {new}");
+    let resumed = finger.json(&arguments);
+    let off = off(&resumed["after"]);
+    assert!(off < 0.02 && resumed["applied"] == true, "{what}: {resumed} of {reference}");
+    (kept, off)
 }

@@ -11,7 +11,7 @@ use std::net::{Shutdown, TcpListener};
 use std::process::Child;
 
 /// A force that a stopped finger may still show, N.
-const RESIDUAL_N: f64 = 0.05;
+pub const RESIDUAL_N: f64 = 0.05;
 
 /// A press that measures ends by itself at 6 N: below this something else ended it.
 const CUT_SHORT_N: f64 = 4.0;

@@ -18,7 +18,7 @@ _RELEASE_S = 0.5  # longest wait for the release when a bus or the program ends
 _TRIES = 3  # on a noisy line
 _CHUNK = 1000  # bytes of data in one Fast Sync Read, at most
 _GRIPS = [Mode.APPROACH, Mode.FORCE, Mode.RELEASE]
-_DRIVEN = [*_GRIPS, Mode.IDENTIFY, Mode.COMMISSION]
+_DRIVEN = [*_GRIPS, Mode.PRESS, Mode.STROKES]
 _live: "Set[Bus]" = set()  # those that wrote something
 
 

@@ -7,7 +7,7 @@ use sim::population::budget::Budget;
 const FINGERS: usize = 24;
 
 fn main() {
-    match Budget::of(FINGERS, &native::board) {
+    match Budget::of(FINGERS, &native::board, &native::calibrated::board) {
         Ok(budget) => print!("{}", budget.page()),
         Err(why) => panic!("{why}"),
     }

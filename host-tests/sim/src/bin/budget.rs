@@ -16,7 +16,7 @@ struct Args {
 }
 
 fn main() -> ExitCode {
-    match Budget::of(Args::parse().fingers as usize, &native::board) {
+    match Budget::of(Args::parse().fingers as usize, &native::board, &native::calibrated::board) {
         Ok(budget) => {
             say::text(budget.page());
             ExitCode::SUCCESS

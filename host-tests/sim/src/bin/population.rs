@@ -12,6 +12,7 @@ fn main() -> ExitCode {
     match args.board {
         Board::Native if args.name() == Some("unlike") => errors(&args),
         Board::Native => cli::answer(&args, &native::board),
+        Board::Calibrated => cli::answer(&args, &native::calibrated::board),
         Board::Virtual => {
             say::aside(
                 "this program is the native board: `cargo xtask population --board virtual` runs the flash image",

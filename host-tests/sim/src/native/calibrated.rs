@@ -5,10 +5,12 @@
 pub mod unlike;
 
 use super::bench::Bench;
+use super::simulate_calibrated;
 use crate::effects::set::Named;
 use crate::run::RunError;
 use crate::scene::text::{set, write};
 use crate::scene::{Scene, controller, read};
+use crate::watch::{Summary, Watch};
 use fingertip::config::newtons;
 use fingertip::measure::{State, Task};
 use fingertip::params::Params;
@@ -57,6 +59,40 @@ pub struct Calibrated {
     pub gains: Gains,
     /// Steps of the procedure that failed, each with its reason. The finger keeps its values there.
     pub refused: Vec<String>,
+}
+
+impl Calibrated {
+    /// Calibrates the first finger of a scene.
+    ///
+    /// # Errors
+    /// As [`calibrate`].
+    pub fn of(scene: &Scene) -> Result<Self, RunError> {
+        calibrate(&mut Bench::new(scene)?, scene)
+    }
+
+    /// The scene with the parameters found.
+    ///
+    /// # Errors
+    /// They are not valid there.
+    pub fn scene(&self, scene: &Scene) -> Result<Scene, RunError> {
+        let Params { modulus_pa, codes_per_kpa_milli, .. } = self.params;
+        changed(
+            scene,
+            &[
+                ("controller.modulus_pa", modulus_pa.to_string()),
+                ("controller.codes_per_kpa_milli", codes_per_kpa_milli.to_string()),
+            ],
+        )
+    }
+}
+
+/// The native board with a finger that is calibrated first.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
+    let calibrated = Calibrated::of(scene)?;
+    Ok(simulate_calibrated(&calibrated.scene(scene)?, &calibrated.gains, watch)?)
 }
 
 /// Calibrates a finger that stands before the plate of its scene; the finger has the result in the end.

@@ -76,20 +76,23 @@ pub struct Budget {
     pub left: Vec<Errors>,
     /// Without any.
     pub none: Errors,
+    /// With all causes, of fingers that were calibrated first.
+    pub calibrated: Errors,
 }
 
 impl Budget {
-    /// Runs the fingers with all causes, without each, and without any.
+    /// Runs the fingers with all causes, without each, and without any; and once on a board that calibrates them first.
     ///
     /// # Errors
     /// A finger does not run.
-    pub fn of(fingers: usize, board: Run) -> Result<Self, RunError> {
+    pub fn of(fingers: usize, board: Run, calibrated: Run) -> Result<Self, RunError> {
         let population = load(POPULATION)?;
-        let off = |causes: &[Cause]| {
+        let off_on = |board: Run, causes: &[Cause]| {
             let less = causes.iter().try_fold(population.clone(), |less, cause| less.without(cause.names))?;
             Ok::<Off, RunError>(errors(&run::fingers(&less, SEED, fingers, Shard::WHOLE, board)?))
         };
-        let (all, none) = (off(&[])?, off(&CAUSES)?);
+        let off = |causes: &[Cause]| off_on(board, causes);
+        let (all, none, calibrated) = (off(&[])?, off(&CAUSES)?, off_on(calibrated, &[])?);
         let (mut changes, mut left) = (Vec::new(), Vec::new());
         for cause in CAUSES {
             let without = off(&[cause])?;
@@ -99,7 +102,7 @@ impl Budget {
             changes.push(rms(&all.iter().zip(&without).map(pairs).collect()));
             left.push(rms(&without));
         }
-        Ok(Self { fingers, all: rms(&all), changes, left, none: rms(&none) })
+        Ok(Self { fingers, all: rms(&all), changes, left, none: rms(&none), calibrated: rms(&calibrated) })
     }
 
     /// The page of the documentation.
@@ -126,6 +129,8 @@ impl Budget {
         let mut causes: Vec<_> = CAUSES.iter().zip(self.changes.iter().zip(&self.left)).collect();
         causes.sort_by(|(_, (a, _)), (_, (b, _))| b[1].total_cmp(&a[1]));
         row("**all of them: the error**", &self.all, &self.none, "");
+        let minutes = "[three presses onto a plate and three holds on a scale](commissioning.md): a quarter of an hour, no cycles";
+        row("**the same, calibrated**", &self.calibrated, &self.none, minutes);
         for (cause, (changes, left)) in causes {
             row(cause.about, changes, left, cause.answer);
         }

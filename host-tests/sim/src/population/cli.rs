@@ -24,6 +24,7 @@ use std::time::Instant;
     after_help = "Examples:\n  \
         population ordinary --fingers 1000 --seed 1 --json ordinary.json\n  \
         population ordinary --fingers 100 --worst 5 --out worst    (then: sim with a file it wrote)\n  \
+        population ordinary --fingers 300 --board calibrated\n  \
         population unlike --fingers 40    (the error of the force before and after calibration)\n  \
         population ordinary --fingers 1000 --shard 2/4 --json 2.json    (on the second of four machines)\n  \
         population merge 1.json 2.json 3.json 4.json --json all.json    (the same, byte for byte, as without --shard)"
@@ -70,6 +71,9 @@ impl Args {
 pub enum Board {
     /// The same core on the host.
     Native,
+    /// The core on the host, with a finger that the host calibrates first: three presses onto a plate, three holds on a
+    /// kitchen scale.
+    Calibrated,
     /// The flash image on the emulated microcontroller.
     Virtual,
 }
@@ -105,6 +109,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let board_name = match args.board {
         Board::Native => "native",
+        Board::Calibrated => "calibrated",
         Board::Virtual => "virtual",
     };
     let all = args.fingers as usize;

@@ -35,13 +35,14 @@ fn a_cause_that_nobody_drew_is_refused() {
 
 #[test]
 fn what_makes_the_force_wrong_is_larger_than_what_is_left() {
-    let budget = Budget::of(1, &native::board).unwrap();
+    let budget = Budget::of(1, &native::board, &native::calibrated::board).unwrap();
     for goal in 0..3 {
         let largest = budget.changes.iter().map(|changes| changes[goal]).fold(0.0, f64::max);
         // A finger is off by what parts vary, and all of that is in the causes.
         assert!((0.02..0.25).contains(&(budget.all[goal] / [0.5, 1.0, 5.0][goal])), "{budget:?}");
         assert!(largest > 10.0 * budget.none[goal] && budget.none[goal] > 0.0, "{budget:?}");
     }
+    assert!((1..3).all(|goal| budget.calibrated[goal] < 0.5 * budget.all[goal]), "{budget:?}");
     assert_eq!((budget.changes.len(), budget.left.len()), (CAUSES.len(), CAUSES.len()));
     let page = budget.page();
     assert!(CAUSES.iter().all(|cause| page.contains(cause.about)), "{page}");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Programs behind a command of `cargo xtask`, which hands its arguments on.
-const BEHIND: [&str; 6] = ["sim", "sweep", "population", "budget", "sensor", "serve"];
+const BEHIND: [&str; 5] = ["sim", "sweep", "population", "budget", "serve"];
 /// Folders of the repository: a path that begins with one names a file.
 const FOLDERS: [&str; 11] = [
     "captures/",
@@ -96,7 +96,7 @@ impl Programs {
         let profile = folder.file_name().expect("its name").to_string_lossy().replace("debug", "dev");
         let mut build = Command::new(env!("CARGO"));
         build.args(["build", "--quiet", "--bins", "--profile", &profile]).current_dir(root());
-        for package in ["xtask", "sim", "sensor", "serve", "fingertip-cli"] {
+        for package in ["xtask", "sim", "serve", "fingertip-cli"] {
             build.args(["--package", package]);
         }
         assert!(build.status().expect("cargo").success(), "the programs do not build");

@@ -31,8 +31,6 @@ pub const BOARD: Program = Program { package: "virtual-board", name: "virtual-bo
 pub const SCENE_BOARD: Program = Program { package: "virtual-board", name: "virtual-board", whole: true };
 /// `fingertip`, the host's program.
 pub const TOOL: Program = Program { package: "fingertip-cli", name: "fingertip", whole: true };
-/// What recordings of a sensor say.
-pub const SENSOR: Program = Program { package: "sensor", name: "sensor", whole: true };
 
 impl Program {
     /// One of the tools of `host-tests`.

@@ -23,6 +23,7 @@ mod proof;
 mod python;
 mod qemu;
 mod replay;
+mod sensor;
 mod serve;
 mod sim;
 mod size;
@@ -81,10 +82,9 @@ enum Command {
         after_help = "Examples:\n  cargo xtask budget --fingers 300\n  cargo xtask budget --help    (all that it takes)"
     )]
     Budget(sim::Args),
-    /// Fit a real sensor's characteristic or creep to recordings, and judge it on others
+    /// Fit a real sensor's characteristic, creep or gains to recordings, and judge the fit on others
     #[command(
-        disable_help_flag = true,
-        after_help = "Examples:\n  cargo xtask sensor fit cycles.csv --judge others.csv --json fit.json\n  cargo xtask sensor fit --help    (all that it takes)"
+        after_help = "Examples:\n  cargo xtask sensor fit cycles.csv --judge others.csv --json fit.json\n  cargo xtask sensor gains presses.csv --judge others.csv --json gains.json --parameters array.toml\n  cargo xtask sensor gains --help    (all that it takes)"
     )]
     Sensor(sim::Args),
     /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
@@ -156,7 +156,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Sweep(args) => sim::sweep(args, console),
         Command::Population(args) => sim::population(args, toolchain, console),
         Command::Budget(args) => sim::budget(args, console),
-        Command::Sensor(args) => sim::sensor(args, console),
+        Command::Sensor(args) => sensor::run(args, console),
         Command::Serve(args) => serve::run(args, toolchain, console),
         Command::Replay(args) => replay::run(args, console),
         Command::Test(args) => test::run(args, toolchain),
@@ -186,12 +186,13 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     timing::ensure(console)?;
     qemu::ensure(console)?;
     python::ensure(console)?;
+    sensor::script("fit.py", console)?;
     cluster::ensure(console)?;
     browser::ensure(console)?;
     tools::ensure_all(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
-        "All set up: demo, sim, sweep, population, cluster, test, build, qemu, timing, size, lint and docs work offline now.",
+        "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, size, lint and docs work offline now.",
     );
     Ok(())
 }

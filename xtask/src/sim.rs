@@ -1,4 +1,4 @@
-//! Scenes: one run, or many; and recordings.
+//! Scenes: one run, or many.
 
 use crate::{
     console::{self, Console},
@@ -46,14 +46,6 @@ pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<
 /// As [`sim`].
 pub fn budget(args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim("budget").build(console)?.args(&args.arguments))
-}
-
-/// Fits a sensor to recordings.
-///
-/// # Errors
-/// As [`sim`].
-pub fn sensor(args: &Args, console: &mut Console) -> Result<()> {
-    start(host::SENSOR.build(console)?.args(&args.arguments))
 }
 
 /// Runs a program on this machine, or the same command of the board that runs the flash image.

@@ -1,7 +1,7 @@
 //! Every test, a stage each.
 
 use crate::{
-    bringup, browser, console, host, image, proof, python, qemu,
+    bringup, browser, console, host, image, proof, python, qemu, sensor,
     size::Sizes,
     stages::Stages,
     timing,
@@ -22,6 +22,10 @@ pub struct Args {}
 pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
+    stages.stage("fit of a sensor to recordings", |console| {
+        let mut command = sensor::script("test_fit.py", console)?;
+        console.run(&mut command)
+    });
     let image = stages.stage("flash image", |console| {
         let image = image::firmware(choice, console)?;
         console.print(&image.summary());

@@ -17,11 +17,14 @@ fn pressed(finger: &mut Made) {
     }
 }
 
+/// A state, how it is made, and how a jog, strokes and a press end in it.
+type Case = (&'static str, fn() -> Made, [Option<Ended>; 3]);
+
 /// Each state of a finger, and what becomes of a jog, of strokes and of a press in it; `None` begins.
 #[test]
 fn every_state_has_its_answer() {
     const NO: Option<Ended> = Some(Ended::NotReady);
-    let states: [(&str, fn() -> Made, [Option<Ended>; 3]); 9] = [
+    let states: [Case; 9] = [
         ("not tared", || Finger::with(&params()), [NO; 3]),
         ("tared", Finger::tared, [None, None, NO]),
         (

@@ -108,7 +108,8 @@ fn an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
 fn strokes_of_a_broken_drive_end_near_the_origin() {
     let params = Params { direction_confirmed: 1, ..Params::DEFAULT };
     let config = Config::shipped(&params).expect("they are allowed");
-    let cases: [(fn(&mut Faults), &[Ended]); 5] = [
+    type Case = (fn(&mut Faults), &'static [Ended]);
+    let cases: [Case; 5] = [
         (|faults| faults.encoder_reversed = true, &[Ended::Reversed]),
         (|faults| faults.leads_swapped = true, &[Ended::Reversed]),
         (|faults| faults.encoder_frozen = true, &[Ended::Still]),

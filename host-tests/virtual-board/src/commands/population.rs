@@ -19,6 +19,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> ExitCode {
     cli::answer(&arguments.population, &|scene, watch| match arguments.population.board {
         Board::Native => sim::native::board(scene, watch),
+        Board::Calibrated => sim::native::calibrated::board(scene, watch),
         Board::Virtual => scene::simulate(&arguments.image, scene, watch).map_err(Into::into),
     })
 }

@@ -48,8 +48,11 @@ def run(*arguments: str, port: str, device_id: int = 1, within_s: Optional[float
         raise
     if child.returncode:
         raise FingertipError(_error(complained))
-    last = said.strip().splitlines()[-1:] or ["{}"]
-    found: Dict[str, Any] = json.loads(last[0])
+    try:
+        found: Dict[str, Any] = json.loads(said or "{}")
+    except ValueError:
+        # A procedure ends with one object in one line, whatever was said before.
+        found = json.loads(said.strip().splitlines()[-1])
     return found
 
 

@@ -230,7 +230,7 @@ class Broken(OnServed):
             bus.fingers[1].write(reg.ID, 9)
 
         for broken in [close, junk, other_id, kill]:
-            for number in range(17):
+            for number in range(13):
                 # A finger of its own: late answers to what broke before would be taken for answers to this one.
                 self.served.stop()
                 self.served = self.serve(*self.ARGUMENTS)

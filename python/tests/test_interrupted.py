@@ -32,13 +32,13 @@ METHODS = {
     "a press that measures": "finger.enable_torque(); finger.write(registers.MEASURE, 3); list(finger.stream(100, 9.0)); finger.release(); finger.tare()",
 }
 EXAMPLES = {
-    "force.py": ["--readings", "1000000"],
-    "stream_to_csv.py": ["--seconds", "1000", "--press", "1.0", str(Path(tempfile.gettempdir()) / "interrupted.csv")],
-    "recovery.py": ["--seconds", "1000"],
+    "force.py": ["--patience-ms", "60000", "--readings", "1000000"],
+    "stream_to_csv.py": ["--timeout-ms", "60000", "--seconds", "1000", "--press", "1.0", str(Path(tempfile.gettempdir()) / "interrupted.csv")],
+    "recovery.py": ["--timeout-ms", "60000", "--seconds", "1000"],
 }
 PROGRAMS: Dict[str, List[str]] = {
     **{name: ["-c", CHILD.format(call), "PORT"] for name, call in METHODS.items()},
-    **{name: [str(PYTHON / "examples" / name), "--port", "PORT", "--timeout-ms", "60000", *rest] for name, rest in EXAMPLES.items()},
+    **{name: [str(PYTHON / "examples" / name), "--port", "PORT", *rest] for name, rest in EXAMPLES.items()},
 }
 # Signals, and a cable that is pulled out.
 ENDS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGKILL, None]
@@ -79,6 +79,7 @@ class Interrupted(OnServed):
                         self.pass_s(1.0)
                     most_n = max(most_n, self.served.truths()[1].force_n)
                     self.assert_released(f"{name} {end!r} {told}")
+            self.assertGreater(running, 0, f"{name} never ran")
             print(f"{name}: {len(ENDS) * INSTANTS} ends, {running} while it ran; at most {most_n} N left", flush=True)
 
     def test_every_example_tells_its_options(self) -> None:

@@ -41,8 +41,8 @@ class Package(OnServed):
             shown = self.done(python, PYTHON / "examples" / "parameters.py", "--port", self.served.port)
             self.assertIn("modulus_pa", shown)
             # The program of the wheel, run by the package of the wheel.
-            asks = f"from fingertip import run; print(run('info', port={self.served.port!r})['model'])"
-            self.assertIn("fingertip", self.done(python, "-c", asks))
+            asks = f"from fingertip import run; print(run('info', port={self.served.port!r})['model_number'])"
+            self.assertEqual("21574", self.done(python, "-c", asks).strip())
             wrong = f"from fingertip import run; run('press', '99', port={self.served.port!r})"
             told = subprocess.run([python, "-c", wrong], env={**os.environ, "PYTHONPATH": sysconfig.get_path("purelib")}, stderr=subprocess.PIPE, text=True)
             self.assertIn("FingertipError", told.stderr)

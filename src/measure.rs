@@ -61,7 +61,7 @@ pub enum Ended {
     Complete = 0,
     /// Stop, torque, a fault, a tare or new parameters ended it.
     Interrupted = 1,
-    /// A tare is missing, something touches the tip, or torque is not as the task needs it.
+    /// A tare is missing, something touches the tip, torque is not as the task needs it, or a count is above 0.1 mm.
     NotReady = 2,
     /// The direction is not confirmed.
     Unconfirmed = 3,

@@ -104,7 +104,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             touch.observe(&felt, || guard.depth_felt(config), config);
             self.learn_baseline(contact.force);
         }
-        let wanted = self.act(&contact, sound && tares, sense, command, &mut limits);
+        let wanted = self.act(&contact, [sound, tares], sense, command, &mut limits);
         let duty = if sound { self.guard.allow(wanted, &mut limits) } else { Duty::ZERO };
         if duty != wanted {
             self.motion.drive.cut();
@@ -207,7 +207,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
     /// A frame of the activity: the duty that it wants. An activity that ends makes way for the next one.
     #[inline(always)]
-    fn act(&mut self, contact: &Contact, tares: bool, sense: &Sense, command: &Command, limits: &mut Limits) -> Duty {
+    fn act(
+        &mut self,
+        contact: &Contact,
+        [sound, tares]: [bool; 2],
+        sense: &Sense,
+        command: &Command,
+        limits: &mut Limits,
+    ) -> Duty {
         self.status.drift = self.warmth.force(command.goal, &self.config);
         let applied = i64::from(self.status.duty.0) * i64::from(sense.supply_mv);
         let Self { activity, motion, touch, config, array, status, step, .. } = self;
@@ -231,7 +238,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 press.reference(motion, config, limits)
             }
             Activity::Strokes(run) => {
-                let force = contact.force.max(picture.force(config));
+                // The sums of a broken array mean nothing.
+                let force = if sound { contact.force.max(picture.force(config)) } else { contact.force };
                 let view = strokes::View { encoder: sense.encoder, force, supply_mv, applied: (applied >> 13) as i32 };
                 run.observe(&view, &mut status.measure, config);
                 let voltage = config.push(run.voltage_mv());
@@ -241,7 +249,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 return motion.push(voltage, supply_mv, config, limits);
             }
             Activity::Off(_) | Activity::Tare { .. } | Activity::Fault(_) => {
-                self.rest(tares);
+                self.rest(sound && tares);
                 return Duty::ZERO;
             }
         };

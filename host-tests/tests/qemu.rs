@@ -80,7 +80,7 @@ fn every_function_gives_the_same_bits_for_a_million_inputs() {
     let output = same_bits(&[]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(text.contains("57 functions give the same bits for 1000000 inputs each"), "{text}");
+    assert!(text.contains("55 functions give the same bits for 1000000 inputs each"), "{text}");
     println!("{text}");
 }
 

@@ -199,6 +199,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
     pub fn end(&mut self, why: Ended) {
         match self.standing.state {
             State::Armed if why == Ended::Asked => self.standing.state = State::None,
+            // A motion goes on where the array was broken for a part of a frame.
+            State::Recording if self.series.kind != 0 && why == Ended::Cut => {}
             State::Recording if self.series.kind != 0 => self.end_series(measure::Ended::Interrupted, 0),
             State::Recording => {
                 let (bits, frames) = (self.place.bits(), self.standing.frames);

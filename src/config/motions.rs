@@ -21,7 +21,7 @@ const FEEL_N: f32 = 0.17;
 /// this share of the back-EMF of the fastest one.
 const START_N: f32 = 0.05;
 const START_PART: f32 = 0.1;
-/// Speed of the fastest stroke, mm/s, at most what rolls on for this far, mm, when shorted.
+/// Speed of the fastest stroke, mm/s, at most that of an approach, and what rolls on for this far, mm, when shorted.
 const SPEED_MM_PER_S: f32 = 28.0;
 const ROLL_MM: f32 = 0.25;
 /// The way that a shorted motor rolls on, in time constants of the parameters.
@@ -112,7 +112,8 @@ impl Motions {
         let (k, rad_per_mm) = (p.torque_constant_unm_per_a as f32, p.reduction_mrad_per_mm as f32 * 1e-3);
         let uv_s_per_mm = k * rad_per_mm;
         let uv_per_newton = p.resistance_mohm as f32 * 1e6 / uv_s_per_mm;
-        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping);
+        let approach = p.approach_um_per_s as f32 * 1e-3;
+        let fastest_uv = uv_s_per_mm * SPEED_MM_PER_S.min(ROLL_MM * damping).min(approach);
         let span_part = frames(SPAN_S / SPAN_PARTS as f32).max(1);
         let span_s = span_part as f32 * SPAN_PARTS as f32 * frame_s;
         let push_mm_per_s = PUSH_MN as f32 * 1e-3 * uv_per_newton / uv_s_per_mm;

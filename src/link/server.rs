@@ -74,13 +74,13 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 /// The device on the bus.
 ///
 /// ```
-/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, Proposal, ROWS, Record, Server, Snapshot}};
+/// # use fingertip::{link::Reply, pipeline::Status, shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, Server, Snapshot}};
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
 ///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0, loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(), health: Default::default(),
-///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros, proposal: &Proposal::NONE, capture: Default::default(),
+///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros, capture: Default::default(),
 /// };
 /// let mut reply = Reply::new();
 /// let mut received: &[u8] = &[0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4E];

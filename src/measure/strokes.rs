@@ -34,6 +34,8 @@ const PULSE_SUPPLY: [i32; 2] = [2, 25];
 const STROKE_SUPPLY: [i32; 2] = [1, 3];
 /// Counts that are motion.
 const MOVED: i32 = 2;
+/// Pulses that a way may take: five times what it needs.
+const PULSES: u8 = 100;
 
 /// What a frame says.
 #[derive(Clone, Copy, Debug)]
@@ -77,6 +79,8 @@ pub struct Strokes {
     part: Part,
     /// Parts begun so far: the pulses of a way that is felt are one.
     done: u8,
+    /// Pulses of the way that is felt.
+    pulses: u8,
     /// Forward 1, back -1.
     sign: i32,
     /// Counts where it all began, and where this motion did.
@@ -123,6 +127,7 @@ impl Strokes {
             phase: Phase::Moving,
             part: Part::Pulse { quick: true },
             done: 0,
+            pulses: 0,
             sign: 1,
             origin: encoder,
             begun: encoder,
@@ -282,6 +287,11 @@ impl Strokes {
     fn next(&mut self, view: &View, standing: &mut Standing, plan: &Motions) {
         let felt = self.part != Part::Feel || self.place(view.encoder) >= plan.felt;
         self.done += u8::from(felt);
+        self.pulses = if felt { 0 } else { self.pulses.saturating_add(1) };
+        if self.pulses > PULSES {
+            let place = plan.um(self.place(view.encoder));
+            return self.end(standing, Ended::Stalled, place);
+        }
         if felt {
             let part = match self.done {
                 1 => (Part::Pulse { quick: true }, -1),
@@ -361,7 +371,8 @@ impl Strokes {
             self.short(view.encoder, Some(ended));
         } else {
             let quick = self.part == Part::Pulse { quick: true };
-            self.voltage_uv += if quick { plan.jog_rise_uv } else { plan.rise_uv };
+            let rise = if quick { plan.jog_rise_uv } else { plan.rise_uv };
+            self.voltage_uv = self.voltage_uv.saturating_add(rise).min(limit);
         }
     }
 
@@ -392,8 +403,10 @@ impl Strokes {
             let force = plan.push_mn.saturating_mul(self.fastest - span).checked_div(plan.push.max(1)).unwrap_or(0);
             self.short(view.encoder, Some((Ended::Pushed, force)));
         } else if gone < MOVED && self.frames > 3 * plan.span() {
-            self.more_uv += plan.rise_uv;
-            if self.more_uv > plan.feel_uv {
+            // With all of it no more than a stroke may take.
+            let most = of_supply(view, STROKE_SUPPLY).saturating_sub(self.voltage_uv).max(0);
+            self.more_uv = self.more_uv.saturating_add(plan.rise_uv);
+            if self.more_uv > plan.feel_uv.min(most) {
                 self.short(view.encoder, Some((Ended::Pushed, plan.millinewtons(self.more_uv))));
             }
         }

@@ -21,7 +21,11 @@ use crate::safety::guard::Guard;
 use crate::state::Fault;
 use crate::status::{Taken, Taring};
 use crate::touch::{Stage, Touch};
+use crate::units::Millimetres;
 use fixed::types::I8F24;
+
+/// The coarsest encoder whose counts a jog can go by: 0.1 mm.
+const COARSEST: Millimetres = Millimetres::from_bits((1 << 24) / 10);
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     /// Whether a command asks for something new, or for something that waits.
@@ -156,7 +160,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             // The one under way answers for both.
             _ if runs => return,
             (Task::Jog | Task::Strokes, Activity::Off(_))
-                if !command.torque && may_drive && contact.force < self.config.contact_on =>
+                if !command.torque
+                    && may_drive
+                    && contact.force < self.config.contact_on
+                    && self.config.count <= COARSEST =>
             {
                 if task == Task::Jog || self.config.params.direction_confirmed != 0 {
                     self.start(encoder);

@@ -147,6 +147,8 @@ fn codes() -> impl Strategy<Value = Codes> {
 fn turn() -> impl Strategy<Value = Turn> {
     prop_oneof![
         20 => (-60..60).prop_map(Turn::By),
+        // A jog waits until the tip is at rest.
+        8 => Just(Turn::By(0)),
         2 => any::<i32>().prop_map(Turn::By),
         1 => prop_oneof![Just(i32::MIN), Just(i32::MAX), Just(0), any::<i32>()].prop_map(Turn::To),
     ]

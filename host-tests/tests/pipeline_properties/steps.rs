@@ -118,10 +118,11 @@ impl Run {
         let was_running = self.before.measure.state == State::Running;
         let runs = status.measure.state == State::Running;
         if measures && status.taken.measure != command.measure_request {
-            // For torque, or for the frame after the one in which a motion was interrupted.
+            // For torque, for rest, or for the frame after the one in which a motion was interrupted.
             let torque = task == Task::Press && command.torque;
             let interrupted = was_running && status.measure.ended == Ended::Interrupted;
-            assert!(torque || interrupted, "{task:?} waits in {:?}", status.mode);
+            let rest = matches!(task, Task::Jog | Task::Strokes) && (self.before.braking || status.braking);
+            assert!(torque || rest || interrupted, "{task:?} waits in {:?}", status.mode);
         } else if measures && task != Task::Stop && !was_running {
             assert_eq!(status.measure.task, task);
             // Accepted or refused; a fault may end it in its first frame.

@@ -42,7 +42,10 @@ fn refusals_are_sentences_with_their_number() {
     assert!(ended(Reason::Stalled, 850).contains("0.85 mm"));
     assert!(ended(Reason::MemoryFull, 120).contains("120 records"));
     let touched = Refusal::from(Ended { reason: Reason::Touched, value: 51 }).to_string();
-    assert_eq!(touched, "the strokes were ended early: the array measured 0.051 N in the air: clear the tip's way");
+    assert_eq!(
+        touched,
+        "the strokes were ended early: the array measured 0.051 N, more than allowed here: clear the tip's way, hold the plate fast"
+    );
     assert_eq!(creep(&solve::drift::HeldSeries::default()), Err(NoDrift::Readings(0)));
     assert_eq!(scale(&[]).unwrap_err().to_string(), "the largest force is 0.000 N; 0.1 N is needed");
 }

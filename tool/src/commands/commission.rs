@@ -50,10 +50,12 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let run = Run::begin(&args.options, json)?;
     let mut session = Session::open(args.options.session(), "commission", client)?;
     result::same_settings(&session, client)?;
-    if session.step(JOG).is_none() {
+    // A controller that started anew does not know it any more.
+    if session.step(JOG).is_none() || super::press::direction_confirmed(client).is_err() {
         direction(args, &mut session, &run, client)?;
     }
     if session.record(STROKES).is_none() {
+        motion::tare(&run, client)?;
         run.report("strokes: 1 mm to both sides, some 10 s");
         let bytes = motion::motion(Task::Strokes, &run, client)?;
         solve::record::strokes(&bytes, &session.before.params).map_err(|why| why.to_string())?;

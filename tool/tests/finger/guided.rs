@@ -303,11 +303,14 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
             names.map(|name| now[name].as_f64().unwrap_or(0.0) / new[name].as_f64().unwrap_or(0.0).max(1e-9) - 1.0);
         off.map(f64::abs).fold(0.0, f64::max)
     };
-    // Of the first motion of a commissioning the direction counts by itself.
     let kept = now == old;
-    assert!(kept || off(&now) < 0.02, "{what}: {now} of {old} and {new}");
+    // A motion that was repeated gives another result of the same uncertainty: 6 % of the friction.
+    assert!(kept || off(&now) < 0.1, "{what}: {now} of {old} and {new}");
     let resumed = finger.json(&arguments);
     let off = off(&resumed["after"]);
-    assert!(off < 0.02 && resumed["applied"] == true, "{what}: {resumed} of {reference}");
+    assert!(off < 0.1 && resumed["applied"] == true, "{what}: {resumed} of {reference}");
+    if !kept {
+        assert_eq!(parameters(&finger)["modulus_pa"], now["modulus_pa"], "{what}: written once");
+    }
     (kept, off)
 }

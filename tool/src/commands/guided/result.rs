@@ -107,6 +107,7 @@ pub fn finish(found: &Found, session: &mut Session, run: &Run<'_>, client: &mut 
         && (is_set
             || run.options.apply
             || !run.json && { run.ask.yes("write these values to the controller?", "--apply")? });
+    run.interrupt.check()?;
     if wanted && !is_set {
         write(found, &values, session, client)?;
         run.report("written; `fingertip params save` or --save keeps them over a reset");

@@ -21,6 +21,8 @@ pub const HEAD: usize = 32;
 pub const SAMPLE_FRAMES: u32 = 8;
 /// Count that marks the start of a stroke.
 pub const START: i16 = i16::MIN;
+/// What the chip clips counts and voltages at.
+const CLIPPED: u16 = 32_767;
 
 /// Length of a step's record before the taxels, bytes.
 const STEP: usize = 24;
@@ -148,6 +150,11 @@ pub enum NoRecord {
     /// Number of the record.
     #[error("sample {0} belongs to no stroke, or marks the start of a stroke with a voltage")]
     Stroke(usize),
+    /// Number of the record, its count and its voltage in quarters of a mV.
+    #[error(
+        "sample {0} holds count {1} and voltage {2}: the chip clips both at 32767; take an encoder or a gear with fewer counts for each mm, or a lower supply"
+    )]
+    Clipped(usize, i16, i16),
     /// Parameter out of its range.
     #[error("the controller's parameters are not valid: {0}")]
     Params(#[from] ParamError),
@@ -228,6 +235,9 @@ pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
             continue;
         }
         let stroke = strokes.last_mut().filter(|_| count != START).ok_or(NoRecord::Stroke(index))?;
+        if count.unsigned_abs() >= CLIPPED || voltage.unsigned_abs() >= CLIPPED {
+            return Err(NoRecord::Clipped(index, count, voltage));
+        }
         stroke.samples.push(Sample { count: count.into(), voltage_v: VOLTS_PER_LSB * f64::from(voltage) });
     }
     let ohm = 1e-3 * f64::from(params.resistance_mohm);

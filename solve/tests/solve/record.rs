@@ -81,6 +81,11 @@ fn strokes_are_read_as_they_were_written() {
     close(record.counts_per_turn, 1600.0);
     close(record.rad_per_mm, 3.583);
     close(record.resistance.value, 3.53);
+    // What the chip clipped is no sample.
+    for clipped in [[0xff, 0x7f, 0, 0], [0x01, 0x80, 0, 0], [0, 0, 0xff, 0x7f], [0, 0, 0x01, 0x80]] {
+        let read = strokes(&sealed(&strokes_head(2), &[[0, 0x80, 0, 0], clipped].concat()), PARAMS);
+        assert!(matches!(read, Err(NoRecord::Clipped(1, ..))), "{read:?}");
+    }
 }
 
 /// FNV-1a by its published test vectors.
@@ -253,9 +258,9 @@ proptest! {
         for (samples, calm) in &strokes_counts {
             body.extend([0, 0x80, 0, 0]);
             for (at, [count, voltage]) in samples.iter().enumerate() {
-                let count = if *calm { at as i16 * 20 + count % 30 } else { (*count).max(-32767) };
+                let count = if *calm { at as i16 * 20 + count % 30 } else { (*count).clamp(-32_766, 32_766) };
                 body.extend(count.to_le_bytes());
-                body.extend(voltage.to_le_bytes());
+                body.extend((*voltage).clamp(-32_766, 32_766).to_le_bytes());
             }
         }
         let record = strokes(&sealed(&strokes_head((body.len() / 4) as u32), &body), PARAMS).expect("strokes");

@@ -1,5 +1,6 @@
 //! `fingertip capture`.
 
+use super::guided::motion;
 use super::moving::Moving;
 use super::{Interrupt, TOUCHED, aside, no_fault, press, say, say_json, stopped, wait_for};
 use crate::captured::{self, About, ENDED};
@@ -78,6 +79,7 @@ impl Args {
 /// A fault stands or comes, torque is on, the capture does not come about, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
+    motion::alone(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: a capture begins with a tare, for which the tip must be free".into());
     }

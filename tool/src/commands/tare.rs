@@ -1,5 +1,6 @@
 //! `fingertip tare`.
 
+use super::guided::motion;
 use super::{TOUCHED, no_fault, say, say_json, wait_for};
 use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
@@ -26,6 +27,7 @@ pub struct Args {
 /// Torque is on, a fault stands, or something touched.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
+    motion::alone(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: the tip may be pressing on something. Turn it off first: `fingertip stop`".into());
     }

@@ -148,7 +148,8 @@ fn a_motion_that_somebody_else_began_is_left_alone() {
     finger.done(&["tare"]);
     client(&finger).set(address::MEASURE, 2).expect("it obeys");
     finger.until_alone("Strokes");
-    for command in [&["commission", "--forward", "yes"][..], &["identify", "--no-wait", "--pause-s", "0"]] {
+    let (identify, file) = (["identify", "--no-wait", "--pause-s", "0"], finger.file("other.mcap"));
+    for command in [&["commission", "--forward", "yes"][..], &identify, &["tare"], &["capture", "--out", &file]] {
         let why = finger.refused(command);
         assert!(why.contains("another motion that measures is under way"), "{command:?}: {why}");
     }

@@ -72,11 +72,17 @@ pub fn ended_early(task: Task, number: i64, value: i64) -> Error {
 /// Fails where a motion cannot begin, and says why.
 pub fn ready(client: &mut Client) -> Result<(), Error> {
     no_fault(client)?;
-    if client.number(address::MEASURE_STATE)? == State::Running as i64 {
-        return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
-    }
+    alone(client)?;
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: turn it off first, by `fingertip stop`".into());
+    }
+    Ok(())
+}
+
+/// Fails while a motion that measures is under way, which a tare would end.
+pub fn alone(client: &mut Client) -> Result<(), Error> {
+    if client.number(address::MEASURE_STATE)? == State::Running as i64 {
+        return Err("another motion that measures is under way: wait for its end, or `fingertip stop`".into());
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ const BESIDE: usize = 4;
 /// what it has under them. So the missing force of dead taxels, and of what lies off the array, is filled by the model.
 ///
 /// Near the contact the ratio is that of a quarter of the depth: there and in the air, readings that creep leaves are forces
-/// too, by which [`crate::modulus`] tells creep from relaxation.
+/// too, by which [`crate::modulus()`] tells creep from relaxation.
 pub fn forces(press: &Press, pose: &Pose, taxels: &[Gain]) -> Vec<f64> {
     let Press { tip, array, .. } = press;
     let sound = |taxel: usize| matches!(taxels[taxel].condition, Condition::Sound | Condition::Unreached);

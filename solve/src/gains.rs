@@ -12,7 +12,7 @@
 //! are solved together by Gauss and Newton's method with Huber's weights: a taxel that two presses reach ties them together.
 //!
 //! One factor is free: all gains times f with all y over f read the same. It is fixed by the gains' mean, which is 1 for
-//! an array as made; its uncertainty is their spread over the root of their number, and [`crate::modulus`] takes it on.
+//! an array as made; its uncertainty is their spread over the root of their number, and [`crate::modulus()`] takes it on.
 
 use crate::joint::{YIELD_USUAL, joint};
 use crate::judge::{Judgement, Verdict};

@@ -1,7 +1,7 @@
 //! Young's modulus and the contact point from force over travel.
 //!
 //! The force of a step is `F = pi y d^2` (Park, Kim and Hirai 2003, eq. 14) with the stiffness y that all sound taxels give
-//! together ([`crate::gains`]). What the tip and the ink remember changes it by 5 to 20 %, so it is fitted along
+//! together ([`crate::gains()`]). What the tip and the ink remember changes it by 5 to 20 %, so it is fitted along
 //! ([`crate::memory`]): the two ways of a press and its holds show all of it. Unknowns of a press: Y, the contact point,
 //! hysteresis, creep, relaxation and its time constant.
 

@@ -29,7 +29,7 @@ impl Form {
     }
 
     /// V_s, what friction at standstill has beyond that at high speed. The slowest strokes fix friction at their own
-    /// speed far better than V_s and w_s, so its excess there is the parameter; [`SHARE`] keeps V_s finite.
+    /// speed far better than V_s and w_s, so its excess there is the parameter; `SHARE` keeps V_s finite.
     pub fn standstill_v(self, p: &Parameters, side: usize, slowest: f64) -> f64 {
         p[index::STRIBECK + side] / (self.share(slowest * (-p[index::SPEED]).exp()) + SHARE)
     }

@@ -69,7 +69,7 @@ pub enum Reason {
     Pushed = 8,
     /// Part of the requested voltage was not applied, mV.
     HeldBack = 9,
-    /// The tip did not come to rest: way after the time allowed, um.
+    /// The tip did not come to rest: counts in the last half of the time allowed.
     Restless = 10,
     /// The tip touched nothing on its way, um.
     NoContact = 11,

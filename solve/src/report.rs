@@ -71,7 +71,7 @@ impl Display for Ended {
                 )
             }
             Reason::Restless => {
-                write!(f, "the tip did not come to rest: it still went {thousandths:.3} mm; hold the finger fast")
+                write!(f, "the tip did not come to rest: it still went {value} counts; hold the finger fast")
             }
             Reason::NoContact => {
                 write!(f, "the tip touched nothing within {thousandths:.2} mm: bring the plate nearer")

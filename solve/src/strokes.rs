@@ -37,7 +37,7 @@ mod model;
 pub use model::Form;
 
 use crate::Value;
-use crate::record::Ended;
+use crate::record::{Ended, Reason};
 use fit::Fit;
 use model::{Path, SPAN, index};
 use nalgebra::SVector;
@@ -192,8 +192,14 @@ pub struct Drive {
 /// # Errors
 /// [`Refusal`] where the motions were ended early or the samples do not follow the model.
 pub fn solve(record: &Record) -> Result<Drive, Refusal> {
-    if let Some(ended) = record.ended {
-        return Err(ended.into());
+    match record.ended {
+        // The motions went on after the memory was full: what it holds counts, but for the stroke that was cut.
+        Some(Ended { reason: Reason::MemoryFull, .. }) => {
+            let strokes = record.strokes.split_last().map_or(Vec::new(), |(_, strokes)| strokes.to_vec());
+            return solve(&Record { strokes, ended: None, ..record.clone() });
+        }
+        Some(ended) => return Err(ended.into()),
+        None => {}
     }
     let resistance = record.resistance;
     let gone = || record.strokes.iter().map(Stroke::gone);
@@ -220,11 +226,17 @@ pub fn solve(record: &Record) -> Result<Drive, Refusal> {
     if fastest < SPEEDS * slowest {
         return Err(Refusal::Slow(fastest / slowest));
     }
-    let fits = Fit::all(&paths, record, slowest)?;
+    // Changes of speed between samples, counts; the largest is compared with what the largest voltage can make of it, or
+    // with the others where nothing can be fitted.
+    let samples = record.strokes.iter().flat_map(|stroke| stroke.samples.windows(3));
+    let mut jumps: Vec<i32> = samples.map(|part| (part[2].count - 2 * part[1].count + part[0].count).abs()).collect();
+    jumps.sort_unstable();
+    let jump = jumps.last().copied().unwrap_or(0);
+    let fits = Fit::all(&paths, record, slowest).map_err(|refusal| {
+        let usual = jumps.get(jumps.len() * 9 / 10).copied().map_or(0.0, f64::from);
+        if f64::from(jump) > JUMP_COUNTS + JUMP * usual { Refusal::Astray(jump) } else { refusal }
+    })?;
     let best = &fits[0];
-    // The largest change of speed between samples, and what the largest voltage can make of it.
-    let jumps = record.strokes.iter().flat_map(|stroke| stroke.samples.windows(3));
-    let jump = jumps.map(|part| (part[2].count - 2 * part[1].count + part[0].count).abs()).max().unwrap_or(0);
     let most_v = paths.iter().map(|path| path.voltage_v).fold(0.0, f64::max);
     let most = most_v / best.p[index::A].exp() * record.sample_s.powi(2) / rad;
     if f64::from(jump) > JUMP_COUNTS + JUMP * most {

@@ -245,6 +245,12 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     assert!((f64::from(found) - counts).abs() < 0.1 * counts);
     assert_eq!(refused(&changed(|_| 7)), Refusal::Still(0));
     assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), Refusal::Astray(_)));
+    // A memory that was full before the motions ended: the strokes in it count, but for the last.
+    let full = Ended { reason: Reason::MemoryFull, value: 5_000 };
+    let cut = Record { strokes: record.strokes[..25].to_vec(), ended: Some(full), ..record.clone() };
+    let whole = Record { strokes: record.strokes[..24].to_vec(), ..record.clone() };
+    assert_eq!(solve(&cut), solve(&whole));
+    assert!(solve(&cut).is_ok());
     assert_eq!(refused(&Record { strokes: record.strokes[..4].to_vec(), ..record.clone() }), Refusal::Few(2));
     let touched = Ended { reason: Reason::Touched, value: 50 };
     assert_eq!(refused(&Record { ended: Some(touched), ..record }), Refusal::Ended(touched));

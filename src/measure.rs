@@ -8,7 +8,7 @@
 //!
 //! Nothing is fitted and nothing is judged here but whether to go on: each motion has limits of travel, force, speed and
 //! time, beside those of guard and monitor. [`crate::capture`] keeps the rows in the memory of a capture, and a host
-//! reads them the same way; [`series`] has the layout. `docs/solve.md` tells what a host makes of them.
+//! reads them the same way; [`series`] has the layout. `docs/solve.md` describes what a host computes from them.
 
 pub mod press;
 pub mod series;
@@ -85,7 +85,29 @@ pub enum Ended {
     Full = 13,
 }
 
-/// How the motion that was last asked for stands.
+impl Ended {
+    /// The end of this number.
+    pub fn of(number: u8) -> Option<Self> {
+        let all = [
+            Self::Complete,
+            Self::Interrupted,
+            Self::NotReady,
+            Self::Unconfirmed,
+            Self::Still,
+            Self::Reversed,
+            Self::Astray,
+            Self::Touched,
+            Self::Pushed,
+            Self::Restless,
+            Self::NoContact,
+            Self::Stalled,
+            Self::Full,
+        ];
+        all.into_iter().find(|ended| *ended as u8 == number)
+    }
+}
+
+/// State of the motion that was last requested.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Standing {
     /// What it is doing.
@@ -124,12 +146,12 @@ impl Standing {
     /// Ends it, where it is under way.
     pub fn end(&mut self, ended: Ended, value: i32) {
         if self.state == State::Running {
-            *self = Self::refused(self.task, ended, value);
+            *self = Self::over(self.task, ended, value);
         }
     }
 
-    /// A task that ended before it began.
-    pub const fn refused(task: Task, ended: Ended, value: i32) -> Self {
+    /// A task that has ended, or could not begin.
+    pub const fn over(task: Task, ended: Ended, value: i32) -> Self {
         let (state, progress) = if matches!(ended, Ended::Complete) { (State::Done, 100) } else { (State::Ended, 0) };
         Self { state, task, ended, value, progress }
     }

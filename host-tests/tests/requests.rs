@@ -12,7 +12,7 @@ use images::record::Record;
 use sim::native::bench::Bench;
 use sim::plant::Taxel;
 
-const NOT_READY: Standing = Standing::refused(Task::Press, Ended::NotReady, 0);
+const NOT_READY: Standing = Standing::over(Task::Press, Ended::NotReady, 0);
 const RUNNING: Standing = Standing::running(Task::Press);
 
 /// With the object so far away.
@@ -189,7 +189,7 @@ fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
         let mut board = ready();
         board.request(Task::Press);
         let status = board.step_with(spoil);
-        let interrupted = Standing::refused(Task::Press, Ended::Interrupted, 0);
+        let interrupted = Standing::over(Task::Press, Ended::Interrupted, 0);
         assert_eq!((status.mode, status.fault, status.measure), (Mode::Fault, Some(fault), interrupted));
     }
 }

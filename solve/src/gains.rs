@@ -152,7 +152,7 @@ pub(crate) fn settle(presses: &[Press]) -> Result<Settled, NoGains> {
     let first = shape(presses.first().ok_or(NoGains::NoPress)?);
     // Faults of the record itself, before anything is solved.
     let fault = |press: &Press| match press.ended {
-        Some(ended) if ended.reason != Reason::MemoryFull => Some(NoGains::Ended(ended)),
+        Some(ended) if ended.reason != Reason::Full => Some(NoGains::Ended(ended)),
         _ => (shape(press) != first).then(|| NoGains::Shape(shape(press), first)),
     };
     for press in presses.chunks(1).filter(|press| fault(&press[0]).is_none()) {

@@ -8,24 +8,19 @@
 use crate::Value;
 use crate::press::{Array, Branch, Press, Reading, Step, Tip};
 use crate::strokes::{Record, Sample, Stroke};
+pub use fingertip::measure::Ended as Reason;
+use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
+use fingertip::measure::strokes::SAMPLE_FRAMES;
 use fingertip::params::{ParamError, Params};
 use std::f64::consts::TAU;
 
-/// Version of the format.
-pub const VERSION: u8 = 1;
 /// First bytes of a series.
 pub const MAGIC: [u8; 3] = *b"FTS";
-/// Length of the head, bytes.
-pub const HEAD: usize = 32;
-/// Frames between two samples of a stroke.
-pub const SAMPLE_FRAMES: u32 = 8;
 /// Count that marks the start of a stroke.
 pub const START: i16 = i16::MIN;
 /// What the chip clips counts and voltages at.
 const CLIPPED: u16 = 32_767;
 
-/// Length of a step's record before the taxels, bytes.
-const STEP: usize = 24;
 /// Codes of a mean: an eighth of a code, from -128 codes.
 const CODES_PER_LSB: f64 = 0.125;
 const LEAST_CODES: f64 = -128.0;
@@ -48,59 +43,10 @@ pub enum Kind {
     Strokes = 2,
 }
 
-/// Reason for which the chip ended a series early.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reason {
-    /// A command stopped the motion.
-    Interrupted = 1,
-    /// The controller was not ready: it had a fault, no torque or no tare.
-    NotReady = 2,
-    /// Nobody has confirmed the motor's direction.
-    Unconfirmed = 3,
-    /// The encoder did not count under a voltage, mV.
-    Still = 4,
-    /// The encoder counted against the voltage, counts.
-    Reversed = 5,
-    /// The tip left its bounds, um.
-    Astray = 6,
-    /// The array felt a force in the air, mN.
-    Touched = 7,
-    /// The motor felt an external force, mN.
-    Pushed = 8,
-    /// Part of the requested voltage was not applied, mV.
-    HeldBack = 9,
-    /// The tip did not come to rest: counts in the last half of the time allowed.
-    Restless = 10,
-    /// The tip touched nothing on its way, um.
-    NoContact = 11,
-    /// The tip stopped before it was deep enough: travel, um.
-    Stalled = 12,
-    /// The memory was full before the motion had ended.
-    MemoryFull = 13,
-}
-
-impl Reason {
-    const ALL: [Self; 13] = [
-        Self::Interrupted,
-        Self::NotReady,
-        Self::Unconfirmed,
-        Self::Still,
-        Self::Reversed,
-        Self::Astray,
-        Self::Touched,
-        Self::Pushed,
-        Self::HeldBack,
-        Self::Restless,
-        Self::NoContact,
-        Self::Stalled,
-        Self::MemoryFull,
-    ];
-}
-
 /// Early end of a series.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ended {
-    /// Reason.
+    /// Reason, as the chip numbers it.
     pub reason: Reason,
     /// The number behind it, in the unit that the [`Reason`] states; 0 for those without a unit.
     pub value: i32,
@@ -112,13 +58,13 @@ impl std::error::Error for Ended {}
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoRecord {
     /// Number of bytes.
-    #[error("the series has {0} bytes; its head alone has 32")]
+    #[error("the series has {0} bytes; its head alone has {HEAD}")]
     Short(usize),
     /// First bytes.
     #[error("the bytes begin with {0:02x?}, not with \"FTS\": they are not a series")]
     Magic([u8; 3]),
     /// Version of the format.
-    #[error("the series has format {0}; this program reads format 1")]
+    #[error("the series has format {0}; this program reads format {VERSION}")]
     Version(u8),
     /// Kind that was requested, and number of the kind in the series.
     #[error("the series does not hold {0}: its kind is {1} (1 is a press, 2 are strokes)")]
@@ -252,16 +198,6 @@ pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
     })
 }
 
-/// Check of a body: FNV-1a of 32 bits.
-pub fn check(body: &[u8]) -> u32 {
-    body.iter().fold(0x811C_9DC5, |check, byte| (check ^ u32::from(*byte)).wrapping_mul(0x0100_0193))
-}
-
-/// Length of a press's record of a step, bytes.
-pub fn step_length(taxels: usize) -> usize {
-    (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
-}
-
 fn rad_per_mm(params: &Params) -> f64 {
     1e-3 * f64::from(params.reduction_mrad_per_mm)
 }
@@ -306,14 +242,13 @@ impl Head {
         } else if frame_ns == 0 {
             return Err(NoRecord::FrameTime);
         }
-        let reason = |number: u8| Reason::ALL.into_iter().find(|reason| *reason as u8 == number);
         let ended = match ended {
             0 => None,
-            number => Some(Ended { reason: reason(number).ok_or(NoRecord::Reason(number))?, value }),
+            number => Some(Ended { reason: Reason::of(number).ok_or(NoRecord::Reason(number))?, value }),
         };
         let shape = [rows, columns].map(usize::from);
         let record = match kind {
-            Kind::Press => step_length(shape[0] * shape[1]),
+            Kind::Press => step_bytes(shape[0] * shape[1]),
             Kind::Strokes => 4,
         };
         let length = HEAD as u64 + u64::from(records) * record as u64;

@@ -40,6 +40,7 @@ impl Display for Ended {
         let value = self.value;
         let thousandths = 1e-3 * f64::from(value);
         match self.reason {
+            Reason::Complete => write!(f, "the motion is complete"),
             Reason::Interrupted => write!(f, "a command stopped the motion"),
             Reason::NotReady => {
                 write!(f, "the controller was not ready: enable torque, tare, and see that there is no fault")
@@ -64,12 +65,6 @@ impl Display for Ended {
             Reason::Pushed => {
                 write!(f, "an external force of {thousandths:.3} N was estimated from the motor: clear the tip's way")
             }
-            Reason::HeldBack => {
-                write!(
-                    f,
-                    "{thousandths:.2} V of the requested voltage were not applied: check the supply and the limits"
-                )
-            }
             Reason::Restless => {
                 write!(f, "the tip did not come to rest: it still went {value} counts; hold the finger fast")
             }
@@ -82,7 +77,7 @@ impl Display for Ended {
                     "the tip stopped at {thousandths:.2} mm before it was deep enough: check the supply and the limits"
                 )
             }
-            Reason::MemoryFull => write!(f, "the memory was full after {value} records"),
+            Reason::Full => write!(f, "the memory was full after {value} records"),
         }
     }
 }

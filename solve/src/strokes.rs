@@ -194,7 +194,7 @@ pub struct Drive {
 pub fn solve(record: &Record) -> Result<Drive, Refusal> {
     match record.ended {
         // The motions went on after the memory was full: what it holds counts, but for the stroke that was cut.
-        Some(Ended { reason: Reason::MemoryFull, .. }) => {
+        Some(Ended { reason: Reason::Full, .. }) => {
             let strokes = record.strokes.split_last().map_or(Vec::new(), |(_, strokes)| strokes.to_vec());
             return solve(&Record { strokes, ended: None, ..record.clone() });
         }

@@ -31,7 +31,7 @@ const STROKE_S: f32 = 0.5;
 /// A fall of the speed as by this force, mN, over the span, s, ends a stroke.
 const PUSH_MN: i32 = 300;
 const SPAN_S: f32 = 0.016;
-/// The span's counts are kept at so many places.
+/// The number of parts of a span: the count is kept at the end of each.
 pub const SPAN_PARTS: usize = 16;
 /// At rest: no count for this long, within this long, s.
 const STILL_S: f32 = 0.012;
@@ -56,7 +56,7 @@ pub struct Motions {
     pub farthest: i32,
     /// Against its direction nothing moves by more.
     pub back: i32,
-    /// A pulse ends so far, or so long, after it began to move.
+    /// A pulse ends after this distance or this time of motion.
     pub pulse: i32,
     /// See [`Motions::pulse`].
     pub pulse_frames: u32,
@@ -82,7 +82,7 @@ pub struct Motions {
     pub push_mn: i32,
     /// How far a shorted motor rolls on, for the counts of a quarter of a span, Q8.
     pub roll_q8: i32,
-    /// Without a count for so long is rest, and how long to wait for it.
+    /// The tip is at rest after this time without a count; and how long to wait for it.
     pub still: u32,
     /// See [`Motions::still`].
     pub rest: u32,

@@ -38,12 +38,13 @@ const FAR: Millimetres = Millimetres::from_bits(4 << 24);
 /// The tip must move on by 1/128 mm (Q24) within this time, ns.
 const MOVES: i32 = 1 << 17;
 const STALL_NS: u32 = 1_000_000_000;
-/// For so many frames in turn one more taxel than before must be bad.
+/// One more taxel than before must be bad in this number of frames in a row.
 const BAD_FRAMES: u8 = 4;
 /// A taxel's code is held to this, and what it differs by from the step's first frame: sixteenths and quarters.
 const CODE_MAX: i32 = 1 << 17;
 const CHANGE_MAX: i32 = 1_023;
-/// A complete step is handed over in so many parts, one a frame: to write all of it takes as long as the step of the loop.
+/// A complete step is handed over in this number of parts, one a frame: writing all of it takes as long as the step of the
+/// loop.
 pub const PARTS: u8 = 4;
 /// More frames than this are not taken into a step: the sums then have 31 bits.
 const FRAMES_MAX: u16 = 16_383;

@@ -36,12 +36,17 @@ const STEP: usize = 24;
 /// What is added to a mean, eighths of a code.
 const OFFSET: i32 = 1_024;
 
+/// The check sum of all rows.
+pub fn check(rows: &[u8]) -> u32 {
+    rows.iter().fold(CHECK, |check, byte| (check ^ u32::from(*byte)).wrapping_mul(PRIME))
+}
+
 /// Bytes of a step.
 pub const fn step_bytes(taxels: usize) -> usize {
     (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
 }
 
-/// What stands before the rows.
+/// The bytes before the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
     /// 0 none, 1 a press, 2 strokes.
@@ -109,7 +114,7 @@ pub struct Out<'a> {
 }
 
 impl<'a> Out<'a> {
-    /// Into this room, behind bytes of the same row; with the check sum of all that stands before.
+    /// Into this room, behind bytes of the same row; with the check sum of all before.
     pub fn new(room: &'a mut [u8], count: usize, check: u32) -> Self {
         let full = room.len() < count;
         Self { room: room.get_mut(count..).unwrap_or_default(), check, count, full }
@@ -212,7 +217,7 @@ impl<'a> Out<'a> {
     }
 }
 
-/// A variance in a byte, as the layout tells.
+/// A variance in a byte, as the layout says.
 #[inline(always)]
 fn coded(variance: u32) -> u8 {
     if variance == 0 {

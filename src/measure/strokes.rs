@@ -95,8 +95,10 @@ pub struct Strokes {
     /// The lowest voltages at which pulses moved, forward and back, and what friction takes at the slowest strokes.
     moved_uv: [i32; 2],
     friction_uv: [i32; 2],
-    /// Counts of the last span, a part of it apart; the fastest span.
+    /// Counts at the ends of the last parts of a span; counts over the last span and the last quarter of one, as the
+    /// last part ended; the fastest span.
     history: [i32; SPAN_PARTS],
+    over: [i32; 2],
     fastest: i32,
     /// The count that stood last, since which frame, and where the second half of a rest began.
     stood: (i32, u32),
@@ -138,6 +140,7 @@ impl Strokes {
             moved_uv: [UNKNOWN; 2],
             friction_uv: [0; 2],
             history: [encoder; SPAN_PARTS],
+            over: [0; 2],
             fastest: 0,
             stood: (encoder, 0),
             half_rest: encoder,
@@ -235,7 +238,7 @@ impl Strokes {
         } else if place.saturating_abs() > plan.farthest {
             Some((Ended::Astray, plan.um(place)))
         } else if self.gone(view.encoder) < -plan.back {
-            Some((Ended::Reversed, self.gone(view.encoder)))
+            Some((Ended::Reversed, self.gone(view.encoder).saturating_neg()))
         } else {
             None
         }
@@ -278,9 +281,6 @@ impl Strokes {
     fn end(&mut self, standing: &mut Standing, ended: Ended, value: i32) {
         self.phase = Phase::Over;
         standing.end(ended, value);
-        if ended == Ended::Complete {
-            *standing = Standing::refused(self.task, ended, value);
-        }
     }
 
     /// The next motion, or the end. It begins with the next frame.
@@ -310,12 +310,12 @@ impl Strokes {
             (self.part, self.sign) = part;
         }
         if self.done == 2 {
-            // The slower pulses find the voltages anew.
+            // The slower pulses find the voltages again.
             self.moved_uv = [UNKNOWN; 2];
         }
         standing.progress = (u32::from(self.done) * 100 / (u32::from(STROKES) + 8)) as u8;
         (self.begun, self.frames, self.moving, self.more_uv) = (view.encoder, 0, 0, 0);
-        (self.history, self.fastest) = ([view.encoder; SPAN_PARTS], 0);
+        (self.history, self.over, self.fastest) = ([view.encoder; SPAN_PARTS], [0; 2], 0);
         self.voltage_uv = match self.part {
             Part::Pulse { .. } | Part::Feel => match self.easiest() {
                 UNKNOWN => 0,
@@ -379,11 +379,13 @@ impl Strokes {
     /// A stroke under one voltage that comes to rest at a place.
     fn stroke(&mut self, view: &View, plan: &Motions) {
         let gone = self.gone(view.encoder);
-        let [span, quarter] = [SPAN_PARTS, SPAN_PARTS / 4].map(|parts| self.counts_over(parts, gone));
         if self.frames.is_multiple_of(plan.span_part) {
+            let before = [self.history[SPAN_PARTS - 1], self.history[SPAN_PARTS / 4 - 1]];
+            self.over = before.map(|before| view.encoder.wrapping_sub(before).saturating_mul(self.sign));
             self.history.rotate_right(1);
             self.history[0] = view.encoder;
         }
+        let [span, quarter] = self.over;
         // The first spans are those of the run-up.
         if self.frames > 2 * plan.span() {
             self.fastest = self.fastest.max(span);
@@ -410,12 +412,6 @@ impl Strokes {
                 self.short(view.encoder, Some((Ended::Pushed, plan.millinewtons(self.more_uv))));
             }
         }
-    }
-
-    /// Counts over the last parts of a span, or since the motion began, in its direction.
-    fn counts_over(&self, parts: usize, gone: i32) -> i32 {
-        let before = self.history.get(parts - 1).copied().unwrap_or(self.begun);
-        gone.saturating_sub(before.wrapping_sub(self.begun).saturating_mul(self.sign))
     }
 }
 

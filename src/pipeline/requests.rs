@@ -175,7 +175,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
             _ => Ended::NotReady,
         };
-        self.status.measure = Standing::refused(task, refusal, 0);
+        self.status.measure = Standing::over(task, refusal, 0);
     }
 
     /// Ends what drives the motor, for the reason that something else begins: off, where there is no fault.

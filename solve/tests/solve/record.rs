@@ -2,10 +2,11 @@
 
 use crate::finger::{Draw, FRAME_NS, cycle, presses};
 use crate::series::{self, Head, deviation, sealed};
+use fingertip::measure::series::{HEAD, check, step_bytes};
 use fingertip::params::Params;
 use proptest::prelude::*;
 use solve::press::{Branch, Press};
-use solve::record::{Ended, HEAD, Kind, NoRecord, Reason, check, press, strokes};
+use solve::record::{Ended, Kind, NoRecord, Reason, press, strokes};
 use solve::{gains, modulus};
 
 const PARAMS: &Params = &Params::DEFAULT;
@@ -38,7 +39,7 @@ const STEP: [u8; 64] = [
 
 #[test]
 fn a_step_is_read_as_it_was_written() {
-    let body = &STEP[..solve::record::step_length(9)];
+    let body = &STEP[..step_bytes(9)];
     assert_eq!(body.len(), 56);
     let read = press(&sealed(&press_head([3, 3], 1), body), PARAMS).expect("a press");
     let [step] = read.steps.as_slice() else { panic!("{} steps", read.steps.len()) };
@@ -159,7 +160,7 @@ fn good_with(body: &[u8], at: usize, byte: u8) -> Vec<u8> {
 #[test]
 fn a_press_with_changed_bytes_is_solved_or_refused() {
     let taken = presses(&Draw::plain(250.0), 1, &cycle(5.0, 3.0)).remove(0);
-    let (length, records) = (solve::record::step_length(100), taken.steps.len() as u32);
+    let (length, records) = (step_bytes(100), taken.steps.len() as u32);
     let bytes = series::press(&taken, FRAME_NS, 0);
     for seed in 0..8 {
         let mut rng = fastrand::Rng::with_seed(seed);
@@ -229,7 +230,7 @@ proptest! {
         noise in prop::collection::vec(any::<u8>(), 1..300),
         calm in any::<bool>(),
     ) {
-        let length = solve::record::step_length(usize::from(rows) * usize::from(columns));
+        let length = step_bytes(usize::from(rows) * usize::from(columns));
         let (mut body, mut time) = (Vec::new(), 0);
         for (index, (pause, frame, counts, back)) in frames.iter().enumerate() {
             let end = body.len() + length;

@@ -41,7 +41,7 @@ fn refusals_are_sentences_with_their_number() {
     assert!(ended(Reason::Reversed, 17).contains("counted 17 against"));
     assert!(ended(Reason::Restless, 7).contains("7 counts"));
     assert!(ended(Reason::Stalled, 850).contains("0.85 mm"));
-    assert!(ended(Reason::MemoryFull, 120).contains("120 records"));
+    assert!(ended(Reason::Full, 120).contains("120 records"));
     let touched = Refusal::from(Ended { reason: Reason::Touched, value: 51 }).to_string();
     assert_eq!(
         touched,

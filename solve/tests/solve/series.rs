@@ -1,8 +1,8 @@
-//! The bytes that the chip makes of a press and of strokes.
+//! The bytes that the chip makes of a press.
 
+use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
 use solve::press::{Branch, Press};
-use solve::record::{self, Ended, HEAD, MAGIC, START, VERSION};
-use solve::strokes::Stroke;
+use solve::record::{Ended, MAGIC};
 use std::f64::consts::TAU;
 
 /// Head of a series, but for the check.
@@ -22,7 +22,7 @@ pub fn sealed(head: &Head, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::from(MAGIC);
     bytes.extend([VERSION, head.kind, head.shape[0], head.shape[1], reason]);
     bytes.extend(head.records.to_le_bytes());
-    bytes.extend(record::check(body).to_le_bytes());
+    bytes.extend(check(body).to_le_bytes());
     bytes.extend(head.frame_ns.to_le_bytes());
     bytes.extend(head.origin.to_le_bytes());
     bytes.extend(head.delay_ns.to_le_bytes());
@@ -51,7 +51,7 @@ pub fn mm_per_count() -> f64 {
 pub fn press(press: &Press, frame_ns: u32, origin: i32) -> Vec<u8> {
     let mut body = Vec::new();
     for step in &press.steps {
-        let length = body.len() + record::step_length(step.taxels.len());
+        let length = body.len() + step_bytes(step.taxels.len());
         for time_s in step.time_s {
             body.extend(((1e9 * time_s / f64::from(frame_ns)).round() as u32).to_le_bytes());
         }
@@ -73,18 +73,4 @@ pub fn press(press: &Press, frame_ns: u32, origin: i32) -> Vec<u8> {
     }
     let (shape, records) = ([press.array.rows as u8, press.array.columns as u8], press.steps.len() as u32);
     sealed(&Head { kind: 1, shape, ended: press.ended, records, frame_ns, origin, delay_ns: 0 }, &body)
-}
-
-/// Strokes as a series.
-pub fn strokes(strokes: &[Stroke], ended: Option<Ended>, frame_ns: u32, delay_ns: u32) -> Vec<u8> {
-    let mut body = Vec::new();
-    for stroke in strokes {
-        body.extend([START, 0].map(i16::to_le_bytes).as_flattened());
-        for sample in &stroke.samples {
-            body.extend((sample.count as i16).to_le_bytes());
-            body.extend(((4e3 * sample.voltage_v).round() as i16).to_le_bytes());
-        }
-    }
-    let records = (body.len() / 4) as u32;
-    sealed(&Head { kind: 2, shape: [10, 10], ended, records, frame_ns, origin: 1234, delay_ns }, &body)
 }

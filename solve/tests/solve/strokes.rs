@@ -8,6 +8,9 @@ use drive::{Drive, Rig};
 use solve::record::{Ended, Reason};
 use solve::strokes::{Record, Refusal, solve};
 
+/// Recorded strokes: all, and the slow ones alone.
+const ALL: usize = 32;
+const SLOW: usize = 8;
 /// Bounds of the motions.
 const TRAVEL_MM: f64 = 1.6;
 const FORCE_N: f64 = 0.3;
@@ -45,11 +48,11 @@ struct Figures {
 const MEASURED: [f64; 2] = [0.025, 0.05];
 
 impl Figures {
-    /// Measures drives, `number` by `number`, with strokes of these speeds.
+    /// Measures drives, `number` by `number`, and keeps this number of strokes.
     fn of(
         name: &str,
         numbers: Range<usize>,
-        speeds: &[f64],
+        strokes: usize,
         draw: impl Fn(&mut fastrand::Rng, usize) -> Drive,
     ) -> Self {
         let mut figures = Self::default();
@@ -57,7 +60,7 @@ impl Figures {
         for number in numbers {
             let mut rng = fastrand::Rng::with_seed(number as u64);
             let mut rig = Rig::new(draw(&mut rng, number), rng.u64(..));
-            figures.add(number, &mut rig, speeds);
+            figures.add(number, &mut rig, strokes);
         }
         let Self { errors, sigmas, travels, forces, samples, times, refused, silent, measured } = &figures;
         println!("{name}: {measured} of {count} measured, refused {refused:?}, silently wrong {silent:?}");
@@ -73,8 +76,8 @@ impl Figures {
         figures
     }
 
-    fn add(&mut self, number: usize, rig: &mut Rig, speeds: &[f64]) {
-        let record = chip::measure(rig, speeds);
+    fn add(&mut self, number: usize, rig: &mut Rig, strokes: usize) {
+        let record = chip::measure(rig, strokes);
         self.travels.push((rig.travel_mm, number));
         self.forces.push((1e3 * rig.force_n, number));
         let samples: usize = record.strokes.iter().map(|stroke| stroke.samples.len()).sum();
@@ -134,7 +137,7 @@ impl Figures {
         let worst = |values: &[(f64, usize)]| values.iter().map(|(value, _)| *value).fold(0.0, f64::max);
         assert!(self.silent.is_empty());
         assert!(self.measured >= measured, "{} measured", self.measured);
-        assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= chip::SAMPLES as f64);
+        assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= chip::ROWS as f64);
         assert_eq!(worst(&self.forces), 0.0);
         // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
         if measured >= 20 {
@@ -145,25 +148,25 @@ impl Figures {
 
 #[test]
 fn ordinary_drives_are_measured() {
-    Figures::of("ordinary", 0..30, &chip::SPEEDS, |rng, _| Drive::ordinary(rng)).judge(27);
+    Figures::of("ordinary", 0..30, ALL, |rng, _| Drive::ordinary(rng)).judge(27);
 }
 
 #[test]
 fn varied_drives_are_measured() {
-    Figures::of("varied", 0..30, &chip::SPEEDS, |rng, _| Drive::varied(rng)).judge(27);
+    Figures::of("varied", 0..30, ALL, |rng, _| Drive::varied(rng)).judge(27);
 }
 
 #[test]
 #[ignore = "takes minutes"]
 fn two_hundred_drives_of_each_kind_are_measured() {
-    Figures::of("ordinary", 0..200, &chip::SPEEDS, |rng, _| Drive::ordinary(rng)).judge(180);
-    Figures::of("varied", 0..200, &chip::SPEEDS, |rng, _| Drive::varied(rng)).judge(180);
+    Figures::of("ordinary", 0..200, ALL, |rng, _| Drive::ordinary(rng)).judge(180);
+    Figures::of("varied", 0..200, ALL, |rng, _| Drive::varied(rng)).judge(180);
 }
 
 /// Slow strokes alone do not tell k from friction that falls with speed: nothing is wrong without saying so.
 #[test]
 fn slow_strokes_alone_say_how_little_they_tell() {
-    Figures::of("slow", 0..4, &[0.0, 0.15, 0.3], |rng, _| Drive::varied(rng)).judge(0);
+    Figures::of("slow", 0..4, SLOW, |rng, _| Drive::varied(rng)).judge(0);
 }
 
 /// Friction that changes along the way and from stroke to stroke is not in the model.
@@ -173,7 +176,7 @@ fn friction_that_is_not_even_is_not_silently_wrong() {
         let ripple = if number % 2 == 0 { 0.05 } else { 0.0 };
         Drive { ripple, unrest: 0.05, ..Drive::varied(rng) }
     };
-    Figures::of("uneven", 0..8, &chip::SPEEDS, draw).judge(4);
+    Figures::of("uneven", 0..8, ALL, draw).judge(4);
 }
 
 /// Motors that are nothing like the reference, known as far as their sheets go, and one that is far from its sheet.
@@ -209,7 +212,7 @@ fn other_motors_are_measured_too() {
         },
         Drive { inertia: 2.1e-7, ..drive },
     ];
-    Figures::of("other", 0..3, &chip::SPEEDS, |_, number| motors[number].clone()).judge(2);
+    Figures::of("other", 0..3, ALL, |_, number| motors[number].clone()).judge(2);
 }
 
 #[test]
@@ -224,13 +227,13 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     // The controller's own: the motor's leads swapped, and an encoder without supply.
     for (counts, reason) in [(-1, Reason::Reversed), (0, Reason::Still)] {
         let mut rig = Rig::new(Drive { counts, ..drive.clone() }, 1);
-        let refusal = refused(&chip::measure(&mut rig, &chip::SPEEDS));
+        let refusal = refused(&chip::measure(&mut rig, ALL));
         let Refusal::Ended(ended) = refusal else { panic!("{refusal}") };
         assert_eq!(ended.reason, reason);
         assert!(ended.value > 0 && rig.travel_mm < TRAVEL_MM);
     }
     // What the samples alone show.
-    let record = chip::measure(&mut Rig::new(drive, 1), &chip::SPEEDS);
+    let record = chip::measure(&mut Rig::new(drive, 1), ALL);
     let changed = |change: fn(i32) -> i32| {
         let mut record = record.clone();
         record
@@ -246,7 +249,7 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     assert_eq!(refused(&changed(|_| 7)), Refusal::Still(0));
     assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), Refusal::Astray(_)));
     // A memory that was full before the motions ended: the strokes in it count, but for the last.
-    let full = Ended { reason: Reason::MemoryFull, value: 5_000 };
+    let full = Ended { reason: Reason::Full, value: 5_000 };
     let cut = Record { strokes: record.strokes[..25].to_vec(), ended: Some(full), ..record.clone() };
     let whole = Record { strokes: record.strokes[..24].to_vec(), ..record.clone() };
     assert_eq!(solve(&cut), solve(&whole));
@@ -279,7 +282,7 @@ fn in_the_way(count: usize) {
         drive.object = Some((0.02 + 0.78 * rng.f64(), kpa));
         drive.blind = number % 2 == 1;
         let mut rig = Rig::new(drive, rng.u64(..));
-        let record = chip::measure(&mut rig, &chip::SPEEDS);
+        let record = chip::measure(&mut rig, ALL);
         forces.push((1e3 * rig.force_n, number));
         match solve(&record) {
             Err(refusal) => reasons.push(refusal.to_string()),

@@ -123,8 +123,7 @@ fn scale(
         if !args.how.no_wait {
             run.ask.enter("put a scale under the plate and zero it, the tip in the air", "--no-wait")?;
         }
-        motion::pause(args.how.pause_s, run)?;
-        motion::tare(run, client)?;
+        motion::tare_after(args.how.pause_s, run, client)?;
     }
     hold::all(&goals_mn, &args.shown_n, session, run, client)?;
     let after = found.gains.iter().flat_map(|gains| gains.after.iter().flatten());
@@ -165,8 +164,7 @@ fn creep(
     client: &mut Client,
 ) -> Result<(), Error> {
     if session.step("weight").is_none() {
-        motion::pause(args.how.pause_s, run)?;
-        motion::tare(run, client)?;
+        motion::tare_after(args.how.pause_s, run, client)?;
     }
     match solve::creep(&hold::weight(seconds, session, run, client)?) {
         Ok(creep) => {

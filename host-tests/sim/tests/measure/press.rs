@@ -10,7 +10,9 @@ use sim::cores;
 use sim::effects::set::Named;
 use sim::native::bench::Bench;
 use sim::population::Finger;
+use sim::scene::controller;
 use sim::setup::Setup;
+use solve::record;
 
 const TIPS: &str = include_str!("tips.toml");
 /// The largest force of a press as a share of the largest goal.
@@ -21,7 +23,7 @@ struct Made {
     standing: Standing,
     fault: Option<Fault>,
     rows: u32,
-    bytes: usize,
+    record: Vec<u8>,
     force_n: f64,
     depth_mm: f64,
     took_s: f64,
@@ -42,9 +44,9 @@ fn make(finger: &Finger, mut each: impl FnMut(&mut Bench<Named>, f64)) -> Made {
         each(bench, bench.time_s() - begun_s);
     });
     let took_s = bench.time_s() - begun_s;
-    let rows = rows(bench.kept(), standing.ended as u8);
-    let bytes = bench.kept().len();
-    Made { standing, fault: bench.status().fault, rows, bytes, force_n, depth_mm, took_s }
+    let record = bench.kept().to_vec();
+    let rows = rows(&record, standing.ended as u8);
+    Made { standing, fault: bench.status().fault, rows, record, force_n, depth_mm, took_s }
 }
 
 /// The tips, with 0, 1 or 2 dead taxels near the contact.
@@ -82,13 +84,33 @@ fn valid_presses_complete() {
     }
     let force_n = print_worst("force, N", all(|made| made.force_n));
     let rows = print_worst("rows", all(|made| made.rows.into()));
-    print_worst("bytes", all(|made| made.bytes as f64));
+    print_worst("bytes", all(|made| made.record.len() as f64));
     print_worst("time, s", all(|made| made.took_s));
     let most_n = 1e-3 * f64::from(Params::DEFAULT.force_max_mn) * FORCE_SHARE;
     assert!(force_n < most_n && rows <= ROWS_MAX as f64, "{force_n} N, {rows} rows");
     for (number, made) in made.iter().enumerate() {
         assert!(made.standing.state == State::Done && made.fault.is_none(), "tip {number}");
     }
+    solve_all(&fingers, &made);
+}
+
+/// The modulus of every press: most within two reported sigmas, and the errors not smaller than noise allows.
+fn solve_all(fingers: &[Finger], made: &[Made]) {
+    let (mut errors, mut within) = (Vec::new(), 0);
+    for (number, (finger, made)) in fingers.iter().zip(made).enumerate() {
+        // A press is read as its own finger is set: its encoder's counts are drawn.
+        let params = controller::params(&finger.scene);
+        let press = record::press(&made.record, &params).unwrap_or_else(|why| panic!("tip {number}: {why}"));
+        let found = solve::modulus(&[press]).unwrap_or_else(|why| panic!("tip {number}: {why}"));
+        let truth = drawn(finger, "modulus_kpa");
+        errors.push((100.0 * (found.kpa / truth - 1.0).abs(), number));
+        within += usize::from((found.kpa - truth).abs() <= 2.0 * found.sigma_kpa);
+    }
+    let worst = print_worst("error of the modulus, %", errors.clone());
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let median = errors[errors.len() / 2].0;
+    println!("{within} of {} within two sigmas", made.len());
+    assert!((0.1..4.0).contains(&median) && worst < 10.0 && 10 * within >= 9 * made.len());
 }
 
 /// What happens to a press, and which endings of it are valid.

@@ -87,6 +87,16 @@ pub fn alone(client: &mut Client) -> Result<(), Error> {
     Ok(())
 }
 
+/// Waits in the air with torque off, then tares.
+pub fn tare_after(seconds: f64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+    run.report(format_args!(
+        "pause of {seconds} s in the air: after a press the sensor's creep needs that time to decay"
+    ));
+    run.interrupt.pause(Instant::now() + Duration::from_secs_f64(seconds));
+    run.interrupt.check()?;
+    tare(run, client)
+}
+
 /// Tares with torque off.
 pub fn tare(run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
     ready(client)?;
@@ -154,15 +164,6 @@ fn carry_out(task: Task, run: &Run<'_>, client: &mut Client) -> Result<(), Error
         }
         std::thread::sleep(LOOK);
     }
-}
-
-/// Waits in the air with torque off.
-pub fn pause(seconds: f64, run: &Run<'_>) -> Result<(), Error> {
-    run.report(format_args!(
-        "pause of {seconds} s in the air: after a press the sensor's creep needs that time to decay"
-    ));
-    run.interrupt.pause(Instant::now() + Duration::from_secs_f64(seconds));
-    run.interrupt.check()
 }
 
 /// Waits until the controller's chip has this temperature.

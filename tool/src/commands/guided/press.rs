@@ -51,8 +51,7 @@ pub fn one(
         run.ask.enter(question, "--no-wait")?;
     }
     motion::ready(client)?;
-    motion::pause(options.pause_s, run)?;
-    motion::tare(run, client)?;
+    motion::tare_after(options.pause_s, run, client)?;
     run.report("press: takes about 10 s");
     let bytes = motion::motion(Task::Press, run, client)?;
     // Damaged bytes are no step that is done.

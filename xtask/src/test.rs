@@ -50,6 +50,8 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("Python package on a served finger", |console| {
         let python = python::ensure(console)?;
+        // The wheel's builder reads the sources of every platform, also those that no build here needs.
+        console.prepare(console::cargo("fetch").args(["--locked", "--quiet"]))?;
         let mut command = on_a_board(&["--test", "python"]);
         command.env("FINGERTIP_PYTHON", &python).args(["--", "--ignored"]);
         host::test(&mut command, console)

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::process::{Output, Stdio};
+use std::sync::Mutex;
 
 /// Options of a calibration without questions and without the pause of a real sensor.
 const QUICK: [&str; 6] = ["calibrate", "--no-wait", "--pause-s", "0", "--within-s", "3600"];
@@ -230,6 +231,9 @@ const ENDS: [End; 6] = [
     End::Power,
 ];
 
+/// Fingers that are served side by side where many instants are tried.
+const FINGERS: usize = 12;
+
 /// An instant of an end of each procedure, drawn with a fixed seed: no force is left, the parameters are those before or
 /// all of the new ones, and the same session gives the same result. All ends, at more instants, with
 /// `INSTANTS=42 cargo test -p fingertip-cli --profile host --test finger ends_at_any -- --nocapture`.
@@ -243,13 +247,27 @@ fn a_procedure_that_ends_at_any_instant_resumes() {
         let begun = finger.heard();
         let reference = finger.json(&procedure)["after"].clone();
         let packets = finger.heard() - begun;
-        let (mut before, mut after, mut worst) = (0, 0, 0.0_f64);
-        for number in 0..instants.map_or(1, |instants| instants * ENDS.len()) {
+        let cases = (0..instants.map_or(1, |instants| instants * ENDS.len())).map(|number| {
             let end = if instants.is_some() { ENDS[number % ENDS.len()] } else { ENDS[random.usize(0..ENDS.len())] };
-            let (kept, off) = resumes(&procedure, end, random.u64(1..packets), &reference);
-            *(if kept { &mut before } else { &mut after }) += 1;
-            worst = worst.max(off);
-        }
+            (end, random.u64(1..packets))
+        });
+        let (cases, totals) = (Mutex::new(cases), Mutex::new((0, 0, 0.0_f64)));
+        // A served finger goes at the pace of real time, and mostly waits.
+        std::thread::scope(|scope| {
+            for _ in 0..instants.map_or(1, |_| FINGERS) {
+                scope.spawn(|| {
+                    let next = || cases.lock().expect("no case panics here").next();
+                    while let Some((end, packets)) = next() {
+                        let (kept, off) = resumes(&procedure, end, packets, &reference);
+                        let mut totals = totals.lock().expect("no case panics here");
+                        totals.0 += u32::from(kept);
+                        totals.1 += u32::from(!kept);
+                        totals.2 = totals.2.max(off);
+                    }
+                });
+            }
+        });
+        let (before, after, worst) = totals.into_inner().expect("no case panics here");
         println!(
             "{}: {before} ends before the write, {after} behind it, none within; resumed, at most {:.2} % off",
             procedure[0],
@@ -273,7 +291,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         finger.start(&[&arguments[..], &["--json"]].concat())
     };
     while finger.heard() - begun < packets && child.try_wait().expect("it was started").is_none() {
-        std::thread::yield_now();
+        std::thread::sleep(Served::LOOK);
     }
     match end {
         End::Signal(signal) if child.try_wait().expect("it was started").is_none() => Served::signal(&child, signal),

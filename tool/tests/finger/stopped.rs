@@ -153,7 +153,7 @@ fn ends_without_force(arguments: &[&str], end: Option<Signal>, packets: u64) {
     let mut child = finger.start(&arguments);
     let mut runs = || child.try_wait().expect("it was started").is_none();
     while finger.heard() - begun < packets && runs() {
-        std::thread::yield_now();
+        std::thread::sleep(Served::LOOK);
     }
     let (ended_s, runs) = (finger.now_s(), runs());
     if let Some(signal) = end.filter(|_| runs) {

@@ -302,12 +302,13 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     }
     child.wait().expect("it ends");
     // A controller that had no power for a moment releases nothing: the tip pushes the shorted motor back.
-    let within_s = if matches!(end, End::Power) { 3.0 } else { 1.0 };
+    // With less and less force: the last tenth of a newton takes seconds.
+    let (within_s, left_n) = if matches!(end, End::Power) { (3.0, 2.0 * RESIDUAL_N) } else { (1.0, RESIDUAL_N) };
     let ended_s = finger.now_s();
     while finger.now_s() < ended_s + within_s {
         finger.command("state");
     }
-    assert!(finger.true_force_n() < RESIDUAL_N, "{what}: {}", finger.command("state"));
+    assert!(finger.true_force_n() < left_n, "{what}: {}", finger.command("state"));
     finger.command("deaf no more");
     for command in ["recover", "stop"] {
         finger.fingertip(&[command]).output().expect("it starts");
@@ -326,7 +327,11 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     let kept = now == old;
     // A motion that was repeated gives another result of the same uncertainty: 6 % of the friction.
     assert!(kept || off(&now) < 0.1, "{what}: {now} of {old} and {new}");
-    let resumed = finger.json(&arguments);
+    let (_, mut resumed, why) = output(&finger, &arguments);
+    if matches!(end, End::Power) && why.contains("seemed to touch the tip") {
+        // A tip that still creeps back spoils the first tare, which says so.
+        resumed = finger.json(&arguments);
+    }
     let off = off(&resumed["after"]);
     assert!(off < 0.1 && resumed["applied"] == true, "{what}: {resumed} of {reference}");
     if !kept {

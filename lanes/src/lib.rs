@@ -1,12 +1,19 @@
-//! Instructions of the Cortex-M4F that stable Rust offers only as assembly: two signed 16-bit numbers in a word, worked
+//! Instructions of Cortex-M cores that stable Rust offers only as assembly: two signed 16-bit numbers in a word, worked
 //! on at once, and the FPU's square root.
 //!
-//! Everywhere else each function is the same in portable Rust ([`portable`]). This crate is the only place outside the
-//! board layer with `unsafe`: the core forbids it. A test compares the portable functions with plain arithmetic on any
-//! host, and the emulated target's digest compares the instructions with the portable functions.
+//! On every other core each function is portable Rust ([`portable`]) and gives the same bits. The build script chooses:
+//!
+//! - DSP instructions: on `thumbv7em-*`, and on `thumbv8m.main-*` where the flags name a core that has them
+//!   (`-C target-cpu=cortex-m33`) or the feature (`-C target-feature=+dsp`);
+//! - the FPU's square root: on the M profile's targets that end with `eabihf`.
+//!
+//! This crate is the only place outside the board layer with `unsafe`: the core forbids it. A test compares the portable
+//! functions with plain arithmetic on any host, and digests of emulated cores compare the instructions with the portable
+//! functions.
 #![no_std]
 
 #[cfg(not(target_os = "none"))]
+#[cfg_attr(test, macro_use)]
 extern crate std;
 
 mod rows;
@@ -15,6 +22,12 @@ pub use rows::{
     BOOST_BITS, CODE_BITS, Codes, Common, GAIN_BITS, Row, TARE_BITS, Total, codes_at, each_pair, filled, moment_bits,
     pairs, pass, place, portable_pass, sum_drop,
 };
+
+/// True if this build uses the DSP instructions.
+pub const DSP: bool = cfg!(dsp);
+
+/// True if this build uses the FPU's square root.
+pub const FPU: bool = cfg!(fpu);
 
 /// The sign bits of both lanes.
 pub const SIGNS: u32 = 0x8000_8000;
@@ -78,29 +91,42 @@ pub mod portable {
         sum.wrapping_add(((a as i64 * b as i64) >> 32) as i32)
     }
 
-    /// See [`super::near_root`].
+    /// Square root in single precision, rounded to nearest: with [`libm`] where there is neither `std` nor an FPU.
     #[cfg(not(target_os = "none"))]
+    #[inline(always)]
+    fn sqrt(x: f32) -> f32 {
+        x.sqrt()
+    }
+    #[cfg(all(target_os = "none", not(fpu)))]
+    use libm::sqrtf as sqrt;
+
+    /// See [`super::near_root`].
+    #[cfg(not(fpu))]
     #[inline(always)]
     pub fn near_root(x: u32) -> u32 {
         // Each operation is rounded as IEEE 754 demands, as on the target; the scale is a power of two.
-        ((x as f32).sqrt() * 65_536.0) as u32
+        (sqrt(x as f32) * 65_536.0) as u32
     }
 
     /// See [`super::root_and_product`].
-    #[cfg(not(target_os = "none"))]
+    #[cfg(not(fpu))]
     #[inline(always)]
     pub fn root_and_product(x: u32, y: u32, gain: u64) -> (u32, u64) {
-        ((x as f32 * y as f32).sqrt() as u32, u64::from(x).wrapping_mul(gain))
+        (sqrt(x as f32 * y as f32) as u32, u64::from(x).wrapping_mul(gain))
     }
 }
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
-pub use instructions::{add_high, dot, excess, near_root, root_and_product, sub};
-#[cfg(not(all(target_arch = "arm", target_os = "none")))]
-pub use portable::{add_high, dot, excess, near_root, root_and_product, sub};
+#[cfg(dsp)]
+pub use dsp::{add_high, dot, excess, sub};
+#[cfg(fpu)]
+pub use fpu::{near_root, root_and_product};
+#[cfg(not(dsp))]
+pub use portable::{add_high, dot, excess, sub};
+#[cfg(not(fpu))]
+pub use portable::{near_root, root_and_product};
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
-mod instructions {
+#[cfg(dsp)]
+mod dsp {
     use core::arch::asm;
 
     /// a - b in each lane, wrapping (SSUB16).
@@ -144,6 +170,11 @@ mod instructions {
         }
         result
     }
+}
+
+#[cfg(fpu)]
+mod fpu {
+    use core::arch::asm;
 
     /// sqrt(x) in Q16, saturated, to within 2^-23 of itself for x from 2^30 (VSQRT, in single precision).
     #[inline(always)]
@@ -190,8 +221,37 @@ mod instructions {
 }
 
 #[cfg(test)]
+#[path = "../build.rs"]
+#[expect(dead_code, reason = "cargo calls main")]
+mod build;
+
+#[cfg(test)]
 mod tests {
-    use super::{high, larger, low, pair, portable};
+    use super::{build, high, larger, low, pair, portable};
+
+    #[test]
+    fn dsp_instructions_are_used_where_target_or_flags_show_them() {
+        let has = |target: &str, flags: &[&str]| build::has_dsp(target, "", &flags.join("\x1f"));
+        assert!(has("thumbv7em-none-eabi", &[]) && has("thumbv7em-none-eabihf", &["-C", "opt-level=s"]));
+        for target in ["thumbv6m-none-eabi", "thumbv7m-none-eabi", "thumbv8m.main-none-eabihf"] {
+            assert!(!has(target, &[]), "{target}");
+        }
+        let m33 = "thumbv8m.main-none-eabi";
+        for flags in [
+            &["-C", "target-cpu=cortex-m33"][..],
+            &["-Ctarget-cpu=cortex-m33"],
+            &["--codegen=target-cpu=cortex-m33"],
+            &["-C", "target-feature=+dsp"],
+            &["-C", "target-cpu=cortex-m3", "-Ctarget-cpu=cortex-m55"],
+        ] {
+            assert!(has(m33, flags), "{flags:?}");
+        }
+        assert!(!has(m33, &["-C", "target-cpu=cortex-m33", "-C", "target-feature=+fp-armv8,-dsp"]));
+        assert!(!has(m33, &["-C", "target-cpu=cortex-m33", "-C", "target-cpu=cortex-m3"]));
+        assert!(!has("thumbv6m-none-eabi", &["-C", "target-cpu=cortex-m4"]));
+        assert!(!has("thumbv7a-none-eabi", &["-C", "target-feature=+dsp"]));
+        assert!(build::has_dsp(m33, "dsp,mclass", ""));
+    }
 
     #[test]
     fn lanes_do_not_touch_each_other() {
@@ -209,6 +269,17 @@ mod tests {
                 let exact = 7 + i64::from(a) * i64::from(b) + i64::from(c) * i64::from(d);
                 assert_eq!(portable::dot(pair(a, c), pair(b, d), 7), exact as i32);
             }
+        }
+    }
+
+    #[test]
+    fn libm_gives_the_same_roots_as_std() {
+        // The mantissa of a root depends on the mantissa and on the lowest bit of the exponent: all of these.
+        let all = 0x3f80_0000..0x4080_0000;
+        // And every exponent of a product, with the mantissas at both ends.
+        let exponents = (127..192).flat_map(|exponent| [exponent << 23, (exponent << 23) + 1, (exponent << 23) - 1]);
+        for x in all.chain(exponents).chain([0]).map(f32::from_bits) {
+            assert_eq!(libm::sqrtf(x).to_bits(), x.sqrt().to_bits(), "{x}");
         }
     }
 

@@ -234,12 +234,12 @@ pub fn portable_pass<const ROWS: usize, const COLUMNS: usize>(
     total
 }
 
-#[cfg(not(all(target_arch = "arm", target_os = "none")))]
+#[cfg(not(dsp))]
 pub use portable_pass as pass;
 
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(dsp)]
 mod instructions;
-#[cfg(all(target_arch = "arm", target_os = "none"))]
+#[cfg(dsp)]
 pub use instructions::pass;
 
 #[cfg(test)]

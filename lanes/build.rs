@@ -8,16 +8,8 @@ use std::env;
 
 /// M-profile cores with the DSP instructions, as `-C target-cpu` names them. The instructions are an option of the
 /// Cortex-M33; the compiler takes a named one to have them.
-const DSP_CORES: [&str; 8] = [
-    "cortex-m4",
-    "cortex-m7",
-    "cortex-m33",
-    "cortex-m35p",
-    "cortex-m52",
-    "cortex-m55",
-    "cortex-m85",
-    "star-mc1",
-];
+const DSP_CORES: [&str; 8] =
+    ["cortex-m4", "cortex-m7", "cortex-m33", "cortex-m35p", "cortex-m52", "cortex-m55", "cortex-m85", "star-mc1"];
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

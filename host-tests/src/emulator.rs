@@ -1,4 +1,4 @@
-//! QEMU with an emulated Cortex-M4F, for images that report by semihosting.
+//! QEMU with an emulated core, for images that report by semihosting.
 
 use std::error::Error;
 use std::fs;
@@ -9,32 +9,42 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-const PROGRAM: &str = "qemu-system-arm";
+/// The firmware's core: an STM32F405, a board that QEMU 7 knows as well. An instruction takes 8 ns of virtual time: more
+/// than a tick of SysTick, so every one of them counts.
+const CORTEX_M4F: &str = "qemu-system-arm -M netduinoplus2 -icount shift=3,align=off,sleep=off";
 /// The image's own watchdog ends a hang in virtual time. This one, by the clock on the wall, is for an image that
 /// cannot even do that: the slowest machine takes a small part of it.
 const HUNG: Duration = Duration::from_secs(7200);
 
-/// Runs an image in a folder with the words of its command line to its end, and returns what it wrote.
+/// Runs an image for the firmware's core in a folder with the words of its command line to its end, and returns what it wrote.
 ///
 /// # Errors
 /// The emulator does not start, the image reports a failure, or hangs.
 pub fn run(image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
+    run_on(CORTEX_M4F, image, folder, words)
+}
+
+/// Runs an image on an emulator: its program and its options for the board, separated by spaces.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(emulator: &str, image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
+    let mut options = emulator.split(' ');
+    let program = options.next().unwrap_or_default();
     let image = fs::canonicalize(image).map_err(|error| format!("the image {}: {error}", image.display()))?;
     // A comma within a word is written twice.
     let words: Vec<_> = words.iter().map(|word| format!(",arg={}", word.replace(',', ",,"))).collect();
-    let mut child = Command::new(PROGRAM)
+    let mut child = Command::new(program)
         .current_dir(folder)
-        // An STM32F405; a board that QEMU 7 knows as well.
-        .args(["-M", "netduinoplus2", "-display", "none", "-monitor", "none", "-serial", "none"])
-        // An instruction takes 8 ns of virtual time: more than a tick of SysTick, so every one of them counts.
-        .args(["-icount", "shift=3,align=off,sleep=off", "-semihosting-config"])
+        .args(options)
+        .args(["-display", "none", "-monitor", "none", "-serial", "none", "-semihosting-config"])
         .arg(format!("enable=on,target=native{}", words.concat()))
         .arg("-kernel")
         .arg(image)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .spawn()
-        .map_err(|error| format!("cannot start {PROGRAM}: {error}; looked in PATH"))?;
+        .map_err(|error| format!("cannot start {program}: {error}; looked in PATH"))?;
     let (sender, receiver) = mpsc::channel();
     if let Some(mut stdout) = child.stdout.take() {
         thread::spawn(move || {

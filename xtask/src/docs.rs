@@ -2,7 +2,7 @@
 
 use crate::{
     console::{self, Console},
-    figures, host, image,
+    cores, figures, host, image,
     package::PACKAGES,
     paths,
     toolchain::Choice,
@@ -49,6 +49,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     for (path, example) in GENERATED {
         renew(path, &print(example, None)?, args.check, &mut stale, console)?;
     }
+    renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
     for package in PACKAGES {
         let items = tools::public_items(package, console)?;
         renew(&format!("docs/api/{package}.txt"), &items, args.check, &mut stale, console)?;
@@ -87,7 +88,8 @@ fn print(example: &str, argument: Option<&Path>) -> Result<String> {
     console::output(&mut command)
 }
 
-fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
+/// Writes a file that is not fresh, or adds it to the stale ones.
+pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, console: &Console) -> Result<()> {
     let file = paths::root().join(path);
     if fs::read_to_string(&file).is_ok_and(|present| present == text) {
         console.print(&format!("fresh    {path}"));

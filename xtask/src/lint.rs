@@ -10,8 +10,14 @@ use anyhow::{Result, ensure};
 use std::process::Command;
 
 /// Every image that is emulated or linked as a proof, and its feature.
-const IMAGES: [(&str, &str); 5] =
-    [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
+const IMAGES: [(&str, &str); 6] = [
+    ("qemu", "qemu"),
+    ("cores", "cores"),
+    ("panic-free", "proof"),
+    ("timing", "timing"),
+    ("timing-check", "timing"),
+    ("study", "study"),
+];
 
 /// Runs all checks that are no tests.
 ///

@@ -5,6 +5,7 @@ mod bringup;
 mod browser;
 mod cluster;
 mod console;
+mod cores;
 mod debugger;
 mod demo;
 mod docs;
@@ -102,6 +103,9 @@ enum Command {
     Bringup(bringup::Args),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
     Qemu(qemu::Args),
+    /// Run the loop on every core that QEMU emulates, compare with the host, and renew the table of docs/porting.md
+    #[command(after_help = "Examples:\n  cargo xtask cores")]
+    Cores,
     /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
     Timing(timing::Args),
     /// Measure what accuracy costs in time: every way to work out every kernel, with tables and pictures
@@ -164,6 +168,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Bringup(args) => bringup::run(args, toolchain, console),
         Command::Qemu(args) => qemu::run(args, toolchain, console),
+        Command::Cores => cores::run(toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
         Command::Study(args) => study::run(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
@@ -184,7 +189,7 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
 fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     toolchain::ensure(choice, console)?;
     timing::ensure(console)?;
-    qemu::ensure(console)?;
+    cores::ensure(console)?;
     python::ensure(console)?;
     sensor::script("fit.py", console)?;
     cluster::ensure(console)?;

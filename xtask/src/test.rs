@@ -1,7 +1,7 @@
 //! Every test, a stage each.
 
 use crate::{
-    bringup, browser, console, host, image, proof, python, qemu, sensor,
+    bringup, browser, console, cores, host, image, proof, python, qemu, sensor,
     size::Sizes,
     stages::Stages,
     timing,
@@ -39,6 +39,9 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("panic-free proof", |console| proof::run(choice, console));
     stages.stage("emulated Cortex-M4F against this machine", |console| qemu::test(choice, console));
+    stages.stage("emulated cores of other boards against this machine", |console| {
+        cores::page(choice, console).map(|page| console.print(&cores::table(&page)))
+    });
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;

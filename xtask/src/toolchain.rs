@@ -30,32 +30,49 @@ pub enum Toolchain {
 }
 
 impl Toolchain {
-    /// `cargo <subcommand>` for the target.
+    /// `cargo <subcommand>` for the firmware's target.
     pub fn cargo(self, subcommand: &str) -> Command {
+        self.cargo_for(subcommand, TARGET, &[])
+    }
+
+    /// `cargo <subcommand>` for a target, with flags for the compiler.
+    pub fn cargo_for(self, subcommand: &str, target: &str, flags: &[&str]) -> Command {
         let mut command = match self {
             Self::Native => console::cargo(subcommand),
             Self::Debian => {
                 let mut command = Command::new("/usr/bin/cargo");
                 command.arg(subcommand).arg("-Zbuild-std=core");
                 command.env("RUSTC", "/usr/bin/rustc").env("RUSTC_BOOTSTRAP", "1");
-                command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld");
+                let variable = target.replace(['-', '.'], "_").to_uppercase();
+                command.env(format!("CARGO_TARGET_{variable}_LINKER"), "ld.lld");
                 // Cargo put the libraries of the toolchain that runs this program there.
                 command.env_remove("LD_LIBRARY_PATH").env_remove("RUSTUP_TOOLCHAIN").env_remove("CARGO");
-                command.arg("--target-dir").arg(self.target_dir());
                 command
             }
         };
-        command.args(["--target", TARGET]);
-        if let Some(short) = short_paths() {
-            // Added to the flags of `.cargo/config.toml`.
-            command.arg("--config").arg(format!("target.{TARGET}.rustflags=[{short:?}]"));
+        command.args(["--target", target]).arg("--target-dir").arg(self.flagged_dir(flags));
+        let flags: Vec<_> = short_paths().into_iter().chain(flags.iter().map(|flag| (*flag).into())).collect();
+        if !flags.is_empty() {
+            // Added to the flags of `.cargo/config.toml`. Cargo does not find a target by a name with a dot here.
+            let key = if target.contains('.') { "'cfg(target_os = \"none\")'" } else { target };
+            command.arg("--config").arg(format!("target.{key}.rustflags={flags:?}"));
         }
         command
     }
 
-    /// Where its release images lie.
+    /// Folder of its release images for the firmware's target.
     pub fn images(self) -> PathBuf {
-        self.target_dir().join(TARGET).join("release")
+        self.images_for(TARGET, &[])
+    }
+
+    /// Folder of its release images for a target, built with these flags.
+    pub fn images_for(self, target: &str, flags: &[&str]) -> PathBuf {
+        self.flagged_dir(flags).join(target).join("release")
+    }
+
+    /// Builds with other flags in one folder would rebuild each other's work, too.
+    fn flagged_dir(self, flags: &[&str]) -> PathBuf {
+        if flags.is_empty() { self.target_dir() } else { self.target_dir().join("flagged") }
     }
 
     /// Two compilers in one folder would rebuild each other's work.
@@ -84,27 +101,37 @@ pub fn sources() -> Option<PathBuf> {
 /// # Errors
 /// Neither rustup nor Debian could provide one: says what was tried and what to do.
 pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
+    ensure_for(choice, &[TARGET], "the firmware is compiled for it", console)
+}
+
+/// Finds or installs a compiler for some targets.
+///
+/// # Errors
+/// As [`ensure`].
+pub fn ensure_for(choice: Choice, targets: &[&str], why: &str, console: &mut Console) -> Result<Toolchain> {
     if choice == Choice::Debian {
         return debian(console);
     }
-    if has_target() {
+    let missing: Vec<_> = targets.iter().copied().filter(|target| !has_target(target)).collect();
+    if missing.is_empty() {
         return Ok(Toolchain::Native);
     }
     // Debian's compiler once taken is taken again: asking an unreachable server each time would cost minutes.
     if choice == Choice::Auto && Toolchain::Debian.target_dir().is_dir() && apt::all_installed(&DEBIAN_PACKAGES) {
         return debian(console);
     }
-    let Err(rustup) = add_target(console) else { return Ok(Toolchain::Native) };
+    let Err(rustup) = add_targets(&missing, why, console) else { return Ok(Toolchain::Native) };
     if choice == Choice::Rustup {
         return Err(rustup);
     }
     console.say(&format!("{rustup:#}: taking Debian's Rust instead."));
     debian(console).map_err(|debian| {
         anyhow!(
-            "no compiler for {TARGET}.\n\
+            "no compiler for {}.\n\
              - rustup: {rustup:#}\n\
              - Debian: {debian:#}\n\
-             Open the way to static.rust-lang.org or to a Debian mirror, or do one of the two by hand."
+             Open the way to static.rust-lang.org or to a Debian mirror, or do one of the two by hand.",
+            missing.join(", ")
         )
     })
 }
@@ -115,10 +142,10 @@ fn debian(console: &mut Console) -> Result<Toolchain> {
     Ok(Toolchain::Debian)
 }
 
-/// Whether the compiler that cargo takes has `core` for the target.
-fn has_target() -> bool {
+/// True if the compiler that cargo takes has `core` for the target.
+fn has_target(target: &str) -> bool {
     let rustc = env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
-    let Ok(output) = Command::new(rustc).args(["--print", "target-libdir", "--target", TARGET]).output() else {
+    let Ok(output) = Command::new(rustc).args(["--print", "target-libdir", "--target", target]).output() else {
         return false;
     };
     let folder = PathBuf::from(String::from_utf8_lossy(&output.stdout).trim());
@@ -126,15 +153,16 @@ fn has_target() -> bool {
     files.flatten().any(|file| file.file_name().to_string_lossy().starts_with("libcore-"))
 }
 
-fn add_target(console: &mut Console) -> Result<()> {
+fn add_targets(targets: &[&str], why: &str, console: &mut Console) -> Result<()> {
     if paths::find_program("rustup").is_none() {
         bail!("there is no rustup in PATH");
     }
-    console.say(&format!("Adding rustup's target {TARGET}: the firmware is compiled for it."));
-    let added = console.prepare(Command::new("rustup").args(["target", "add", TARGET]));
+    let list = targets.join(", ");
+    console.say(&format!("Adding rustup's target {list}: {why}."));
+    let added = console.prepare(Command::new("rustup").args(["target", "add"]).args(targets));
     added.context("the Rust distribution server (static.rust-lang.org) gave no target")?;
-    if !has_target() {
-        bail!("rustup added {TARGET} to another toolchain than the one that cargo takes");
+    if !targets.iter().all(|target| has_target(target)) {
+        bail!("rustup added {list} to another toolchain than the one that cargo takes");
     }
     Ok(())
 }

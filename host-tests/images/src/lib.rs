@@ -16,6 +16,8 @@ use fingertip::state::Limits;
 use fingertip::touch::{Felt, Touch};
 use fingertip::units::Millimetres;
 
+pub mod closed_loop;
+
 pub mod record;
 
 pub mod same_bits;

@@ -1,0 +1,46 @@
+//! Prints `docs/porting.md` with its table of cores. The argument is a file with a line for each core, as `cargo xtask
+//! docs` writes it: name, target, flags, bytes, emulator and image, separated by tabs.
+//!
+//! Fails if the digest of an emulated core differs from this machine's.
+
+use host_tests::{emulator, page::Page};
+use images::closed_loop;
+use std::{collections::BTreeMap, env, error::Error, fmt::Write as _, fs, path::Path};
+
+const PAGE: Page = Page { name: "docs/porting.md", tables: "cores", command: "cargo xtask docs" };
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let list = fs::read_to_string(env::args_os().nth(1).ok_or("usage: porting-page FILE")?)?;
+    let (host, _) = closed_loop::run(|finger, frame, sense, command| finger.step(frame, sense, command).0)?;
+    let mut table =
+        "| core | target | flags | DSP | FPU | instructions per frame, mean | largest | flash of the program |\n\
+        | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+            .to_owned();
+    for line in list.lines() {
+        let [name, target, flags, bytes, emulator, image] = line.split('\t').collect::<Vec<_>>()[..] else {
+            return Err(format!("not a line of six columns: {line}").into());
+        };
+        let text = emulator::run_on(emulator, Path::new(image), Path::new("."), &[])
+            .map_err(|error| format!("{name}, {target}: {error}"))?;
+        let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
+        let figure = |name| report.get(name).copied().ok_or_else(|| format!("{target} reported no {name}:\n{text}"));
+        let emulated = figure("digest")?;
+        if emulated != format!("{host:016x}") {
+            return Err(
+                format!("FAILED: {name}, {target}: digest {emulated}, and this machine's is {host:016x}").into()
+            );
+        }
+        let used = |name| figure(name).map(|used| if used == "1" { "yes" } else { "no" });
+        let flags = if flags.is_empty() { "default".into() } else { format!("`{flags}`") };
+        writeln!(
+            table,
+            "| {name} | `{target}` | {flags} | {} | {} | {} | {} | {bytes} bytes |",
+            used("dsp")?,
+            used("fpu")?,
+            figure("instructions_mean")?,
+            figure("instructions_max")?,
+        )?;
+    }
+    print!("{}", PAGE.renewed(&table)?.1);
+    Ok(())
+}

@@ -1,0 +1,124 @@
+//! The closed loop of the crate's example on every core that QEMU emulates: each gives the same bits as this machine.
+
+use crate::{
+    apt,
+    console::{self, Console},
+    docs, host,
+    image::Image,
+    paths, qemu,
+    toolchain::{self, Choice, TARGET},
+};
+use anyhow::{Context, Result};
+use std::{fmt::Write as _, fs};
+
+/// The page with the table of cores, and the example that runs the images and prints it.
+pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
+const RISCV_PROGRAM: &str = "qemu-system-riscv32";
+const WHY: &str = "running the loop on emulated cores";
+
+/// A core, how the image is built for it, and what runs the image.
+struct Core {
+    name: &'static str,
+    target: &'static str,
+    flags: &'static [&'static str],
+    /// QEMU's board.
+    board: &'static str,
+}
+
+const CORES: [Core; 9] = [
+    Core { name: "Cortex-M0", target: "thumbv6m-none-eabi", flags: &[], board: "microbit" },
+    Core { name: "Cortex-M3", target: "thumbv7m-none-eabi", flags: &[], board: "mps2-an385" },
+    Core { name: "Cortex-M4", target: "thumbv7em-none-eabi", flags: &[], board: "mps2-an386" },
+    Core { name: "Cortex-M4F", target: TARGET, flags: &[], board: "netduinoplus2" },
+    Core { name: "Cortex-M33", target: "thumbv8m.main-none-eabi", flags: &[], board: "mps2-an505" },
+    Core { name: "Cortex-M33F", target: "thumbv8m.main-none-eabihf", flags: &[], board: "mps2-an505" },
+    Core {
+        name: "Cortex-M33F",
+        target: "thumbv8m.main-none-eabihf",
+        flags: &["-Ctarget-cpu=cortex-m33"],
+        board: "mps2-an505",
+    },
+    Core { name: "RV32IMC", target: "riscv32imc-unknown-none-elf", flags: &[], board: "virt" },
+    Core { name: "RV32IMAC", target: "riscv32imac-unknown-none-elf", flags: &[], board: "virt" },
+];
+
+impl Core {
+    /// The emulator and its options. On Arm an instruction takes 64 ns of virtual time, a tick of SysTick on the slowest
+    /// of the boards.
+    fn emulator(&self) -> String {
+        let Self { target, board, .. } = self;
+        if target.starts_with("riscv") {
+            format!("{RISCV_PROGRAM} -M {board} -bios none -icount shift=0,align=off,sleep=off")
+        } else {
+            format!("qemu-system-arm -M {board} -icount shift=6,align=off,sleep=off")
+        }
+    }
+}
+
+/// Runs the loop on every core and writes the table.
+///
+/// # Errors
+/// As [`page`], or the page cannot be written.
+pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
+    let page = page(choice, console)?;
+    console.print(&table(&page));
+    docs::renew(PAGE.0, &page, false, &mut Vec::new(), console)
+}
+
+/// Builds the image for every core, runs each, and compares its digest with this machine's. Returns the text of the page
+/// with their table.
+///
+/// # Errors
+/// No compiler or emulator, an image does not build or fails, or a digest differs.
+pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
+    ensure(console)?;
+    let targets = CORES.map(|core| core.target);
+    let toolchain =
+        toolchain::ensure_for(choice, &targets, "the loop is built for other cores than the board's", console)?;
+    let folder = paths::made("cores")?;
+    let mut list = String::new();
+    for (number, core) in CORES.iter().enumerate() {
+        let mut command = toolchain.cargo_for("build", core.target, core.flags);
+        command.args(["--package", "images", "--bin", "cores", "--features", "cores", "--release"]);
+        console.build(&mut command, &format!("the loop for {}", core.target), crate::progress::IMAGE)?;
+        // Two boards have the same target and name.
+        let elf = folder.join(format!("{number}.elf"));
+        fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
+            .with_context(|| paths::shown(&elf))?;
+        let bytes = Image::read(&elf)?.bytes.len();
+        // A string takes every write.
+        let _ = writeln!(
+            list,
+            "{}\t{}\t{}\t{bytes}\t{}\t{}",
+            core.name,
+            core.target,
+            core.flags.join(" "),
+            core.emulator(),
+            elf.display()
+        );
+    }
+    let file = folder.join("list.tsv");
+    fs::write(&file, list).with_context(|| paths::shown(&file))?;
+    let mut command = host::cargo("run", "host-tests");
+    command.args(["--quiet", "--example", PAGE.1, "--"]).arg(&file);
+    console::output(&mut command)
+}
+
+/// The lines of the page's table.
+pub fn table(page: &str) -> String {
+    let lines = page.lines().skip_while(|line| !line.starts_with("<!-- cores"));
+    lines.skip(1).take_while(|line| line.starts_with('|')).collect::<Vec<_>>().join("\n")
+}
+
+/// Makes sure of the emulators.
+///
+/// # Errors
+/// One is missing and cannot be installed.
+pub fn ensure(console: &mut Console) -> Result<()> {
+    qemu::ensure(console)?;
+    match paths::find_program(RISCV_PROGRAM) {
+        Some(_) => Ok(()),
+        // Of the same version as the emulator for Arm: both share files.
+        None => apt::newest(&["qemu-system-riscv"], WHY, console),
+    }
+}

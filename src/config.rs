@@ -91,11 +91,11 @@ pub struct Config {
 
     /// Share of a held reading that is creep in the end, Q32; 0 where none is taken off.
     pub creep_share_q32: u32,
-    /// Share of its way that the creep goes in a frame, Q32: at most 1/64.
+    /// Share of its way that the creep goes in a frame, Q32: at most a half.
     pub creep_leak_q32: u32,
 
-    /// Frame time in s, Q39.
-    pub frame_s_q39: i32,
+    /// Frame time in s, Q37: below 1/64 s. Of frames that take longer than 61 us, single precision has no bit more.
+    pub frame_s_q37: i32,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
     /// The same: the encoder's resolution.
@@ -242,8 +242,8 @@ impl Config {
             contact_off: newtons(p.contact_off_mn),
             touch_line: narrow(0.5e-3 * p.contact_on_mn as f32 / newtons_per_sum),
             creep_share_q32: (creep / (1.0 + creep) * exp2(32)) as u32,
-            creep_leak_q32: (frame_s * (1.0 + creep) / (p.creep_time_ms as f32 * 1e-3) * exp2(32)).min(exp2(26)) as u32,
-            frame_s_q39: narrow(frame_s * exp2(39)),
+            creep_leak_q32: (frame_s * (1.0 + creep) / (p.creep_time_ms as f32 * 1e-3) * exp2(32)).min(exp2(31)) as u32,
+            frame_s_q37: narrow(frame_s * exp2(37)),
             mm_per_count_q40,
             count: Millimetres(I8F24::from_bits(narrow(mm_per_count * exp2(24)))),
             jump: narrow((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24))

@@ -22,7 +22,7 @@
 //! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so
 //! a change of mode is bumpless.
 
-mod arith;
+pub(crate) mod arith;
 pub mod creep;
 pub mod drive;
 pub mod observer;

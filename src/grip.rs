@@ -11,6 +11,7 @@
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::SpeedLoop;
+use crate::control::arith::product;
 use crate::control::creep::Creep;
 use crate::control::profile::Reference;
 use crate::state::{Limits, Mode};
@@ -267,6 +268,5 @@ fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> Millim
 
 /// How far the tip moved since the middle of the scan: half a frame.
 fn since_scan(speed: MillimetresPerSecond, config: &Config) -> I8F24 {
-    let bits = (i64::from(speed.to_bits()) * i64::from(config.frame_s_q39)) >> 32;
-    I8F24::from_bits(bits as i32)
+    I8F24::from_bits(product(speed.to_bits(), config.frame_s_q37, 30))
 }

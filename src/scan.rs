@@ -2,30 +2,96 @@
 
 use crate::units::{CoreCycles, ScanTicks};
 
-/// What a board's clocks and converters make of a scan: a figure of the board, not of the core.
+/// Nanoseconds in a second.
+const NS: u64 = 1_000_000_000;
+
+/// Clocks, converters and frame time of a board.
+///
+/// A board with two converters of 48 MHz and a timer of 150 MHz, which asks for 2,000 frames in a second:
+///
+/// ```
+/// use fingertip::config::Shaped;
+/// use fingertip::params::Params;
+/// use fingertip::scan::Clocks;
+///
+/// const QUICK: Clocks = Clocks {
+///     timer_hz: 150_000_000,
+///     core_hz: 150_000_000,
+///     converter_hz: 48_000_000,
+///     converters: 2,
+///     sample_cycles: &[15],
+///     conversion_cycles: 81,
+///     trigger_cycles: 2,
+///     slot_step: 1,
+///     frame_ns: Some(500_000),
+/// };
+/// let params = Params { pitch_um: 2_000, ..Params::DEFAULT };
+/// let timing = Shaped::<6, 4>::new(&params, &QUICK)?.timing;
+/// // Two conversions of 96 cycles follow each other in a slot: 194 cycles of the converters are 606.25 ticks.
+/// assert_eq!((timing.settle.0, timing.slot.0), (360, 967));
+/// // Seven slots take 6,769 ticks. The timer rests for the remainder of the 75,000 ticks.
+/// assert_eq!((timing.idle.0, timing.frame_ns), (68_231, 500_000));
+///
+/// // One converter, 32 columns, 200 frames in a second.
+/// let slow = Clocks { converters: 1, frame_ns: Some(5_000_000), ..QUICK };
+/// let params = Params { pitch_um: 900, ..Params::DEFAULT };
+/// let timing = Shaped::<16, 32>::new(&params, &slow)?.timing;
+/// assert_eq!((timing.slot.0, timing.frame_ns), (9_967, 5_000_000));
+///
+/// // The scan of all rows takes 1.13 ms, so 1 kHz is impossible.
+/// let refused = Shaped::<16, 32>::new(&params, &Clocks { frame_ns: Some(1_000_000), ..slow }).unwrap_err();
+/// assert_eq!(refused.to_string(), "frame_ns of 1000000: the scan alone takes 1129594");
+/// # Ok::<(), fingertip::config::ConfigError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Clocks {
-    /// Ticks of the scan's timer in a second; the timer counts a slot with 16 bits.
+    /// Frequency of the scan's timer, Hz, at least 100 kHz. The timer counts a slot with 16 bits.
     pub timer_hz: u32,
-    /// Cycles of the processor's core in a second.
+    /// Frequency of the processor's core, Hz, at least 100 kHz.
     pub core_hz: u32,
-    /// Ticks of the scan's timer in a cycle of the converters' clock.
-    pub ticks_per_converter_cycle: u32,
+    /// Frequency of the converters' clock, Hz, at least 100 kHz.
+    pub converter_hz: u32,
+    /// Number of converters, 1 or 2. Two convert a pair of columns at the same time, one converts them in turn.
+    pub converters: u32,
     /// Sampling times that the converters have, in their cycles.
     pub sample_cycles: &'static [u16],
     /// Converter cycles of a conversion, after sampling.
     pub conversion_cycles: u32,
     /// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
     pub trigger_cycles: u32,
-    /// A slot is a whole multiple of so many ticks, so that what a board keeps in step with the frames finds whole
-    /// ticks in it; 1, or 0, where nothing asks for it.
+    /// Slot and frame are whole multiples of this number of ticks, for a PWM that keeps step with the frames. 1 or 0
+    /// if the board has no such PWM.
     pub slot_step: u32,
+    /// Frame time, ns, at most 15 ms. `None` is the shortest that the scan allows. A longer frame has idle time behind
+    /// its last slot.
+    pub frame_ns: Option<u32>,
 }
 
+/// Least frequency of a clock, Hz.
+const HZ_LEAST: u32 = 100_000;
+/// Longest frame time that a board may ask for, ns. It lies a little below [`FRAMES_PER_S_LEAST`].
+const FRAME_NS_MAX: u32 = 15_000_000;
+/// The loop's numbers hold a frame time below 1/64 s.
+const FRAMES_PER_S_LEAST: u32 = 64;
+
 impl Clocks {
-    /// What is longer than the loop's 32 bits hold of a frame's time: 1/256 s.
-    const fn frame_too_long(&self) -> ScanTicks {
-        ScanTicks(self.timer_hz / 256)
+    /// Refuses the first number that no board has.
+    fn check(&self) -> Result<(), ScanError> {
+        let frame_ns = self.frame_ns.unwrap_or(1);
+        let (name, value, min, max) = if self.timer_hz < HZ_LEAST {
+            ("timer_hz", self.timer_hz, HZ_LEAST, u32::MAX)
+        } else if self.core_hz < HZ_LEAST {
+            ("core_hz", self.core_hz, HZ_LEAST, u32::MAX)
+        } else if self.converter_hz < HZ_LEAST {
+            ("converter_hz", self.converter_hz, HZ_LEAST, u32::MAX)
+        } else if !matches!(self.converters, 1 | 2) {
+            ("converters", self.converters, 1, 2)
+        } else if frame_ns == 0 || frame_ns > FRAME_NS_MAX {
+            ("frame_ns", frame_ns, 1, FRAME_NS_MAX)
+        } else {
+            return Ok(());
+        };
+        Err(ScanError::Clock { name, value, min, max })
     }
 }
 
@@ -41,6 +107,8 @@ pub struct ScanTiming {
     pub sample_cycles: u16,
     /// Rows of the array, and one slot with no row driven.
     pub slots: u16,
+    /// Idle time behind the last slot. It may exceed 16 bits.
+    pub idle: ScanTicks,
     /// From frame to frame, ns, rounded.
     pub frame_ns: u32,
     /// What control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left for
@@ -52,6 +120,17 @@ pub struct ScanTiming {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ScanError {
+    /// A number of [`Clocks`] is out of its range.
+    Clock {
+        /// The field of [`Clocks`].
+        name: &'static str,
+        /// Its value.
+        value: u32,
+        /// The least value allowed.
+        min: u32,
+        /// The largest value allowed.
+        max: u32,
+    },
     /// The converters have no such sampling time.
     SampleCycles {
         /// What was asked for.
@@ -71,11 +150,19 @@ pub enum ScanError {
         /// It must be less than this.
         end: u32,
     },
+    /// The frame time asked for is shorter than the scan.
+    FrameTooShort {
+        /// [`Clocks::frame_ns`].
+        frame_ns: u32,
+        /// Time of all slots, ns, rounded up.
+        scan_ns: u32,
+    },
 }
 
 impl core::fmt::Display for ScanError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
+            Self::Clock { name, value, min, max } => write!(f, "{name} of {value}: {min} to {max} are allowed"),
             Self::SampleCycles { cycles, allowed } => {
                 write!(f, "sample_cycles of {cycles}: {allowed:?} are allowed")
             }
@@ -85,6 +172,9 @@ impl core::fmt::Display for ScanError {
             Self::FrameTooLong { ticks, end } => {
                 write!(f, "settle_ns and sample_cycles make a frame of {ticks} ticks: less than {end} are allowed")
             }
+            Self::FrameTooShort { frame_ns, scan_ns } => {
+                write!(f, "frame_ns of {frame_ns}: the scan alone takes {scan_ns}")
+            }
         }
     }
 }
@@ -92,49 +182,65 @@ impl core::fmt::Display for ScanError {
 impl core::error::Error for ScanError {}
 
 impl ScanTiming {
-    /// The tightest scan of so many rows and columns that gives each row `settle_ns` before its conversions.
+    /// The tightest scan of an array that gives each row `settle_ns` before its conversions, and idle time up to the
+    /// frame time that the board asks for.
     ///
     /// # Errors
-    /// A sampling time that the converters lack, a slot beyond the timer's range, or a frame beyond the loop's.
+    /// A clock out of its range, a sampling time that the converters lack, a slot beyond the timer's range, a frame
+    /// beyond the loop's, or a frame time that is shorter than the scan.
     pub fn new(
         settle_ns: u32,
         sample_cycles: u16,
         [rows, columns]: [usize; 2],
         clocks: &Clocks,
     ) -> Result<Self, ScanError> {
+        clocks.check()?;
         let allowed = clocks.sample_cycles;
         if !allowed.contains(&sample_cycles) {
             return Err(ScanError::SampleCycles { cycles: sample_cycles, allowed });
         }
-        let settle = (u64::from(settle_ns) * u64::from(clocks.timer_hz)).div_ceil(1_000_000_000);
+        let [timer_hz, core_hz, converter_hz] = [clocks.timer_hz, clocks.core_hz, clocks.converter_hz].map(u64::from);
+        let settle = (u64::from(settle_ns) * timer_hz).div_ceil(NS);
         let conversion = u64::from(sample_cycles) + u64::from(clocks.conversion_cycles);
-        let cycles = lanes::pairs(columns) as u64 * conversion + u64::from(clocks.trigger_cycles);
-        let needed = cycles.saturating_mul(clocks.ticks_per_converter_cycle.into()).saturating_add(settle);
-        let step = u64::from(clocks.slot_step.max(1));
-        let slot = needed.div_ceil(step).saturating_mul(step);
-        if slot > u64::from(u16::MAX) {
-            return Err(ScanError::SlotTooLong { ticks: u32::try_from(slot).unwrap_or(u32::MAX) });
+        let conversions = if clocks.converters == 1 { columns } else { lanes::pairs(columns) };
+        let cycles = conversions as u64 * conversion + u64::from(clocks.trigger_cycles);
+        // Cycles that do not fit 32 bits are too many ticks by any clocks.
+        let needed = settle + (cycles.min(u32::MAX.into()) * timer_hz).div_ceil(converter_hz);
+        let step = clocks.slot_step.max(1);
+        let slot = u32::try_from(needed).unwrap_or(u32::MAX).div_ceil(step).saturating_mul(step);
+        if slot > u32::from(u16::MAX) {
+            return Err(ScanError::SlotTooLong { ticks: slot });
         }
         let slots = rows as u16 + 1;
-        let frame = slot as u32 * u32::from(slots);
-        let end = clocks.frame_too_long().0;
+        let scan = slot * u32::from(slots);
+        let mut frame = scan;
+        if let Some(frame_ns) = clocks.frame_ns {
+            let ticks = (u64::from(frame_ns) * timer_hz / NS) as u32;
+            frame = (ticks + step / 2) / step * step;
+            if frame < scan {
+                let scan_ns = (u64::from(scan) * NS).div_ceil(timer_hz) as u32;
+                return Err(ScanError::FrameTooShort { frame_ns, scan_ns });
+            }
+        }
+        let end = clocks.timer_hz / FRAMES_PER_S_LEAST;
         if frame >= end {
             return Err(ScanError::FrameTooLong { ticks: frame, end });
         }
-        let [timer_hz, core_hz, wide] = [clocks.timer_hz, clocks.core_hz, frame].map(u64::from);
+        let wide = u64::from(frame);
         Ok(Self {
             settle: ScanTicks(settle as u32),
-            slot: ScanTicks(slot as u32),
+            slot: ScanTicks(slot),
             sample_cycles,
             slots,
-            frame_ns: ((wide * 1_000_000_000 + timer_hz / 2) / timer_hz.max(1)) as u32,
-            deadline: CoreCycles((wide * core_hz / timer_hz.max(1) / 4 * 3) as u32),
+            idle: ScanTicks(frame - scan),
+            frame_ns: ((wide * NS + timer_hz / 2) / timer_hz) as u32,
+            deadline: CoreCycles((wide * core_hz / timer_hz / 4 * 3) as u32),
         })
     }
 
     /// From frame to frame.
     pub const fn frame(self) -> ScanTicks {
-        ScanTicks(self.slot.0 * self.slots as u32)
+        ScanTicks(self.slot.0 * self.slots as u32 + self.idle.0)
     }
 
     /// The longest time, at most `longest`, that fits a whole number of times into a frame.
@@ -150,15 +256,18 @@ impl ScanTiming {
 mod tests {
     use super::*;
     use crate::params::Params;
+    use std::string::ToString;
 
     const CLOCKS: Clocks = Clocks {
         timer_hz: 168_000_000,
         core_hz: 168_000_000,
-        ticks_per_converter_cycle: 8,
+        converter_hz: 21_000_000,
+        converters: 2,
         sample_cycles: &[3, 15, 28],
         conversion_cycles: 12,
         trigger_cycles: 5,
         slot_step: 1,
+        frame_ns: None,
     };
 
     fn timing(settle_ns: u32, sample_cycles: u16, shape: [usize; 2]) -> Result<ScanTiming, ScanError> {
@@ -179,7 +288,8 @@ mod tests {
         assert!(matches!(timing(2_000, 16, [10, 10]), Err(ScanError::SampleCycles { cycles: 16, .. })));
         assert!(matches!(timing(400_000, 15, [10, 10]), Err(ScanError::SlotTooLong { .. })));
         assert!(matches!(timing(u32::MAX, 15, [10, 10]), Err(ScanError::SlotTooLong { .. })));
-        assert!(matches!(timing(300_000, 15, [16, 16]), Err(ScanError::FrameTooLong { .. })));
+        let slow = ScanTiming::new(1_000_000, 15, [16, 16], &Clocks { timer_hz: 1_000_000, ..CLOCKS });
+        assert!(matches!(slow, Err(ScanError::FrameTooLong { ticks: 17_187, end: 15_625 })), "{slow:?}");
     }
 
     #[test]
@@ -220,7 +330,60 @@ mod tests {
 
     #[test]
     fn clocks_that_no_timer_has_are_refused_without_an_overflow() {
-        let clocks = Clocks { conversion_cycles: u32::MAX, ticks_per_converter_cycle: u32::MAX, ..CLOCKS };
+        let clocks = Clocks { conversion_cycles: u32::MAX, timer_hz: u32::MAX, ..CLOCKS };
         assert!(matches!(ScanTiming::new(u32::MAX, 3, [16, 32], &clocks), Err(ScanError::SlotTooLong { .. })));
+        for (clocks, words) in [
+            (Clocks { timer_hz: 0, ..CLOCKS }, "timer_hz of 0: 100000 to 4294967295 are allowed"),
+            (Clocks { core_hz: 0, ..CLOCKS }, "core_hz of 0: 100000 to 4294967295 are allowed"),
+            (Clocks { converter_hz: 0, ..CLOCKS }, "converter_hz of 0: 100000 to 4294967295 are allowed"),
+            (Clocks { converters: 0, ..CLOCKS }, "converters of 0: 1 to 2 are allowed"),
+            (Clocks { converters: 3, ..CLOCKS }, "converters of 3: 1 to 2 are allowed"),
+            (Clocks { frame_ns: Some(0), ..CLOCKS }, "frame_ns of 0: 1 to 15000000 are allowed"),
+            (Clocks { frame_ns: Some(20_000_000), ..CLOCKS }, "frame_ns of 20000000: 1 to 15000000 are allowed"),
+            (Clocks { frame_ns: Some(90_000), ..CLOCKS }, "frame_ns of 90000: the scan alone takes 99786"),
+        ] {
+            assert_eq!(ScanTiming::new(2_400, 15, [10, 10], &clocks).unwrap_err().to_string(), words);
+        }
+    }
+
+    /// Every clock ratio, frame time and shape, against the same sums without rounding.
+    #[test]
+    fn a_slot_is_never_too_short_and_a_frame_takes_the_time_asked_for() {
+        let (mut made, mut refused) = (0, 0);
+        for (timer_hz, converter_hz) in [(1, 1), (150, 48), (168, 21), (64, 16), (125, 3), (240, 80), (48, 64), (500, 1)] {
+            let [timer_hz, converter_hz] = [timer_hz, converter_hz].map(|mhz: u32| mhz * 1_000_000);
+            for (rows, columns, converters) in
+                (3..=16).flat_map(|rows| (3..=32_usize).flat_map(move |columns| [(rows, columns, 1), (rows, columns, 2)]))
+            {
+                for frame_ns in [None, Some(83_333), Some(123_457), Some(1_000_000), Some(10_000_000)] {
+                    let clocks = Clocks { timer_hz, converter_hz, converters, slot_step: 3, frame_ns, ..CLOCKS };
+                    let conversions = columns.div_ceil(converters as usize) as f64;
+                    let needed_s = 2_400e-9 + (27.0 * conversions + 5.0) / f64::from(converter_hz);
+                    let tick_s = 1.0 / f64::from(timer_hz);
+                    let scan_s = (rows + 1) as f64 * needed_s;
+                    match ScanTiming::new(2_400, 15, [rows, columns], &clocks) {
+                        Ok(timing) => {
+                            made += 1;
+                            let slot_s = f64::from(timing.slot.0) * tick_s;
+                            assert!((-1e-15..5.0 * tick_s).contains(&(slot_s - needed_s)), "{clocks:?} {timing:?}");
+                            let frame_s = f64::from(timing.frame().0) * tick_s;
+                            assert!(timing.frame().0.is_multiple_of(3));
+                            assert!((frame_s * 1e9 - f64::from(timing.frame_ns)).abs() <= 0.501);
+                            match frame_ns {
+                                None => assert_eq!(timing.idle, ScanTicks(0)),
+                                Some(ns) => assert!((frame_s - f64::from(ns) * 1e-9).abs() < 2.6 * tick_s),
+                            }
+                        }
+                        Err(ScanError::FrameTooShort { frame_ns, scan_ns }) => {
+                            refused += 1;
+                            assert!(scan_ns > frame_ns && f64::from(scan_ns) > scan_s * 1e9 - 1e-3, "{clocks:?}");
+                        }
+                        Err(ScanError::SlotTooLong { ticks }) => assert!(ticks > 65_535 && needed_s > 65_530.0 * tick_s),
+                        Err(error) => panic!("{error}: {clocks:?}"),
+                    }
+                }
+            }
+        }
+        assert!(made > 20_000 && refused > 5_000, "{made} made, {refused} refused");
     }
 }

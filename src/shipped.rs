@@ -26,11 +26,13 @@ pub const TARE_FRAMES: u32 = Array::TARE_FRAMES;
 pub const CLOCKS: Clocks = Clocks {
     timer_hz: 168_000_000,
     core_hz: 168_000_000,
-    ticks_per_converter_cycle: 8,
+    converter_hz: 21_000_000,
+    converters: 2,
     sample_cycles: &[3, 15, 28, 56, 84, 112, 144, 480],
     conversion_cycles: 12,
     trigger_cycles: 5,
     slot_step: 12,
+    frame_ns: None,
 };
 
 impl Config {

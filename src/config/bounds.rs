@@ -5,8 +5,9 @@ use crate::model::Tip;
 use crate::params::Params;
 use crate::units::{Millimetres, MillimetresPerSecond};
 
-/// Time over which the guard compares motor and encoder, s,
+/// Time over which the guard compares motor and encoder, s, but at least this number of frames,
 const TAU_S: f32 = 0.005;
+const TAU_FRAMES: f32 = 8.0;
 /// for an encoder whose counts are no farther apart than this, mm; the others need longer, up to so many times.
 const COUNT_MM: f32 = 0.008;
 const LONGER: f32 = 8.0;
@@ -59,7 +60,7 @@ pub(crate) struct Drives {
 impl Bounds {
     pub(crate) fn new(p: &Params, tip: &Tip, drives: &Drives) -> Self {
         let Drives { frame_s, mm_per_count, mass, driven } = *drives;
-        let tau_s = TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER);
+        let tau_s = (TAU_S * (mm_per_count / COUNT_MM).max(1.0).min(LONGER)).max(TAU_FRAMES * frame_s);
         let friction_n = 1e-6 * p.friction_unm as f32 * p.reduction_mrad_per_mm as f32;
         let change_per_n = 1e3 / mass * tau_s;
         let (count, rubbed) = (mm_per_count / tau_s, friction_n * change_per_n);
@@ -71,7 +72,7 @@ impl Bounds {
             speed_loose: speed(p.approach_um_per_s + p.approach_um_per_s / 2),
             speed_any: speed(p.speed_max_um_per_s + p.speed_max_um_per_s / 2),
             frames_per_s: (1.0 / frame_s) as i32,
-            leak: narrow((frame_s / tau_s).min(0.125) * exp2(16)),
+            leak: narrow(frame_s / tau_s * exp2(16)),
             acceleration_per_n: narrow(1e3 / mass * exp2(8)),
             change_per_n: narrow(change_per_n * exp2(16)),
             change_least: narrow(change_least * exp2(16)),

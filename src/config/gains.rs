@@ -35,6 +35,8 @@ const KICK_MOST: f32 = 0.75;
 const SPEED_MOST: f32 = 60.0;
 /// The slowest speed loop, in 1/s: what the profile's arithmetic holds.
 const SPEED_GAIN_LEAST: f32 = 60.0;
+/// The quickest, in 1/s: what its fixed-point format holds.
+const SPEED_GAIN_MOST: f32 = 8_000.0;
 
 /// The gains of observer, law and profile for one pace.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,7 +60,7 @@ pub(crate) fn paces(frame_s: f32, mm_per_count: f32, voltage_limit: f32) -> [Gai
     let square = (KICK_MOST * voltage_limit / (KICK * mm_per_count)).min(2_147_483_648.0);
     let by_counts = floor_sqrt((square * 65_536.0) as u64) as f32 / 256.0;
     let by_speed = SPEED_MOST / (OBSERVER_TO_SPEED * mm_per_count);
-    let mut speed_gain = by_time.min(by_counts).min(by_speed);
+    let mut speed_gain = by_time.min(by_counts).min(by_speed).min(SPEED_GAIN_MOST);
     [(); PACES].map(|()| {
         let gains = Gains::new(speed_gain.max(SPEED_GAIN_LEAST), frame_s);
         speed_gain *= 0.5;

@@ -3,8 +3,10 @@
 use super::{exp2, narrow, wide};
 use crate::params::Params;
 
-/// Frames of a step of the model.
-pub const FRAMES: u32 = 256;
+/// Frames of a step of the model, as a power of two: at most 256,
+const FRAMES_BITS: u32 = 8;
+/// and fewer where these would take longer than this, s. The shortest time constant is 2 s.
+const STEP_S: f32 = 0.0625;
 /// The current falls from its limit to none over 2 to the power of this many K below the largest temperature: 16.
 pub const ALLOWANCE_BITS: u32 = 4;
 /// Heat counts so many times as much, a rise is so many times quicker, and a fall slower.
@@ -28,6 +30,8 @@ pub struct Lag {
 /// The winding's model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heat {
+    /// Frames of a step of the model, as a power of two: at most 256.
+    pub frames_bits: u32,
     /// The largest g R i that it takes, Q8 mm/s^2: four times the current limit, where that is within its type.
     pub most: i32,
     /// Shift that takes the current limit to 25 bits: to the right, or
@@ -53,7 +57,10 @@ impl Heat {
         let whole = ((limit >> down) << up) as f32;
         let amperes = p.current_max_ma as f32 * 1e-3;
         let watts = MARGIN * amperes * amperes * p.resistance_mohm as f32 * 1e-3;
-        let step_s = frame_s * FRAMES as f32;
+        let (mut frames_bits, mut step_s) = (FRAMES_BITS, frame_s * exp2(FRAMES_BITS));
+        while step_s > STEP_S && frames_bits > 0 {
+            (frames_bits, step_s) = (frames_bits - 1, 0.5 * step_s);
+        }
         let lag = |k_per_w: i32, time_ms: i32| {
             let gain = watts * k_per_w as f32 * exp2(30 + 24) / (whole * whole);
             let share = step_s / (time_ms as f32 * 1e-3);
@@ -66,6 +73,7 @@ impl Heat {
         let both = (p.winding_k_per_w + p.housing_k_per_w).max(1) as f32;
         let start_k = (room_k * p.housing_k_per_w as f32 / both).min(room_k - START_K);
         Self {
+            frames_bits,
             most: limit.saturating_mul(4),
             down,
             up,

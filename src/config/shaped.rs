@@ -19,11 +19,13 @@ use core::ops::{Deref, DerefMut};
 /// let clocks = Clocks {
 ///     timer_hz: 64_000_000,
 ///     core_hz: 64_000_000,
-///     ticks_per_converter_cycle: 4,
+///     converter_hz: 16_000_000,
+///     converters: 2,
 ///     sample_cycles: &[4, 8, 16],
 ///     conversion_cycles: 13,
 ///     trigger_cycles: 4,
 ///     slot_step: 1,
+///     frame_ns: None,
 /// };
 /// let config = Shaped::<4, 4>::new(&Params { sample_cycles: 8, ..Params::DEFAULT }, &clocks)?;
 /// assert_eq!(config.timing.frame_ns, 26_406); // five slots of 338 ticks

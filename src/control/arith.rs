@@ -2,7 +2,7 @@
 
 /// `a b / 2^shift`, rounded down and held to 32 bits.
 #[inline(always)]
-pub(super) fn product(a: i32, b: i32, shift: u32) -> i32 {
+pub(crate) fn product(a: i32, b: i32, shift: u32) -> i32 {
     held_wide((i64::from(a) * i64::from(b)) >> shift)
 }
 

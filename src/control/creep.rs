@@ -2,7 +2,7 @@
 //!
 //! Under a constant force F the reading grows to F (1 + k) with the time constant tau. So of a reading S a part c is
 //! creep, c' = (k (S - c) - c) / tau: a lag towards S k / (1 + k) with tau / (1 + k). One state, first order: a frame
-//! takes it a share of at most 1/64 of the way, so it stays between 0 and the largest target, and cannot ring.
+//! takes it at most half of the way, so it stays between 0 and the largest target, and cannot ring.
 //!
 //! It is added to the goal, not taken off the reading: the guard, the monitor and the model see what the array reads.
 

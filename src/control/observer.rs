@@ -66,10 +66,11 @@ impl Observer {
     /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
     #[inline(always)]
     pub fn update(&mut self, encoder: i32, acceleration: i32, gains: &Gains, config: &Config) {
-        // Q8 mm/s^2 times T (Q39) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
-        let gained = nearest_share(acceleration.saturating_add(self.disturbance.to_bits()), config.frame_s_q39);
+        // Q8 mm/s^2 times T (Q37) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.
+        let pushed = acceleration.saturating_add(self.disturbance.to_bits());
+        let gained = nearest_product(pushed, config.frame_s_q37, 29);
         let before = self.speed.to_bits();
-        let moved = nearest_share(before.saturating_add(gained / 2), config.frame_s_q39);
+        let moved = nearest_product(before.saturating_add(gained / 2), config.frame_s_q37, 29);
         let travel = self.travel.to_bits().saturating_add(moved);
         let speed = before.saturating_add(gained);
 

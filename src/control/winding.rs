@@ -11,11 +11,11 @@
 //! slower. R is that of the cold winding with the bridge; at a given voltage a warm one takes less. What is covered and
 //! what is not stands in `docs/control.md`.
 //!
-//! The squares of 256 frames make one step of the lags: at most half of the way each, so neither leaves the
-//! range from 0 to its largest target.
+//! The squares of 256 frames, or of fewer slow ones, make one step of the lags: at most half of the way each, so neither
+//! leaves the range from 0 to its largest target.
 
 use crate::config::Config;
-use crate::config::heat::{ALLOWANCE_BITS, FRAMES, Heat};
+use crate::config::heat::{ALLOWANCE_BITS, Heat};
 use crate::units::Celsius;
 use fixed::types::I16F16;
 
@@ -59,7 +59,7 @@ impl Winding {
         let current = i64::from((net >> heat.down) << heat.up);
         self.squares = self.squares.wrapping_add((current * current).cast_unsigned());
         self.frames += 1;
-        if self.frames >= FRAMES {
+        if self.frames >> heat.frames_bits != 0 {
             self.step(heat);
         }
     }
@@ -84,7 +84,7 @@ impl Winding {
         let [squares, winding, housing] =
             [[a, b], [c, d], [e, f]].map(|[low, high]| u64::from(high) << 32 | u64::from(low));
         let (frames, started) = (last & !STARTED, last & STARTED != 0);
-        if frames >= FRAMES || squares > u64::from(frames) << 54 || winding > MOST || housing > MOST {
+        if frames >> config.heat.frames_bits != 0 || squares > u64::from(frames) << 54 || winding > MOST || housing > MOST {
             return None;
         }
         let lags = [winding, housing].map(u64::cast_signed);
@@ -115,7 +115,7 @@ impl Winding {
             self.lags = [0, heat.start_q30];
         }
         // The mean, at most 2^30, rounded up.
-        let mean = ((self.squares / u64::from(FRAMES)) >> 24) + u64::from(self.squares != 0);
+        let mean = (self.squares >> (24 + heat.frames_bits)) + u64::from(self.squares != 0);
         (self.squares, self.frames) = (0, 0);
         for (lag, part) in self.lags.iter_mut().zip(&heat.lags) {
             let target = (mean * u64::from(part.gain)).min(MOST).cast_signed();

@@ -220,8 +220,7 @@ impl Guard {
         // By the way itself: what a filtered speed is late by would add up.
         let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
-        // A frame's time is below 1/256 s, so this fits.
-        let gained = ((i64::from(acceleration) * i64::from(config.frame_s_q39)) >> 31) as i32;
+        let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q37)) >> 29);
         self.change = towards(self.change.saturating_add(gained), 0, config.bounds.leak);
         self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);
     }

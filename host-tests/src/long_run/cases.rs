@@ -3,7 +3,6 @@
 use super::{Machine, Outcome};
 use crate::finger::config;
 use fingertip::config::gains::PACES;
-use fingertip::config::heat::FRAMES;
 use fingertip::control::SpeedLoop;
 use fingertip::control::drive::Drive;
 use fingertip::control::observer::Observer;
@@ -259,12 +258,13 @@ fn windings(longest: bool) -> Vec<Machine<Winding>> {
     let machine = |(input, pair): (&str, [i32; 2])| {
         let config = Config::shipped(&params).expect("allowed");
         let currents = if pair == [1; 2] { [config.current_limit; 2] } else { pair };
+        let frames = 1 << config.heat.frames_bits;
         Machine {
             name: format!("winding over {} s, {input}", housing_time_ms / 1_000),
             start: Winding::new(),
-            inputs: u64::from(FRAMES),
+            inputs: frames,
             step: Box::new(move |winding: &mut Winding| {
-                for net in currents.into_iter().cycle().take(FRAMES as usize) {
+                for net in currents.into_iter().cycle().take(frames as usize) {
                     winding.observe(net, &config);
                 }
             }),

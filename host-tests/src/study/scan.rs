@@ -48,7 +48,7 @@ impl Row {
     fn of(setting: Setting, array: &Array) -> Option<Self> {
         let (settle_ns, sample_cycles, frames) = setting;
         let timing = ScanTiming::new(settle_ns, sample_cycles, [ROWS, COLUMNS], &CLOCKS).ok()?;
-        let cycle_s = f64::from(CLOCKS.ticks_per_converter_cycle) / f64::from(CLOCKS.timer_hz);
+        let cycle_s = 1.0 / f64::from(CLOCKS.converter_hz);
         let sampling_s = (f64::from(sample_cycles) - 0.5) * cycle_s;
         Some(Self {
             setting,

@@ -7,7 +7,7 @@ use fingertip::shipped;
 /// Of a pace: k_v, and all gains by it.
 fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
     let gains = &config.paces[pace];
-    let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     let slope = speed_gain / 3.0;
     let half = 0.5 * 2.5 * speed_gain * frame_s;
     let beta = (1.0 - half) / (1.0 + half);
@@ -31,7 +31,7 @@ fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
 fn a_fine_encoder_leaves_the_pace_to_the_time() {
     let config =
         shipped::Config::shipped(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
-    let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     for pace in 0..config.paces.len() {
         is_made_for(0.2 / frame_s / f64::from(1 << pace), pace, &config);
     }
@@ -44,7 +44,7 @@ fn a_coarse_encoder_makes_a_slower_loop() {
     let config = shipped::Config::shipped(&Params { encoder_counts_per_turn: 16, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = (0.75 * f64::from(config.voltage_limit) / 256.0 / (5.8 * q_mm)).sqrt();
-    let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     assert!((120.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
     let mut at_the_least = 0;
     for pace in 0..config.paces.len() {
@@ -62,7 +62,7 @@ fn a_count_is_no_more_than_so_fast() {
     let config = shipped::Config::shipped(&Params { reduction_mrad_per_mm: 150, ..Params::DEFAULT }).expect("allowed");
     let q_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let quickest = 60.0 / (2.5 * q_mm);
-    let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+    let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     assert!((480.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
     for pace in 0..config.paces.len() {
         is_made_for(quickest / f64::from(1 << pace), pace, &config);

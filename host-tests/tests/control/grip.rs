@@ -244,7 +244,7 @@ fn the_motion_since_the_scan_counts() {
     for mm_per_s in [-80, 40] {
         let mut motion = at(travel);
         motion.observer.speed = MillimetresPerSecond::from_bits(mm_per_s << 16);
-        let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+        let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
         let distance = minus(config.tip.indentation(newtons(900)), held.indentation);
         let distance = minus(distance, mm(f64::from(mm_per_s) * frame_s / 2.0));
         let (reference, _) = hand.frame(900, &held, motion, &config);

@@ -17,7 +17,7 @@ struct Reference {
 impl Reference {
     /// For a pace: its poles are 2.5 times as quick as the speed loop.
     fn new(pace: usize, config: &Config) -> Self {
-        let frame_s = f64::from(config.frame_s_q39) / 2_f64.powi(39);
+        let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
         let speed_gain = f64::from(config.paces[pace].speed_q18_per_s) / 2_f64.powi(18);
         let half = 0.5 * 2.5 * speed_gain * frame_s;
         Self { beta: (1.0 - half) / (1.0 + half), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }

@@ -89,7 +89,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     let config::Config {
         params: _,
         geometry: _,
-        timing: ScanTiming { settle, slot, sample_cycles, slots: _, frame_ns, deadline },
+        timing: ScanTiming { settle, slot, sample_cycles, slots: _, idle, frame_ns, deadline },
         tip,
         sag_q32,
         dead_codes,
@@ -103,7 +103,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         contact_on,
         contact_off,
         touch_line,
-        frame_s_q39,
+        frame_s_q37,
         mm_per_count_q40,
         count,
         jump,
@@ -134,7 +134,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         force_seen,
     } = &**config;
     for ticks in
-        [settle.0, slot.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into(), (*saturated_codes).into()]
+        [settle.0, slot.0, idle.0, deadline.0, (*sample_cycles).into(), (*dead_codes).into(), (*saturated_codes).into()]
     {
         mix.add(ticks);
     }
@@ -159,11 +159,11 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [gain_q32_per_k, gain_at_q16, zero_q24_per_k] {
         mix.add(number);
     }
-    let Heat { most, down, up, lags, start_q30, room_q30, ambient_q16 } = *heat;
+    let Heat { frames_bits, most, down, up, lags, start_q30, room_q30, ambient_q16 } = *heat;
     for number in [most, ambient_q16] {
         mix.add(number);
     }
-    for shift in [down, up] {
+    for shift in [frames_bits, down, up] {
         mix.add(shift);
     }
     for kelvin in [start_q30, room_q30] {
@@ -174,7 +174,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(rise_q31);
         mix.add(fall_q31);
     }
-    for number in [*frame_s_q39, *counts_max, calm_frames.cast_signed()] {
+    for number in [*frame_s_q37, *counts_max, calm_frames.cast_signed()] {
         mix.add(number);
     }
     for gains in paces {

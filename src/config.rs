@@ -38,6 +38,9 @@ use warm::Warm;
 
 /// The least supply must give this part of the largest voltage: 1/4.
 const SUPPLY_PART: i32 = 4;
+/// The converter must see at least this number of least contacts: a contact begins at one, its surface is known at two,
+/// and a signal that fails in a step takes a quarter and one more.
+const SEEN_LEAST: i32 = 4;
 /// The band of the way at rest: this, for the array's noise, mm,
 const CALM_MM: f32 = 0.008;
 /// and so many counts of the encoder;
@@ -199,6 +202,11 @@ impl Config {
             return Err(ConfigError::Param(ParamError { name, value, min: 0, max }));
         }
         let tip = tip(p)?;
+        let (force_seen, least_mn) = (force_seen(p, codes_milli, &tip), SEEN_LEAST * p.contact_on_mn);
+        if force_seen < newtons(least_mn) {
+            let seen_mn = (force_seen.0 * 1_000).to_num();
+            return Err(ConfigError::Seen { codes_per_kpa_milli: p.codes_per_kpa_milli, seen_mn, least_mn });
+        }
 
         let frame_s = timing.frame_ns as f32 * 1e-9;
         let travel_rad_per_m = p.reduction_mrad_per_mm as f32;
@@ -276,7 +284,7 @@ impl Config {
             motions: Motions::new(p, &Driven { frame_s, mm_per_count, damping: c }),
             force_fault: newtons(p.force_fault_mn),
             force_max: newtons(p.force_max_mn),
-            force_seen: force_seen(p, codes_milli, &tip),
+            force_seen,
         })
     }
 }

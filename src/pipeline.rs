@@ -24,6 +24,10 @@ use crate::touch::{Felt, Touch};
 use crate::units::{Duty, Newtons};
 use budget::Budget;
 
+/// Steps in a row without a new frame that are a fault. At the second one the newest frame is two frame times old; the
+/// board's guard trips after 1.75.
+const REPEATED_MAX: u32 = 2;
+
 /// The loop's state between frames. The example at the crate's top closes a loop with it.
 ///
 /// In the order of the fields: what every frame uses lies in the first 4 KiB, which an instruction reaches by itself.
@@ -32,6 +36,8 @@ use budget::Budget;
 pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     status: Status,
     tared: bool,
+    /// Number of steps in a row that brought no new frame; none before the first step.
+    repeated: Option<u32>,
     /// True once the travel has its zero: the place where torque was first enabled.
     zeroed: bool,
     motion: SpeedLoop,
@@ -66,6 +72,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             step: press::Step::NONE,
             status: Status::default(),
             tared: false,
+            repeated: None,
             zeroed: false,
         }
     }
@@ -114,15 +121,18 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (duty, &self.status)
     }
 
-    /// Counts missed frames from the gap in the sequence.
+    /// Counts missed frames from the gap in the sequence. A number that does not grow is a frame that was there before.
     fn count_frames(&mut self, sequence: u32) -> Limits {
         let mut limits = Limits::default();
-        let missed = sequence.wrapping_sub(self.status.sequence).wrapping_sub(1);
-        if self.status.sequence != 0 && missed != 0 {
-            self.status.missed_frames = self.status.missed_frames.wrapping_add(missed);
-            limits.set(Limits::FRAME_MISSED);
+        let step = sequence.wrapping_sub(core::mem::replace(&mut self.status.sequence, sequence)).cast_signed();
+        if let Some(repeated) = self.repeated.replace(0) {
+            limits.set(if step == 1 { 0 } else { Limits::FRAME_MISSED });
+            if step > 0 {
+                self.status.missed_frames = self.status.missed_frames.wrapping_add(step.cast_unsigned() - 1);
+            } else {
+                self.repeated = Some(repeated.saturating_add(1));
+            }
         }
-        self.status.sequence = sequence;
         limits
     }
 
@@ -169,6 +179,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         if sense.bridge_fault {
             return Some(Fault::Bridge);
+        }
+        if self.repeated >= Some(REPEATED_MAX) {
+            return Some(Fault::LostFrames);
         }
         if let Some(fault) = monitor::array_broken(picture, &self.config) {
             return Some(fault);
@@ -363,7 +376,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (self.monitor, self.guard) = (Monitor::default(), Guard::default());
         self.activity = Activity::Off(Halt::OPEN);
         self.status = Status { taken, missed_frames, ..Status::default() };
-        (self.tared, self.zeroed) = (false, false);
+        (self.tared, self.repeated, self.zeroed) = (false, None, false);
     }
 
     /// What the last step reported.

@@ -89,7 +89,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
         if params_changed {
             Shaped::<ROWS, COLUMNS>::new(&self.record.params, clocks).map_err(|error| match error {
                 ConfigError::Param(_) => StatusError::Range,
-                ConfigError::Scan(_) | ConfigError::Order(..) | ConfigError::Supply(..) => StatusError::Limit,
+                _ => StatusError::Limit,
             })?;
         }
         if goal_mn(self.command.goal) > self.record.params.force_max_mn {

@@ -100,6 +100,7 @@ fn give_up(params: &mut Params, error: ConfigError) {
         ConfigError::Param(error) => [error.name; 2],
         ConfigError::Scan(_) => ["settle_ns", "sample_cycles"],
         ConfigError::Order([(low, _), (high, _)]) => [low, high],
+        ConfigError::Seen { .. } => ["codes_per_kpa_milli", "contact_on_mn"],
         ConfigError::Supply(..) => ["voltage_max_mv", "supply_min_mv"],
     };
     let mut values = params.to_array();

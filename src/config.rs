@@ -13,12 +13,16 @@ pub(crate) mod geometry;
 pub mod heat;
 pub mod motions;
 mod numbers;
+#[cfg(test)]
+mod rates;
 mod shaped;
 pub mod warm;
+pub mod warnings;
 
 pub use error::ConfigError;
 pub use geometry::Geometry;
 pub use shaped::Shaped;
+pub use warnings::Warning;
 
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};

@@ -350,10 +350,12 @@ mod tests {
     #[test]
     fn a_slot_is_never_too_short_and_a_frame_takes_the_time_asked_for() {
         let (mut made, mut refused) = (0, 0);
-        for (timer_hz, converter_hz) in [(1, 1), (150, 48), (168, 21), (64, 16), (125, 3), (240, 80), (48, 64), (500, 1)] {
+        for (timer_hz, converter_hz) in
+            [(1, 1), (150, 48), (168, 21), (64, 16), (125, 3), (240, 80), (48, 64), (500, 1)]
+        {
             let [timer_hz, converter_hz] = [timer_hz, converter_hz].map(|mhz: u32| mhz * 1_000_000);
-            for (rows, columns, converters) in
-                (3..=16).flat_map(|rows| (3..=32_usize).flat_map(move |columns| [(rows, columns, 1), (rows, columns, 2)]))
+            for (rows, columns, converters) in (3..=16)
+                .flat_map(|rows| (3..=32_usize).flat_map(move |columns| [(rows, columns, 1), (rows, columns, 2)]))
             {
                 for frame_ns in [None, Some(83_333), Some(123_457), Some(1_000_000), Some(10_000_000)] {
                     let clocks = Clocks { timer_hz, converter_hz, converters, slot_step: 3, frame_ns, ..CLOCKS };
@@ -378,7 +380,9 @@ mod tests {
                             refused += 1;
                             assert!(scan_ns > frame_ns && f64::from(scan_ns) > scan_s * 1e9 - 1e-3, "{clocks:?}");
                         }
-                        Err(ScanError::SlotTooLong { ticks }) => assert!(ticks > 65_535 && needed_s > 65_530.0 * tick_s),
+                        Err(ScanError::SlotTooLong { ticks }) => {
+                            assert!(ticks > 65_535 && needed_s > 65_530.0 * tick_s)
+                        }
                         Err(error) => panic!("{error}: {clocks:?}"),
                     }
                 }

@@ -84,7 +84,11 @@ impl Winding {
         let [squares, winding, housing] =
             [[a, b], [c, d], [e, f]].map(|[low, high]| u64::from(high) << 32 | u64::from(low));
         let (frames, started) = (last & !STARTED, last & STARTED != 0);
-        if frames >> config.heat.frames_bits != 0 || squares > u64::from(frames) << 54 || winding > MOST || housing > MOST {
+        if frames >> config.heat.frames_bits != 0
+            || squares > u64::from(frames) << 54
+            || winding > MOST
+            || housing > MOST
+        {
             return None;
         }
         let lags = [winding, housing].map(u64::cast_signed);

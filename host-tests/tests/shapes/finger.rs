@@ -7,6 +7,7 @@ use fingertip::contact::FitLevel;
 use fingertip::frame::{Frame, Sense, Shape};
 use fingertip::params::Params;
 use fingertip::pipeline::{Pipeline, Status};
+use fingertip::scan::Clocks;
 use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
 use fingertip::units::CoreCycles;
@@ -28,14 +29,20 @@ pub struct Finger<const ROWS: usize, const COLUMNS: usize> {
     frame: Frame<ROWS, COLUMNS>,
     shaft: Shaft,
     slot_s: f64,
+    idle_s: f64,
     bridge: Bridge,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     /// With taxels so far apart, whose array meets the plane there.
     pub fn new(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel) -> Self {
+        Self::with_clocks(pitch_um, centre_mm, fit_level, &CLOCKS)
+    }
+
+    /// The same on a board with other clocks.
+    pub fn with_clocks(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel, clocks: &Clocks) -> Self {
         let params = Params { pitch_um, ..Params::DEFAULT };
-        let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).expect("a pitch that is allowed");
+        let config = Shaped::<ROWS, COLUMNS>::new(&params, clocks).expect("a pitch that is allowed");
         let mut setup = Setup::default();
         setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;
         [setup.wall.centre_x_mm, setup.wall.centre_y_mm] = centre_mm;
@@ -46,7 +53,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             digest: Digest::new(),
             frame: Frame::EMPTY,
             shaft: Shaft::default(),
-            slot_s: f64::from(config.timing.slot.0) / f64::from(CLOCKS.timer_hz),
+            slot_s: f64::from(config.timing.slot.0) / f64::from(clocks.timer_hz),
+            idle_s: f64::from(config.timing.idle.0) / f64::from(clocks.timer_hz),
             bridge: Bridge::Coast,
         }
     }
@@ -61,7 +69,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         self.setup.tip.force_n(self.indentation_mm())
     }
 
-    fn advance(&mut self) {
+    fn frame_s(&self) -> f64 {
+        self.slot_s * Shape::<ROWS, COLUMNS>::SLOTS as f64 + self.idle_s
+    }
+
+    fn advance(&mut self, seconds: f64) {
         let supply = &self.setup.supply;
         let source = match self.bridge {
             Bridge::Coast => Source::OPEN,
@@ -70,7 +82,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
                 Source { volts: duty * supply.source_v, ohms, ..Source::OPEN }
             }
         };
-        self.shaft = Dynamics::new(&self.setup).advance(self.shaft, self.slot_s, &source);
+        self.shaft = Dynamics::new(&self.setup).advance(self.shaft, seconds, &source);
     }
 
     /// The codes of a row under the present load, or of the slot with none driven.
@@ -97,14 +109,27 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     /// A frame, row by row while the finger moves on, and a control step.
     pub fn step(&mut self) -> Status {
         let slots = Shape::<ROWS, COLUMNS>::SLOTS;
+        if self.idle_s > 0.0 {
+            // The duty acts at once, and the scan follows the idle time.
+            self.bridge = Bridge::of(self.pipeline.status());
+            let steps = (self.idle_s / self.slot_s).ceil() as u32;
+            (0..steps).for_each(|_| self.advance(self.idle_s / f64::from(steps)));
+        }
         for slot in 0..slots {
             if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
                 self.bridge = Bridge::of(self.pipeline.status());
             }
-            self.advance();
+            self.advance(self.slot_s);
             self.scan(slot);
         }
         self.frame.sequence = self.frame.sequence.wrapping_add(1);
+        let status = self.repeat();
+        assert_eq!(status.fault, None, "at {} N", self.force_n());
+        status
+    }
+
+    /// A control step with the frame of the last one.
+    pub fn repeat(&mut self) -> Status {
         let turns = self.shaft.angle_rad / core::f64::consts::TAU;
         let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
         let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
@@ -113,14 +138,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
         let status = *status;
         self.digest.add(duty, &status);
-        assert_eq!(status.fault, None, "at {} N", self.force_n());
         status
     }
 
     /// So long, and the last status.
     pub fn run(&mut self, seconds: f64) -> Status {
-        let frame_s = self.slot_s * Shape::<ROWS, COLUMNS>::SLOTS as f64;
-        (0..(seconds / frame_s) as u32).map(|_| self.step()).last().expect("a step")
+        (0..(seconds / self.frame_s()) as u32).map(|_| self.step()).last().expect("a step")
     }
 
     /// Tares and enables torque with no goal.
@@ -136,7 +159,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
     pub fn hold(&mut self, goal_mn: i32, seconds: f64) -> ([f64; 2], Status) {
         self.command.goal = newtons(goal_mn);
         self.run(seconds - 0.05);
-        let end = 0.05 / self.slot_s / Shape::<ROWS, COLUMNS>::SLOTS as f64;
+        let end = 0.05 / self.frame_s();
         let mut forces = [f64::INFINITY, 0.0_f64];
         for _ in 0..end as u32 {
             self.step();

@@ -3,5 +3,6 @@
 
 mod closed_loop;
 mod finger;
+mod rates;
 mod slopes;
 mod worst;

@@ -106,7 +106,10 @@ fn check_together(bytes: &[u8]) -> Result<(), Error> {
         *value = i32::from_le_bytes(*bytes);
     }
     let checked = Config::shipped(&Params::from_array(&values));
-    checked.map(drop).map_err(|why| Error::Other(format!("these do not go together: {why}; nothing was changed")))
+    let config =
+        checked.map_err(|why| Error::Other(format!("these do not go together: {why}; nothing was changed")))?;
+    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
+    Ok(())
 }
 
 /// Undoes what was set, and says how it stands.

@@ -16,7 +16,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use fingertip::frame::BANKS;
 use fingertip::scan::ScanTiming;
-use fingertip::shipped::{BANK_COLUMNS, COLUMNS, Frame, SLOTS};
+use fingertip::shipped::{BANK_COLUMNS, CLOCKS, COLUMNS, Frame, SLOTS};
 
 use super::health::{self, Broken};
 use super::{converter, guard, pins, trace};
@@ -88,6 +88,7 @@ impl Scan {
 
     /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
+        const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
         stop();
         // Not before: the register is the first converter's, whose clock is on by now.
         converter::set_clock();

@@ -1,6 +1,6 @@
 //! Parameters at and between the ends of their ranges, and the configurations they make.
 
-use fingertip::config::gains::Gains;
+use fingertip::config::{ConfigError, gains::Gains};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use proptest::prelude::*;
@@ -44,6 +44,15 @@ pub fn placed(places: impl IntoIterator<Item = Place>) -> Params {
     params.voltage_max_mv = params.voltage_max_mv.min(4 * params.supply_min_mv);
     // A curve leaves a code of a kPa at the full range.
     params.codes_per_kpa_milli = params.codes_per_kpa_milli.max(1_000 + params.curve_permille);
+    // The converter sees four least contacts: smaller ones, or fewer codes for each kPa.
+    while let Err(ConfigError::Seen { seen_mn, .. }) = Config::shipped(&params) {
+        if seen_mn < 20 {
+            params.codes_per_kpa_milli = (params.codes_per_kpa_milli / 2).max(1_000 + params.curve_permille);
+        } else {
+            params.contact_on_mn = seen_mn / 4;
+            params.contact_off_mn = params.contact_off_mn.min(params.contact_on_mn - 1);
+        }
+    }
     params
 }
 

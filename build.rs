@@ -4,12 +4,12 @@ use std::{env, error::Error, fs, path::PathBuf};
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo:rerun-if-changed=build.rs");
-    println!("cargo:rerun-if-changed=src/board/memory.x");
+    println!("cargo:rerun-if-changed=memory.x");
     if env::var("CARGO_CFG_TARGET_OS")? != "none" || env::var_os("CARGO_FEATURE_FIRMWARE").is_none() {
         return Ok(());
     }
     let out = PathBuf::from(env::var_os("OUT_DIR").ok_or("cargo sets OUT_DIR")?);
-    fs::copy("src/board/memory.x", out.join("memory.x"))?;
+    fs::copy("memory.x", out.join("memory.x"))?;
     println!("cargo:rustc-link-search={}", out.display());
     // Sections follow each other without padding to a page: flash has no pages to protect.
     println!("cargo:rustc-link-arg-bins=--nmagic");

@@ -8,11 +8,13 @@ use crate::{
     paths, qemu,
     toolchain::{self, Choice, TARGET},
 };
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use std::{fmt::Write as _, fs};
 
 /// The page with the table of cores, and the example that runs the images and prints it.
 pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
+/// The example for another board, and its target.
+const EXAMPLE: (&str, &str) = ("rp2040", "thumbv6m-none-eabi");
 const RISCV_PROGRAM: &str = "qemu-system-riscv32";
 const WHY: &str = "running the loop on emulated cores";
 
@@ -79,7 +81,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let mut list = String::new();
     for (number, core) in CORES.iter().enumerate() {
         let mut command = toolchain.cargo_for("build", core.target, core.flags);
-        command.args(["--package", "images", "--bin", "cores", "--features", "cores", "--release"]);
+        command.args(["--manifest-path", "host-tests/cores/Cargo.toml", "--release", "--locked"]);
         console.build(&mut command, &format!("the loop for {}", core.target), crate::progress::IMAGE)?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
@@ -102,6 +104,23 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let mut command = host::cargo("run", "host-tests");
     command.args(["--quiet", "--example", PAGE.1, "--"]).arg(&file);
     console::output(&mut command)
+}
+
+/// Builds the example for another board, which links for its chip.
+///
+/// # Errors
+/// No compiler, or it does not build.
+pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
+    let (name, target) = EXAMPLE;
+    let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
+    let mut command = toolchain.cargo_for("build", target, &[]);
+    command.args(["--manifest-path", &format!("examples/{name}/Cargo.toml"), "--release", "--locked"]);
+    console.build(&mut command, &format!("the example for the {name}"), crate::progress::IMAGE)?;
+    let bytes = Image::read(&toolchain.images_for(target, &[]).join(name))?.bytes.len();
+    // Without the loop a few kilobytes would be left: its configuration would always be refused.
+    ensure!(bytes > 40_000, "the example for the {name} has {bytes} bytes: the loop is not in it");
+    console.print(&format!("{name}: {bytes} bytes of flash"));
+    Ok(())
 }
 
 /// The lines of the page's table.

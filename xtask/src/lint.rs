@@ -10,14 +10,11 @@ use anyhow::{Result, ensure};
 use std::process::Command;
 
 /// Every image that is emulated or linked as a proof, and its feature.
-const IMAGES: [(&str, &str); 6] = [
-    ("qemu", "qemu"),
-    ("cores", "cores"),
-    ("panic-free", "proof"),
-    ("timing", "timing"),
-    ("timing-check", "timing"),
-    ("study", "study"),
-];
+const IMAGES: [(&str, &str); 5] =
+    [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
+
+/// Programs of other boards, each a workspace of its own, and the target for which they are checked.
+const APART: ([&str; 2], &str) = (["examples/rp2040", "host-tests/cores"], "thumbv6m-none-eabi");
 
 /// Runs all checks that are no tests.
 ///
@@ -25,7 +22,14 @@ const IMAGES: [(&str, &str); 6] = [
 /// Names the checks that failed.
 pub fn run(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
-    stages.stage("format", |console| console.run(console::cargo("fmt").args(["--all", "--check"])));
+    stages.stage("format", |console| {
+        console.run(console::cargo("fmt").args(["--all", "--check"]))?;
+        for folder in APART.0 {
+            let manifest = format!("{folder}/Cargo.toml");
+            console.run(console::cargo("fmt").args(["--manifest-path", &manifest, "--check"]))?;
+        }
+        Ok(())
+    });
     stages.stage("lints, host", |console| console.run(&mut clippy(&["--workspace", "--all-targets"])));
     stages.stage("lints, what the demonstration is built of", |console| {
         for package in ["sim", "virtual-board"] {
@@ -44,7 +48,15 @@ pub fn run(choice: Choice) -> Result<()> {
         for (name, feature) in IMAGES {
             console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
         }
-        console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))
+        console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))?;
+        let toolchain =
+            toolchain::ensure_for(choice, &[APART.1], "programs of other boards are checked for it", console)?;
+        for folder in APART.0 {
+            let mut command = toolchain.cargo_for("clippy", APART.1, &[]);
+            command.args(["--manifest-path", &format!("{folder}/Cargo.toml"), "--locked"]);
+            console.run(&mut denying_warnings(command))?;
+        }
+        Ok(())
     });
     stages.stage("documentation", |console| {
         let mut command = console::cargo("doc");

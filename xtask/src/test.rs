@@ -42,6 +42,7 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     stages.stage("emulated cores of other boards against this machine", |console| {
         cores::page(choice, console).map(|page| console.print(&cores::table(&page)))
     });
+    stages.stage("example for another board", |console| cores::example(choice, console));
     stages.stage("timing model against published measurements", |console| timing::check(choice, console));
     stages.stage("virtual board", |console| {
         let python = python::ensure(console)?;

@@ -6,15 +6,8 @@
 //! without friction: d = x, F = pi Y d^2. All forces of a step come from one energy, which is asked for its mean slope,
 //! so a step creates none.
 
-mod breakable_object;
-mod cylinder;
-mod edge;
-mod object_mass;
-mod object_stiffness;
-mod relaxation;
-mod sphere;
-mod tangential;
-mod tilted_plane;
+mod surface;
+mod tip_and_object;
 
 use super::{Metered, Part};
 use crate::registry::Description;
@@ -22,15 +15,15 @@ use crate::watch::{Cost, Truth};
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[
-    &tilted_plane::EFFECT,
-    &sphere::EFFECT,
-    &cylinder::EFFECT,
-    &edge::EFFECT,
-    &relaxation::EFFECT,
-    &object_stiffness::EFFECT,
-    &breakable_object::EFFECT,
-    &tangential::EFFECT,
-    &object_mass::EFFECT,
+    &surface::TILTED_PLANE,
+    &surface::SPHERE,
+    &surface::CYLINDER,
+    &surface::EDGE,
+    &tip_and_object::RELAXATION,
+    &tip_and_object::OBJECT_STIFFNESS,
+    &tip_and_object::BREAKABLE_OBJECT,
+    &tip_and_object::TANGENTIAL,
+    &tip_and_object::OBJECT_MASS,
 ];
 
 /// Acts on the object's surface.

@@ -6,17 +6,9 @@
 //! gear's play follow; the encoder's count is worked out where it is read. Without effects there is a rotor without
 //! friction, a winding that is a resistance, an ideal source, and a rigid transmission.
 
-mod backlash;
-mod cogging;
-mod dry_friction;
-mod encoder_resolution;
-mod gear_efficiency;
-mod inertia;
-mod stribeck;
-mod supply_sag;
-mod thermal_derating;
-mod viscous_friction;
-mod winding_inductance;
+mod electric;
+mod friction;
+mod transmission;
 
 use super::{Metered, Part};
 use crate::registry::Description;
@@ -26,17 +18,17 @@ use serde::{Deserialize, Serialize};
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[
-    &inertia::EFFECT,
-    &supply_sag::EFFECT,
-    &thermal_derating::EFFECT,
-    &winding_inductance::EFFECT,
-    &dry_friction::EFFECT,
-    &stribeck::EFFECT,
-    &viscous_friction::EFFECT,
-    &gear_efficiency::EFFECT,
-    &cogging::EFFECT,
-    &backlash::EFFECT,
-    &encoder_resolution::EFFECT,
+    &transmission::INERTIA,
+    &electric::SUPPLY_SAG,
+    &electric::THERMAL_DERATING,
+    &electric::WINDING_INDUCTANCE,
+    &friction::DRY_FRICTION,
+    &friction::STRIBECK,
+    &friction::VISCOUS_FRICTION,
+    &friction::GEAR_EFFICIENCY,
+    &transmission::COGGING,
+    &transmission::BACKLASH,
+    &transmission::ENCODER_RESOLUTION,
 ];
 
 /// What the winding is connected to, for a step.
@@ -99,6 +91,12 @@ pub trait Electric: Send {
 
     /// Says what it knows.
     fn tell(&self, _truth: &mut Truth) {}
+}
+
+impl<F: FnMut(&mut Circuit) + Send> Electric for F {
+    fn apply(&mut self, circuit: &mut Circuit) {
+        self(circuit);
+    }
 }
 
 /// Adds to what takes energy from the shaft in a step whose mean speed is about this, rad/s.

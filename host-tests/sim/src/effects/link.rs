@@ -1,23 +1,14 @@
 //! Clocks, electronics, bus and host.
 
-mod burst;
-mod clock_tolerance;
-mod corrupted_packets;
-mod host_jitter;
-mod lost_packets;
+mod named;
 
 use super::{Metered, Part};
 use crate::registry::Description;
 use crate::watch::Cost;
 
 /// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[
-    &clock_tolerance::EFFECT,
-    &burst::EFFECT,
-    &host_jitter::EFFECT,
-    &lost_packets::EFFECT,
-    &corrupted_packets::EFFECT,
-];
+pub const EFFECTS: &[&Description] =
+    &[&named::CLOCK_TOLERANCE, &named::BURST, &named::HOST_JITTER, &named::LOST_PACKETS, &named::CORRUPTED_PACKETS];
 
 /// Acts on the controller's clock: how long a second of it lasts in the world, s, from this time on, s.
 pub type Clock = dyn FnMut(f64) -> f64 + Send;

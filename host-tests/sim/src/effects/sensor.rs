@@ -4,19 +4,8 @@
 //! volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal:
 //! every taxel alike, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
-mod broken_taxels;
-mod converter;
-mod creep;
-mod gain_spread;
-mod ghosting;
-mod hysteresis;
-mod noise;
-mod offset;
-mod row_sag;
-mod saturation;
-pub(crate) mod settling;
-mod since;
-mod temperature_drift;
+pub(crate) mod readout;
+mod taxels;
 
 use super::{Metered, Part};
 use crate::events::ArrayEvents;
@@ -28,18 +17,18 @@ use fingertip::shipped::{COLUMNS, ROWS};
 
 /// The effects of this family, in the order in which they act within a stage.
 pub const EFFECTS: &[&Description] = &[
-    &hysteresis::EFFECT,
-    &creep::EFFECT,
-    &gain_spread::EFFECT,
-    &temperature_drift::EFFECT,
-    &broken_taxels::EFFECT,
-    &ghosting::EFFECT,
-    &row_sag::EFFECT,
-    &settling::EFFECT,
-    &saturation::EFFECT,
-    &noise::EFFECT,
-    &offset::EFFECT,
-    &converter::EFFECT,
+    &taxels::HYSTERESIS,
+    &taxels::CREEP,
+    &taxels::GAIN_SPREAD,
+    &taxels::TEMPERATURE_DRIFT,
+    &taxels::BROKEN_TAXELS,
+    &readout::GHOSTING,
+    &readout::ROW_SAG,
+    &readout::SETTLING,
+    &readout::SATURATION,
+    &readout::NOISE,
+    &readout::OFFSET,
+    &readout::CONVERTER,
 ];
 
 /// A row's or a slot's worth of numbers, a column each.
@@ -53,6 +42,12 @@ pub trait Pressure: Send {
     /// The microcontroller's temperature, degrees Celsius, where the effect has one.
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
+    }
+}
+
+impl<F: FnMut(usize, f64, &mut Row) + Send> Pressure for F {
+    fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row) {
+        self(row, time_s, kpa);
     }
 }
 

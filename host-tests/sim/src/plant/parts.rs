@@ -3,7 +3,7 @@
 use super::{ArrayFaults, Faults, Row, Taxel};
 use crate::effects::drive::{self, Circuit, Friction};
 use crate::effects::sensor;
-use crate::effects::sensor::settling::Settling;
+use crate::effects::sensor::readout::Settling;
 use crate::effects::set::{Parts, Set};
 use crate::scene::{Scene, controller};
 use crate::setup::{Array, Setup};

@@ -1,4 +1,4 @@
-//! The winding heats up: its resistance rises, and the warm magnet is weaker.
+//! The winding and what feeds it.
 
 use super::{Circuit, Electric};
 use crate::effects::{Build, Part};
@@ -7,11 +7,28 @@ use crate::mechanics::decay::decay;
 use crate::registry::{Description, Family};
 use crate::watch::Truth;
 
+pub(super) const SUPPLY_SAG: Description = Description {
+    name: "supply_sag",
+    family: Family::Drive,
+    about: "The source, its wires and connectors have a resistance.",
+    equations: &[
+        "the bridge takes the share u of the current: V = source_v - source_ohm u i",
+        "so the motor sees u^2 source_ohm in series",
+    ],
+    state: "none",
+    reference: "docs/plant.md: 0.1 Ohm",
+    keys: &[Key::number("source_ohm", "Resistance of source, wires and connectors.", 0.0, 100.0, 0.1)],
+    zero: &[("source_ohm", 0.0)],
+    build: |build: &Build| {
+        let ohm = build.values.number("source_ohm");
+        Part::Electric(Box::new(move |circuit: &mut Circuit| circuit.source_ohm += ohm))
+    },
+};
+
 /// Copper's temperature coefficient of resistance.
 const COPPER_PER_K: f64 = 0.0039;
 
-/// What a scene names.
-pub const EFFECT: Description = Description {
+pub(super) const THERMAL_DERATING: Description = Description {
     name: "thermal_derating",
     family: Family::Drive,
     about: "The winding heats up: its resistance rises, and the warm magnet is weaker.",
@@ -80,3 +97,22 @@ impl Electric for ThermalDerating {
         truth.winding_c = self.winding_c;
     }
 }
+
+pub(super) const WINDING_INDUCTANCE: Description = Description {
+    name: "winding_inductance",
+    family: Family::Drive,
+    about: "The winding's current takes time to follow.",
+    equations: &[
+        "L di/dt = u V - R i - k w",
+        "over a step: i = i_end + (i_0 - i_end) exp(-t R / L), i_end = (u V - k w) / R, exact at a held speed",
+        "an open bridge takes the current at once",
+    ],
+    state: "current in the winding, A",
+    reference: "FAULHABER data sheet 1331 T 006 SR: 70 uH",
+    keys: &[Key::number("inductance_uh", "Inductance of the winding.", 0.0, 100000.0, 70.0)],
+    zero: &[("inductance_uh", 0.0)],
+    build: |build: &Build| {
+        let henry = build.values.number("inductance_uh") * 1e-6;
+        Part::Electric(Box::new(move |circuit: &mut Circuit| circuit.henry += henry))
+    },
+};

@@ -86,9 +86,6 @@ impl Args {
 }
 
 /// A scene by its path or its name in the library, with `TABLE.KEY=VALUE` set in its text.
-///
-/// # Errors
-/// As [`Args::scene`].
 pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, String> {
     let (path, mut source) = library::text(scene)?;
     let file = path.to_string_lossy();

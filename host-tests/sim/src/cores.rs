@@ -29,9 +29,6 @@ fn count() -> usize {
 }
 
 /// Does the tasks on all cores, and hands each result to `done` as it comes, in any order. The first error ends it.
-///
-/// # Errors
-/// That of the work, or of `done`.
 pub fn each<T: Sync, R: Send>(
     tasks: &[T],
     work: impl Fn(&T) -> Result<R, RunError> + Sync,

@@ -60,9 +60,6 @@ pub struct Without {
 }
 
 /// Runs the scene once without each of its effects.
-///
-/// # Errors
-/// A run fails.
 pub fn ablate(scene: &Scene, board: Run) -> Result<Vec<Without>, RunError> {
     let without = |left_out: usize| {
         let mut fewer = scene.clone();

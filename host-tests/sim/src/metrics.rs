@@ -4,17 +4,16 @@
 //! reference page shows it. All figures are of what is simulated; times before 0, when the finger is tared, do not
 //! count.
 
-mod at_goal;
 mod conduct;
 mod finger;
 mod response;
 mod slips;
 mod table;
 
-pub use at_goal::AtGoal;
 pub use conduct::Hold;
 pub use finger::Finger;
 pub use finger::newtons;
+pub use response::AtGoal;
 pub use table::{BY_GOAL, METRICS};
 
 use crate::scene::Bound;

@@ -6,10 +6,12 @@
 pub mod bench;
 #[cfg(feature = "calibrated")]
 pub mod calibrated;
-mod clock;
 mod digest;
 mod scan;
 pub mod served;
+
+pub use scan::Clock;
+pub use scan::DUTY_DELAY_SLOTS;
 
 use crate::bridge::Bridge;
 use crate::effects::sensor::{Readout, Stages as _};
@@ -24,14 +26,12 @@ use crate::scene::controller;
 use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
 use crate::world::{World, WorldError};
-pub use clock::Clock;
 use digest::Digest;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::frame::Sense;
 use fingertip::shipped::{Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::units::Celsius;
-pub use scan::DUTY_DELAY_SLOTS;
 use std::time::Instant;
 
 /// Why a scene does not run.
@@ -46,33 +46,21 @@ pub enum SimError {
 }
 
 /// [`simulate`] as a [`Run`](crate::run::Run).
-///
-/// # Errors
-/// As [`simulate`].
 pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
     Ok(simulate(scene, watch)?)
 }
 
 /// Runs a scene with the effects that it names.
-///
-/// # Errors
-/// What the scene asks for cannot be simulated.
 pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     simulate_with::<Named>(scene, watch)
 }
 
 /// The same with a set of effects: `()` has none compiled in, whatever the scene names.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     simulate_from::<E>(scene, Begun::default(), watch)
 }
 
 /// [`simulate`] with gains of the first finger's taxels, Q14.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_calibrated(
     scene: &Scene,
     gains: &fingertip::shipped::Gains,
@@ -94,9 +82,6 @@ pub struct Begun {
 }
 
 /// The same with time begun elsewhere.
-///
-/// # Errors
-/// As [`simulate`].
 pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
     Board::<E>::new(scene, begun)?.whole(scene, started, watch)

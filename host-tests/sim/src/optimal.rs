@@ -61,9 +61,6 @@ impl core::fmt::Display for Unreachable {
 impl core::error::Error for Unreachable {}
 
 /// Least time from rest at one indentation to rest at another; see [`profile`].
-///
-/// # Errors
-/// The limits do not allow the motion at all.
 pub fn minimum_time_s(
     setup: &Setup,
     d_from_mm: f64,
@@ -77,9 +74,6 @@ pub fn minimum_time_s(
 /// The time-optimal motion from rest at one indentation to rest at another.
 ///
 /// `voltage_limit` is the bridge's mean voltage before the supply sags; more than the supply has counts as all of it.
-///
-/// # Errors
-/// The limits do not allow the motion at all.
 pub fn profile(
     setup: &Setup,
     d_from_mm: f64,

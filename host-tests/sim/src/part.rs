@@ -63,9 +63,6 @@ impl Part {
     }
 
     /// Adds a line.
-    ///
-    /// # Errors
-    /// It cannot be written; those before it are there.
     pub fn add(&mut self, text: &str) -> Result<(), RunError> {
         let line = line(text);
         if let Err(error) = self.file.write_all(line.as_bytes()) {
@@ -77,9 +74,6 @@ impl Part {
     }
 
     /// Writes the file itself, whole.
-    ///
-    /// # Errors
-    /// It cannot be written; the lines are still there.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
         let told = |error| {
             format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
@@ -93,9 +87,6 @@ impl Part {
     }
 
     /// Removes the lines, once all that was made of them is written.
-    ///
-    /// # Errors
-    /// They cannot be removed.
     pub fn done(self) -> Result<(), RunError> {
         Ok(fs::remove_file(&self.path).map_err(|error| format!("cannot remove {}: {error}", self.path.display()))?)
     }

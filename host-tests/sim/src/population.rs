@@ -7,27 +7,32 @@ pub mod budget;
 pub mod cli;
 mod draw;
 mod expression;
-mod file;
 mod parts;
 mod read;
 pub mod report;
-pub mod run;
-mod spread;
-mod text;
-pub mod worst;
 
 pub use draw::Drawn;
-pub use file::{folder, load};
 pub use parts::read;
+pub use read::{folder, load};
 pub use report::Report;
 
 use crate::effects::stream;
-use crate::metrics;
+use crate::part::cannot_write;
+use crate::population::read::judged;
+use crate::population::report::Ran;
+use crate::run::{Run, RunError, run};
+use crate::scene::text::set;
 use crate::scene::{self, Scene, SceneErrors};
+use crate::sweep::{Shard, progress};
+use crate::{cores, metrics};
 use draw::Draw;
 use fastrand::Rng;
+use output::kept;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
+use std::fs;
 use std::ops::Range;
+use std::path::{Path, PathBuf};
 
 /// A population.
 #[derive(Clone, Debug)]
@@ -91,9 +96,6 @@ pub struct Finger {
 impl Population {
     /// Draws a finger, from 0. Each value has a stream of random numbers of its own, so one more leaves the others as
     /// they are.
-    ///
-    /// # Errors
-    /// It is no scene.
     pub fn finger(&self, seed: u64, number: usize) -> Result<Finger, SceneErrors> {
         let mut drawn: Vec<(String, Drawn)> = Vec::new();
         let draw = |name: &str, draw: &Draw, whole: bool, drawn: &[(String, Drawn)]| {
@@ -164,4 +166,67 @@ fn written(value: &Drawn, whole: bool) -> String {
         Drawn::Number(number) => format!("{number:?}"),
         Drawn::Word(word) => toml_edit::Value::from(word.as_str()).to_string(),
     }
+}
+
+/// Draws fingers and runs them on all cores.
+pub fn fingers(population: &Population, seed: u64, all: usize, shard: Shard, board: Run) -> Result<Vec<Ran>, RunError> {
+    go_on(population, seed, (0..all).filter(|number| shard.has(*number)), Vec::new(), board, |_| Ok(()))
+}
+
+/// Runs those of the fingers that are not done yet; each is handed to `keep` when it is.
+fn go_on(
+    population: &Population,
+    seed: u64,
+    numbers: impl Iterator<Item = usize>,
+    mut fingers: Vec<Ran>,
+    board: Run,
+    mut keep: impl FnMut(&Ran) -> Result<(), RunError>,
+) -> Result<Vec<Ran>, RunError> {
+    let done: BTreeSet<usize> = fingers.iter().map(|ran| ran.finger).collect();
+    let numbers: Vec<usize> = numbers.filter(|number| !done.contains(&(number + 1))).collect();
+    let progress = progress(numbers.len() + done.len(), "fingers")?.with_position(done.len() as u64);
+    let work = |number: &usize| {
+        let told = |error: RunError| format!("{}: finger {} of seed {seed}: {error}", population.file, number + 1);
+        let finger = population.finger(seed, *number).map_err(|errors| told(errors.into()))?;
+        let outcome = run(&finger.scene, board, &mut []).map_err(told)?;
+        Ok(Ran::new(*number, &finger, &outcome))
+    };
+    cores::each(&numbers, work, |_, ran| {
+        progress.inc(1);
+        keep(&ran)?;
+        fingers.push(ran);
+        Ok(())
+    })?;
+    progress.finish_and_clear();
+    Ok(fingers)
+}
+
+/// Writes the scenes of the `count` worst fingers into a folder, in the order of [`Report::worst`].
+pub fn write_worst(
+    population: &Population,
+    report: &Report,
+    count: usize,
+    out: &Path,
+) -> Result<Vec<PathBuf>, RunError> {
+    fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
+    let mut paths = Vec::new();
+    for ran in report.worst().into_iter().take(count) {
+        let scene = population.finger(report.seed, ran.finger - 1)?.scene;
+        let head = format!(
+            "# Drawn from the population `{}`, seed {}; of {}.\n# {}\n",
+            population.name,
+            report.seed,
+            report.of_fingers,
+            judged(ran)
+        );
+        let mut text = set(&scene.text, "seed", &scene.seed.to_string())?;
+        // What was drawn left empty lines behind.
+        while text.contains("\n\n\n") {
+            text = text.replace("\n\n\n", "\n\n");
+        }
+        let path = out.join(format!("{}-{}-{}.toml", population.name, report.seed, ran.finger));
+        kept::write(&path, head + text.trim_start()).map_err(|error| cannot_write(&path, &error))?;
+        paths.push(path);
+    }
+    Ok(paths)
 }

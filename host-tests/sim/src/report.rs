@@ -1,13 +1,9 @@
 //! A run as one page of HTML: no network, no other file, light and dark, for a screen and a phone.
 
 mod data;
-mod effects;
-mod groups;
 mod page;
 mod plots;
-mod pressures;
 mod states;
-mod strip;
 mod trace;
 
 pub use page::page;

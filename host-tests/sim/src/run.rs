@@ -29,9 +29,6 @@ pub struct Outcome {
 }
 
 /// Runs a scene, measured, and watched by these too.
-///
-/// # Errors
-/// The board cannot run it.
 pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result<Outcome, RunError> {
     let mut meter = Meter::default();
     let summary = board(scene, &mut All { meter: &mut meter, others: watchers })?;

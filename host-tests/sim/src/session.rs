@@ -89,9 +89,6 @@ fn write(path: &path::Path, text: &str) -> Result<(), RunError> {
 }
 
 /// Replays a recording, and says how it went. Returns whether every bit is the same.
-///
-/// # Errors
-/// It is no whole recording.
 pub fn replay_file(path: &path::Path) -> Result<bool, RunError> {
     let replayed = replay(path)?;
     match &replayed.difference {

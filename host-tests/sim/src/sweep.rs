@@ -4,25 +4,17 @@
 //! from shards is the same, byte for byte, as one whole sweep.
 
 pub mod files;
-mod merge;
-mod plots;
-mod random;
-mod shard;
 mod summary;
-mod table;
-mod vary;
 
-pub use files::merge;
-pub use shard::Shard;
-pub(crate) use shard::first_missing;
-pub use table::Table;
-pub use vary::Vary;
+pub(crate) use files::first_missing;
+pub use files::{Shard, merge};
+pub use summary::Table;
 
-use crate::cli;
-use crate::cores;
 use crate::metrics::METRICS;
+use crate::registry::Named;
 use crate::run::{Run, RunError, run};
 use crate::scene::Scene;
+use crate::{cli, cores};
 use files::Rows;
 use indicatif::{ProgressBar, ProgressStyle};
 use output::say;
@@ -71,11 +63,11 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let all = all.ok_or_else(|| format!("more than {MOST} runs: vary fewer keys, or give fewer values or seeds"))?;
     let points = points(plan)?;
     let first = &points.first().ok_or("there is nothing to run")?.1;
-    if seeds > 1 && !points.iter().any(|(_, scene)| random::is(scene)) {
+    if seeds > 1 && !points.iter().any(|(_, scene)| is(scene)) {
         return Err(format!(
             "nothing in {} is random: all {seeds} seeds would give the same run. Leave --seeds out, or name an effect that draws: {}",
             first.name,
-            random::EFFECTS.join(", ")
+            EFFECTS.join(", ")
         )
         .into());
     }
@@ -103,9 +95,6 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
 }
 
 /// A bar on the terminal.
-///
-/// # Errors
-/// None: the template is one.
 pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
     let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
     Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
@@ -140,4 +129,108 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
         Ok((values, cli::load(&plan.scene, &set, None)?))
     };
     combinations.into_iter().map(point).collect()
+}
+
+/// A key and its values, as a scene's text has them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Vary {
+    /// `table.key`.
+    pub key: String,
+    /// From the first to the last.
+    pub values: Vec<String>,
+}
+
+/// Values where none are asked for.
+const VALUES: usize = 5;
+/// More are a slip of the keyboard.
+const MOST_VALUES: usize = 100_000;
+
+impl std::str::FromStr for Vary {
+    type Err = String;
+
+    /// Reads `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole where they come out
+    /// so.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("--vary {text}: table.key=lo..hi or table.key=lo..hi:n is asked for");
+        let (key, range) = text.split_once('=').ok_or_else(wrong)?;
+        let (range, count) = match range.split_once(':') {
+            Some((range, count)) => (range, count.trim().parse().map_err(|_| wrong())?),
+            None => (range, VALUES),
+        };
+        let (low, high) = range.split_once("..").ok_or_else(wrong)?;
+        let end = |text: &str| text.trim().parse::<f64>().ok().filter(|end| end.is_finite()).ok_or_else(wrong);
+        let (low_end, high_end) = (end(low)?, end(high)?);
+        if count > MOST_VALUES {
+            return Err(format!("--vary {text}: {count} values, at most {MOST_VALUES} are allowed"));
+        }
+        if key.trim().is_empty() || count == 0 || (count == 1 && low_end != high_end) {
+            return Err(wrong());
+        }
+        let whole = [low, high].iter().all(|end| end.trim().parse::<i64>().is_ok());
+        let value = |n: usize| {
+            let share = if count > 1 { n as f64 / (count - 1) as f64 } else { 0.0 };
+            let value = low_end + (high_end - low_end) * share;
+            // Sums of tenths and the like come out as they are meant.
+            let value = format!("{value:.12e}").parse().unwrap_or(value);
+            if whole && value.fract() == 0.0 { format!("{value}") } else { format!("{value:?}") }
+        };
+        Ok(Self { key: key.trim().into(), values: (0..count).map(value).collect() })
+    }
+}
+
+/// The effects that draw random numbers.
+pub const EFFECTS: [&str; 8] =
+    ["noise", "offset", "gain_spread", "tangential", "host_jitter", "lost_packets", "corrupted_packets", "burst"];
+
+/// Whether another seed may give another run.
+pub fn is(scene: &Scene) -> bool {
+    scene.effects.iter().any(draws)
+}
+
+/// Whether an effect draws, and not by a deviation of nothing.
+fn draws(named: &Named) -> bool {
+    let Named { effect, values } = named;
+    let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
+    EFFECTS.contains(&effect.name)
+        && match effect.name {
+            "tangential" => !idle(&[("spread_percent", 0.0)]),
+            _ => effect.zero.is_empty() || !idle(effect.zero),
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registry;
+    use std::fs;
+
+    /// What an effect takes its random numbers from.
+    const DRAWN_FROM: &str = "build.seed";
+
+    #[test]
+    fn those_that_draw_are_listed() {
+        for effect in registry::all() {
+            let folder = format!("{}/host-tests/sim/src/effects/{}", env!("FINGERTIP_ROOT"), effect.family.name());
+            let files = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
+            let text: String = files.map(|file| fs::read_to_string(file.unwrap().path()).unwrap()).collect();
+            let (_, text) = text.split_once(&format!("const {}: Description", effect.name.to_uppercase())).unwrap();
+            let text = text.split(": Description").next().unwrap();
+            assert_eq!(text.contains(DRAWN_FROM), EFFECTS.contains(&effect.name), "{}", effect.name);
+        }
+    }
+
+    #[test]
+    fn ranges_are_read() {
+        let values = |text: &str| text.parse::<Vary>().map(|vary| vary.values.join(" "));
+        assert_eq!(values("tip.radius_mm=8..12"), Ok("8 9 10 11 12".into()));
+        assert_eq!(values("tip.radius_mm=0.1..0.3:3"), Ok("0.1 0.2 0.3".into()));
+        assert_eq!(values("tip.radius_mm=1..2:3"), Ok("1 1.5 2".into()));
+        assert_eq!(values("a.b=-1..1:2"), Ok("-1 1".into()));
+        assert_eq!(values("a.b=7..7:1"), Ok("7".into()));
+        for wrong in
+            ["a.b", "a.b=1", "a.b=1..x", "=1..2", "a.b=1..2:0", "a.b=1..2:1", "a.b=1..inf", "a.b=1..2:1000000000000"]
+        {
+            assert!(values(wrong).is_err(), "{wrong}");
+        }
+    }
 }

@@ -1,18 +1,17 @@
 //! The world of a scene: its fingers and what they touch, moved on by steps.
 
-mod rows;
-
+use crate::bridge::Bridge;
 use crate::effects::contact::Stages as _;
 use crate::effects::drive::Stages as _;
 use crate::effects::set::Set;
 use crate::events::Happened;
 use crate::mechanics::body::{Body, Surroundings, overlap_s};
-use crate::mechanics::contact::Contact;
+use crate::mechanics::contact::{Contact, Place};
 use crate::mechanics::finger::Finger;
-use crate::setup::Tip;
+use crate::setup::{Setup, Tip};
 use crate::watch::Truth;
-use crate::{bridge::Bridge, setup::Setup};
 use fingertip::frame::Sense;
+use fingertip::shipped::COLUMNS;
 use fingertip::units::CoreCycles;
 
 /// A step times the fastest oscillation's angular frequency is at most this: its solution then gains a factor of 16 a
@@ -87,9 +86,6 @@ impl<E: Set> World<E> {
     }
 
     /// Refuses a step that is too long for the steepest contact.
-    ///
-    /// # Errors
-    /// Says what is allowed.
     pub fn check_step(&self, step_s: f64) -> Result<(), WorldError> {
         for finger in &self.fingers {
             let n_per_mm = finger.contact.steepest_n_per_mm(Tip::DEEPEST * finger.setup().tip.radius_mm);
@@ -328,4 +324,48 @@ impl<E: Set> World<E> {
 /// The travel at which a finger's tip meets the object's surface.
 fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
     setup.wall.distance_mm + side(finger) * body.place_mm[0] + body.away_mm
+}
+
+impl<E: Set> World<E> {
+    /// How a finger touches at a time within the last step. Several may be asked for before their rows: one then need
+    /// not wait for another to be worked out.
+    #[inline]
+    pub fn place(&self, index: usize, since_s: f64) -> Place {
+        let mut body = self.body;
+        if since_s < self.dt_s {
+            let (before, t) = (&self.body_before, since_s / self.dt_s);
+            let (v0, v1) = (before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
+            body.away_mm += (before.away_mm - body.away_mm) * (1.0 - t);
+            body.place_mm[0] = before.place_mm[0] + since_s * (v0 + 0.5 * (v1 - v0) * t);
+        }
+        let finger = &self.fingers[index];
+        finger.contact.place(finger.flank_within_mm(since_s) - surface_mm(finger.setup(), index, &body))
+    }
+
+    /// Mean pressures on a row's taxels where a finger touches like this.
+    #[inline]
+    pub fn placed_kpa(&mut self, index: usize, place: &Place, row: usize) -> [f64; COLUMNS] {
+        self.fingers[index].contact.row_kpa(place, row)
+    }
+
+    /// The same at a time within the last step.
+    pub fn row_kpa(&mut self, index: usize, since_s: f64, row: usize) -> [f64; COLUMNS] {
+        let place = self.place(index, since_s);
+        self.placed_kpa(index, &place, row)
+    }
+
+    /// The same at a time before the last step's end, below 0, or behind it: then all goes on as it did in it.
+    pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
+        if off_s < 0.0 {
+            return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
+        }
+        let mut body = self.body;
+        if self.dt_s > 0.0 {
+            let (v0, v1) = (self.body_before.speed_mm_per_s[0], body.speed_mm_per_s[0]);
+            body.place_mm[0] += off_s * (v1 + 0.5 * (v1 - v0) * off_s / self.dt_s);
+        }
+        let finger = &self.fingers[index];
+        let place = finger.contact.place(finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body));
+        self.placed_kpa(index, &place, row)
+    }
 }

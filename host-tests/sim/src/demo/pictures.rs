@@ -10,9 +10,6 @@ const BEFORE_MS: f64 = 5.0;
 const AFTER_MS: f64 = 60.0;
 
 /// Draws the pictures into a folder and returns where they are.
-///
-/// # Errors
-/// A file cannot be written.
 pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
     let touched_s = run.goals.first().map_or(0.0, |asked| asked.at_s) + forces.touch.touched_after_ms * 1e-3;
     let window = |zero_s: f64| run.between(zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);

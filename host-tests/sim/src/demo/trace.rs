@@ -30,9 +30,6 @@ impl Trace {
     }
 
     /// What came of it.
-    ///
-    /// # Errors
-    /// The controller stopped with a fault.
     pub fn finish(mut self) -> Result<Run, DemoError> {
         self.keep();
         match self.fault {

@@ -1,8 +1,8 @@
 //! How a finger behaved: what it must never do, and what it was like once a goal had had its time. All of it is judged
 //! by what is true of the finger, never by what the controller reports.
 
-use super::at_goal::{AtGoal, note};
 use super::finger::{duty, newtons, trimmed};
+use super::response::{AtGoal, note};
 use crate::watch::Step;
 use fingertip::params::Params;
 use serde::{Deserialize, Serialize};

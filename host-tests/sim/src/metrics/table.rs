@@ -1,7 +1,7 @@
 //! The one table of metrics.
 
-use super::at_goal::AtGoal;
 use super::finger::{DROPPED_MM, Finger, LIMITS};
+use super::response::AtGoal;
 use super::{ByGoal, Metric, Worst};
 use Worst::{FirstFault, Largest, Least, Sum};
 

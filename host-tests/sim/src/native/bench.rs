@@ -34,18 +34,12 @@ const REST_STEP_S: f64 = 0.02;
 
 impl<E: Set> Bench<E> {
     /// At rest, torque off, not tared.
-    ///
-    /// # Errors
-    /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
 
     /// Exchanges the world around the finger. Controller, tip and array stay: their effects remember what was before, and
     /// time goes on.
-    ///
-    /// # Errors
-    /// What the scene asks for cannot be simulated.
     pub fn exchange(&mut self, scene: &Scene) -> Result<(), SimError> {
         let mut before = core::mem::replace(&mut self.board, Board::new(&scene.without_events(), Begun::default())?);
         let now = &mut self.board;
@@ -63,9 +57,6 @@ impl<E: Set> Bench<E> {
 
     /// Copies the bench, so that several futures can begin at one instant. `scene` is the scene of this bench. The copy
     /// is exact where no effect of the scene has a memory: noise, hysteresis and creep begin again.
-    ///
-    /// # Errors
-    /// The scene cannot be simulated.
     pub fn fork(&self, scene: &Scene) -> Result<Self, SimError> {
         let mut fork = Self::new(scene)?;
         let (from, to) = (&self.board, &mut fork.board);

@@ -63,17 +63,11 @@ pub struct Calibrated {
 
 impl Calibrated {
     /// Calibrates the first finger of a scene.
-    ///
-    /// # Errors
-    /// As [`calibrate`].
     pub fn of(scene: &Scene) -> Result<Self, RunError> {
         calibrate(&mut Bench::new(scene)?, scene)
     }
 
     /// The scene with the parameters found.
-    ///
-    /// # Errors
-    /// They are not valid there.
     pub fn scene(&self, scene: &Scene) -> Result<Scene, RunError> {
         let Params { modulus_pa, codes_per_kpa_milli, .. } = self.params;
         changed(
@@ -87,9 +81,6 @@ impl Calibrated {
 }
 
 /// The native board with a finger that is calibrated first.
-///
-/// # Errors
-/// As [`calibrate`].
 pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> {
     let calibrated = Calibrated::of(scene)?;
     Ok(simulate_calibrated(&calibrated.scene(scene)?, &calibrated.gains, watch)?)
@@ -154,9 +145,6 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
 }
 
 /// The scene's finger before a level or inclined plate, with the contact at a place.
-///
-/// # Errors
-/// The place is out of the scene's range.
 pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
     let Place { centre_mm: [x, y], tilt_deg: [along_columns, along_rows] } = place;
     let number = |path, value: f64| (path, format!("{value:?}"));

@@ -8,13 +8,14 @@
 mod broken;
 mod object;
 
+pub use broken::Kind;
+
 use super::{Begun, Board, SimError};
 use crate::bridge::Bridge;
 use crate::effects::set::Set;
 use crate::scene::Scene;
 use crate::watch::Truth;
 use broken::Broken;
-pub use broken::Kind;
 use fingertip::capture::Ended;
 use fingertip::link::{Captured, Crash, Health, Reply, ResetCause};
 use fingertip::pipeline::Status;
@@ -61,9 +62,6 @@ struct Device {
 
 impl<E: Set> Bus<E> {
     /// At power-on: torque off, not tared, nothing stored but what the scene says.
-    ///
-    /// # Errors
-    /// What the scene asks for cannot be simulated.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         let board = Board::<E>::new(&scene.without_events(), Begun::default())?;
         let device = |finger: usize| {

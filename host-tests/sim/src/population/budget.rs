@@ -1,7 +1,7 @@
 //! What makes the force wrong: the same fingers without one cause at a time.
 
 use super::report::Ran;
-use super::{Draw, Drawn, Population, load, run};
+use super::{Draw, Drawn, Population, load};
 use crate::run::{Run, RunError};
 use crate::sweep::Shard;
 use std::fmt::Write as _;
@@ -82,14 +82,11 @@ pub struct Budget {
 
 impl Budget {
     /// Runs the fingers with all causes, without each, and without any; and once on a board that calibrates them first.
-    ///
-    /// # Errors
-    /// A finger does not run.
     pub fn of(fingers: usize, board: Run, calibrated: Run) -> Result<Self, RunError> {
         let population = load(POPULATION)?;
         let off_on = |board: Run, causes: &[Cause]| {
             let less = causes.iter().try_fold(population.clone(), |less, cause| less.without(cause.names))?;
-            Ok::<Off, RunError>(errors(&run::fingers(&less, SEED, fingers, Shard::WHOLE, board)?))
+            Ok::<Off, RunError>(errors(&super::fingers(&less, SEED, fingers, Shard::WHOLE, board)?))
         };
         let off = |causes: &[Cause]| off_on(board, causes);
         let (all, none, calibrated) = (off(&[])?, off(&CAUSES)?, off_on(calibrated, &[])?);
@@ -161,9 +158,6 @@ fn rms(off: &Off) -> Errors {
 
 impl Population {
     /// The same with these variables and keys at 0. All others are drawn as before.
-    ///
-    /// # Errors
-    /// There is none of that name.
     pub fn without(mut self, names: &[&str]) -> Result<Self, String> {
         let zero = Draw::Always(Drawn::Number(0.0));
         for name in names {

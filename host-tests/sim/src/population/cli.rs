@@ -1,8 +1,8 @@
 //! The command line of `population`, the same for both boards.
 
+use super::read::{judged, text};
 use super::report::{self, Ran, Report};
-use super::text::{judged, text};
-use super::{load, run, worst};
+use super::{go_on, load, write_worst};
 use crate::cli::verdict;
 use crate::part::Part;
 use crate::run::{Run, RunError};
@@ -128,7 +128,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
         part = Some(opened);
     }
     let keep = |ran: &Ran| part.as_mut().map_or(Ok(()), |part| part.add(&serde_json::to_string(ran)?));
-    let fingers = run::go_on(&population, args.seed, numbers, done, board, keep)?;
+    let fingers = go_on(&population, args.seed, numbers, done, board, keep)?;
     let report = Report::new(&population, board_name, args.seed, all, fingers);
     match (part, &args.json) {
         (Some(part), _) => {
@@ -140,7 +140,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     }
     say::text(text(&report));
     if let (Some(count), Some(out)) = (args.worst, &args.out) {
-        for (path, ran) in worst::write(&population, &report, count, out)?.iter().zip(report.worst()) {
+        for (path, ran) in write_worst(&population, &report, count, out)?.iter().zip(report.worst()) {
             say::line(format_args!("wrote {}: {}", path.display(), judged(ran)));
         }
     }

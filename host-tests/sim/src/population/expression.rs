@@ -47,9 +47,6 @@ impl Operator {
 
 impl Expression {
     /// Reads one.
-    ///
-    /// # Errors
-    /// Says what is not understood.
     pub fn read(text: &str) -> Result<Self, String> {
         let mut rest = text;
         let read = sum(&mut rest)?;

@@ -1,7 +1,7 @@
 //! From a population's text to what is drawn in it.
 
 use super::draw::{Draw, Drawn};
-use super::file::stem;
+use super::read::stem;
 use super::read::{DrawReader, Wrong, number};
 use super::{Counted, Events, Place, Population};
 use crate::events::{EVENT, KINDS, own_keys};
@@ -18,9 +18,6 @@ use toml_edit::{Document, Item, Table, TableLike};
 const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
 /// Reads a population that extends nothing any more.
-///
-/// # Errors
-/// Everything in the text that is not a population.
 pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
     let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, message, allowed);
     let document = Document::parse(text).map_err(|failure| {

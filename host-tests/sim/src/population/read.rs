@@ -2,9 +2,19 @@
 
 use super::draw::{Draw, Drawn};
 use super::expression::Expression;
+use super::{Counted, Population, read};
+use crate::metrics::shown;
+use crate::population::draw::Spread;
+use crate::population::report::{Promise, Ran, Report};
+use crate::run::asked;
 use crate::scene::error::alike;
+use crate::scene::library;
+use crate::scene::tables::{EXPECT, SCRIPT};
+use std::fmt::Write as _;
+use std::fs;
 use std::ops::Range;
-use toml_edit::{InlineTable, Value};
+use std::path::{Path, PathBuf};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
 
 /// What is wrong, where, and what is allowed.
 pub type Wrong = (Range<usize>, String, String);
@@ -25,9 +35,6 @@ pub struct DrawReader<'a> {
 
 impl DrawReader<'_> {
     /// What a value says: a draw, or always the same.
-    ///
-    /// # Errors
-    /// It is neither.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
         match (value.as_inline_table(), number.or_else(|| value.as_str().map(|word| Drawn::Word(word.into())))) {
@@ -188,4 +195,138 @@ fn at(value: &Value) -> Range<usize> {
 
 fn wrong(value: &Value, message: &str, allowed: &str) -> Wrong {
     (at(value), message.into(), allowed.into())
+}
+
+/// Where the populations lie that come with the project.
+pub fn folder() -> PathBuf {
+    Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/populations")
+}
+
+/// A population by its path or by its name among those that come with the project.
+///
+/// # Errors
+/// There is none, or it is not one; the text is for people.
+pub fn load(name: &str) -> Result<Population, String> {
+    let (path, text) = library::find(&folder(), "population", name)?;
+    let file = path.to_string_lossy();
+    let over: DocumentMut =
+        text.parse().map_err(|error: toml_edit::TomlError| format!("{file}: this is not TOML: {error}"))?;
+    let Some(base) = over.get("extends") else { return read(&file, &text).map_err(|errors| errors.to_string()) };
+    let base = base.as_str().ok_or_else(|| format!("{file}: `extends` names a population, such as \"ordinary\""))?;
+    let beside = path.with_file_name(base).with_extension("toml");
+    let found = if beside.is_file() { beside } else { folder().join(base).with_extension("toml") };
+    let told = |why: String| format!("{file} extends {base}: {why}");
+    let unknown = |error| told(library::unknown(&folder(), "population", base, &error));
+    let text = fs::read_to_string(&found).map_err(unknown)?;
+    let whole: Result<DocumentMut, toml_edit::TomlError> = text.parse();
+    if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {
+        return Err(told(format!("{base} extends another itself; extend that one, or none")));
+    }
+    // What is wrong in it is told as it stands there.
+    let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
+    let mut whole = whole.map_err(|error| told(error.to_string()))?;
+    overlay(whole.as_table_mut(), over.as_table());
+    let label = format!("{file} over {}", known.name);
+    let population = read(&label, &whole.to_string()).map_err(|errors| errors.to_string())?;
+    Ok(Population { name: stem(&file), ..population })
+}
+
+/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole. What is
+/// counted is added.
+fn overlay(base: &mut Table, over: &Table) {
+    for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
+        match (base.get_mut(name), item) {
+            (Some(Item::Table(base)), Item::Table(over)) => overlay(base, over),
+            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name == EXPECT.name => bounds(base, over),
+            (Some(Item::ArrayOfTables(base)), Item::ArrayOfTables(over)) if name != SCRIPT.name => {
+                over.iter().for_each(|table| base.push(table.clone()));
+            }
+            (Some(known), item) => *known = item.clone(),
+            (None, item) => {
+                base.insert(name, item.clone());
+            }
+        }
+    }
+}
+
+fn bounds(base: &mut ArrayOfTables, over: &ArrayOfTables) {
+    let metric = |table: &Table| table.get("metric").and_then(Item::as_str).map(str::to_owned);
+    for table in over {
+        let place = base.iter().position(|known| metric(known) == metric(table));
+        match place.and_then(|place| base.get_mut(place)) {
+            Some(known) => table.iter().for_each(|(name, item)| {
+                known.insert(name, item.clone());
+            }),
+            None => base.push(table.clone()),
+        }
+    }
+}
+
+/// A file's name without its ending.
+pub fn stem(file: &str) -> String {
+    Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
+}
+
+/// Fingers that are named each.
+const NAMED: usize = 30;
+
+/// The table of promises, the forces' errors, and who broke what.
+pub fn text(report: &Report) -> String {
+    let Report { population, board, seed, of_fingers, fingers, .. } = report;
+    let count = fingers.len();
+    let percent = |part: usize| 100.0 * part as f64 / count.max(1) as f64;
+    let mut text = format!("{population}: {}\n", report.about);
+    // Writing to a string does not fail.
+    let _ = writeln!(text, "{count} of {of_fingers} fingers, seed {seed}, board {board}; simulated\n");
+    let promises = report.promises();
+    let width = promises.iter().map(|row| row.metric.len()).max().unwrap_or(0);
+    let _ = writeln!(
+        text,
+        "  {:width$} {:>8} {:>8} {:>10} {:>10} {:>10}",
+        "promise", "broken", "%", "median", "95 %", "worst"
+    );
+    for row in &promises {
+        let [median, most, worst] = values(&row.spread);
+        let (broken, share) = (row.broken, percent(row.broken));
+        let _ = writeln!(text, "  {:width$} {broken:>8} {share:>8.1} {median:>10} {most:>10} {worst:>10}", row.metric);
+    }
+    for (Counted { metric, above }, fingers) in report.counted() {
+        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers));
+    }
+    let [of_goal, mn] = report.errors();
+    let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);
+    for (spread, unit) in [(of_goal, "% of the goal"), (mn, "mN")] {
+        let _ = writeln!(text, "  {} {unit}", values(&spread).join(", "));
+    }
+    let worst: Vec<&Ran> = report.worst().into_iter().filter(|ran| !ran.inside).collect();
+    if !worst.is_empty() {
+        text += "\n  outside, the worst first:\n";
+    }
+    worst.iter().take(NAMED).for_each(|ran| text += &format!("  {}\n", judged(ran)));
+    if worst.len() > NAMED {
+        let _ = writeln!(text, "  and {} more: --json FILE has them all", worst.len() - NAMED);
+    }
+    let _ = writeln!(
+        text,
+        "\n{} of {count} fingers inside the envelope ({:.1} %)",
+        report.inside(),
+        percent(report.inside())
+    );
+    text
+}
+
+/// A line with the promises that a finger broke, or the one that it kept most narrowly.
+pub fn judged(ran: &Ran) -> String {
+    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
+        format!("{metric} {} ({})", shown(*value), asked(*min, *max))
+    };
+    let about = match ran.nearest().filter(|_| ran.inside) {
+        Some(nearest) => format!("broke no promise, nearest to its bound is {}", promise(nearest)),
+        None => ran.broken().map(promise).collect::<Vec<_>>().join("; "),
+    };
+    format!("finger {}: {about}", ran.finger)
+}
+
+fn values(spread: &Spread) -> [String; 3] {
+    [spread.median, spread.most, spread.worst].map(shown)
 }

@@ -1,6 +1,6 @@
 //! What became of a population: every finger's draws and verdicts, and what they come to.
 
-use super::spread::Spread;
+use super::draw::Spread;
 use super::{Counted, Finger, Population};
 use crate::metrics::Hold;
 use crate::part::{cannot_write, check};
@@ -253,9 +253,6 @@ impl Report {
     }
 
     /// For scripts.
-    ///
-    /// # Errors
-    /// None: it is JSON.
     pub fn json(&self) -> Result<String, RunError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }

@@ -1,6 +1,6 @@
 //! Feeds a recording through the core again; the answers must be the same to the bit.
 
-use super::{END, OF_SCENE, OF_SETUP, SETUP, WHOLE, check, controller_of, topic};
+use super::{END, OF_SCENE, OF_SETUP, SETUP, WHOLE, check, controller_of, digest, texts, topic};
 use crate::run::RunError;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::{Calibration, Config, Pipeline};
@@ -65,7 +65,7 @@ pub fn replay(path: &Path) -> Result<Replay, RunError> {
 }
 
 fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
-    check::check(bytes)?;
+    check(bytes)?;
     let setup = metadata(bytes, SETUP)?;
     if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
         return Err(
@@ -82,10 +82,10 @@ fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
             .ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
     };
     // The file is whole, but a program may have written it anew with other contents.
-    if field(&end, OF_SETUP)? != check::digest(&setup.metadata) {
+    if field(&end, OF_SETUP)? != digest(&setup.metadata) {
         return Err(format!("its {SETUP}, how the controllers were set, was changed after the run").into());
     }
-    if field(&end, OF_SCENE)? != check::texts(scene(bytes)?.iter().map(|scene| &scene.data[..])) {
+    if field(&end, OF_SCENE)? != texts(scene(bytes)?.iter().map(|scene| &scene.data[..])) {
         return Err("the attached scene was changed after the run, or is missing".into());
     }
     let fingers: usize = field(&setup, "fingers")?.parse()?;

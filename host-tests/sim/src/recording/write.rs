@@ -1,6 +1,6 @@
 //! Writes a recording while the run goes on.
 
-use super::{END, OF_SCENE, OF_SETUP, SETUP, WHOLE, check, controller_json, schemas, topic};
+use super::{END, OF_SCENE, OF_SETUP, SCALARS, SETUP, WHOLE, controller_json, digest, schemas, texts, topic};
 use crate::part::cannot_write;
 use crate::run::RunError;
 use crate::scene::Scene;
@@ -94,7 +94,7 @@ impl Recorder {
         self.failed?;
         let steps =
             self.fingers.iter().enumerate().map(|(n, finger)| (format!("finger{n}.steps"), finger.steps.to_string()));
-        let scene = check::texts([self.scene.text.as_bytes()]);
+        let scene = texts([self.scene.text.as_bytes()]);
         let digests = [("digest", digest.into()), (OF_SETUP, self.setup.clone()), (OF_SCENE, scene)];
         let metadata = steps.chain(digests.map(|(name, digest)| (name.to_owned(), digest))).collect();
         self.out.write_metadata(&Metadata { name: END.into(), metadata })?;
@@ -122,9 +122,9 @@ impl Recorder {
         for (number, controller) in controllers.iter().enumerate() {
             metadata.insert(format!("finger{number}"), controller_json(controller).to_string());
         }
-        self.setup = check::digest(&metadata);
+        self.setup = digest(&metadata);
         out.write_metadata(&Metadata { name: SETUP.into(), metadata })?;
-        let schemas = schemas::all();
+        let schemas = schemas();
         let mut ids = [0; 4];
         for ((_, name, schema), id) in schemas.iter().zip(&mut ids) {
             *id = out.add_schema(name, "jsonschema", schema.as_bytes())?;
@@ -203,7 +203,7 @@ fn scalars(step: &Step) -> Value {
         truth.slip_mm,
         truth.object_mm[1],
     ];
-    let names = schemas::SCALARS.iter().map(|(name, _)| (*name).to_owned());
+    let names = SCALARS.iter().map(|(name, _)| (*name).to_owned());
     Value::Object(names.zip(values.map(Value::from)).collect::<Map<_, _>>())
 }
 

@@ -120,9 +120,6 @@ impl Over {
     }
 
     /// The run of a report's text.
-    ///
-    /// # Errors
-    /// See [`Over::read`].
     pub fn of(page: &str) -> Result<Self, String> {
         let again = "write it anew with `--out`";
         let (_, rest) = page.split_once(BEGIN).ok_or(format!("this is no report with a run in it; {again}"))?;

@@ -1,10 +1,10 @@
 //! The page's parts.
 
 use super::data::{self, BEGIN};
-use super::groups::{Group, groups};
 use super::plots::{self, Plot};
-use super::{Report, Tracks, effects, pressures, strip};
-use crate::metrics::{Metric, Verdict, shown};
+use super::{Report, Tracks};
+use crate::ledger::{difference, differences, rows};
+use crate::metrics::{METRICS, Metric, Verdict, shown};
 use crate::run::{RunError, asked};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use output::plot::PlotError;
@@ -25,9 +25,6 @@ const SCRIPTS: [&str; 5] = [
 ];
 
 /// The page.
-///
-/// # Errors
-/// A plot cannot be drawn.
 pub fn page(report: &Report) -> Result<String, RunError> {
     let Report { scene, board, outcome, trace, over, .. } = report;
     let summary = &outcome.summary;
@@ -64,7 +61,7 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                     section id="metrics" { h2 { "Metrics" } (metrics(report)) }
                     section id="ledger" {
                         h2 { "What each effect cost" }
-                        (effects::ledger(report))
+                        (ledger(report))
                         p.note {
                             (shown(Some(summary.virtual_s))) " s simulated in " (shown(Some(summary.wall_s)))
                             " s, behind " (shown(Some(summary.set_up_s))) " s to power up and tare. Digest "
@@ -72,7 +69,7 @@ pub fn page(report: &Report) -> Result<String, RunError> {
                         }
                     }
                     @if !report.ablated.is_empty() {
-                        section id="ablation" { h2 { "What each effect changes" } (effects::ablation(report)) }
+                        section id="ablation" { h2 { "What each effect changes" } (ablation(report)) }
                     }
                     section id="scene" { h2 { "The scene" } pre tabindex="0" { code { (scene.text) } } }
                 }
@@ -175,13 +172,13 @@ fn finger(number: usize, tracks: &Tracks, several: bool) -> Result<Markup, PlotE
                 }
                 figure.plot data-title="strip" {
                     h3 { "Mode, faults and limits" }
-                    (strip::strip(&tracks.strip(), &times))
+                    (plots::strip(&tracks.strip(), &times))
                     figcaption { "What occurred, however short, is as wide as a nine-hundredth of the run." }
                 }
             }
             div.array {
                 h3 { "Pressure on the array" }
-                (pressures::pressures(tracks))
+                (plots::pressures(tracks))
             }
         }
     })
@@ -230,5 +227,112 @@ fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
                 td.about { (metric.about) }
             } } }
         } }
+    }
+}
+
+/// What each cost.
+pub fn ledger(report: &Report) -> Markup {
+    html! {
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "effect" } th.number scope="col" { "evaluations" }
+                th.number scope="col" { "time, s" } th.number scope="col" { "share, %" }
+            } }
+            tbody { @for (effect, evaluations, seconds, percent) in rows(&report.outcome.summary) { tr {
+                td { (effect) }
+                td.number { @if let Some(evaluations) = evaluations { (evaluations) } }
+                td.number { (format!("{seconds:.4}")) }
+                td.number { (format!("{percent:.1}")) }
+            } } }
+        } }
+    }
+}
+
+/// What each changes.
+pub fn ablation(report: &Report) -> Markup {
+    html! {
+        p.note { "What each effect adds to a metric: the run as it is, less a run without the effect." }
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "metric" } th.number scope="col" { "all effects" }
+                @for without in report.ablated { th.number scope="col" { (without.effect) } }
+            } }
+            tbody { @for (name, value, others) in differences(&report.outcome.measured, report.ablated) { tr {
+                td { code { (name) } }
+                td.number { (shown(value)) }
+                @for other in others { td.number { (difference(value, other)) } }
+            } } }
+        } }
+    }
+}
+
+/// A group's title, and what the names of its metrics begin with.
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("Force", &["peak_force", "overshoot", "rise", "settling", "steady_error", "over_force", "stop_force", "hold_"]),
+    ("Motion and touch", &["touch", "approach", "travel", "indentation", "runaway", "air_speed", "rest_travel"]),
+    ("Faults and limits", &["fault", "limit_", "missed_frames"]),
+    ("Sensing", &["force_error", "centre_error", "confidence"]),
+    ("Slip and object", &["slip", "object_"]),
+    ("Motor and energy", &["duty", "rest_duty", "energy", "current", "winding"]),
+];
+/// Of what belongs to none of them.
+const REST: &str = "More";
+
+/// Metrics under a title.
+pub struct Group {
+    /// The title.
+    pub title: &'static str,
+    /// Its metrics, in the order of the table.
+    pub metrics: Vec<&'static Metric>,
+    /// How many bounds on them are broken.
+    pub broken: usize,
+}
+
+/// All metrics; groups in which a bound is broken come first.
+pub fn groups(verdicts: &[Verdict]) -> Vec<Group> {
+    let titles = GROUPS.iter().map(|(title, _)| *title).chain([REST]);
+    let group = |title| {
+        let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| title_of(metric.name) == title).collect();
+        let of_it = |verdict: &&Verdict| title_of(short(&verdict.bound.metric)) == title;
+        let broken = verdicts.iter().filter(of_it).filter(|verdict| !verdict.held).count();
+        Group { title, metrics, broken }
+    };
+    let mut groups: Vec<Group> = titles.map(group).filter(|group| !group.metrics.is_empty()).collect();
+    groups.sort_by_key(|group| group.broken == 0);
+    groups
+}
+
+fn title_of(metric: &str) -> &'static str {
+    let of = |(_, begins): &&(&str, &[&str])| begins.iter().any(|begin| metric.starts_with(begin));
+    GROUPS.iter().find(of).map_or(REST, |(title, _)| title)
+}
+
+/// A metric's name without the finger before it.
+fn short(metric: &str) -> &str {
+    metric.split_once('.').map_or(metric, |(_, name)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Bound;
+
+    fn bound(metric: &str, held: bool) -> Verdict {
+        let bound = Bound { metric: metric.into(), min: None, max: Some(1.0), max_per_goal_n: None };
+        Verdict { bound, value: Some(2.0), max: Some(1.0), held }
+    }
+
+    #[test]
+    fn each_metric_is_in_one_group_and_broken_ones_come_first() {
+        let verdicts = [bound("peak_force_n", true), bound("finger1.energy_j", false), bound("energy_j", false)];
+        let groups = groups(&verdicts);
+        let mut names: Vec<_> = groups.iter().flat_map(|group| &group.metrics).map(|metric| metric.name).collect();
+        assert_eq!(names.len(), METRICS.len());
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), METRICS.len());
+        assert_eq!((groups[0].title, groups[0].broken), ("Motor and energy", 2));
+        assert!(groups[1..].iter().all(|group| group.broken == 0));
+        assert_eq!(groups[1].title, "Force");
     }
 }

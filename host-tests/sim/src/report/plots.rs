@@ -1,6 +1,11 @@
 //! A report's plots: what they show, and each as it is drawn where no script runs.
 
-use super::trace::{Kept, Track, Tracks};
+use super::states::{Row, Strip};
+use super::trace::{Instant, Kept, Track, Tracks};
+use crate::metrics::shown;
+
+use maud::{Markup, html};
+use output::heatmap::Pressures;
 use output::plot::{Curve, Curves, PlotError, curves};
 use serde::Serialize;
 
@@ -105,9 +110,6 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
 }
 
 /// A plot without a script.
-///
-/// # Errors
-/// It cannot be drawn.
 pub fn drawn(plot: &Plot, times: &[f64]) -> Result<String, PlotError> {
     let mut lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
     let (x_range, all) = ranges(&mut lines);
@@ -156,4 +158,85 @@ pub fn around(low: f64, high: f64) -> [f64; 2] {
 fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let corners = points.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]);
     corners.chain(points.last().copied()).collect()
+}
+
+/// Parts of the whole width.
+const WIDE: f64 = 1000.0;
+
+/// The strip: a line of text and a bar for each that occurred.
+pub fn strip(Strip(rows): &Strip, times: &[f64]) -> Markup {
+    let end = times.last().copied().unwrap_or(0.0).max(1e-9);
+    // What holds in a stretch holds until the next one.
+    let place = |at: usize| times.get(at).map_or(WIDE, |time_s| if at == 0 { 0.0 } else { WIDE * time_s / end });
+    html! {
+        div.strip {
+            @for Row { kind, name, spans } in rows {
+                @let about = format!("{kind} {name}: {} times", spans.len());
+                div.row {
+                    span { (kind) ": " (name) }
+                    @let all = format!("0 0 {WIDE} 10");
+                    svg.(kind) viewBox=(all) preserveAspectRatio="none" role="img" aria-label=(about) {
+                        @for [from, to] in spans {
+                            rect x=(format!("{:.2}", place(*from))) y="0" height="10"
+                                width=(format!("{:.2}", (place(*to) - place(*from)).max(1.0))) {}
+                        }
+                    }
+                }
+            }
+            p.note { "From 0 to " (shown(times.last().copied())) " s." }
+        }
+    }
+}
+
+/// How many are shown.
+const MAPS: usize = 10;
+/// Steps of the scale.
+const STEPS: u32 = 20;
+
+/// The maps of a finger.
+pub fn pressures(tracks: &Tracks) -> Markup {
+    let all = &tracks.instants;
+    let full_kpa = all.iter().flat_map(|at| at.true_kpa.iter().flatten()).copied().fold(1.0, f64::max);
+    let chosen = (0..MAPS.min(all.len())).map(|n| &all[(2 * n + 1) * all.len() / (2 * MAPS.min(all.len()))]);
+    html! {
+        div.still {
+            p.note { "True mean pressure on each taxel." }
+            (scale(full_kpa))
+            div.maps { @for Instant { time_s, true_kpa, .. } in chosen { (map(*time_s, true_kpa, full_kpa)) } }
+        }
+    }
+}
+
+fn scale(full_kpa: f64) -> Markup {
+    html! {
+        div.scale {
+            span { "0" }
+            svg viewBox={ "0 0 " (STEPS) " 1" } preserveAspectRatio="none" role="img" aria-label="Colours of the maps" {
+                @for n in 0..STEPS {
+                    @let share = (f64::from(n) + 0.5) / f64::from(STEPS);
+                    rect x=(n) y="0" width="1" height="1" fill-opacity=(format!("{share:.3}")) {}
+                }
+            }
+            span { (format!("{full_kpa:.1}")) " kPa" }
+        }
+    }
+}
+
+fn map(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
+    let peak = format!("{:.1}", map.iter().flatten().copied().fold(0.0, f64::max));
+    let time = shown(Some((time_s * 1e3).round() / 1e3));
+    let about = format!("Pressure map at {time} s, at most {peak} kPa");
+    // The last row on top, as everywhere.
+    let cells =
+        map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
+    html! {
+        figure {
+            svg viewBox="0 0 10 10" role="img" aria-label=(about) shape-rendering="crispEdges" {
+                @for (x, y, kpa) in cells.filter(|(.., kpa)| **kpa > 0.0) {
+                    rect x=(x) y=(y) width="1" height="1" fill-opacity=(format!("{:.3}", kpa / full_kpa)) {}
+                }
+            }
+            figcaption { (time) " s, " (peak) " kPa" }
+        }
+    }
 }

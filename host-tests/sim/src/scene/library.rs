@@ -11,9 +11,6 @@ pub fn folder() -> PathBuf {
 }
 
 /// The library's scenes by name, in order.
-///
-/// # Errors
-/// The folder cannot be read.
 pub fn names() -> io::Result<Vec<String>> {
     names_in(&folder())
 }
@@ -32,17 +29,11 @@ fn names_in(folder: &Path) -> io::Result<Vec<String>> {
 }
 
 /// The path and the text of a scene, by its path or by its name in the library.
-///
-/// # Errors
-/// There is none.
 pub fn text(scene: &str) -> Result<(PathBuf, String), String> {
     find(&folder(), "scene", scene)
 }
 
 /// The path and the text of a file, by its path or by its name in a folder; `what` it is, errors tell.
-///
-/// # Errors
-/// There is none.
 pub fn find(folder: &Path, what: &str, name: &str) -> Result<(PathBuf, String), String> {
     let named = folder.join(name).with_extension("toml");
     let path = if Path::new(name).is_file() || !named.is_file() { PathBuf::from(name) } else { named };

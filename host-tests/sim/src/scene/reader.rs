@@ -3,6 +3,8 @@
 
 mod values;
 
+pub(crate) use values::{item_span, key_span};
+
 use super::error::{SceneError, SceneErrors, alike};
 use super::tables::{EXPECT, MANY, ROOT, SCRIPT, TABLES, Table};
 use super::{Bound, Goal, Scene, controller};
@@ -14,12 +16,8 @@ use fingertip::shipped::Config;
 use std::ops::Range;
 use std::path::Path;
 use toml_edit::{Document, TableLike};
-pub(crate) use values::{item_span, key_span};
 
 /// Reads a scene. `file` names it in errors; `metrics` are those that `[[expect]]` may name.
-///
-/// # Errors
-/// Everything in the text that is not a scene.
 pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
     let mut reader = Reader { file, text, errors: Vec::new() };
     let scene = match Document::parse(text) {

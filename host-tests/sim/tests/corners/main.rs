@@ -9,7 +9,6 @@ mod goals;
 mod instants;
 mod memory;
 mod motion;
-mod sensor;
 mod sequences;
 mod signal;
 

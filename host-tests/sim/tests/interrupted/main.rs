@@ -2,7 +2,6 @@
 //!
 //! A short campaign runs with the other tests; the whole one is asked for by name, as docs/runs.md says.
 
-mod campaign;
 mod jobs;
 mod refused;
 mod strike;

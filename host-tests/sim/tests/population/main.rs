@@ -1,6 +1,5 @@
 //! Populations: what is drawn, what is refused, what the envelope finds, and what comes of shards.
 
-mod budget;
 mod draws;
 mod promises;
 mod refused;

@@ -3,7 +3,7 @@
 use crate::population;
 use sim::native;
 use sim::population::report::Promise;
-use sim::population::{Population, Report, run, worst};
+use sim::population::{Population, Report, fingers, write_worst};
 use sim::sweep::Shard;
 use std::fs;
 use std::path::PathBuf;
@@ -39,7 +39,7 @@ fn touching() -> Population {
 }
 
 fn report(population: &Population, shard: Shard) -> Report {
-    let fingers = run::fingers(population, 3, FINGERS, shard, &native::board).unwrap_or_else(|error| panic!("{error}"));
+    let fingers = fingers(population, 3, FINGERS, shard, &native::board).unwrap_or_else(|error| panic!("{error}"));
     Report::new(population, "native", 3, FINGERS, fingers)
 }
 
@@ -90,7 +90,7 @@ fn the_worst_run_again_as_they_did() {
     let report = report(&population, Shard::WHOLE);
     let inside = report.inside();
     assert!(inside > 0 && inside < FINGERS, "{inside}");
-    let paths = worst::write(&population, &report, FINGERS, &folder("worst")).unwrap();
+    let paths = write_worst(&population, &report, FINGERS, &folder("worst")).unwrap();
     assert_eq!(paths.len(), FINGERS);
     // Those that broke a promise come first; the others are as near to a bound as they come, and say so.
     let worst = report.worst();
@@ -118,6 +118,6 @@ fn a_finger_that_cannot_be_run_is_named() {
     let population = population(
         "[tip]\nmodulus_kpa = { uniform = [1500, 2000] }\n[motor]\ninertia_g_cm2 = 0.01\n[world]\nstep_us = { uniform = [900, 1000] }\n",
     );
-    let error = run::fingers(&population, 1, 2, Shard::WHOLE, &native::board).unwrap_err().to_string();
+    let error = fingers(&population, 1, 2, Shard::WHOLE, &native::board).unwrap_err().to_string();
     assert!(error.contains("test.toml: finger ") && error.contains("step_us"), "{error}");
 }

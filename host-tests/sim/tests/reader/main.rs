@@ -3,7 +3,6 @@
 mod any_text;
 mod errors;
 mod keys;
-mod sets;
 
 use sim::metrics;
 use sim::scene::{self, Scene, SceneErrors, read};

@@ -1,7 +1,6 @@
 //! Each sensor effect against its closed form, and all of them against any input.
 
 mod always;
-mod codes;
 mod network;
 mod pressure;
 

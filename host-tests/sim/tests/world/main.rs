@@ -9,6 +9,3 @@ mod drive;
 mod energy;
 mod hard;
 mod object;
-mod off_step;
-mod pressures;
-mod wall;

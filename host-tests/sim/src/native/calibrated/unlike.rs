@@ -30,9 +30,6 @@ pub struct Unlike {
 }
 
 /// Draws a finger, holds forces, calibrates it and holds them again.
-///
-/// # Errors
-/// The finger cannot be simulated.
 pub fn finger(seed: u64, number: usize) -> Result<Unlike, RunError> {
     let drawn = load("unlike")?.finger(seed, number)?;
     let mut rng = Rng::with_seed(seed ^ (number as u64) << 32);
@@ -72,9 +69,6 @@ pub fn percentiles(fingers: &[Unlike]) -> [[[f64; 2]; 3]; 2] {
 }
 
 /// Runs fingers on all cores.
-///
-/// # Errors
-/// A finger cannot be simulated.
 pub fn fingers(seed: u64, count: usize) -> Result<Vec<Unlike>, RunError> {
     cores::map(0..count, |number| finger(seed, number).map_err(|error| error.to_string()))
         .into_iter()

@@ -25,7 +25,6 @@
 //! ```
 
 pub mod drift;
-mod force;
 pub mod gains;
 mod joint;
 pub mod judge;
@@ -38,10 +37,9 @@ mod report;
 mod robust;
 pub mod scale;
 pub mod strokes;
-mod value;
 
 pub use drift::{creep, temperature};
 pub use gains::gains;
 pub use modulus::modulus;
+pub use report::Value;
 pub use scale::scale;
-pub use value::Value;

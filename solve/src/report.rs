@@ -1,6 +1,5 @@
 //! Results and refusals in sentences.
 
-use crate::Value;
 use crate::drift::{Creep, Temperature};
 use crate::gains::{Condition, Gains};
 use crate::modulus::Modulus;
@@ -41,23 +40,29 @@ impl Display for Ended {
         let thousandths = 1e-3 * f64::from(value);
         match self.reason {
             Reason::Complete => write!(f, "the motion is complete"),
-            Reason::Interrupted => write!(f, "a command stopped the motion"),
+            Reason::Interrupted => {
+                write!(f, "a stop, torque, a fault, a tare or new parameters ended the motion: run it again")
+            }
             Reason::NotReady => {
-                write!(f, "the controller was not ready: enable torque, tare, and see that there is no fault")
-            }
-            Reason::Unconfirmed => write!(f, "the motor's direction is not confirmed: confirm it first"),
-            Reason::Still => {
-                write!(f, "the encoder did not count at {thousandths:.2} V: check the motor's and the encoder's cables")
-            }
-            Reason::Reversed => {
                 write!(
                     f,
-                    "the encoder counted {value} against the voltage: exchange the motor's or the encoder's leads"
+                    "not tared, something touches the tip, or torque is not as needed: free the tip, tare, run it again"
                 )
             }
-            Reason::Astray => {
-                write!(f, "the tip was {thousandths:.2} mm away, outside of its bounds: check the encoder")
-            }
+            Reason::Unconfirmed => write!(f, "the motor's direction is not confirmed: `fingertip commission` does it"),
+            Reason::Still => write!(
+                f,
+                "the encoder did not count at {thousandths:.2} V: is the motor connected, the encoder supplied, the tip free?"
+            ),
+            Reason::Reversed => write!(
+                f,
+                "the encoder counted {value} against the voltage: swap the motor's leads if the tip went back first, else the \
+                 encoder's channels"
+            ),
+            Reason::Astray => write!(
+                f,
+                "the tip was {thousandths:.2} mm away, outside of its bounds: is a channel of the encoder open?"
+            ),
             Reason::Touched => write!(
                 f,
                 "the array measured {thousandths:.3} N, more than allowed here: clear the tip's way, hold the plate fast"
@@ -71,13 +76,15 @@ impl Display for Ended {
             Reason::NoContact => {
                 write!(f, "the tip touched nothing within {thousandths:.2} mm: bring the plate nearer")
             }
-            Reason::Stalled => {
-                write!(
-                    f,
-                    "the tip stopped at {thousandths:.2} mm before it was deep enough: check the supply and the limits"
-                )
-            }
-            Reason::Full => write!(f, "the memory was full after {value} records"),
+            Reason::Stalled => write!(
+                f,
+                "the tip stopped at {thousandths:.2} mm before it was deep enough: is current_max_ma too small, or the way \
+                 blocked?"
+            ),
+            Reason::Full => write!(
+                f,
+                "the memory was full after {value} records: lower modulus or force_max_mn make a shorter press"
+            ),
         }
     }
 }
@@ -198,5 +205,26 @@ impl Display for Drive {
             times(&self.time_constant_s, 1e3),
             times(&self.inertia_kg_m2, 1e7),
         )
+    }
+}
+
+/// A number with its standard uncertainty, in the same unit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Value {
+    /// The estimate.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub sigma: f64,
+}
+
+impl Value {
+    /// The uncertainty as a share of the value.
+    pub fn relative(&self) -> f64 {
+        self.sigma / self.value.abs()
+    }
+
+    /// True if the number differs from 0 by more than three of its uncertainties.
+    pub fn differs(&self) -> bool {
+        self.value.abs() > 3.0 * self.sigma
     }
 }

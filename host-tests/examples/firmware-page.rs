@@ -1,6 +1,6 @@
 //! Prints `docs/firmware.md` with its table of saves.
 
-use host_tests::saves::{PAGE, table};
+use host_tests::page::{PAGE, table};
 
 fn main() -> Result<(), String> {
     print!("{}", PAGE.renewed(&table())?.1);

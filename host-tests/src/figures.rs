@@ -26,9 +26,6 @@ const NOISE: f64 = 0.1;
 const SEED: u64 = 2003;
 
 /// All figures: name of the file and SVG.
-///
-/// # Errors
-/// A picture cannot be drawn.
 pub fn all() -> Result<[(&'static str, String); 3], PlotError> {
     let tip = tip();
     Ok([("figure-7.svg", figure_7(&tip)?), ("figure-10.svg", figure_10(&tip)?), ("figure-11.svg", figure_11(&tip)?)])

@@ -15,6 +15,5 @@ pub mod model_file;
 pub mod page;
 pub mod program;
 pub mod prove;
-pub mod saves;
 pub mod stimulus;
 pub mod study;

@@ -53,9 +53,6 @@ pub enum NoDrift {
 ///
 /// The chip knows one term: under a force F the reading goes to F (1 + k) with a time constant tau (`src/control/creep.rs`).
 /// Ink creeps with the logarithm of time instead, so k and tau are those that serve this hold best; `left` shows how well.
-///
-/// # Errors
-/// See [`NoDrift`].
 pub fn creep(series: &HeldSeries) -> Result<Creep, NoDrift> {
     let readings = &series.readings;
     if readings.len() < 10 {
@@ -102,9 +99,6 @@ pub struct Temperature {
 /// Change of the array's gain with the chip's temperature (FlexiForce A201: 0.36 %/K), from two presses at the same place.
 ///
 /// Both presses are solved for the modulus; what the two have in common, radius and gains, cancels in their ratio.
-///
-/// # Errors
-/// See [`NoDrift`].
 pub fn temperature(cold: &Press, warm: &Press) -> Result<Temperature, NoDrift> {
     let mean_c = |press: &Press| {
         let known: Vec<f64> = press.steps.iter().filter_map(|step| step.chip_c).collect();

@@ -136,9 +136,6 @@ pub(crate) struct Settled {
 /// Poses and gains of presses on the same array, with a judgement of each press.
 ///
 /// Presses that are judged other than good or soft are left out ([`Gains::left_out`]).
-///
-/// # Errors
-/// No press counts: the reason of the first.
 pub fn gains(presses: &[Press]) -> Result<Gains, NoGains> {
     settle(presses).map(|settled| settled.gains)
 }

@@ -3,11 +3,11 @@
 //! Each residual meets one pose, one stiffness and one gain, so the normal equations are summed row by row: some hundred
 //! unknowns and ten thousand residuals for three presses.
 
-use crate::force::{first_pose, forces};
 use crate::gains::{Condition, Gain, Gains, NoGains, Posed};
 use crate::judge::{judge, shifts};
 use crate::model::{At, Pose, Share, Square, UNKNOWNS};
 use crate::press::{Array, Press, Step};
+use crate::press::{first_pose, forces};
 use crate::robust::{huber, huber_cost, median, spread};
 use nalgebra::{DMatrix, DVector};
 

@@ -85,9 +85,6 @@ pub enum NoModulus {
 }
 
 /// Young's modulus of presses of one tip.
-///
-/// # Errors
-/// See [`NoModulus`].
 pub fn modulus(presses: &[Press]) -> Result<Modulus, NoModulus> {
     let Settled { presses, gains, creep } = settle(presses)?;
     let mut found = Vec::new();

@@ -5,10 +5,11 @@
 //!
 //! Lengths in millimetres, the tip and the array's scale are not in the series: they come from the controller's parameters.
 
+pub use fingertip::measure::Ended as Reason;
+
 use crate::Value;
 use crate::press::{Array, Branch, Press, Reading, Step, Tip};
 use crate::strokes::{Record, Sample, Stroke};
-pub use fingertip::measure::Ended as Reason;
 use fingertip::measure::series::{HEAD, VERSION, check, step_bytes};
 use fingertip::measure::strokes::SAMPLE_FRAMES;
 use fingertip::params::{ParamError, Params};
@@ -107,9 +108,6 @@ pub enum NoRecord {
 }
 
 /// Press of a series.
-///
-/// # Errors
-/// See [`NoRecord`].
 pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
     params.check()?;
     let (head, body) = Head::of(bytes, Kind::Press)?;
@@ -166,9 +164,6 @@ pub fn press(bytes: &[u8], params: &Params) -> Result<Press, NoRecord> {
 
 /// Strokes of a series. The resistance is that of the parameters, with an uncertainty of 2.2 %: who has measured it better
 /// overwrites it.
-///
-/// # Errors
-/// See [`NoRecord`].
 pub fn strokes(bytes: &[u8], params: &Params) -> Result<Record, NoRecord> {
     params.check()?;
     let (head, body) = Head::of(bytes, Kind::Strokes)?;

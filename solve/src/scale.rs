@@ -53,9 +53,6 @@ const HELD_PART: f64 = 0.01;
 const LEAST_N: f64 = 0.1;
 
 /// Scale by forces that were held.
-///
-/// # Errors
-/// See [`NoScale`].
 pub fn scale(held: &[Held]) -> Result<Scale, NoScale> {
     let largest_n = held.iter().map(|held| held.read_n).fold(0.0, f64::max);
     if largest_n < LEAST_N || held.iter().all(|held| held.shown_n < LEAST_N) {

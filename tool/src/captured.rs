@@ -6,15 +6,21 @@
 //! | metadata `fingertip.capture` | whose it is: board, firmware, image, notes, licence; and for people parameters, gains, frame time |
 //! | `/fingerN/scalars`, `/fingerN/frame`, N the ID less one | as in a scene's recording: what the core on this machine makes of the frames |
 
-mod read;
-mod write;
-
-pub use read::{Kept, of_bytes, open};
-pub use write::write;
-
+use crate::messages::{Topic, topic};
+use crate::state::{Stamp, State};
+use fingertip::capture::Head;
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{CLOCKS, COLUMNS, ROWS};
+use fingertip::shipped::{CLOCKS, COLUMNS, ROWS, SLOTS, TAXELS};
+use mcap::records::{MessageHeader, Metadata, Record};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{Attachment, McapError, WriteOptions, Writer};
 use replay::{Refusal, Replayed, Taken, replay};
+use serde_json::{Map, Value, json};
+use std::borrow::Cow;
+use std::fs;
+use std::io::{Seek, Write};
+use std::path::Path;
 
 /// The attachment's name, and the metadata record's.
 const ATTACHED: &str = "capture.bin";
@@ -26,12 +32,195 @@ pub const ENDED: &str = "ended_unix_ns";
 pub type About = std::collections::BTreeMap<String, String>;
 
 /// Feeds a capture through the core on this machine.
-///
-/// # Errors
-/// It is none that this version replays.
 pub fn through_the_core(
     bytes: &[u8],
     each: impl FnMut(&Taken<ROWS, COLUMNS>, &Status),
 ) -> Result<Replayed<ROWS, COLUMNS>, Refusal> {
     replay(bytes, &CLOCKS, each)
+}
+
+/// What a file holds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Kept {
+    /// The capture, as the board kept it.
+    pub bytes: Vec<u8>,
+    /// What is known of it.
+    pub about: About,
+}
+
+/// Reads a file; every byte of it is under a check sum, and all are looked at.
+///
+/// # Errors
+/// It cannot be read, is damaged or cut off, or holds no capture.
+pub fn open(path: &Path) -> Result<Kept, String> {
+    of_bytes(&fs::read(path).map_err(|why| format!("cannot be read: {why}"))?)
+}
+
+/// The same of a file's bytes.
+pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
+    if !rest.starts_with(mcap::MAGIC) {
+        return Err("this is no MCAP file: it does not begin as one".into());
+    }
+    if !rest.ends_with(mcap::MAGIC) {
+        return Err("the file was cut off: it does not end as an MCAP file does".into());
+    }
+    let damaged = |why: &dyn std::fmt::Display| format!("the file is damaged: {why}");
+    let options = LinearReaderOptions::default()
+        .with_emit_chunks(true)
+        .with_check_finishes_after_end_magic(true)
+        .with_validate_data_section_crc(true)
+        .with_validate_summary_section_crc(true)
+        .with_record_length_limit(rest.len());
+    let mut reader = LinearReader::new_with_options(options);
+    let (mut bytes, mut about, mut ends) = (None, None, Vec::new());
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|why| damaged(&why))? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode } => {
+                match mcap::parse_record(opcode, data).map_err(|why| damaged(&why))? {
+                    Record::Attachment { header, data, .. } if header.name == ATTACHED => {
+                        bytes = Some(data.into_owned())
+                    }
+                    Record::Metadata(metadata) if metadata.name == ABOUT => about = Some(metadata.metadata),
+                    Record::DataEnd(end) => ends.push(end.data_section_crc),
+                    Record::Footer(footer) => ends.push(footer.summary_crc),
+                    Record::Unknown { opcode, .. } => return Err(damaged(&format_args!("a record of kind {opcode}"))),
+                    _ => {}
+                }
+            }
+        }
+    }
+    match ends[..] {
+        [data, summary] if data != 0 && summary != 0 => {}
+        [_, _] => {
+            return Err(
+                "the file has no check sums: another program wrote it anew. Take the one that it was made from".into(),
+            );
+        }
+        _ => return Err(damaged(&"it has no end of its messages, or no footer")),
+    }
+    let (Some(bytes), Some(about)) = (bytes, about) else {
+        return Err(
+            "the file holds no capture: it is a recording of another kind (a scene's is replayed by its own tests)"
+                .into(),
+        );
+    };
+    Ok(Kept { bytes, about })
+}
+
+/// Frames from one message of scalars to the next, and from one of codes to the next.
+const SCALARS_EVERY: u32 = 5;
+const CODES_EVERY: u32 = 50;
+/// As a scene's recording has it: that includes the same file.
+const FRAME_SCHEMA: [&str; 2] = ["fingertip.Frame", include_str!("messages/frame.json")];
+
+type Captured<'a> = (&'a Taken<ROWS, COLUMNS>, &'a Status);
+
+/// Writes a capture with what is known of it.
+///
+/// # Errors
+/// It is no capture of this version, or it cannot be written.
+pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), String> {
+    let mut shown = Vec::new();
+    let replayed =
+        through_the_core(bytes, |taken, status| shown.push((*taken, *status))).map_err(|why| why.to_string())?;
+    let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
+    let out = options.create(to).map_err(|why| in_words(&why))?;
+    put(out, bytes, about, &replayed.head, &shown).map_err(|why| in_words(&why))
+}
+
+/// The system's reason where it has one: a full disk is told as such.
+fn in_words(why: &McapError) -> String {
+    if let McapError::Io(why) = why { why.to_string() } else { why.to_string() }
+}
+
+fn put(
+    mut out: Writer<impl Write + Seek>,
+    bytes: &[u8],
+    about: &About,
+    head: &Head<ROWS, COLUMNS>,
+    shown: &[(Taken<ROWS, COLUMNS>, Status)],
+) -> mcap::McapResult<()> {
+    let ended_ns = about.get(ENDED).and_then(|ended| ended.parse().ok()).unwrap_or(0_u64);
+    let attached = Attachment {
+        log_time: ended_ns,
+        create_time: ended_ns,
+        name: ATTACHED.into(),
+        media_type: "application/octet-stream".into(),
+        data: Cow::Borrowed(bytes),
+    };
+    out.attach(&attached)?;
+    let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
+    let params: Map<String, Value> = names.zip(head.params.to_array().map(Value::from)).collect();
+    let gains: Vec<u16> = (0..TAXELS).map(|place| head.gains.get(place)).collect();
+    let more = [
+        ("params", Value::Object(params).to_string()),
+        ("gains_q14", json!(gains).to_string()),
+        ("codes_per_kpa_milli", head.params.codes_per_kpa_milli.to_string()),
+        ("frame_ns", head.frame_ns.to_string()),
+        ("core_hz", CLOCKS.core_hz.to_string()),
+        ("frames", head.frames.to_string()),
+    ];
+    let metadata = more.into_iter().map(|(name, value)| (name.to_owned(), value));
+    let metadata = about.clone().into_iter().chain(metadata).collect();
+    out.write_metadata(&Metadata { name: ABOUT.into(), metadata })?;
+    let id = about.get("id").and_then(|id| id.parse().ok()).unwrap_or(1);
+    let scalars = out.add_schema(Topic::Scalars.schema_name(), "jsonschema", &Topic::Scalars.schema())?;
+    let scalars = out.add_channel(scalars, &Topic::Scalars.name(id), "json", about)?;
+    let codes = out.add_schema(FRAME_SCHEMA[0], "jsonschema", FRAME_SCHEMA[1].as_bytes())?;
+    let codes = out.add_channel(codes, &topic(id, "frame"), "json", about)?;
+    let sequence = |shown: Option<&(Taken<ROWS, COLUMNS>, Status)>| shown.map_or(0, |(taken, _)| taken.frame.sequence);
+    let (first, frame_ns) = (sequence(shown.first()), u64::from(head.frame_ns));
+    let since_ns = |sequence: u32| u64::from(sequence.wrapping_sub(first)) * frame_ns;
+    let begun_ns = ended_ns.saturating_sub(since_ns(sequence(shown.last())));
+    for (frame, captured) in (0..).zip(shown) {
+        let since_ns = since_ns(captured.0.frame.sequence);
+        let log_time = begun_ns + since_ns;
+        let mut message = |channel_id, message: &[u8]| {
+            let header = MessageHeader { channel_id, sequence: frame, log_time, publish_time: log_time };
+            out.write_to_known_channel(&header, message)
+        };
+        if frame % SCALARS_EVERY == 0 {
+            let state = state((&captured.0, &captured.1), head.frame_ns);
+            let stamp = Stamp { time_s: since_ns as f64 * 1e-9, read_ns: log_time, frame_ns: log_time };
+            message(scalars, &Topic::Scalars.message(&stamp, &state))?;
+        }
+        if frame % CODES_EVERY == 0 {
+            message(codes, codes_of(&captured.0).to_string().as_bytes())?;
+        }
+    }
+    out.finish().map(drop)
+}
+
+fn state((taken, status): Captured<'_>, frame_ns: u32) -> State {
+    let thousandths = |value: f64| (value * 1e3).round() as i64;
+    let contact = &status.contact;
+    State {
+        frame: status.sequence.into(),
+        goal_mn: thousandths(taken.command.goal.0.to_num()),
+        force_mn: thousandths(contact.force.0.to_num()),
+        indentation_um: thousandths(contact.indentation.0.to_num()),
+        centre_x_um: thousandths(contact.centre_x.0.to_num()),
+        centre_y_um: thousandths(contact.centre_y.0.to_num()),
+        travel_um: thousandths(status.travel.0.to_num()),
+        speed_um_per_s: thousandths(status.speed.0.to_num()),
+        duty_permille: (f64::from(status.duty.0) * 1e3 / f64::from(fingertip::units::Duty::FULL)).round() as i64,
+        mode: status.mode as i64,
+        fault: status.fault.map_or(0, |fault| fault as i64),
+        limits: status.limits.0.into(),
+        confidence: contact.confidence.into(),
+        period_ns: frame_ns.into(),
+        ..State::default()
+    }
+}
+
+fn codes_of(taken: &Taken<ROWS, COLUMNS>) -> Value {
+    let codes: Vec<Vec<u16>> =
+        (0..SLOTS).map(|slot| (0..COLUMNS).map(|column| taken.frame.code(slot, column)).collect()).collect();
+    json!({ "sequence": taken.frame.sequence, "codes": codes })
 }

@@ -73,9 +73,6 @@ pub struct Pong {
 
 impl Client {
     /// Opens the port; asks nothing yet.
-    ///
-    /// # Errors
-    /// There is no such port.
     pub fn open(reach: &Reach) -> Result<Self, Error> {
         let port = reach.port.clone().ok_or(Error::NoPort)?;
         let line = Line::open(&port, reach.baud).map_err(|why| Error::Open { port: port.clone(), why })?;
@@ -84,9 +81,6 @@ impl Client {
     }
 
     /// Opens a port again that was lost.
-    ///
-    /// # Errors
-    /// It is not back.
     pub fn reopen(&mut self) -> Result<(), Error> {
         self.line = Line::open(&self.port, self.baud).map_err(|why| Error::Open { port: self.port.clone(), why })?;
         self.owed = false;
@@ -109,9 +103,6 @@ impl Client {
     }
 
     /// Sees to it that a fingertip of a known table answers.
-    ///
-    /// # Errors
-    /// None answers, or it is another device.
     pub fn check(&mut self) -> Result<(), Error> {
         let pong = self.ping()?;
         if i64::from(pong.model) != table::model() {
@@ -131,9 +122,6 @@ impl Client {
     }
 
     /// Goes on at another speed.
-    ///
-    /// # Errors
-    /// The port does not go at it.
     pub fn set_baud(&mut self, baud: u32) -> Result<(), Error> {
         self.line.set_baud(baud).map_err(|why| Error::Open { port: format!("{} at {baud} baud", self.port), why })?;
         self.baud = baud;
@@ -151,18 +139,12 @@ impl Client {
     }
 
     /// Asks who is there.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn ping(&mut self) -> Result<Pong, Error> {
         let data = self.ask("ping", instruction::PING, &[], 3)?;
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
     }
 
     /// Whether another device answers to an address; two at once do so with a damaged packet.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn is_taken(&mut self, id: u8) -> Result<bool, Error> {
         let (own, timeout) = (self.id, self.timeout);
         (self.id, self.timeout) = (id, timeout.min(PROBE));
@@ -179,9 +161,6 @@ impl Client {
     }
 
     /// Asks all who are there.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn ping_all(&mut self) -> Result<Vec<Pong>, Error> {
         let heard = self.pass(&packet(BROADCAST, instruction::PING, &[]), None, usize::MAX)?;
         let (mut receiver, mut found) = (Receiver::new(), Vec::new());
@@ -197,9 +176,6 @@ impl Client {
     }
 
     /// Asks again where the line was at fault. What is asked must do no harm a second time.
-    ///
-    /// # Errors
-    /// The last one's.
     pub fn again<T>(&mut self, ask: impl Fn(&mut Self) -> Result<T, Error>) -> Result<T, Error> {
         for _ in 1..TRIES {
             match ask(self) {
@@ -211,9 +187,6 @@ impl Client {
     }
 
     /// Reads bytes of the table.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read(&mut self, address: u16, length: u16) -> Result<Vec<u8>, Error> {
         let doing = format!("read {}", table::place(address));
         let params = [address.to_le_bytes(), length.to_le_bytes()].concat();
@@ -221,44 +194,29 @@ impl Client {
     }
 
     /// Reads registers side by side, from the first to the last.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn block(&mut self, first: u16, last: u16) -> Result<table::Block, Error> {
         let end = table::register_at(last).map_or(last + 1, table::end);
         Ok(table::Block { first, bytes: self.read(first, end - first)? })
     }
 
     /// Reads a register of one number.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn number(&mut self, address: u16) -> Result<i64, Error> {
         Ok(self.block(address, address)?.number(address))
     }
 
     /// Writes bytes of the table.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn write(&mut self, address: u16, data: &[u8]) -> Result<(), Error> {
         let doing = format!("write {}", table::place(address));
         self.ask(&doing, instruction::WRITE, &[&address.to_le_bytes(), data].concat(), 0).map(drop)
     }
 
     /// Writes a register of one number.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn set(&mut self, address: u16, value: i64) -> Result<(), Error> {
         let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
         self.set_register(register, value)
     }
 
     /// The same.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn set_register(&mut self, register: &Register, value: i64) -> Result<(), Error> {
         let data = table::encode(register, value);
         let doing = format!("set {} to {}", table::name(register), Value { register, value });
@@ -266,9 +224,6 @@ impl Client {
     }
 
     /// Writes a register of one number of all devices on the bus. None of them answers.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn set_all(&mut self, address: u16, value: i64) -> Result<(), Error> {
         let register = table::register_at(address).ok_or_else(|| format!("no register at {address}"))?;
         let data = table::encode(register, value);
@@ -277,9 +232,6 @@ impl Client {
 
     /// Sends a packet unchanged. Returns the bytes received until this number of status packets arrived, or until the
     /// time-out. Of a packet for one device, `from`, only answers of that device count.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn pass(&mut self, packet: &[u8], from: Option<u8>, mut answers: usize) -> Result<Vec<u8>, Error> {
         self.transmit(packet)?;
         let all = answers == usize::MAX;

@@ -49,9 +49,6 @@ fn note(written: io::Result<()>) {
 }
 
 /// Whether all that was said is written.
-///
-/// # Errors
-/// It is not, though nobody closed the output.
 pub fn said() -> Result<(), Error> {
     note(io::stdout().flush());
     if LOST.load(Ordering::Relaxed) { Err("the output cannot be written: is the disk full?".into()) } else { Ok(()) }
@@ -107,9 +104,6 @@ pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
     /// From now on they end nothing by themselves.
-    ///
-    /// # Errors
-    /// The system does not tell of them.
     pub fn catch() -> Result<Self, Error> {
         let flag = Arc::new(AtomicBool::new(false));
         let set = flag.clone();
@@ -124,9 +118,6 @@ impl Interrupt {
     }
 
     /// Fails once a signal came: for commands that a signal cuts short.
-    ///
-    /// # Errors
-    /// A signal came.
     pub fn check(&self) -> Result<(), Error> {
         if self.came() { Err(Error::Interrupted) } else { Ok(()) }
     }

@@ -53,9 +53,6 @@ impl Line {
     }
 
     /// Changes the speed, where there is one.
-    ///
-    /// # Errors
-    /// It does not go at this speed.
     pub fn set_baud(&mut self, baud: u32) -> io::Result<()> {
         let Self::Serial(port) = self else { return Ok(()) };
         let mut settings = port.get_configuration()?;
@@ -64,9 +61,6 @@ impl Line {
     }
 
     /// Sends all.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         match self {
             Self::Serial(port) => port.write_all(bytes),
@@ -75,9 +69,6 @@ impl Line {
     }
 
     /// What comes in within this time; nothing where that is over.
-    ///
-    /// # Errors
-    /// The port is lost.
     pub fn read(&mut self, within: Duration) -> io::Result<Vec<u8>> {
         let mut buffer = [0; BUFFER];
         // A time of 0 means for ever, to some.
@@ -97,9 +88,6 @@ impl Line {
     }
 
     /// Drops what came in so far.
-    ///
-    /// # Errors
-    /// What came in says that the port is busy.
     pub fn discard(&mut self) -> io::Result<()> {
         match self {
             Self::Serial(port) => {

@@ -80,9 +80,6 @@ pub fn topic(id: u8, kind: &str) -> String {
 }
 
 /// Identity of a controller, for the metadata of a recording and of its channels.
-///
-/// # Errors
-/// See [`Error`].
 pub fn device(client: &mut Client) -> Result<BTreeMap<String, String>, Error> {
     let (pong, information) = (client.ping()?, client.number(address::MODEL_INFORMATION)?);
     let entries = [

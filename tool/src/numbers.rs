@@ -9,49 +9,31 @@ const SECONDS: RangeInclusive<f64> = 0.0..=1e9;
 const RATES_HZ: RangeInclusive<f64> = 0.001..=1e6;
 
 /// A time in s.
-///
-/// # Errors
-/// It is none.
 pub fn seconds(text: &str) -> Result<f64, String> {
     within(text, &SECONDS)
 }
 
 /// A rate in Hz.
-///
-/// # Errors
-/// It is none.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     within(text, &RATES_HZ)
 }
 
 /// A rate in Hz, or 0 for as fast as it goes.
-///
-/// # Errors
-/// It is none.
 pub fn rate_hz_or_all(text: &str) -> Result<f64, String> {
     if text.parse() == Ok(0.0) { Ok(0.0) } else { rate_hz(text).map_err(|why| format!("{why}, or 0")) }
 }
 
 /// A share in percent.
-///
-/// # Errors
-/// It is none.
 pub fn percent(text: &str) -> Result<f64, String> {
     within(text, &(0.0..=100.0))
 }
 
 /// Goal force in mN of a number in N. The controller has a narrower limit, `force_max_mn`.
-///
-/// # Errors
-/// No force that the register of the goal can hold.
 pub fn goal_mn(text: &str) -> Result<i64, String> {
     within(text, &(0.001..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }
 
 /// Force in mN that a scale shows, of a number in N.
-///
-/// # Errors
-/// Below 0 or above 150 N.
 pub fn shown_mn(text: &str) -> Result<i64, String> {
     within(text, &(0.0..=150.0)).map(|newtons| (newtons * 1e3).round() as i64)
 }

@@ -52,17 +52,11 @@ pub struct State {
 
 impl State {
     /// Reads it, in one packet.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read(client: &mut Client) -> Result<Self, Error> {
         Ok(Self::of(&client.block(FIRST, LAST)?))
     }
 
     /// Reads it with the pressures, in one packet.
-    ///
-    /// # Errors
-    /// See [`Error`].
     pub fn read_picture(client: &mut Client) -> Result<Self, Error> {
         let block = client.block(PICTURE, address::PRESSURES)?;
         // The mirrors have the registers' names at other places.

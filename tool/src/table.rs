@@ -67,9 +67,6 @@ pub fn place(address: u16) -> String {
 }
 
 /// A register by its name.
-///
-/// # Errors
-/// There is none; the text tells one that is alike.
 pub fn find(wanted: &str) -> Result<&'static Register, String> {
     let found = REGISTERS.iter().find(|register| register.name.eq_ignore_ascii_case(wanted));
     found.ok_or_else(|| {
@@ -82,9 +79,6 @@ pub fn find(wanted: &str) -> Result<&'static Register, String> {
 }
 
 /// A register of one number by its name.
-///
-/// # Errors
-/// As [`find`], or it has several numbers.
 pub fn find_number(wanted: &str) -> Result<&'static Register, String> {
     let register = find(wanted)?;
     if register.count == 1 {

@@ -57,9 +57,6 @@ impl Part {
     }
 
     /// What is written to.
-    ///
-    /// # Errors
-    /// The system has no more handles.
     pub fn file(&self) -> io::Result<File> {
         self.file.try_clone()
     }

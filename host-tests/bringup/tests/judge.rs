@@ -3,7 +3,12 @@
 use bringup::checks::checks;
 use bringup::judge::{Board, Judgement, Verdict, judge};
 use bringup::listen::{Report, listen};
+use bringup::script::{Bench, STEPS};
+use bringup::steps;
 use bringup::text::{CHECK, READY, asked_frames, checked};
+use fingertip::params::Params;
+use fingertip::shipped::{Config, Pipeline};
+use fingertip::units::CoreCycles;
 use std::collections::HashMap;
 use std::io::{Cursor, Read, Result, Write};
 
@@ -102,4 +107,27 @@ fn a_report_is_taken_in_among_other_lines_and_a_damaged_one_is_refused() {
 fn the_host_asks_for_frames() {
     let asked = ["go", "go 5", " go 12 \r", "gone", "go x", ""].map(asked_frames);
     assert_eq!(asked, [Some(1_000_000), Some(5), Some(12), None, None, None]);
+}
+
+#[test]
+fn its_steps_are_within_a_tenth_of_the_demonstrations() {
+    let config = Config::shipped(&Params::DEFAULT).expect("the defaults make a configuration");
+    let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
+    bench.finger.make_table();
+    let mut answers = Vec::new();
+    while !bench.done() {
+        let (frame, sense, command) = bench.inputs();
+        pipeline.step(frame, sense, command);
+        let status = pipeline.status();
+        assert_eq!(status.fault, None, "at {} mm", bench.finger.travel_mm());
+        answers.extend(bench.pass(status, config.timing.frame_ns, CoreCycles(0)));
+    }
+    let checks = steps::checks();
+    for (answer, of_step) in answers[STEPS].iter().zip(checks.chunks(3)) {
+        let ours = [answer.rise_ms, answer.overshoot_percent, answer.settled_ms];
+        for (ours, check) in ours.into_iter().zip(of_step) {
+            let [least, most] = check.within;
+            assert!((least..=most).contains(&f64::from(ours)), "{}: {ours}, {least} to {most}", check.what);
+        }
+    }
 }

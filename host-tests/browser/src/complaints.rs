@@ -66,9 +66,6 @@ const QUESTIONS: &str = r#"(() => {
 })()"#;
 
 /// Has the browser show pages so from here on.
-///
-/// # Errors
-/// The browser fails.
 pub fn look(browser: &mut Browser, look: Look) -> Result<(), BrowserError> {
     let scheme = if look.dark { "dark" } else { "light" };
     let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);

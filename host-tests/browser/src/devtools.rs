@@ -83,9 +83,6 @@ impl Browser {
     }
 
     /// Opens an address, and waits until it is loaded. What happened on the page before is forgotten.
-    ///
-    /// # Errors
-    /// There is no such page.
     pub fn open(&mut self, address: &str) -> Result<(), BrowserError> {
         self.events.clear();
         let answer = self.call("Page.navigate", json!({ "url": address }))?;
@@ -100,9 +97,6 @@ impl Browser {
     }
 
     /// Works an expression out on the page; a promise, once it is kept.
-    ///
-    /// # Errors
-    /// It throws.
     pub fn evaluate(&mut self, expression: &str) -> Result<Value, BrowserError> {
         let answer = self.call(
             "Runtime.evaluate",
@@ -120,9 +114,6 @@ impl Browser {
     }
 
     /// Calls a method of the protocol.
-    ///
-    /// # Errors
-    /// The browser refuses, or is gone.
     pub fn call(&mut self, method: &str, params: Value) -> Result<Value, BrowserError> {
         self.sent += 1;
         let id = self.sent;

@@ -21,9 +21,6 @@ fn way((x, y): Place, (to_x, to_y): Place) -> impl Iterator<Item = Place> {
 
 impl Browser {
     /// Scrolls the first element of a selector into sight, and tells a place in it by shares of its width and height.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn place(&mut self, selector: &str, (right, down): (f64, f64)) -> Result<Place, BrowserError> {
         let place = self.evaluate(&format!(
             "(() => {{
@@ -38,9 +35,6 @@ impl Browser {
     }
 
     /// Presses the left button, moves, and lets it go.
-    ///
-    /// # Errors
-    /// The browser fails.
     pub fn drag(&mut self, from: Place, to: Place) -> Result<(), BrowserError> {
         self.mouse("mouseMoved", from, 0)?;
         self.mouse("mousePressed", from, 1)?;
@@ -49,9 +43,6 @@ impl Browser {
     }
 
     /// Clicks; twice makes a double click.
-    ///
-    /// # Errors
-    /// The browser fails.
     pub fn click(&mut self, at: Place, times: u32) -> Result<(), BrowserError> {
         self.mouse("mouseMoved", at, 0)?;
         for count in 1..=times {
@@ -69,9 +60,6 @@ impl Browser {
     }
 
     /// Draws a finger over the glass.
-    ///
-    /// # Errors
-    /// The browser fails.
     pub fn swipe(&mut self, from: Place, to: Place) -> Result<(), BrowserError> {
         self.touch("touchStart", Some(from))?;
         way(from, to).try_for_each(|place| self.touch("touchMove", Some(place)))?;
@@ -84,9 +72,6 @@ impl Browser {
     }
 
     /// Chooses a file in the first element of a selector.
-    ///
-    /// # Errors
-    /// There is none.
     pub fn choose(&mut self, selector: &str, path: &Path) -> Result<(), BrowserError> {
         let document = self.call("DOM.getDocument", json!({}))?;
         let found = json!({ "nodeId": document["root"]["nodeId"], "selector": selector });
@@ -96,9 +81,6 @@ impl Browser {
     }
 
     /// Waits until an expression holds on the page, looked at with each picture that it draws, `PICTURES` at most.
-    ///
-    /// # Errors
-    /// It never holds, or throws.
     pub fn until(&mut self, holds: &str) -> Result<(), BrowserError> {
         let look = format!(
             "new Promise((kept, broken) => {{

@@ -38,9 +38,6 @@ impl Lock {
     }
 
     /// The same, where who has it and by which file is told in other words.
-    ///
-    /// # Errors
-    /// As [`Lock::take`].
     pub fn take_or(path: &Path, taken: impl Fn(&str, &Path) -> String) -> io::Result<Self> {
         Self::get(path, |file, lock| match file.try_lock() {
             Ok(()) => Ok(()),
@@ -50,9 +47,6 @@ impl Lock {
     }
 
     /// The same, but waits for who has it: for what is written in an instant.
-    ///
-    /// # Errors
-    /// The folder cannot be written.
     pub fn wait(path: &Path) -> io::Result<Self> {
         Self::get(path, |file, _| file.lock())
     }
@@ -88,9 +82,6 @@ impl Lock {
     }
 
     /// Replaces a file that belongs to it, and that nobody writes without this lock.
-    ///
-    /// # Errors
-    /// As [`Lock::write`].
     pub fn write_with(&self, path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
         replace(path, bytes.as_ref())
     }
@@ -134,9 +125,6 @@ impl Whole {
     }
 
     /// Puts it in its place.
-    ///
-    /// # Errors
-    /// It does not fit on the disk.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.sync_all()?;
         put(&self.new, self.lock.path())?;

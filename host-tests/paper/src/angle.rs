@@ -3,7 +3,7 @@
 //! Each series alternates in sign with falling coefficients, so that every intermediate value of its nested form is
 //! positive and below 1: one multiply and one subtraction a term.
 
-use crate::arith::{mul_high, quotient};
+use crate::touching::{mul_high, quotient};
 
 /// pi/2 in Q1.31.
 const HALF_PI_Q31: u64 = 3_373_259_426;

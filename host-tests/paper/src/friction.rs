@@ -10,7 +10,7 @@
 //!
 //! which goes from 8/15 for a shallow contact to 0.655 at 0.95 a (a uniform pressure has 2/3, Hertz 0.589).
 
-use crate::arith::{depth, quotient, radius, square};
+use crate::touching::{depth, quotient, radius, square};
 use crate::units::{NewtonMillimetres, Ratio};
 use fingertip::model::Tip;
 use fingertip::units::{Millimetres, Newtons};

@@ -26,17 +26,15 @@
 pub mod units;
 
 mod angle;
-mod arith;
-mod column;
 mod friction;
 mod relaxation;
 mod tilt;
 mod touching;
 
-pub use column::{force_on, particle_force, pressure_of, strain_of};
 pub use friction::{LimitSurface, friction_shape, limit_surface};
 pub use relaxation::{PERIODS_MAX, Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 pub use tilt::{Displacement, Load, energy, free_shift, load};
 pub use touching::{
     area_density, compression_at, distance_at, distance_slope, height_at, touching_angle, touching_angle_max,
 };
+pub use touching::{force_on, particle_force, pressure_of, strain_of};

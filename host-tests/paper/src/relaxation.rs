@@ -18,7 +18,7 @@
 //! The memory has 48 bits after the point. A constant force is reached to within `2^-48 N / A`, below 2^-27 N for the
 //! slowest term allowed, and stays there: the output then neither drifts nor cycles.
 
-use crate::arith::mul_high;
+use crate::touching::mul_high;
 use crate::units::Ratio;
 use fingertip::units::Newtons;
 

@@ -14,7 +14,7 @@
 //! With `s = t = 0` they are the paper's. `1/cos^2 t` is computed as `1 + tan^2 t`.
 
 use crate::angle::sine_cosine;
-use crate::arith::{depth, nearest_long_quotient};
+use crate::touching::{depth, nearest_long_quotient};
 use crate::units::{NewtonMillimetres, Radians};
 use fingertip::model::Tip;
 use fingertip::units::{Millimetres, Newtons};

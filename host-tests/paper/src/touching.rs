@@ -3,11 +3,10 @@
 //! The touching angle `theta` of a point of the contact is seen from the hemisphere's centre, `a - d` above the plane.
 
 use crate::angle::{angle_of, arc_tangent, sine_cosine};
-use crate::arith::{depth, mul_high, nearest_long_quotient, quotient, radius, rest, square};
 use crate::units::{MillimetresPerRadian, Radians, SquareMillimetres};
 use fingertip::model::Tip;
 use fingertip::root::floor_sqrt;
-use fingertip::units::Millimetres;
+use fingertip::units::{Kilopascals, Millimetres, Newtons, Strain};
 
 /// Below the cosine of every touching angle, in Q63: it is 1/20 at the deepest indentation.
 const COSINE_MIN: u64 = (1 << 63) / 21;
@@ -82,4 +81,96 @@ fn sine_cosine_of(tip: &Tip, theta: Radians, d: Millimetres) -> (u64, u64) {
     let theta = theta.max(Radians::ZERO).min(touching_angle_max(tip, d)).to_bits().unsigned_abs();
     let (sine, cosine) = sine_cosine(theta);
     (sine, cosine.max(COSINE_MIN))
+}
+
+/// The upper half of a product of 64 by 64 bits.
+pub(crate) const fn mul_high(x: u64, y: u64) -> u64 {
+    ((x as u128 * y as u128) >> 64) as u64
+}
+
+/// A quotient rounded down; 0 when the denominator is.
+pub(crate) const fn quotient(numerator: u64, denominator: u64) -> u64 {
+    match numerator.checked_div(denominator) {
+        Some(quotient) => quotient,
+        None => 0,
+    }
+}
+
+/// A long quotient rounded to nearest; 0 when the denominator is. Costs about as much as ten short ones.
+pub(crate) const fn nearest_long_quotient(numerator: u128, denominator: u64) -> u64 {
+    match (numerator + (denominator / 2) as u128).checked_div(denominator as u128) {
+        Some(quotient) => quotient as u64,
+        None => 0,
+    }
+}
+
+/// The square of a length in Q24, in Q48.
+pub(crate) const fn square(x: u32) -> u64 {
+    x as u64 * x as u64
+}
+
+/// The radius a.
+pub(crate) const fn radius(tip: &Tip) -> u32 {
+    tip.radius().to_bits().unsigned_abs()
+}
+
+/// The indentation within its domain.
+pub(crate) fn depth(tip: &Tip, d: Millimetres) -> u32 {
+    d.max(Millimetres::ZERO).min(tip.depth_max()).to_bits().unsigned_abs()
+}
+
+/// The distance between plane and centre, `a - d`.
+pub(crate) fn rest(tip: &Tip, d: Millimetres) -> u32 {
+    radius(tip) - depth(tip, d)
+}
+
+// One column of the tip: equations 9 to 13.
+//
+// Each is a ratio or a product, rounded once; what does not fit the result's range stops at its end. Compression
+// counts as positive, the other way round than in the paper's equation 10.
+
+/// The stress of a column, `sigma = F/S` (eq. 9), which is also the pressure on it, `P = F/S` (eq. 12).
+///
+/// Without an area it is 0.
+pub fn pressure_of(force: Newtons, area: SquareMillimetres) -> Kilopascals {
+    // 1 N/mm^2 is 1000 kPa.
+    let numerator = (i64::from(force.to_bits()) * 1000) << 16;
+    Kilopascals::from_bits(saturate(divide(numerator.into(), area.to_bits().into())))
+}
+
+/// The compressional strain of a column, `e = dL/L` (eq. 10).
+///
+/// Without a length it is 0.
+pub fn strain_of(compression: Millimetres, length: Millimetres) -> Strain {
+    let numerator = i64::from(compression.to_bits()) << 30;
+    Strain::from_bits(saturate(divide(numerator.into(), length.to_bits().into())))
+}
+
+/// The force on a column under a pressure, `F = P S` (eq. 13).
+pub fn force_on(pressure: Kilopascals, area: SquareMillimetres) -> Newtons {
+    let product = i64::from(pressure.to_bits()) * i64::from(area.to_bits());
+    Newtons::from_bits(saturate(divide(product.into(), 1000 << 16)))
+}
+
+/// The force on a column compressed by `dL` from its length `L`, `F = Y (dL/L) S` (eq. 11, 13).
+///
+/// Without a length it is 0.
+pub fn particle_force(tip: &Tip, compression: Millimetres, length: Millimetres, area: SquareMillimetres) -> Newtons {
+    let pull = i64::from(tip.modulus().to_bits()) * i64::from(area.to_bits());
+    let numerator = i128::from(pull) * i128::from(compression.to_bits());
+    Newtons::from_bits(saturate(divide(numerator, (i128::from(length.to_bits()) * 1000) << 16)))
+}
+
+/// A quotient rounded to nearest, halves away from zero; 0 when the denominator is.
+const fn divide(numerator: i128, denominator: i128) -> i128 {
+    if denominator == 0 {
+        return 0;
+    }
+    let magnitude = (numerator.unsigned_abs() + denominator.unsigned_abs() / 2) / denominator.unsigned_abs();
+    if (numerator < 0) == (denominator < 0) { magnitude as i128 } else { -(magnitude as i128) }
+}
+
+/// The nearest 32-bit number.
+fn saturate(wide: i128) -> i32 {
+    wide.clamp(i32::MIN.into(), i32::MAX.into()) as i32
 }

@@ -1,7 +1,6 @@
 //! The parts of the force loop, each by itself: pace, drive, observer, profile, law, and what each mode asks of them.
 
 mod drive;
-mod gains;
 mod grip;
 mod law;
 mod observer;

@@ -2,8 +2,6 @@
 
 mod bench;
 mod client;
-mod document;
-mod gains;
 mod indirect;
 mod instructions;
 mod mirrors;

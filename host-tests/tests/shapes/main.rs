@@ -4,5 +4,4 @@
 mod closed_loop;
 mod finger;
 mod rates;
-mod slopes;
 mod worst;

@@ -1,10 +1,10 @@
 //! A record's bytes, and what is never taken for a record.
 
-use crate::fleet::{crc32, named, names, of_values};
 use crate::nor::{Nor, bits, record};
+use crate::taken::{crc32, named, names, of_values};
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector};
-use host_tests::saves::{PAGE, table};
+use host_tests::page::{PAGE, table};
 use sim::encode;
 
 const SIZE: usize = 8 * SLOT_BYTES;

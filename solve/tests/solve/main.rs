@@ -4,7 +4,6 @@ mod drift;
 mod finger;
 mod gains;
 mod modulus;
-mod plates;
 mod record;
 mod report;
 mod series;

@@ -62,9 +62,6 @@ pub struct Args {
 
 impl Args {
     /// Judges the file's name.
-    ///
-    /// # Errors
-    /// It does not end with `.mcap`.
     pub fn check(&self) -> Result<(), Error> {
         if self.out.extension().is_some_and(|ending| ending == "mcap") {
             return Ok(());

@@ -19,9 +19,6 @@ const COUNTERS: [u16; 8] = [
 ];
 
 /// Tells what the controller is and how it stands.
-///
-/// # Errors
-/// See [`Error`].
 pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let pong = client.ping()?;
     let state = State::read(client)?;

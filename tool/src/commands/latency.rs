@@ -20,9 +20,6 @@ pub struct Args {
 }
 
 /// Reads 54 bytes again and again without a pause, and tells how long answers took.
-///
-/// # Errors
-/// The line is lost.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let delay_us = 2 * client.number(address::RETURN_DELAY_TIME)?;

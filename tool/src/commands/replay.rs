@@ -16,9 +16,6 @@ pub struct Args {
 }
 
 /// Feeds captures through the core on this machine; a line for each.
-///
-/// # Errors
-/// One differs or is refused, or there is none.
 pub fn run(args: &Args, json: bool) -> Result<(), Error> {
     let mut files = Vec::new();
     for path in &args.paths {

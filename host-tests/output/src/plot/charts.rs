@@ -48,9 +48,6 @@ pub struct Panel<'a> {
 }
 
 /// Force against goal, indentation and duty over the whole run.
-///
-/// # Errors
-/// The trace is empty.
 pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
     let end_s = trace.last().ok_or_else(|| PlotError("the trace is empty".into()))?.time_s;
     fine_picture((WIDTH_PX, 640), |area| {
@@ -82,9 +79,6 @@ pub fn overview(trace: &[Sample]) -> Result<String, PlotError> {
 }
 
 /// Each change of the goal at a larger scale, two panels side by side.
-///
-/// # Errors
-/// There is nothing to show.
 pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
     if panels.iter().any(|panel| panel.samples.is_empty()) {
         return Err(PlotError("a panel has no samples".into()));

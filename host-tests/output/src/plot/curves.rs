@@ -48,9 +48,6 @@ pub struct Curves<'a> {
 }
 
 /// Panels side by side, each of a size.
-///
-/// # Errors
-/// There is no panel.
 pub fn curves(panels: &[Curves<'_>], panel_px: (u32, u32)) -> Result<String, PlotError> {
     if panels.is_empty() {
         return Err(PlotError("there is no panel".into()));

@@ -51,9 +51,6 @@ pub struct Front<'a> {
 }
 
 /// Draws it.
-///
-/// # Errors
-/// There is no point.
 pub fn front(front: &Front<'_>) -> Result<String, PlotError> {
     let Front { title, x, y, dots } = front;
     let positive = |of: fn(&Dot) -> f64| dots.iter().map(of).filter(|value| *value > 0.0);

@@ -27,9 +27,6 @@ const SCALE_STEPS: u32 = 64;
 const DOTS: u32 = 60;
 
 /// Maps side by side, with the scale of their colours.
-///
-/// # Errors
-/// There is no map.
 pub fn maps(maps: &[Map], pitch_mm: f64) -> Result<String, PlotError> {
     if maps.is_empty() {
         return Err(PlotError("there is no map".into()));

@@ -59,9 +59,6 @@ enum Board {
 }
 
 /// Builds the image, runs it and judges what it reports. This process ends as the judge does.
-///
-/// # Errors
-/// Something does not build, or there is no board.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     // First, as it takes no time: where there is no board nobody waits for a build.
     let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
@@ -99,9 +96,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Builds the image.
-///
-/// # Errors
-/// It does not compile.
 pub fn build(toolchain: Toolchain, console: &mut Console) -> Result<Image> {
     image::checking(toolchain, NAME, console)
 }

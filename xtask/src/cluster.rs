@@ -32,18 +32,12 @@ const CLIENTS: Environment = Environment {
 };
 
 /// Makes sure of the schedulers and of a Python with the rest, and returns its interpreter.
-///
-/// # Errors
-/// One is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
     apt::ensure(&PACKAGES, "the test of the examples for clusters", console)?;
     python::environment(&CLIENTS, console)
 }
 
 /// Runs a sweep whole and by each example, and compares what they make byte by byte.
-///
-/// # Errors
-/// A tool is missing and cannot be installed, an example fails, or its result is another one.
 pub fn run(console: &mut Console) -> Result<()> {
     let python = ensure(console)?;
     Program::sim("sweep").build(console)?;

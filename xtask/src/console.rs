@@ -54,17 +54,11 @@ impl Console {
     }
 
     /// Runs a program that prepares a command, an installer for example: what it writes is progress.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
     pub fn prepare(&mut self, command: &mut Command) -> Result<()> {
         self.run(command.stdout(io::stderr()))
     }
 
     /// Runs a program to its end.
-    ///
-    /// # Errors
-    /// It is missing, or ends with anything but success.
     pub fn run(&mut self, command: &mut Command) -> Result<()> {
         command.current_dir(paths::root());
         let shown = show(command);
@@ -90,9 +84,6 @@ impl Console {
     }
 
     /// Runs a command of cargo's that only compiles, and shows how far it is. What cargo says is shown where it fails.
-    ///
-    /// # Errors
-    /// It does not compile.
     pub fn build(&mut self, command: &mut Command, what: &str, slow: Slow) -> Result<()> {
         let before_s = cpu_s();
         let shown = show(command);
@@ -122,9 +113,6 @@ impl Console {
     }
 
     /// Runs a program that is expected to fail, and returns what it wrote.
-    ///
-    /// # Errors
-    /// It is missing, or succeeds.
     pub fn run_to_failure(&mut self, command: &mut Command) -> Result<String> {
         command.current_dir(paths::root());
         let output = command.output().with_context(|| missing(command))?;
@@ -192,9 +180,6 @@ pub fn cpu_s() -> f64 {
 }
 
 /// What a program writes to its standard output; its errors go to the terminal.
-///
-/// # Errors
-/// It is missing, ends with anything but success, or writes no text.
 pub fn output(command: &mut Command) -> Result<String> {
     let output =
         command.current_dir(paths::root()).stderr(Stdio::inherit()).output().with_context(|| missing(command))?;

@@ -40,9 +40,6 @@ pub struct Session {
 
 impl Session {
     /// Starts `probe-rs gdb` with the flags that name the probe, and connects to it.
-    ///
-    /// # Errors
-    /// There is no board: the server says so on standard error.
     pub fn open(mut command: Command) -> Result<Self> {
         let address = TcpListener::bind("127.0.0.1:0")?.local_addr()?;
         command.args(["--gdb-connection-string", &address.to_string()]);

@@ -22,9 +22,6 @@ pub struct Args {
 }
 
 /// Shows the demonstration on the native core, which is built soon, then on the flash image.
-///
-/// # Errors
-/// Something does not build, or the demonstration misses what it must show.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     native(args, console)?;
     let image = image::firmware(choice, console)?;

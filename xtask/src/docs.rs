@@ -41,9 +41,6 @@ pub struct Args {
 }
 
 /// Writes or checks the generated files; the figures come from a run of the demonstration.
-///
-/// # Errors
-/// A generator fails, the demonstration misses what it must show, or a file is stale.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED {

@@ -14,18 +14,12 @@ pub struct Args {
 }
 
 /// Draws the figures.
-///
-/// # Errors
-/// The folder cannot be written.
 pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     let default = args.out == Path::new(docs::PICTURES);
     draw(&if default { paths::root().join(docs::PICTURES) } else { args.out.clone() }, console)
 }
 
 /// Draws the figures into a folder.
-///
-/// # Errors
-/// The folder cannot be written.
 pub fn draw(folder: &Path, console: &mut Console) -> Result<()> {
     let mut command = Program::tool("figures").build(console)?;
     console.run(command.arg(folder))

@@ -22,9 +22,6 @@ pub struct Args {
 }
 
 /// Prints the tables, writes or checks them.
-///
-/// # Errors
-/// The tables are stale, or the page lacks their place.
 pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     let mut command = Program::tool("fit").build(console)?;
     if let Some(cases) = args.cases {

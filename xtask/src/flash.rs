@@ -23,9 +23,6 @@ pub struct Args {
 }
 
 /// Builds the flash image, prints its SHA-256, sees to the option bytes, writes and verifies it, and starts it.
-///
-/// # Errors
-/// The image does not build, probe-rs is missing, or as [`put`].
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     need_probe_rs()?;
     let image = image::firmware(choice, console)?;
@@ -36,9 +33,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 }
 
 /// Looks for probe-rs before a build, so that nobody waits for an image that cannot be written.
-///
-/// # Errors
-/// probe-rs is not in PATH.
 pub fn need_probe_rs() -> Result<()> {
     if paths::find_program("probe-rs").is_some() {
         return Ok(());
@@ -51,9 +45,6 @@ pub fn need_probe_rs() -> Result<()> {
 }
 
 /// Sees to the option bytes, writes and verifies an image, and starts it.
-///
-/// # Errors
-/// There is no board, or it has another microcontroller.
 pub fn put(image: &Image, probe: Option<&str>, console: &mut Console) -> Result<()> {
     let command = |subcommand| {
         let mut command = Command::new("probe-rs");

@@ -44,9 +44,6 @@ impl Program {
     }
 
     /// Builds it, and returns the command that starts it.
-    ///
-    /// # Errors
-    /// It does not compile.
     pub fn build(&self, console: &mut Console) -> Result<Command> {
         let mut command = cargo("build", self.package);
         command.args(["--bin", self.name]);
@@ -71,9 +68,6 @@ pub fn cargo(subcommand: &str, package: &str) -> Command {
 }
 
 /// Builds the tests of a command `cargo test ...`, then runs them.
-///
-/// # Errors
-/// They do not compile, or one fails.
 pub fn test(command: &mut Command, console: &mut Console) -> Result<()> {
     let mut build = Command::new(command.get_program());
     // What follows `--` is for the tests.

@@ -17,9 +17,6 @@ const IMAGES: [(&str, &str); 5] =
 const APART: ([&str; 2], &str) = (["examples/rp2040", "host-tests/cores"], "thumbv6m-none-eabi");
 
 /// Runs all checks that are no tests.
-///
-/// # Errors
-/// Names the checks that failed.
 pub fn run(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| {

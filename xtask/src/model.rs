@@ -19,18 +19,12 @@ pub struct Args {
 }
 
 /// Answers rows of CSV on standard input.
-///
-/// # Errors
-/// A row is outside the domain, or the input is no table.
 pub fn answer(console: &mut Console) -> Result<()> {
     let mut command = Program::tool("model").build(console)?;
     console.run(&mut command)
 }
 
 /// Proves the model's error bounds: some minutes on two cores.
-///
-/// # Errors
-/// A bound does not hold, or the figures in the documentation are stale.
 pub fn prove(args: &Args, console: &mut Console) -> Result<()> {
     let flags = [(args.quick, "--quick"), (args.write, "--write"), (args.check, "--check")];
     let mut command = Program::tool("prove").build(console)?;

@@ -117,9 +117,6 @@ pub fn check(probe: &mut impl Probe) -> Result<Option<u32>> {
 }
 
 /// Programs brown-out level 3: the image refuses torque without it. All other option bytes stay, and the core halted.
-///
-/// # Errors
-/// As [`check`].
 pub fn program(probe: &mut impl Probe, options: u32) -> Result<()> {
     let wanted = options & !(OPTLOCK | OPTSTRT | BOR_LEV);
     run(probe, &unlock(wanted), UNCHANGED)?;

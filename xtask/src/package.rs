@@ -13,9 +13,6 @@ pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Makes the packages and runs the tests of `host-tests/outside`, which depends on them.
-///
-/// # Errors
-/// A package lacks something that it needs, or what it offers does not do.
 pub fn run(console: &mut Console) -> Result<()> {
     let mut package = console::cargo("package");
     // The project outside compiles them.

@@ -27,9 +27,6 @@ pub fn target() -> PathBuf {
 }
 
 /// A folder of that name in the build folder, made where it is not there; as the system calls it.
-///
-/// # Errors
-/// It cannot be made.
 pub fn made(name: &str) -> Result<PathBuf> {
     let folder = target().join(name);
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", shown(&folder)))?;

@@ -15,9 +15,6 @@ const NAME: &str = "panic-free";
 const UNDEFINED: &str = "fingertip_step_can_panic";
 
 /// Builds the proof and its two controls.
-///
-/// # Errors
-/// The step can panic, calls floating-point routines, or a control passes that should fail.
 pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
     let elf = link(toolchain, console)?;

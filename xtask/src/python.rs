@@ -27,9 +27,6 @@ const BUS: Environment = Environment {
 };
 
 /// Finds or makes the environment with the bus client, and returns its interpreter.
-///
-/// # Errors
-/// As [`environment`].
 pub fn ensure(console: &mut Console) -> Result<PathBuf> {
     environment(&BUS, console)
 }

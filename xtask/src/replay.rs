@@ -15,9 +15,6 @@ pub struct Args {
 }
 
 /// Replays all captures in a folder: a line for each.
-///
-/// # Errors
-/// It does not build. Where a capture differs or is refused, this process ends as the program does.
 pub fn run(args: &Args, console: &mut Console) -> Result<()> {
     let place = args.place.clone().unwrap_or_else(|| paths::root().join("captures"));
     sim::start(host::TOOL.build(console)?.arg("replay").arg(place))

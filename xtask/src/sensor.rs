@@ -17,9 +17,6 @@ const LEAST_SQUARES: Environment = Environment {
 };
 
 /// Returns the command that starts a script of the fit, in an environment with what it imports.
-///
-/// # Errors
-/// As [`python::environment`].
 pub fn script(name: &str, console: &mut Console) -> Result<Command> {
     let mut command = Command::new(python::environment(&LEAST_SQUARES, console)?);
     // -B leaves no compiled files among the sources.
@@ -28,9 +25,6 @@ pub fn script(name: &str, console: &mut Console) -> Result<Command> {
 }
 
 /// Fits a sensor to recordings.
-///
-/// # Errors
-/// As [`script`]. Where a recording cannot be used, this process ends as the script does.
 pub fn run(args: &sim::Args, console: &mut Console) -> Result<()> {
     sim::start(script("fit.py", console)?.args(&args.arguments))
 }

@@ -42,9 +42,6 @@ enum Board {
 }
 
 /// Serves a scene's finger on the native core, or the flash image on the emulated board.
-///
-/// # Errors
-/// It does not build. Where it cannot serve, this process ends as the program does.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut command = match args.board {
         Board::Native => {

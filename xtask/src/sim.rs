@@ -17,33 +17,21 @@ pub struct Args {
 }
 
 /// Runs a scene, on the board that is asked for.
-///
-/// # Errors
-/// The board does not build. Where a scene breaks its bounds, this process ends as the board's does.
 pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     on_board("sim", args, choice, console)
 }
 
 /// Runs a sweep, on the native board.
-///
-/// # Errors
-/// As [`sim`].
 pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim("sweep").build(console)?.args(&args.arguments))
 }
 
 /// Runs a population of drawn fingers, on the board that is asked for.
-///
-/// # Errors
-/// As [`sim`].
 pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     on_board("population", args, choice, console)
 }
 
 /// Says what makes the force wrong.
-///
-/// # Errors
-/// As [`sim`].
 pub fn budget(args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim("budget").build(console)?.args(&args.arguments))
 }
@@ -67,9 +55,6 @@ fn wants_image(arguments: &[String]) -> bool {
 }
 
 /// Runs a program where the user is; this process ends as it does.
-///
-/// # Errors
-/// It cannot be started.
 pub fn start(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| format!("cannot start {}", console::show(command)))?;
     if !status.success() {

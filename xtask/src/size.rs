@@ -33,9 +33,6 @@ pub struct Sizes {
 }
 
 /// Builds the flash image and measures it.
-///
-/// # Errors
-/// It does not build, or exceeds a limit.
 pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
     let image = image::firmware(choice, console)?;
     let sizes = Sizes::of(&image)?;
@@ -45,9 +42,6 @@ pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
 
 impl Sizes {
     /// Measures a linked image.
-    ///
-    /// # Errors
-    /// It cannot be read.
     pub fn of(image: &Image) -> Result<Self> {
         let data = fs::read(&image.elf)?;
         let file = object::File::parse(&*data)?;
@@ -81,9 +75,6 @@ impl Sizes {
     }
 
     /// Fails beyond the limits.
-    ///
-    /// # Errors
-    /// Names the limit, and by how much it is exceeded.
     pub fn check(&self) -> Result<()> {
         for (what, bytes, limit) in [("flash", self.flash, FLASH_MAX_BYTES), ("static RAM", self.ram, RAM_MAX_BYTES)] {
             if bytes > limit {

@@ -58,9 +58,6 @@ impl Stages {
     }
 
     /// The verdict.
-    ///
-    /// # Errors
-    /// Names the stages that failed.
     pub fn finish(self, what: &str) -> Result<()> {
         println!("\n{:>10} {:>8} {:>8}  seconds of CPU time", "compiling", "running", "clock");
         let line = |built_s: f64, ran_s: f64, clock_s: f64, name: &str| {

@@ -37,9 +37,6 @@ pub struct Args {
 }
 
 /// Runs the study and renews or checks its page, its table in the README and its pictures.
-///
-/// # Errors
-/// Something does not build, a variant cannot be measured, or a figure is stale.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let toolchain = toolchain::ensure(choice, console)?;
     let folder = paths::made("study")?;

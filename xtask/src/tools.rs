@@ -23,9 +23,6 @@ const PUBLIC_API: Tool = Tool { name: "cargo-public-api", version: "0.52.0", doe
 
 impl Tool {
     /// Finds or installs it.
-    ///
-    /// # Errors
-    /// It is missing and cannot be installed.
     pub fn ensure(&self, console: &mut Console) -> Result<PathBuf> {
         let Self { name, version, does } = self;
         let folder = paths::target().join("tools");
@@ -43,17 +40,11 @@ impl Tool {
 }
 
 /// Installs all of them.
-///
-/// # Errors
-/// One is missing and cannot be installed.
 pub fn ensure_all(console: &mut Console) -> Result<()> {
     [DENY, PUBLIC_API].iter().try_for_each(|tool| tool.ensure(console).map(drop))
 }
 
 /// The public items of a package, a line each.
-///
-/// # Errors
-/// The tool cannot be had, or does not read what this compiler's rustdoc writes.
 pub fn public_items(package: &str, console: &mut Console) -> Result<String> {
     let mut command = Command::new(PUBLIC_API.ensure(console)?);
     command.args(["public-api", "-sss", "--package", package, "--target-dir"]).arg(paths::target().join("api"));

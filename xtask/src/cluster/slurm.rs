@@ -24,9 +24,6 @@ pub struct Slurm {
 
 impl Slurm {
     /// Starts the daemons, and waits until the controller answers.
-    ///
-    /// # Errors
-    /// One does not start; says what its log says.
     pub fn start(console: &mut Console) -> Result<Self> {
         let folder = std::env::temp_dir().join(format!("fingertip-slurm-{}", std::process::id()));
         let mut slurm = Self { folder, daemons: Vec::new() };

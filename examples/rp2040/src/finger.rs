@@ -8,7 +8,8 @@ pub const ROWS: usize = 6;
 /// The sensed columns.
 pub const COLUMNS: usize = 4;
 
-/// A small tip on a coarse array, and a motor for 12 V.
+/// A small tip on a coarse array, and a motor for 12 V. Set `direction_confirmed` to 1 once you have seen that a positive duty moves
+/// the tip towards the object and makes the encoder count up: nothing drives the motor before.
 pub const PARAMS: Params = Params {
     tip_radius_um: 7_000,
     pitch_um: 1_500,

@@ -65,7 +65,8 @@ fn main() -> ! {
         bridge.set(status.bridge());
         // The guard moves its deadline: this frame was answered.
         guard::answered();
-        command.torque = status.tare == Taring::Done && status.fault.is_none();
-        command.goal = if command.torque && pins::button_pressed() { newtons(1_000) } else { newtons(0) };
+        let ready = status.tare == Taring::Done && status.fault.is_none();
+        command.torque = ready && PARAMS.direction_confirmed == 1;
+        command.goal = newtons(if command.torque && pins::button_pressed() { 1_000 } else { 0 });
     }
 }

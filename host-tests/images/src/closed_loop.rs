@@ -33,7 +33,7 @@ const TRAVEL_PER_MM: i64 = 10_000_000_000;
 pub fn run(
     mut step: impl FnMut(&mut Pipeline<ROWS, COLUMNS>, &Frame<ROWS, COLUMNS>, &Sense, &Command) -> Duty,
 ) -> Result<(u64, i32), &'static str> {
-    let params = Params { pitch_um: PITCH_UM as i32, ..crate::CONFIRMED };
+    let params = Params { pitch_um: PITCH_UM as i32, ..Params::DEFAULT };
     let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).map_err(|_| "the parameters are refused")?;
     let mut finger = Pipeline::new(&config);
     let mut digest = Digest::new();

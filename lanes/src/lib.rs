@@ -91,7 +91,7 @@ pub mod portable {
         sum.wrapping_add(((a as i64 * b as i64) >> 32) as i32)
     }
 
-    /// Square root in single precision, rounded to nearest: with [`libm`] where there is neither `std` nor an FPU.
+    /// Square root in single precision, rounded to nearest: with `libm` where there is neither `std` nor an FPU.
     #[cfg(not(target_os = "none"))]
     #[inline(always)]
     fn sqrt(x: f32) -> f32 {

@@ -1,0 +1,91 @@
+//! Doubtful configurations: what is warned of, and that the line for the pitch separates good fits from bad ones.
+
+use fingertip::command::Command;
+use fingertip::config::Shaped;
+use fingertip::config::{newtons, warnings::Warning};
+use fingertip::contact::FitLevel;
+use fingertip::fixed::types::I8F24;
+use fingertip::frame::{Frame, Sense};
+use fingertip::params::Params;
+use fingertip::pipeline::Pipeline;
+use fingertip::scan::Clocks;
+use fingertip::shipped::CLOCKS;
+use fingertip::units::Millimetres;
+
+fn warned(params: Params) -> Vec<Warning> {
+    Shaped::<10, 10>::new(&params, &CLOCKS).unwrap().warnings().collect()
+}
+
+/// Confidence and force (N) of an ideal hemisphere at a force, with the middle of its contact off the middle of the
+/// array, and with one dead taxel or none. A taxel reads the mean pressure on it.
+fn seen<const ROWS: usize, const COLUMNS: usize>(params: &Params, force_mn: i32, off_mm: f64, dead: bool) -> (u8, f64) {
+    let config = Shaped::<ROWS, COLUMNS>::new(params, &CLOCKS).unwrap();
+    let depth = config.tip.indentation(newtons(force_mn));
+    let pitch = f64::from(params.pitch_um) * 1e-3;
+    let mut finger = Pipeline::new(&config);
+    let command = Command { tare_request: 1, fit_level: FitLevel::AllRows, ..Command::default() };
+    let sense = Sense { supply_mv: 6_500, ..Sense::default() };
+    let mut blank = Frame::<ROWS, COLUMNS>::EMPTY;
+    let mut pressed = blank;
+    for (row, column) in (0..=ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+        blank.set_code(row, column, if row < ROWS { 412 } else { 372 });
+        const PARTS: usize = 6;
+        let mut kpa = 0.0;
+        for part in 0..PARTS * PARTS {
+            let mm = |taxel: usize, part: usize, side: usize| {
+                pitch * (taxel as f64 - 0.5 * side as f64 + (part as f64 + 0.5) / PARTS as f64) - off_mm
+            };
+            let distance = mm(row, part / PARTS, ROWS).hypot(mm(column, part % PARTS, COLUMNS));
+            let distance = Millimetres(I8F24::from_num(distance));
+            kpa += config.tip.pressure(distance, depth).0.to_num::<f64>() / (PARTS * PARTS) as f64;
+        }
+        let dead = dead && (row, column) == ((ROWS - 1) / 2, (COLUMNS - 1) / 2);
+        let code = if dead || row == ROWS { 372.0 } else { 412.0 + kpa * f64::from(params.codes_per_kpa_milli) * 1e-3 };
+        pressed.set_code(row, column, code as u16);
+    }
+    for sequence in 1..=400 {
+        let frame = Frame { sequence, ..if sequence < 200 { blank } else { pressed } };
+        finger.step(&frame, &sense, &command);
+    }
+    let contact = finger.status().contact;
+    (contact.confidence, contact.force.0.to_num())
+}
+
+/// From two pitches on, a hemisphere is seen as one wherever it touches, and a dead taxel costs 2 % at most.
+#[test]
+fn a_pitch_is_doubtful_where_an_ideal_hemisphere_is_not_seen_as_one() {
+    const FORCE_MN: i32 = Params::DEFAULT.force_max_mn / 8;
+    for (tip_radius_um, modulus_pa) in [(6_000, 120_000), (10_000, 250_000), (14_000, 600_000)] {
+        for pitch_um in (1_200..=3_600).step_by(200) {
+            let codes_per_kpa_milli = 12_000;
+            let params = Params { tip_radius_um, modulus_pa, pitch_um, codes_per_kpa_milli, ..Params::DEFAULT };
+            let places = [0.0, 0.25, 0.5].map(|place| place * 1e-3 * f64::from(pitch_um));
+            let confidences = places.map(|mm| seen::<10, 10>(&params, FORCE_MN, mm, false).0);
+            let forces = places.map(|mm| seen::<10, 10>(&params, FORCE_MN, -mm, true).1);
+            let off = forces.map(|force| (force * 1e3 / f64::from(FORCE_MN) - 1.0).abs());
+            let worst = off.into_iter().fold(0.0, f64::max);
+            let coarse = warned(params).into_iter().find_map(|warning| match warning {
+                Warning::CoarsePitch { radius_um, .. } => Some(f64::from(radius_um) / f64::from(pitch_um)),
+                _ => None,
+            });
+            match coarse {
+                None => assert!(confidences.iter().all(|it| *it > 190) && worst < 0.02, "{params:?} {worst}"),
+                Some(ratio) => assert!(ratio > 1.4 || worst > 0.2, "{params:?}: {ratio}, {worst}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn each_doubt_has_its_warning_and_the_reference_finger_has_none() {
+    assert_eq!(warned(Params::DEFAULT), []);
+    let one = |params| warned(params).iter().map(ToString::to_string).collect::<Vec<_>>();
+    assert!(one(Params { pitch_um: 2_500, ..Params::DEFAULT })[0].starts_with("pitch_um of 2500: a contact of 875 mN"));
+    let unseen = one(Params { codes_per_kpa_milli: 80_000, ..Params::DEFAULT });
+    assert!(unseen[0].starts_with("force_max_mn of 7000: the converter sees up to"), "{unseen:?}");
+    let coarse = one(Params { encoder_counts_per_turn: 16, ..Params::DEFAULT });
+    assert!(coarse[0].starts_with("encoder_counts_per_turn: a count is 109 um"), "{coarse:?}");
+    let clocks = Clocks { frame_ns: Some(10_000_000), ..CLOCKS };
+    let slow = Shaped::<10, 10>::new(&Params::DEFAULT, &clocks).unwrap();
+    assert!(slow.warnings().eq([Warning::SlowFrames { frame_ns: 10_000_000 }]));
+}

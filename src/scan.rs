@@ -253,12 +253,12 @@ impl ScanTiming {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::params::Params;
     use std::string::ToString;
 
-    const CLOCKS: Clocks = Clocks {
+    pub(crate) const CLOCKS: Clocks = Clocks {
         timer_hz: 168_000_000,
         core_hz: 168_000_000,
         converter_hz: 21_000_000,

@@ -219,7 +219,7 @@ fn normal(rng: &mut Rng) -> f64 {
 /// How readings are rounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Steps {
-    /// To the nearest sixteenth of a code, the pipeline's own step.
+    /// Codes rounded to 1/16, the resolution of the pipeline.
     Sixteenths,
     /// Down to a whole code, as a 12-bit converter does without noise.
     Codes,

@@ -2,21 +2,9 @@
 
 use super::Config;
 use crate::params::Params;
+use crate::scan::tests::CLOCKS;
 use crate::scan::{Clocks, ScanError};
 use crate::{config::ConfigError, config::gains::PACES};
-
-/// A board like the shipped one.
-const CLOCKS: Clocks = Clocks {
-    timer_hz: 168_000_000,
-    core_hz: 168_000_000,
-    converter_hz: 21_000_000,
-    converters: 2,
-    sample_cycles: &[3, 15, 28],
-    conversion_cycles: 12,
-    trigger_cycles: 5,
-    slot_step: 12,
-    frame_ns: None,
-};
 
 /// A number within this share of what double precision makes of it, and a unit of its last place.
 fn near(name: &str, number: f64, exact: f64, share: f64) {

@@ -4,7 +4,7 @@ use crate::{
     apt,
     console::{self, Console},
     docs, host,
-    image::Image,
+    image::{self, Image},
     paths, qemu,
     toolchain::{self, Choice, TARGET},
 };
@@ -13,8 +13,11 @@ use std::{fmt::Write as _, fs};
 
 /// The page with the table of cores, and the example that runs the images and prints it.
 pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
-/// The example for another board, and its target.
-const EXAMPLE: (&str, &str) = ("rp2040", "thumbv6m-none-eabi");
+/// The folder of the loop that every core runs.
+pub const LOOP: &str = "host-tests/cores";
+/// The folder of the example for another board, and its target.
+pub const EXAMPLE: &str = "examples/rp2040";
+pub const TARGET_OF_EXAMPLE: &str = "thumbv6m-none-eabi";
 const RISCV_PROGRAM: &str = "qemu-system-riscv32";
 const WHY: &str = "running the loop on emulated cores";
 
@@ -80,9 +83,8 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let folder = paths::made("cores")?;
     let mut list = String::new();
     for (number, core) in CORES.iter().enumerate() {
-        let mut command = toolchain.cargo_for("build", core.target, core.flags);
-        command.args(["--manifest-path", "host-tests/cores/Cargo.toml", "--release", "--locked"]);
-        console.build(&mut command, &format!("the loop for {}", core.target), crate::progress::IMAGE)?;
+        let mut command = image::apart(toolchain, "build", LOOP, core.target, core.flags);
+        console.build(command.arg("--release"), &format!("the loop for {}", core.target), crate::progress::IMAGE)?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
@@ -111,15 +113,14 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
 /// # Errors
 /// No compiler, or it does not build.
 pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
-    let (name, target) = EXAMPLE;
+    let target = TARGET_OF_EXAMPLE;
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
-    let mut command = toolchain.cargo_for("build", target, &[]);
-    command.args(["--manifest-path", &format!("examples/{name}/Cargo.toml"), "--release", "--locked"]);
-    console.build(&mut command, &format!("the example for the {name}"), crate::progress::IMAGE)?;
-    let bytes = Image::read(&toolchain.images_for(target, &[]).join(name))?.bytes.len();
+    let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
+    console.build(command.arg("--release"), EXAMPLE, crate::progress::IMAGE)?;
+    let bytes = Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len();
     // Without the loop a few kilobytes would be left: its configuration would always be refused.
-    ensure!(bytes > 40_000, "the example for the {name} has {bytes} bytes: the loop is not in it");
-    console.print(&format!("{name}: {bytes} bytes of flash"));
+    ensure!(bytes > 40_000, "{EXAMPLE} has {bytes} bytes: the loop is not in it");
+    console.print(&format!("{EXAMPLE}: {bytes} bytes of flash"));
     Ok(())
 }
 

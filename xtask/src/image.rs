@@ -152,6 +152,13 @@ pub fn emulated(toolchain: Toolchain, subcommand: &str, name: &str, feature: &st
     command
 }
 
+/// `cargo <subcommand>` of a program that is a workspace of its own in this folder, for a target with flags.
+pub fn apart(toolchain: Toolchain, subcommand: &str, folder: &str, target: &str, flags: &[&str]) -> Command {
+    let mut command = toolchain.cargo_for(subcommand, target, flags);
+    command.args(["--manifest-path", &format!("{folder}/Cargo.toml"), "--locked"]);
+    command
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

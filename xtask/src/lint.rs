@@ -1,7 +1,7 @@
 //! Format, lints, documentation and licences.
 
 use crate::{
-    console, image,
+    console, cores, image,
     stages::Stages,
     toolchain::{self, Choice, TARGET, Toolchain},
     tools,
@@ -13,15 +13,15 @@ use std::process::Command;
 const IMAGES: [(&str, &str); 5] =
     [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
 
-/// Programs of other boards, each a workspace of its own, and the target for which they are checked.
-const APART: ([&str; 2], &str) = (["examples/rp2040", "host-tests/cores"], "thumbv6m-none-eabi");
+/// Programs of other boards, each a workspace of its own.
+const APART: [&str; 2] = [cores::EXAMPLE, cores::LOOP];
 
 /// Runs all checks that are no tests.
 pub fn run(choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("format", |console| {
         console.run(console::cargo("fmt").args(["--all", "--check"]))?;
-        for folder in APART.0 {
+        for folder in APART {
             let manifest = format!("{folder}/Cargo.toml");
             console.run(console::cargo("fmt").args(["--manifest-path", &manifest, "--check"]))?;
         }
@@ -46,12 +46,11 @@ pub fn run(choice: Choice) -> Result<()> {
             console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
         }
         console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))?;
+        let target = cores::TARGET_OF_EXAMPLE;
         let toolchain =
-            toolchain::ensure_for(choice, &[APART.1], "programs of other boards are checked for it", console)?;
-        for folder in APART.0 {
-            let mut command = toolchain.cargo_for("clippy", APART.1, &[]);
-            command.args(["--manifest-path", &format!("{folder}/Cargo.toml"), "--locked"]);
-            console.run(&mut denying_warnings(command))?;
+            toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
+        for folder in APART {
+            console.run(&mut denying_warnings(image::apart(toolchain, "clippy", folder, target, &[])))?;
         }
         Ok(())
     });

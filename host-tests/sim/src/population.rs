@@ -173,7 +173,7 @@ pub fn fingers(population: &Population, seed: u64, all: usize, shard: Shard, boa
     go_on(population, seed, (0..all).filter(|number| shard.has(*number)), Vec::new(), board, |_| Ok(()))
 }
 
-/// Runs those of the fingers that are not done yet; each is handed to `keep` when it is.
+/// Simulates the fingers that are not finished yet, and passes each result to `keep` as soon as it is there.
 fn go_on(
     population: &Population,
     seed: u64,

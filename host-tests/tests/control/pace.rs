@@ -110,7 +110,7 @@ fn a_way_in_between_makes_the_calm_begin_anew() {
     assert_eq!(run(&mut pace, 0, 1, &config), [1]);
 }
 
-/// Of a pace: k_v, and all gains by it.
+/// Checks that all gains of a pace follow from this speed gain k_v.
 fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
     let gains = &config.paces[pace];
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);

@@ -266,6 +266,7 @@ fn the_runs_come_everywhere() {
     assert_eq!(Vec::from_iter(modes), [0, 1, 2, 3, 4, 5, 6, 7]);
     assert_eq!(Vec::from_iter(tasks), [0, 1, 2, 3]);
     assert!([0, 1, 2, 3].iter().all(|number| ends.contains(number)), "{ends:?}");
-    // Fault 1 is a frame that comes again. Frames that do not come, damaged parameters, late steps and crashes are found outside the step.
+    // A repeated frame gives fault 1. Missing frames, damaged parameters, late steps and crashes are detected outside of
+    // the step.
     assert_eq!(Vec::from_iter(faults), [0, 1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 14, 15]);
 }

@@ -214,7 +214,7 @@ pub enum Other {
     More,
     /// It has one fewer.
     Fewer,
-    /// One has another name there.
+    /// One parameter has another name.
     Renamed,
 }
 

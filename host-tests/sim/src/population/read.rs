@@ -315,7 +315,7 @@ pub fn text(report: &Report) -> String {
     text
 }
 
-/// A line with the promises that a finger broke, or the one that it kept most narrowly.
+/// One line for a finger: the promises that it broke, else the promise with the smallest margin.
 pub fn judged(ran: &Ran) -> String {
     let promise = |Promise { metric, value, min, max, .. }: &Promise| {
         format!("{metric} {} ({})", shown(*value), asked(*min, *max))

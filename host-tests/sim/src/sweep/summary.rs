@@ -162,7 +162,7 @@ impl Table {
         Some([min.parse().ok(), max.parse().ok()])
     }
 
-    /// How many of these rows held their bounds.
+    /// Number of these rows that stayed within their bounds.
     pub(super) fn passes<'a>(&self, rows: impl Iterator<Item = &'a Vec<String>>) -> usize {
         let passed = self.place(PASSED);
         rows.filter(|row| row[passed] == "1").count()

@@ -207,7 +207,7 @@ fn campaign(name: &str, times: usize) {
     println!("{tally:#?}\n{} interruptions, nothing lost or changed", tally.values().sum::<usize>());
 }
 
-/// Strikes a job once, or a few times before it goes on.
+/// Interrupts a job once, or several times before it is resumed to its end.
 fn once(job: &Job, kind: Kind, rng: &mut Rng) -> bool {
     let after = format!("{kind:?}");
     let mut at = rng.u64(1..job.bytes * 9 / 10);

@@ -89,7 +89,9 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
             .with_context(|| paths::shown(&elf))?;
-        let bytes = Image::read(&elf)?.bytes.len();
+        let image = Image::read(&elf)?;
+        image.names_no_folder()?;
+        let bytes = image.bytes.len();
         // A string takes every write.
         let _ = writeln!(
             list,

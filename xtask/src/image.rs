@@ -61,9 +61,18 @@ impl Image {
         Sha256::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Whether these bytes are among the flashable ones.
-    fn holds(&self, wanted: &[u8]) -> bool {
-        self.bytes.windows(wanted.len()).any(|bytes| bytes == wanted)
+    /// Makes sure that the image is the same bytes on another machine.
+    ///
+    /// # Errors
+    /// It names the folder of this checkout, or that of other crates.
+    pub fn names_no_folder(&self) -> Result<()> {
+        for folder in toolchain::sources().iter().map(PathBuf::as_path).chain([paths::root()]) {
+            let name = folder.as_os_str().as_encoded_bytes();
+            if self.bytes.windows(name.len()).any(|bytes| bytes == name) {
+                bail!("{} names {}: it would be other bytes elsewhere", paths::shown(&self.elf), folder.display());
+            }
+        }
+        Ok(())
     }
 
     /// Path, size and SHA-256, a line each.
@@ -101,9 +110,7 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let image = Image::read(&built(flashed(toolchain, "build").arg("--release"), toolchain, "firmware", console)?)?;
-    if toolchain::sources().is_some_and(|folder| image.holds(folder.as_os_str().as_encoded_bytes())) {
-        bail!("the image names a folder of this machine: it would be other bytes on another one");
-    }
+    image.names_no_folder()?;
     fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
     Ok(image)
 }

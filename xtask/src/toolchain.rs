@@ -3,7 +3,7 @@
 use crate::{apt, console, console::Console, paths};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
-use std::{env, path::PathBuf, process::Command};
+use std::{env, iter, path::PathBuf, process::Command};
 
 /// The microcontroller, in the compiler's words.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -51,12 +51,10 @@ impl Toolchain {
             }
         };
         command.args(["--target", target]).arg("--target-dir").arg(self.flagged_dir(flags));
-        let flags: Vec<_> = short_paths().into_iter().chain(flags.iter().map(|flag| (*flag).into())).collect();
-        if !flags.is_empty() {
-            // Added to the flags of `.cargo/config.toml`. Cargo does not find a target by a name with a dot here.
-            let key = if target.contains('.') { "'cfg(target_os = \"none\")'" } else { target };
-            command.arg("--config").arg(format!("target.{key}.rustflags={flags:?}"));
-        }
+        let flags: Vec<_> = short_paths().chain(flags.iter().map(|flag| (*flag).into())).collect();
+        // Added to the flags of `.cargo/config.toml`. Cargo does not find a target by a name with a dot here.
+        let key = if target.contains('.') { "'cfg(target_os = \"none\")'" } else { target };
+        command.arg("--config").arg(format!("target.{key}.rustflags={flags:?}"));
         command
     }
 
@@ -84,10 +82,11 @@ impl Toolchain {
     }
 }
 
-/// The flag that names the sources of other crates by their place in cargo's home: where a panic would be is part of
-/// the image, which is the same bytes on every machine.
-pub fn short_paths() -> Option<String> {
-    Some(format!("--remap-path-prefix={}=crates", sources()?.display()))
+/// The flags that name the sources of this checkout and of other crates without their folders: where a panic would be is
+/// part of an image, which is the same bytes on every machine.
+pub fn short_paths() -> impl Iterator<Item = String> {
+    let checkout = format!("--remap-path-prefix={}=fingertip", paths::root().display());
+    iter::once(checkout).chain(sources().map(|crates| format!("--remap-path-prefix={}=crates", crates.display())))
 }
 
 /// Where cargo keeps the sources of other crates.

@@ -89,9 +89,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
             .with_context(|| paths::shown(&elf))?;
-        let image = Image::read(&elf)?;
-        image.names_no_folder()?;
-        let bytes = image.bytes.len();
+        let bytes = Image::read(&elf)?.bytes.len();
         // A string takes every write.
         let _ = writeln!(
             list,

@@ -40,7 +40,7 @@ impl Image {
     /// Lays out the loadable segments of a linked image by their load addresses; gaps read as erased.
     ///
     /// # Errors
-    /// The file is missing, no image for the target, or loads nothing.
+    /// The file is missing, no image for the target, loads nothing, or names a folder of this machine.
     pub fn read(elf: &Path) -> Result<Self> {
         let data = fs::read(elf).with_context(|| format!("cannot read the image {}", paths::shown(elf)))?;
         let file = ElfFile::<FileHeader32<LittleEndian>>::parse(&*data)
@@ -53,7 +53,9 @@ impl Image {
             }
         }
         let (base, bytes) = lay_out(&segments).with_context(|| paths::shown(elf))?;
-        Ok(Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base })
+        let image = Self { elf: elf.into(), bin: elf.with_extension("bin"), bytes, base };
+        image.names_no_folder()?;
+        Ok(image)
     }
 
     /// SHA-256 of the flashable bytes, in hexadecimal.
@@ -61,12 +63,13 @@ impl Image {
         Sha256::digest(&self.bytes).iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// Makes sure that the image is the same bytes on another machine.
+    /// Refuses an image with a path of this machine in it: a build on another machine would give other bytes.
     ///
     /// # Errors
-    /// It names the folder of this checkout, or that of other crates.
-    pub fn names_no_folder(&self) -> Result<()> {
-        for folder in toolchain::sources().iter().map(PathBuf::as_path).chain([paths::root()]) {
+    /// Names the path: where the sources of the core lie, or those of other crates.
+    fn names_no_folder(&self) -> Result<()> {
+        // With its subfolder: that of a checkout in `/src` alone is part of most paths.
+        for folder in toolchain::sources().into_iter().chain([paths::root().join("src")]) {
             let name = folder.as_os_str().as_encoded_bytes();
             if self.bytes.windows(name.len()).any(|bytes| bytes == name) {
                 bail!("{} names {}: it would be other bytes elsewhere", paths::shown(&self.elf), folder.display());
@@ -110,7 +113,6 @@ fn lay_out(segments: &[(u32, &[u8])]) -> Result<(u32, Vec<u8>)> {
 pub fn firmware(choice: Choice, console: &mut Console) -> Result<Image> {
     let toolchain = toolchain::ensure(choice, console)?;
     let image = Image::read(&built(flashed(toolchain, "build").arg("--release"), toolchain, "firmware", console)?)?;
-    image.names_no_folder()?;
     fs::write(&image.bin, &image.bytes).with_context(|| format!("cannot write {}", paths::shown(&image.bin)))?;
     Ok(image)
 }

@@ -82,8 +82,8 @@ impl Toolchain {
     }
 }
 
-/// The flags that name the sources of this checkout and of other crates without their folders: where a panic would be is
-/// part of an image, which is the same bytes on every machine.
+/// Flags for the compiler that replace the folders of this checkout and of other crates by short names. The path of a
+/// source that can panic is part of the image, and the image must be the same bytes on every machine.
 pub fn short_paths() -> impl Iterator<Item = String> {
     let checkout = format!("--remap-path-prefix={}=fingertip", paths::root().display());
     iter::once(checkout).chain(sources().map(|crates| format!("--remap-path-prefix={}=crates", crates.display())))

@@ -150,7 +150,7 @@ params! {
     /// Time constant of the creep.
     creep_time_ms = 10_000 in 50..=600_000;
     /// Whether somebody saw that positive duty moves the tip towards the object, and the jog that the encoder then counts
-    /// up: 1 yes, 0 no. Without it the bus refuses torque. See `docs/commissioning.md`.
+    /// up: 1 yes, 0 no. Without it torque is refused. See `docs/commissioning.md`.
     direction_confirmed = 0 in 0..=1;
     /// Largest temperature of the winding, degrees Celsius: below it the current is held back, see limit 13.
     winding_max_c = 125 in 85..=250;

@@ -40,6 +40,11 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     repeated: Option<u32>,
     /// True once the travel has its zero: the place where torque was first enabled.
     zeroed: bool,
+    /// True once torque was off in a frame after which the array had a zero or was about to get one: torque may be taken
+    /// up. Torque that has been on for longer drives nothing until it was off.
+    armed: bool,
+    /// Torque of the last command; on before the first one.
+    torque: bool,
     motion: SpeedLoop,
     touch: Touch,
     warmth: Warmth,
@@ -74,6 +79,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             tared: false,
             repeated: None,
             zeroed: false,
+            armed: false,
+            torque: true,
         }
     }
 
@@ -86,6 +93,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.set_fit_level(command, sense, &mut limits);
         self.motion.observe(sense.encoder, &self.config);
         self.warmth.observe(sense.chip, &self.config);
+        self.monitor.watch_supply(sense, &self.config);
 
         // The tactile image and the contact in it. A broken array shows none: the contact is then the last one's, and
         // the motor gets no voltage by it.
@@ -95,6 +103,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
 
         // What the host asks for, and whether the finger may go on as it does.
         let tares = command.tare_request == self.status.taken.tare;
+        let zeroes = self.tared || !tares || matches!(self.activity, Activity::Tare { .. });
+        self.armed = zeroes && (self.armed || !self.torque);
+        self.torque = command.torque;
         if self.asked(command) {
             self.serve(command, sense, &contact);
         }
@@ -117,7 +128,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.motion.drive.cut();
         }
 
-        self.report(duty, &contact, sense, limits);
+        self.report(duty, &contact, sense, command, limits);
         (duty, &self.status)
     }
 
@@ -145,9 +156,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
+    /// The contact in the tactile image. Before a tare the array's offsets look like one: none is reported then.
     fn contact(&mut self, sound: bool) -> Contact {
         let fits = sound && self.activity.fits();
-        let contact = if fits {
+        let contact = if !self.tared {
+            Contact { bad_taxels: self.array.picture().bad_count.min(255) as u8, ..Contact::default() }
+        } else if fits {
             self.fit.read(self.array.picture(), &self.config)
         } else if sound || !self.activity.drives() {
             contact::from_sums(self.array.picture(), &self.config)
@@ -295,11 +309,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     #[inline(always)]
-    fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, mut limits: Limits) {
+    fn report(&mut self, duty: Duty, contact: &Contact, sense: &Sense, command: &Command, mut limits: Limits) {
         for (held, flag) in [
             (self.array.picture().bad_count > 0, Limits::TAXELS),
             (!self.tared, Limits::NOT_TARED),
             (self.array.tared_touching(), Limits::TARED_TOUCHING),
+            (self.config.params.direction_confirmed == 0, Limits::DIRECTION),
+            (command.torque && !self.armed, Limits::TORQUE_HELD),
         ] {
             limits.set(if held { flag } else { 0 });
         }
@@ -352,6 +368,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
     }
 
     fn restart(&mut self) {
+        self.armed = false;
         self.fit.lose();
         self.touch = Touch::default();
         match self.activity {
@@ -377,6 +394,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.activity = Activity::Off(Halt::OPEN);
         self.status = Status { taken, missed_frames, ..Status::default() };
         (self.tared, self.repeated, self.zeroed) = (false, None, false);
+        (self.armed, self.torque) = (false, true);
     }
 
     /// What the last step reported.

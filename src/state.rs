@@ -150,6 +150,10 @@ impl Limits {
     pub const GUARD: u16 = 1 << 12;
     /// The winding's temperature, by the motor's model, holds the current back.
     pub const WINDING: u16 = 1 << 13;
+    /// Nobody has confirmed which way the motor goes: torque is refused.
+    pub const DIRECTION: u16 = 1 << 14;
+    /// Torque has been on since before the tare or the configuration: it drives nothing until it was off.
+    pub const TORQUE_HELD: u16 = 1 << 15;
 
     /// Adds a flag.
     pub fn set(&mut self, flag: u16) {

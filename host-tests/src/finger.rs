@@ -1,14 +1,13 @@
 //! The reference finger as its firmware knows it.
 
-use fingertip::params::Params;
 use fingertip::shipped::{Array, Calibration, Config, Frame, TARE_FRAMES};
 
-/// The configuration that the default parameters make.
+/// The configuration that the default parameters make, with the motor's direction confirmed.
 ///
 /// # Panics
 /// Where the core does not allow them: a mistake in the core.
 pub fn config() -> Config {
-    Config::shipped(&Params::DEFAULT).expect("the defaults are allowed")
+    Config::shipped(&images::CONFIRMED).expect("the defaults are allowed")
 }
 
 /// An array that was tared with nothing on it.

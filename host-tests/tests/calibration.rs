@@ -82,12 +82,14 @@ fn what_cannot_be_is_refused_by_name() {
 fn a_new_calibration_needs_a_new_tare() {
     let [_, mut blank] = frames();
     let mut pipeline = Pipeline::new(&config());
-    let mut command = Command { torque: true, tare_request: 1, ..Command::default() };
+    let mut command = Command::default();
     let mut step = |pipeline: &mut Pipeline, command: &Command| {
         blank.sequence += 1;
         let sense = fingertip::frame::Sense { supply_mv: 6_000, ..Default::default() };
         pipeline.step(&blank, &sense, command).1.mode
     };
+    step(&mut pipeline, &command);
+    (command.torque, command.tare_request) = (true, 1);
     for _ in 0..TARE_FRAMES + 2 {
         step(&mut pipeline, &command);
     }

@@ -12,7 +12,7 @@ use sim::native::bench::Bench;
 use sim::setup::Setup;
 
 fn config(creep_permille: i32, creep_time_ms: i32) -> Config {
-    Config::shipped(&Params { creep_permille, creep_time_ms, ..Params::DEFAULT }).unwrap()
+    Config::shipped(&Params { creep_permille, creep_time_ms, ..images::CONFIRMED }).unwrap()
 }
 
 fn frame_s(config: &Config) -> f64 {
@@ -100,7 +100,7 @@ fn what_is_held_grows_by_the_rate_and_no_more_than_that() {
 
 #[test]
 fn it_never_leads_beyond_the_largest_force() {
-    let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..Params::DEFAULT };
+    let params = Params { creep_permille: 300, creep_time_ms: 50, force_max_mn: 3_000, ..images::CONFIRMED };
     let (force, board) = hold(&Config::shipped(&params).unwrap(), 3_000, 3.0);
     assert!((2.98..3.02).contains(&force), "{force}");
     assert_eq!(board.status().fault, None);
@@ -114,7 +114,7 @@ fn over_force_is_judged_by_the_reading() {
         creep_time_ms: 50,
         force_max_mn: 2_650,
         force_fault_mn: 2_700,
-        ..Params::DEFAULT
+        ..images::CONFIRMED
     };
     let (_, mut board) = hold(&Config::shipped(&params).unwrap(), 2_000, 4.0);
     assert_eq!(board.status().fault, None);

@@ -41,7 +41,7 @@ fn the_observer_recovers_from_anything() {
         [(500, 3, 2_000_000), (2_400, 15, 250_000), (100_000, 480, 1_000)]
     {
         let approach_um_per_s = speed_max_um_per_s.min(Params::DEFAULT.approach_um_per_s);
-        let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, approach_um_per_s, ..Params::DEFAULT };
+        let params = Params { settle_ns, sample_cycles, speed_max_um_per_s, approach_um_per_s, ..images::CONFIRMED };
         let config = Config::shipped(&params).unwrap();
         let mut rng = Rng::with_seed(11);
         for _ in 0..300 {

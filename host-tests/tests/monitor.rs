@@ -81,21 +81,26 @@ fn a_supply_outside_its_window_for_five_frames_stops() {
         shown.sense.supply_mv = supply_mv;
         shown
     };
+    let watched = |monitor: &mut Monitor, supply_mv| {
+        let shown = with(supply_mv);
+        monitor.watch_supply(&shown.sense, &config);
+        monitor.check(&shown.view(), &config)
+    };
     for inside in [low, high] {
         let mut monitor = Monitor::default();
         for _ in 0..100 {
-            assert_eq!(monitor.check(&with(inside).view(), &config), None, "{inside} mV");
+            assert_eq!(watched(&mut monitor, inside), None, "{inside} mV");
         }
     }
     for (outside, fault) in [(low - 1, Fault::SupplyLow), (0, Fault::SupplyLow), (high + 1, Fault::SupplyHigh)] {
         let mut monitor = Monitor::default();
         for _ in 0..3 {
             for _ in 0..4 {
-                assert_eq!(monitor.check(&with(outside).view(), &config), None);
+                assert_eq!(watched(&mut monitor, outside), None);
             }
-            assert_eq!(monitor.check(&with(low).view(), &config), None, "one good frame is enough");
+            assert_eq!(watched(&mut monitor, low), None, "one good frame is enough");
         }
-        let faults = [(); 6].map(|()| monitor.check(&with(outside).view(), &config));
+        let faults = [(); 6].map(|()| watched(&mut monitor, outside));
         assert_eq!(faults, [None, None, None, None, Some(fault), Some(fault)]);
     }
 }

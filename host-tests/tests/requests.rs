@@ -2,15 +2,17 @@
 //! torque.
 
 use fingertip::config::newtons;
+use fingertip::contact::Contact;
 use fingertip::measure::{Ended, Standing, State, Task};
+use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::TARE_FRAMES;
-use fingertip::state::{Fault, Mode};
+use fingertip::shipped::{Calibration, Config, TARE_FRAMES};
+use fingertip::state::{Fault, Limits, Mode};
 use host_tests::finger::config;
 use images::record::Record;
 use sim::native::bench::Bench;
-use sim::plant::Taxel;
+use sim::plant::{Setup, Taxel};
 
 const NOT_READY: Standing = Standing::over(Task::Press, Ended::NotReady, 0);
 const RUNNING: Standing = Standing::running(Task::Press);
@@ -317,4 +319,120 @@ fn torque_waits_until_the_tip_is_slow() {
         }
         assert_eq!(board.status().bridge(), Bridge::Open);
     }
+}
+
+/// Torque drives nothing before somebody confirmed which way the motor goes, and the reason is reported.
+#[test]
+fn torque_is_refused_before_the_direction_is_confirmed() {
+    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+    let mut board = Bench::of(&Setup::default(), &config);
+    board.tare();
+    board.command().goal = newtons(1_000);
+    for _ in 0..1_000 {
+        let status = board.step();
+        assert_eq!((status.mode, status.duty.0), (Mode::Off, 0));
+        assert!(status.limits.has(Limits::DIRECTION) && !status.limits.has(Limits::TORQUE_HELD));
+    }
+}
+
+/// A caller that holds torque and a goal since before it asks for the tare does not start an approach by it, but once torque
+/// was off.
+#[test]
+fn torque_that_was_on_before_the_tare_drives_nothing_until_it_was_off() {
+    for (off_first, frames) in [(0, 0), (0, 1), (0, 100), (1, 1), (1, 100)] {
+        let mut board = at(5.0);
+        board.command().goal = newtons(1_000);
+        for _ in 0..off_first {
+            board.step();
+        }
+        board.command().torque = true;
+        for _ in 0..frames {
+            board.step();
+        }
+        board.command().tare_request += 1;
+        for _ in 0..2 * TARE_FRAMES {
+            let status = board.step();
+            assert!(matches!(status.mode, Mode::Off | Mode::Tare) && status.limits.has(Limits::TORQUE_HELD));
+            assert_eq!(status.duty.0, 0);
+        }
+        board.command().torque = false;
+        board.step();
+        board.command().torque = true;
+        assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "{off_first}, {frames}");
+    }
+}
+
+/// Torque that is turned on in the frame that asks for the tare, or while it is under way, is taken up after it.
+#[test]
+fn torque_that_comes_with_a_tare_or_during_it_waits_for_its_end() {
+    for after in [0, 1, TARE_FRAMES / 2, TARE_FRAMES] {
+        let mut board = at(5.0);
+        board.command().goal = newtons(1_000);
+        board.step();
+        board.command().tare_request += 1;
+        for _ in 0..after {
+            board.step();
+        }
+        board.command().torque = true;
+        for _ in after..=TARE_FRAMES {
+            assert_eq!(board.step().duty.0, 0);
+        }
+        assert_eq!((board.step().mode, board.status().tare), (Mode::Approach, Taring::Done), "after {after} frames");
+    }
+}
+
+/// New parameters or gains stop the finger; torque that was on starts nothing under them before it was off.
+#[test]
+fn torque_that_was_on_before_a_configuration_drives_nothing_until_it_was_off() {
+    let changes: [fn(&mut Bench); 2] =
+        [|board| board.pipeline().configure(&config()), |board| board.pipeline().calibrate(&Calibration::NONE)];
+    for (number, change) in changes.into_iter().enumerate() {
+        let mut board = ready();
+        change(&mut board);
+        for _ in 0..100 {
+            let status = board.step();
+            assert_eq!(status.mode, Mode::Off);
+            assert!(status.limits.has(Limits::TORQUE_HELD));
+        }
+        board.command().tare_request += u8::from(number == 1);
+        for _ in 0..=2 * TARE_FRAMES {
+            let mode = board.step().mode;
+            assert!(mode == Mode::Off || mode == Mode::Tare);
+        }
+        board.command().torque = false;
+        board.step();
+        board.command().torque = true;
+        assert_eq!(board.step().mode, Mode::Release);
+    }
+}
+
+/// A supply that was out of its window before torque stops the motor in its first frame with torque, undriven.
+#[test]
+fn torque_at_a_wrong_supply_is_a_fault_before_it_drives() {
+    for (supply_mv, fault) in [(3_000, Fault::SupplyLow), (60_000, Fault::SupplyHigh)] {
+        let mut board = Bench::default();
+        board.tare();
+        board.command().torque = false;
+        for _ in 0..10 {
+            assert_eq!(board.step_with(|record| record.sense.supply_mv = supply_mv).fault, None);
+        }
+        board.command().torque = true;
+        board.command().goal = newtons(1_000);
+        let status = board.step_with(|record| record.sense.supply_mv = supply_mv);
+        assert_eq!((status.fault, status.duty.0), (Some(fault), 0));
+    }
+}
+
+/// The offsets of an array that was not tared look like a contact: none is reported, whatever presses, only what is wrong
+/// with the array.
+#[test]
+fn before_a_tare_no_contact_is_reported() {
+    let mut board = at(-2.0);
+    board.harm(|faults| faults.array.taxels[3][4] = Taxel::Dead);
+    for _ in 0..10 {
+        assert_eq!(board.step().contact, Contact { bad_taxels: 1, ..Contact::default() });
+    }
+    board.command().tare_forced = true;
+    board.tare();
+    assert_ne!(board.step().contact, Contact { bad_taxels: 1, ..Contact::default() });
 }

@@ -46,7 +46,7 @@ impl Finger {
             modulus_pa: (modulus_kpa * 1e3) as i32,
             row_sag_ppb_per_code: 0,
             bad_taxels_max: 20,
-            ..Params::DEFAULT
+            ..images::CONFIRMED
         };
         let mut pipeline = Pipeline::new(&Config::shipped(&params).unwrap());
         let mut mask = [0u32; ROWS];

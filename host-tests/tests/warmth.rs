@@ -15,7 +15,7 @@ use sim::native::bench::Bench;
 use sim::setup::Setup;
 
 fn config(array_gain_ppm_per_k: i32, array_zero_pa_per_k: i32) -> Config {
-    Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..Params::DEFAULT }).unwrap()
+    Config::shipped(&Params { array_gain_ppm_per_k, array_zero_pa_per_k, ..images::CONFIRMED }).unwrap()
 }
 
 fn celsius(degrees: i32) -> Option<Celsius> {
@@ -143,7 +143,7 @@ proptest! {
     ) {
         let params = Params {
             array_gain_ppm_per_k: gain, array_gain_at_c: gain_at, array_zero_pa_per_k: zero, pitch_um: pitch,
-            ..Params::DEFAULT
+            ..images::CONFIRMED
         };
         let config = Config::shipped(&params).unwrap();
         let mut warmth = Warmth::default();

@@ -13,7 +13,7 @@ use sim::native::bench::Bench;
 use sim::setup::Setup;
 
 /// Only a winding's own lag, of a small motor: what is judged needs no more.
-const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..Params::DEFAULT };
+const QUICK: Params = Params { housing_k_per_w: 0, winding_k_per_w: 46, winding_time_ms: 2_000, ..images::CONFIRMED };
 
 fn config(params: Params) -> Config {
     Config::shipped(&params).unwrap()
@@ -85,7 +85,7 @@ fn a_steady_current_warms_it_by_a_quarter_more_than_the_parameters_say() {
 
 #[test]
 fn without_resistances_it_is_as_warm_as_its_surroundings_and_takes_nothing_away() {
-    let config = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..Params::DEFAULT });
+    let config = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED });
     let mut winding = Winding::new();
     for _ in 0..100_000 {
         winding.observe(i32::MAX, &config);
@@ -98,10 +98,10 @@ fn without_resistances_it_is_as_warm_as_its_surroundings_and_takes_nothing_away(
 #[test]
 fn what_is_left_out_later_holds_no_heat_of_before() {
     let mut winding = Winding::new();
-    let warm = config(Params::DEFAULT);
+    let warm = config(images::CONFIRMED);
     (0..10_000).for_each(|_| winding.observe(driven(&warm, 0.3), &warm));
     assert!(degrees(&winding, &warm) > 80.0);
-    let hot = config(Params { winding_max_c: 85, ambient_c: 60, ..Params::DEFAULT });
+    let hot = config(Params { winding_max_c: 85, ambient_c: 60, ..images::CONFIRMED });
     (0..256).for_each(|_| winding.observe(0, &hot));
     assert_eq!(winding.share(), 0);
     let left_out = config(Params { winding_k_per_w: 0, housing_k_per_w: 0, ..hot.params });
@@ -112,7 +112,7 @@ fn what_is_left_out_later_holds_no_heat_of_before() {
 
 #[test]
 fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
-    let config = config(Params::DEFAULT);
+    let config = config(images::CONFIRMED);
     let mut winding = Winding::new();
     let mut observe = |seconds: f64| {
         (0..(seconds / frame_s(&config)) as u32).for_each(|_| winding.observe(0, &config));
@@ -129,7 +129,8 @@ fn after_a_reset_it_is_as_warm_as_a_housing_can_be_and_cools() {
 /// What a controller lets through is what warms the motor: it pushes as hard as it may for as long as it takes.
 #[test]
 fn it_never_passes_its_largest_temperature() {
-    for params in [Params::DEFAULT, QUICK, Params { current_max_ma: 20_000, winding_max_c: 85, ..Params::DEFAULT }] {
+    for params in [images::CONFIRMED, QUICK, Params { current_max_ma: 20_000, winding_max_c: 85, ..images::CONFIRMED }]
+    {
         let config = config(params);
         let mut motion = SpeedLoop::new();
         let mut truth = Truth::of(&params);
@@ -167,7 +168,7 @@ proptest! {
         pattern in proptest::collection::vec((0.0..1.0, 0.02..4.0), 3..12),
     ) {
         // The housing starts warm, which hides much: without one nothing is hidden.
-        let params = if housed { Params::DEFAULT } else { QUICK };
+        let params = if housed { images::CONFIRMED } else { QUICK };
         let config = config(params);
         let mut truth = Truth::of(&params);
         truth.ohm *= ohm;
@@ -198,7 +199,7 @@ proptest! {
             "winding_max_c", "winding_k_per_w", "winding_time_ms", "housing_k_per_w", "housing_time_ms", "ambient_c",
             "current_max_ma", "resistance_mohm", "torque_constant_unm_per_a",
         ];
-        let mut params = Params::DEFAULT.to_array();
+        let mut params = images::CONFIRMED.to_array();
         for (name, value) in names.into_iter().zip(values) {
             let place = Params::RANGES.iter().position(|(known, ..)| *known == name).unwrap();
             let (_, _, min, max) = Params::RANGES[place];
@@ -224,7 +225,7 @@ proptest! {
 /// could: 5.2 N for a goal of 3 N, and the contact was lost on the way to less.
 #[test]
 fn a_motor_that_may_hardly_be_driven_presses_no_harder_and_lets_go_no_farther() {
-    let hot = Params { winding_max_c: 85, ambient_c: 60, winding_time_ms: 2_000, ..Params::DEFAULT };
+    let hot = Params { winding_max_c: 85, ambient_c: 60, winding_time_ms: 2_000, ..images::CONFIRMED };
     for (k_per_w, goals_n) in [([500, 500], [3.0, 0.3]), ([200, 0], [6.0, 1.0]), ([200, 0], [6.0, 0.2])] {
         let [winding_k_per_w, housing_k_per_w] = k_per_w;
         let mut board = Bench::of(&Setup::default(), &config(Params { winding_k_per_w, housing_k_per_w, ..hot }));

@@ -64,6 +64,8 @@ class Limits(IntFlag):
     FROM_BELOW = 1 << 11
     GUARD = 1 << 12
     WINDING = 1 << 13
+    DIRECTION = 1 << 14
+    TORQUE_HELD = 1 << 15
 
 
 class Restarted(FingertipError):

@@ -77,9 +77,15 @@ impl Stand {
         }
     }
 
-    /// Whether torque is refused because something touched the tip during the last tare.
-    pub fn touched(&self, command: &Command) -> bool {
-        self.tared_touching && !command.tare_forced && command.tare_request == self.taken.tare
+    /// Whether a tare is under way, or about to be.
+    fn taring(&self, command: &Command) -> bool {
+        self.mode == Mode::Tare || command.tare_request != self.taken.tare
+    }
+
+    /// Whether torque may be enabled: a tare is under way, which torque waits for, or is done; and nothing touched the tip
+    /// in it, or that was forced.
+    pub fn zeroed(&self, command: &Command) -> bool {
+        self.taring(command) || self.tared && (command.tare_forced || !self.tared_touching)
     }
 
     /// Whether the motor jogs or makes strokes, or is about to.
@@ -97,7 +103,7 @@ impl Stand {
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;
-        let taring = self.mode == Mode::Tare || after.tare_request != self.taken.tare;
+        let taring = self.taring(after);
         let tare = after.tare_request == before.tare_request || !stopped;
         let measure = after.measure_request == before.measure_request
             || match Task::of(after.measure_request) {

@@ -4,7 +4,7 @@
 //! | --- | --- | --- |
 //! | clear | in fault, with torque off | the fault remains, or there is none |
 //! | tare | in every activity but fault, also in the frame that clears one; not while something is pressed, unless that was [forced](Command::tare_forced): the zero before remains | refused: [`Taring::Refused`] |
-//! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced) | the finger stays off; limits 6 and 10 give the reason |
+//! | torque on | in off, once the tip is slow; not before a tare, nor after one while something touched the tip, unless that was [forced](Command::tare_forced); not before the direction is confirmed, nor while it has been on since before the tare or the configuration | the finger stays off; limits 6, 10, 14 and 15 give the reason |
 //! | torque off | in every activity | |
 //! | jog, strokes | in off, with torque off, the array tared and nothing at the tip; they wait until the tip is at rest | refused: [`Ended`] |
 //! | press | in a grip; with torque on it waits while torque is taken up or a tare is under way | refused: `NotReady` |
@@ -69,7 +69,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             if let Activity::Strokes(run) = &mut self.activity {
                 run.halt(sense.encoder);
             }
-            if self.may_drive(command.tare_forced) {
+            if self.takes_torque(command.tare_forced) {
                 self.serve_torque(sense.encoder);
             }
         }
@@ -102,7 +102,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.activity = Activity::Tare { halt, free };
     }
 
-    /// Whether torque may be taken up: the readings are those of a free tip.
+    /// Whether torque may be taken up: it is a new request, and somebody confirmed which way the motor goes.
+    fn takes_torque(&self, tare_forced: bool) -> bool {
+        self.may_drive(tare_forced) && self.armed && self.config.params.direction_confirmed != 0
+    }
+
+    /// Whether the motor may be driven: the readings are those of a free tip.
     fn may_drive(&self, tare_forced: bool) -> bool {
         self.tared && (tare_forced || !self.array.tared_touching())
     }
@@ -135,7 +140,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let may_drive = self.may_drive(command.tare_forced);
         let waits = match (task, &self.activity) {
             (Task::Press, Activity::Tare { .. }) => command.torque,
-            (Task::Press, Activity::Off(_) | Activity::Strokes(_)) => command.torque && may_drive,
+            (Task::Press, Activity::Off(_) | Activity::Strokes(_)) => {
+                command.torque && self.takes_torque(command.tare_forced)
+            }
             (Task::Jog | Task::Strokes, Activity::Off(halt)) => !command.torque && may_drive && !halt.rests(),
             _ => false,
         };

@@ -72,7 +72,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Starts anew from this frame.
+    /// Starts again from this frame. The supply is watched on: one that was out of its window before stops the motor in
+    /// the first frame.
     pub fn restart<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         picture: &Picture<ROWS, COLUMNS>,
@@ -80,7 +81,16 @@ impl Monitor {
     ) {
         let Observer { travel, disturbance, .. } = motion.observer;
         let before = (picture.sum, picture.sum, picture.bad_count);
-        *self = Self { sums: sums(picture), travel, disturbance, mean: disturbance, before, ..Self::default() };
+        let supply_frames = self.supply_frames;
+        *self = Self {
+            sums: sums(picture),
+            travel,
+            disturbance,
+            mean: disturbance,
+            before,
+            supply_frames,
+            ..Self::default()
+        };
     }
 
     /// The first fault that the contact and the motion show, the most direct evidence first.
@@ -92,24 +102,21 @@ impl Monitor {
         if view.contact.force > config.force_fault {
             return Some(Fault::OverForce);
         }
-        self.supply(view, config)
+        self.supply(view.sense, config)
             .or_else(|| self.less(view, config))
             .or_else(|| self.more(view, config))
             .or_else(|| self.array(view, config))
     }
 
-    fn supply<const ROWS: usize, const COLUMNS: usize>(
-        &mut self,
-        view: &View<ROWS, COLUMNS>,
-        config: &Config,
-    ) -> Option<Fault> {
-        let supply_mv = i32::from(view.sense.supply_mv);
-        let low = supply_mv < config.params.supply_min_mv;
-        if !low && supply_mv <= config.params.supply_max_mv {
-            self.supply_frames = 0;
-            return None;
-        }
-        self.supply_frames = self.supply_frames.saturating_add(1);
+    /// Counts the frames for which the supply has been out of its window, whether the motor is driven or not.
+    pub fn watch_supply(&mut self, sense: &Sense, config: &Config) {
+        let supply_mv = i32::from(sense.supply_mv);
+        let inside = supply_mv >= config.params.supply_min_mv && supply_mv <= config.params.supply_max_mv;
+        self.supply_frames = if inside { 0 } else { self.supply_frames.saturating_add(1) };
+    }
+
+    fn supply(&self, sense: &Sense, config: &Config) -> Option<Fault> {
+        let low = i32::from(sense.supply_mv) < config.params.supply_min_mv;
         (self.supply_frames >= SUPPLY_FRAMES).then_some(if low { Fault::SupplyLow } else { Fault::SupplyHigh })
     }
 

@@ -65,8 +65,7 @@ fn main() -> ! {
         bridge.set(status.bridge());
         // The guard moves its deadline: this frame was answered.
         guard::answered();
-        let ready = status.tare == Taring::Done && status.fault.is_none();
-        command.torque = ready && PARAMS.direction_confirmed == 1;
+        command.torque = status.tare == Taring::Done && status.fault.is_none();
         command.goal = newtons(if command.torque && pins::button_pressed() { 1_000 } else { 0 });
     }
 }

@@ -6,7 +6,6 @@ use bringup::listen::{Report, listen};
 use bringup::script::{Bench, STEPS};
 use bringup::steps;
 use bringup::text::{CHECK, READY, asked_frames, checked};
-use fingertip::params::Params;
 use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::CoreCycles;
 use std::collections::HashMap;
@@ -111,7 +110,7 @@ fn the_host_asks_for_frames() {
 
 #[test]
 fn its_steps_are_within_a_tenth_of_the_demonstrations() {
-    let config = Config::shipped(&Params::DEFAULT).expect("the defaults make a configuration");
+    let config = Config::shipped(&images::CONFIRMED).expect("the defaults make a configuration");
     let (mut pipeline, mut bench) = (Pipeline::new(&config), Bench::new());
     bench.finger.make_table();
     let mut answers = Vec::new();

@@ -8,7 +8,7 @@ use fingertip::command::Command;
 use fingertip::config::{Shaped, newtons};
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
-use fingertip::pipeline::Pipeline;
+use fingertip::pipeline::{Pipeline, Taring};
 use fingertip::root::floor_sqrt;
 use fingertip::shipped::CLOCKS;
 use fingertip::units::{Duty, Millimetres};
@@ -33,7 +33,7 @@ const TRAVEL_PER_MM: i64 = 10_000_000_000;
 pub fn run(
     mut step: impl FnMut(&mut Pipeline<ROWS, COLUMNS>, &Frame<ROWS, COLUMNS>, &Sense, &Command) -> Duty,
 ) -> Result<(u64, i32), &'static str> {
-    let params = Params { pitch_um: PITCH_UM as i32, ..Params::DEFAULT };
+    let params = Params { pitch_um: PITCH_UM as i32, ..crate::CONFIRMED };
     let config = Shaped::<ROWS, COLUMNS>::new(&params, &CLOCKS).map_err(|_| "the parameters are refused")?;
     let mut finger = Pipeline::new(&config);
     let mut digest = Digest::new();
@@ -62,7 +62,7 @@ pub fn run(
         // The motor: 43 mm/s per volt, so 8,530 nm/s per unit of the duty; a time constant of 7 ms.
         speed_nm_per_s += (8_530 * i32::from(duty.0) - speed_nm_per_s) / 70;
         travel += i64::from(speed_nm_per_s);
-        command.torque = sequence > 200; // after the tare
+        command.torque = finger.status().tare == Taring::Done;
         command.goal = newtons(1_000);
     }
     let force = i64::from(finger.status().contact.force.to_bits());

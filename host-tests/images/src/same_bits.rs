@@ -13,7 +13,6 @@ pub mod model;
 mod pictures;
 
 use fingertip::config::ConfigError;
-use fingertip::params::Params;
 use fingertip::shipped::Config;
 use machines::Machines;
 use model::Sample;
@@ -107,7 +106,7 @@ impl Comparison {
     /// # Errors
     /// None: the default parameters are sound, as the core's own tests show.
     pub fn new() -> Result<Self, ConfigError> {
-        let config = Config::shipped(&Params::DEFAULT)?;
+        let config = Config::shipped(&crate::CONFIRMED)?;
         let sample = Sample::new(config.tip);
         let machines = Machines::new(config);
         Ok(Self { source: Source::new(), taken: 0, sample, machines, mixes: [Mix::EMPTY; FUNCTIONS] })

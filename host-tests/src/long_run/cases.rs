@@ -51,7 +51,7 @@ pub fn all(whole: bool) -> Vec<Outcome> {
 /// A motor that stays cool, for what has the winding beside what is looked at: it is a machine of its own below. While
 /// it holds the current back, the loop's current and its own state repeat together after longer than can be waited for.
 pub fn cool() -> Params {
-    Params { winding_k_per_w: 0, housing_k_per_w: 0, ..Params::DEFAULT }
+    Params { winding_k_per_w: 0, housing_k_per_w: 0, ..images::CONFIRMED }
 }
 
 type Run = Box<dyn FnOnce() -> Outcome + Send>;
@@ -253,7 +253,7 @@ fn relaxations(longest: bool) -> Vec<Machine<RelaxationState<3>>> {
 /// The usual lags, or the longest, without current, at the limit, and in turns.
 fn windings(longest: bool) -> Vec<Machine<Winding>> {
     let [winding_time_ms, housing_time_ms] = if longest { [600_000, 10_000_000] } else { [5_000, 400_000] };
-    let params = Params { winding_time_ms, housing_time_ms, ..Params::DEFAULT };
+    let params = Params { winding_time_ms, housing_time_ms, ..images::CONFIRMED };
     let inputs = [("none", [0; 2]), ("the limit", [1; 2]), ("extremes in turns", [0, i32::MAX])];
     let machine = |(input, pair): (&str, [i32; 2])| {
         let config = Config::shipped(&params).expect("allowed");

@@ -110,9 +110,9 @@ fn a_motion_is_refused_where_it_cannot_begin() {
     let mut bench = Bench::new();
     bench.status.limits.set(Limits::NOT_TARED);
     assert_eq!(all(&mut bench), [false; 3], "not tared, torque off");
-    bench.write(address::TORQUE_ENABLE, &[1]).expect("on");
-    assert_eq!(all(&mut bench), [false; 3], "not tared");
+    assert_eq!(bench.write(address::TORQUE_ENABLE, &[1]), RESULT, "not tared");
     bench.status.mode = Mode::Tare;
+    bench.write(address::TORQUE_ENABLE, &[1]).expect("torque waits for the tare");
     assert_eq!(all(&mut bench), [false, false, true], "a press waits for the tare");
     bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
     assert_eq!(all(&mut bench), [false; 3], "during a tare, torque off");

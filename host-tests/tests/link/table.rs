@@ -76,7 +76,7 @@ fn the_last_fault_and_the_last_limit_are_in_the_table() {
         assert_eq!(Fault::ALL[number] as usize, number + 1);
         assert!(Mode::ALL.get(number).is_none_or(|mode| *mode as usize == number));
     }
-    assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::WINDING) - 1);
+    assert_eq!(largest(address::LIMITS), 2 * i64::from(Limits::TORQUE_HELD) - 1);
 }
 
 #[test]

@@ -41,7 +41,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
 
     /// The same on a board with other clocks.
     pub fn with_clocks(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel, clocks: &Clocks) -> Self {
-        let params = Params { pitch_um, ..Params::DEFAULT };
+        let params = Params { pitch_um, ..images::CONFIRMED };
         let config = Shaped::<ROWS, COLUMNS>::new(&params, clocks).expect("a pitch that is allowed");
         let mut setup = Setup::default();
         setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;

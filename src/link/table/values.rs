@@ -12,16 +12,16 @@ use super::Staged;
 /// The bus watchdog's unit.
 const WATCHDOG_MS: u16 = 20;
 
-/// Torque enable: refused while a fault or a tripped watchdog stands, where nobody confirmed which way the motor goes,
-/// and after a tare while something touched the tip. Off takes the goal back.
+/// Torque enable: refused in a fault, after a tripped watchdog, where nobody confirmed which way the motor goes, before
+/// a tare, and after one while something touched the tip. Off takes the goal back.
 pub(super) fn set_torque<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     value: i64,
 ) -> Result<(), StatusError> {
     let on = value != 0;
     let unconfirmed = staged.settings.record.params.direction_confirmed == 0;
-    let touched = staged.stand.touched(&staged.settings.command);
-    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed || touched) {
+    let zeroed = staged.stand.zeroed(&staged.settings.command);
+    if on && (staged.settings.watchdog_tripped || staged.stand.faulted || unconfirmed || !zeroed) {
         return Err(StatusError::Result);
     }
     let strokes = staged.stand.strokes(&staged.settings.command);

@@ -1,7 +1,6 @@
 //! What a read sees: the device's own state, and the picture of the loop.
 
 use crate::capture;
-use crate::contact::Contact;
 use crate::link::packet::StatusError;
 use crate::link::server::{Counters, State};
 use crate::link::settings::Settings;
@@ -24,11 +23,6 @@ pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
 impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
     pub(super) fn settings(&self) -> &'a Settings<ROWS, COLUMNS> {
         &self.state.settings
-    }
-
-    /// Before the first tare the array's offsets look like a contact: nothing is told of it then.
-    pub(super) fn contact(&self) -> Contact {
-        if self.tared() { self.snapshot.status.contact } else { Contact::default() }
     }
 
     pub(super) fn tared(&self) -> bool {

@@ -124,7 +124,7 @@ fn main() -> ! {
 
 #[inline(never)]
 fn make_config() -> &'static Config {
-    let Ok(config) = Config::shipped(&Params::DEFAULT) else { host::fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&images::CONFIRMED) else { host::fail("the default parameters are refused") };
     CONFIG.init(config)
 }
 

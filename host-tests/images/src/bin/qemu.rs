@@ -90,7 +90,7 @@ async fn replay(name: &[u8], failure: &[u8], syst: &mut SYST) {
     recording.read(&mut count);
     let count = u32::from_le_bytes(count);
 
-    let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&images::CONFIRMED) else { fail("the default parameters are refused") };
     let pipeline = PIPELINE.init_with(|| Pipeline::new(&config));
     let mut digest = Digest::new();
     let loop_ticks = ticks(syst, spin);

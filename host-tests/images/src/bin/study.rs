@@ -22,7 +22,7 @@ use inputs::Inputs;
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let mut inputs = Inputs::open();
-    let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&images::CONFIRMED) else { fail("the default parameters are refused") };
     kernels::run(&config, &mut inputs);
     loop {
         debug::exit(debug::EXIT_SUCCESS);

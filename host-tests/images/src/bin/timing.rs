@@ -198,7 +198,7 @@ fn main() -> ! {
         fail("no recording of this version");
     }
     let count = count.iter().rev().fold(0, |count, byte| count << 8 | u32::from(*byte));
-    let Ok(config) = Config::shipped(&Params::DEFAULT) else { fail("the default parameters are refused") };
+    let Ok(config) = Config::shipped(&images::CONFIRMED) else { fail("the default parameters are refused") };
     let Ok(curved) = Config::shipped(&CORRECTED) else { fail("a curve is refused") };
     let mut bench = Bench {
         config: &config,

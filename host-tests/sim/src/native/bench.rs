@@ -15,7 +15,6 @@ use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::measure::{Standing, State, Task};
-use fingertip::params::Params;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
@@ -234,7 +233,7 @@ impl<E: Set> Bench<E> {
 impl Default for Bench {
     /// The reference finger under a controller with the default parameters.
     fn default() -> Self {
-        Self::of(&Setup::default(), &Config::shipped(&Params::DEFAULT).expect("the defaults are allowed"))
+        Self::of(&Setup::default(), &Config::shipped(&images::CONFIRMED).expect("the defaults are allowed"))
     }
 }
 

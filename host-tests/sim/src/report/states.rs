@@ -54,6 +54,8 @@ const NAMES: [(u32, &str, &[&str]); 3] = [
             "from below",
             "guard",
             "winding",
+            "direction",
+            "torque held",
         ],
     ),
 ];
@@ -122,7 +124,7 @@ fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
 // A new mode or fault must not run into the next one's bits.
 const _: () = assert!(Mode::ALL.len() as u32 <= FAULTS && FAULTS + (Fault::ALL.len() as u32) < LIMITS);
 const _: () = assert!(NAMES[0].2.len() == Mode::ALL.len() && NAMES[1].2.len() == 1 + Fault::ALL.len());
-const _: () = assert!(Limits::WINDING == 1 << 13);
+const _: () = assert!(Limits::TORQUE_HELD == 1 << 15);
 
 #[cfg(test)]
 mod tests {
@@ -137,7 +139,7 @@ mod tests {
         states[1].add(&status(Mode::Force, None, 0));
         states[2].add(&status(Mode::Force, None, Limits::VOLTAGE));
         states[3].add(&status(Mode::Fault, Some(Fault::Unseen), 0));
-        states[4].add(&status(Mode::Approach, None, 1 << 15));
+        states[4].add(&status(Mode::Approach, None, Limits::TORQUE_HELD));
         let row = |kind, name: &str, spans: &[[usize; 2]]| Row { kind, name: name.into(), spans: spans.to_vec() };
         assert_eq!(
             Strip::of(&states).0,
@@ -148,7 +150,7 @@ mod tests {
                 row("fault", "unseen", &[[3, 4]]),
                 row("limit", "voltage", &[[2, 3]]),
                 row("limit", "guard", &[[1, 2]]),
-                row("limit", "15", &[[4, 5]]),
+                row("limit", "torque held", &[[4, 5]]),
             ]
         );
     }

@@ -214,7 +214,7 @@ fn drawn_or(finger: &Finger, name: &str, otherwise: f64) -> f64 {
 /// An end stop ahead of the object: the tip stands, and the motor is not driven against it for longer than a second.
 #[test]
 fn a_stuck_finger_ends_a_press() {
-    let config = Config::shipped(&Params::DEFAULT).expect("the defaults are allowed");
+    let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");
     for front_mm in [0.5, 4.0, 5.2] {
         let mut bench = Bench::of(&Setup::default(), &config);
         bench.harm(|faults| faults.end_stops_mm = Some([-20.0, front_mm]));

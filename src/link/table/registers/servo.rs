@@ -29,9 +29,9 @@ macro_rules! servo {
             11 OPERATING_MODE: U8 TorqueOff, "" * 1, 0 to 0 = 0,
                 |_, _| 0,
                 |_, _| Ok(());
-            /// 1 lets the bridge be driven; refused with a result error before the parameter direction_confirmed is 1.
-            /// Goes to 0 on a fault. 0 takes the goal back: the next 1 presses nothing before a new goal; it stops a
-            /// commissioning.
+            /// 1 lets the bridge be driven; refused with a result error before the parameter direction_confirmed is 1, and
+            /// before a tare was requested. Goes to 0 on a fault. 0 takes the goal back: the next 1 presses nothing before
+            /// a new goal; it stops a commissioning.
             64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
                 |view, _| u32::from(view.settings().command.torque),
                 set_torque;
@@ -62,7 +62,7 @@ macro_rules! servo {
                 |view, _| view.snapshot.tick_ms & 0x7FFF;
             /// The force where an X-series servo has its present current: present_force_mn, held at its ends.
             126 SHORT_FORCE_MN: I16 ReadOnly, "mN" * 1, -32_768 to 32_767,
-                |view, _| short(thousandths(view.contact().force.to_bits(), 16));
+                |view, _| short(thousandths(view.snapshot.status.contact.force.to_bits(), 16));
             /// The supply where an X-series servo has its input voltage, and in its unit.
             144 SHORT_SUPPLY_100MV: U16 ReadOnly, "mV" * 100, 0 to 655,
                 |view, _| u32::from(view.snapshot.supply_mv.saturating_add(50) / 100);

@@ -39,31 +39,32 @@ macro_rules! state {
                 |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
             /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not
             /// tared, 7 frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare,
-            /// 11 force known only from below, 12 guard, 13 winding warm.
-            266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0x3FFF,
+            /// 11 force known only from below, 12 guard, 13 winding warm, 14 direction not confirmed, 15 torque on since
+            /// before the tare or the configuration: it drives nothing until it was off.
+            266 LIMITS: U16 ReadOnly, "" * 1, 0 to 0xFFFF,
                 |view, _| u32::from(view.snapshot.status.limits.0);
-            /// Total normal force. Before the first tare nothing is known of it: this and all that goes by it read 0,
+            /// Total normal force. Before a tare nothing is known of it: this and all that is computed from it read 0,
             /// and limit 6 is set.
             268 PRESENT_FORCE_MN: I32 ReadOnly, "mN" * 1, -32_768_000 to 32_768_000,
-                |view, _| thousandths(view.contact().force.to_bits(), 16) as u32;
+                |view, _| thousandths(view.snapshot.status.contact.force.to_bits(), 16) as u32;
             /// Indentation of the tip, from the force by the model.
             272 INDENTATION_UM: I32 ReadOnly, "um" * 1, 0 to 16_000,
-                |view, _| thousandths(view.contact().indentation.to_bits(), 24) as u32;
+                |view, _| thousandths(view.snapshot.status.contact.indentation.to_bits(), 24) as u32;
             /// Centre of pressure along the columns, from the array's middle.
             276 CENTRE_X_UM: I32 ReadOnly, "um" * 1, -20_000 to 20_000,
-                |view, _| thousandths(view.contact().centre_x.to_bits(), 24) as u32;
+                |view, _| thousandths(view.snapshot.status.contact.centre_x.to_bits(), 24) as u32;
             /// Centre of pressure along the rows, from the array's middle.
             280 CENTRE_Y_UM: I32 ReadOnly, "um" * 1, -20_000 to 20_000,
-                |view, _| thousandths(view.contact().centre_y.to_bits(), 24) as u32;
+                |view, _| thousandths(view.snapshot.status.contact.centre_y.to_bits(), 24) as u32;
             /// Contact radius, by the model.
             284 CONTACT_RADIUS_UM: I32 ReadOnly, "um" * 1, 0 to 16_000,
-                |view, _| thousandths(view.contact().radius.to_bits(), 24) as u32;
+                |view, _| thousandths(view.snapshot.status.contact.radius.to_bits(), 24) as u32;
             /// Highest taxel pressure.
             288 PEAK_PRESSURE_PA: U32 ReadOnly, "Pa" * 1, 0 to 0xFFFF_FFFF,
-                |view, _| view.contact().peak_pa;
+                |view, _| view.snapshot.status.contact.peak_pa;
             /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
             292 CONFIDENCE: U8 ReadOnly, "1/255" * 1, 0 to 255,
-                |view, _| u32::from(view.contact().confidence);
+                |view, _| u32::from(view.snapshot.status.contact.confidence);
             /// Taxels left out because they are dead or saturated.
             293 BAD_TAXELS: U8 ReadOnly, "" * 1, 0 to 100,
                 |view, _| u32::from(view.snapshot.status.contact.bad_taxels);

@@ -25,7 +25,7 @@ pub mod trace;
 pub mod watch;
 pub mod watchdog;
 
-/// Sets every priority of the table in `docs/board.md`; embassy leaves most of them at the highest.
+/// Sets every priority of the table in `docs/firmware.md`; embassy leaves most of them at the highest.
 ///
 /// Comes after [`clocks::init`], which sets those of the time driver and of all DMA streams itself.
 pub fn set_priorities() {

@@ -1,4 +1,4 @@
-//! The reference finger against a wall, in single precision: array, motor and wall of `docs/plant.md`, quick enough to
+//! The reference finger against a wall, in single precision: array, motor and wall of `docs/runs.md`, quick enough to
 //! run beside the loop on the microcontroller.
 //!
 //! Simpler than the plant that the demonstration stands in: explicit steps of a sixth of a frame, all rows of a frame

@@ -25,7 +25,7 @@ use sim::scene::{Scene, read};
 /// A finger with the effects that its scene names.
 type Finger = Bench<Named>;
 
-/// Losses of the reference finger of `docs/plant.md`.
+/// Losses of the reference finger of `docs/runs.md`.
 const LOSSES: &str = "[effects.dry_friction]\n[effects.gear_efficiency]\n[effects.supply_sag]\n";
 
 /// Below this force nothing is touched, N.

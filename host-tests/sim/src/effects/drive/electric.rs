@@ -16,7 +16,7 @@ pub(super) const SUPPLY_SAG: Description = Description {
         "so the motor sees u^2 source_ohm in series",
     ],
     state: "none",
-    reference: "docs/plant.md: 0.1 Ohm",
+    reference: "docs/runs.md: 0.1 Ohm",
     keys: &[Key::number("source_ohm", "Resistance of source, wires and connectors.", 0.0, 100.0, 0.1)],
     zero: &[("source_ohm", 0.0)],
     build: |build: &Build| {

@@ -73,7 +73,7 @@ pub(super) const GEAR_EFFICIENCY: Description = Description {
         "pressing, the share efficiency of the torque arrives; pushed back, the motor feels T (2 - 1 / efficiency)",
     ],
     state: "none",
-    reference: "docs/plant.md: FAULHABER 14/1 at 43:1, 70 %, github.com/ekrimsk/MGDB",
+    reference: "docs/runs.md: FAULHABER 14/1 at 43:1, 70 %, github.com/ekrimsk/MGDB",
     keys: &[Key::number(
         "efficiency",
         "Share of the torque that arrives when the motor drives the load.",

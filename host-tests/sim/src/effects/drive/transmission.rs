@@ -11,7 +11,7 @@ pub(super) const INERTIA: Description = Description {
     about: "Inertia of the gear and mass of the finger, beside the rotor's.",
     equations: &["J = J_rotor + gear_g_cm2 + finger_g (r / n)^2, r / n the tip's way for each angle of the shaft"],
     state: "none",
-    reference: "docs/plant.md: 30 g at the tip are 3 % of the rotor's inertia; none is published for the gear",
+    reference: "docs/runs.md: 30 g at the tip are 3 % of the rotor's inertia; none is published for the gear",
     keys: &[
         Key::number("gear_g_cm2", "Of the gear, at the motor's shaft.", 0.0, 100.0, 0.05),
         Key::number("finger_g", "Mass that moves with the tip.", 0.0, 1000.0, 30.0),

@@ -105,7 +105,7 @@ pub(super) const SETTLING: Description = Description {
         "sampled at after_us behind the slot's edge: v = V + (v_edge - V) exp(-after_us / tau_us), exact",
     ],
     state: "voltage of each column at the last edge, and what it settles to (20 numbers)",
-    reference: "docs/plant.md, readout: 0.2 us; half a bit of 12 takes 9.0 tau",
+    reference: "docs/runs.md, Readout: 0.2 us; half a bit of 12 takes 9.0 tau",
     keys: &[
         Key::number("tau_us", "Time constant.", 0.0, 100.0, 0.2),
         Key::number("after_us", "From the edge to the sample.", 0.1, 1000.0, 2.4),

@@ -193,7 +193,7 @@ pub(super) const BROKEN_TAXELS: Description = Description {
     about: "Taxels that are dead, stuck or shorted, from a time on.",
     equations: &["dead: G = 0", "shorted: G = 0.1 S (10 Ohm)", "stuck: G = what it was at the first sample after at_s"],
     state: "the conductance at which each stuck taxel is stuck",
-    reference: "docs/plant.md, defects of the array",
+    reference: "docs/runs.md, Readout: defects of the array",
     keys: &[
         Key { name: "dead", about: "Open circuits, by row and column.", kind: TAXELS },
         Key { name: "shorted", about: "Short circuits, by row and column.", kind: TAXELS },

@@ -132,8 +132,8 @@ fn clear(board: &mut Bench, clear_mm: f64) {
     }
 }
 
-/// `docs/safety.md`, Releasing: a reading that rises above the minimum since the release is a new touch. Something presses
-/// a released tip by more than a quarter of what was held, for 5 s; then by less.
+/// `docs/safety.md`, Releasing: a reading that rises above the minimum since the release is a new touch. Something
+/// presses a released tip by more than a quarter of what was held, for 5 s; then by less.
 #[test]
 fn what_presses_for_seconds_is_not_left_of_what_was_held() {
     let mut failed = Vec::new();

@@ -8,10 +8,9 @@
 //! asking for one is told to the run.
 
 use crate::front_end::{Shared, Slot};
-use crate::injected::{self, Injected};
 use crate::inside;
 use crate::scan_timer::COMPARE_1;
-use crate::sequence::{self, CONVERSION_CYCLES};
+use crate::sequence::{self, CONVERSION_CYCLES, Injected};
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::store;
 use rigless::soc::stm32f427::generated::adc1::{Register, cr1, cr2, sr};
@@ -167,7 +166,7 @@ impl Converter {
         let front_end = self.front_end.lock();
         let mut cycles = 0;
         let mut words = Vec::new();
-        for input in injected::inputs(registers) {
+        for input in sequence::injected_inputs(registers) {
             let sampling = sequence::sampling_cycles(registers, input);
             if input >= inside::REFERENCE_INPUT && sampling * 1_000_000_000 < inside::SAMPLING_NS * self.clock_hz {
                 context.tell("SMPR1", "reference and sensor are sampled for less than 10 us");

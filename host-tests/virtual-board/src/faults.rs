@@ -84,17 +84,11 @@ impl Fault {
 
 impl Rig {
     /// Breaks something from now on.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn inject(&mut self, fault: Fault) -> Result<(), Error> {
         self.set(fault, true)
     }
 
     /// Mends it again.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn mend(&mut self, fault: Fault) -> Result<(), Error> {
         self.set(fault, false)
     }

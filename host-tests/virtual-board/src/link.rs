@@ -10,9 +10,6 @@ const LOOK_NS: u64 = 50_000;
 
 impl Rig {
     /// Sends bytes from now on, one after another at the port's baud rate.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), Error> {
         let bytes = bytes.to_vec();
         self.with(move |stand| {
@@ -22,18 +19,12 @@ impl Rig {
     }
 
     /// Takes what the image has sent.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn take_received(&mut self) -> Result<Vec<TimedByte>, Error> {
         self.with(|stand| std::mem::take(&mut stand.bench.received))
     }
 
     /// Sends a packet and runs until a whole status packet has come back, or nothing has for the wait's time after the
     /// last byte either way. What came back is not checked.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn transact(&mut self, packet: &[u8], wait_ns: u64) -> Result<Vec<u8>, Error> {
         self.take_received()?;
         self.send(packet)?;

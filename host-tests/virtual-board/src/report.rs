@@ -1,9 +1,16 @@
-//! What a run has come to so far.
+//! Reports of a run: resets, latency, stack use, pins, and gaps of the emulated part.
+//!
+//! The emulator joins peripherals whatever the pins say, so the report compares each pin with its wiring. The start-up
+//! code paints the stack; words that are still painted were never used.
 
 use crate::error::Error;
+use crate::flash::SECTORS;
 use crate::measure::{BridgeEdge, Latency};
 use crate::rig::Rig;
 use rigless::device::ResetCause;
+use rigless::soc::Width;
+use rigless::soc::stm32f427::generated::gpioa::Register;
+use rigless::soc::stm32f427::peripherals::gpio::{Gpio, Pin};
 
 /// A reset of the microcontroller.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -14,43 +21,6 @@ pub struct Reset {
     pub cause: String,
 }
 
-impl Rig {
-    /// Instructions retired since power-on.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn instructions(&mut self) -> Result<u64, Error> {
-        self.with(|stand| stand.stop.instruction_count)
-    }
-
-    /// From the last conversion of each frame to the duty that answered it.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn latency(&mut self) -> Result<Latency, Error> {
-        self.with(|stand| stand.bench.latency.clone())
-    }
-
-    /// When the bridge went on and off.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn bridge_edges(&mut self) -> Result<Vec<BridgeEdge>, Error> {
-        self.with(|stand| stand.bench.bridge_edges.clone())
-    }
-
-    /// The resets since power-on.
-    ///
-    /// # Errors
-    /// The emulator stopped.
-    pub fn resets(&mut self) -> Result<Vec<Reset>, Error> {
-        self.with(|stand| {
-            let resets = stand.session.resets().iter();
-            resets.map(|reset| Reset { at_ns: reset.at.0, cause: cause(reset.cause) }).collect()
-        })
-    }
-}
-
 fn cause(cause: ResetCause) -> String {
     match cause {
         ResetCause::Core => "software".to_owned(),
@@ -58,5 +28,173 @@ fn cause(cause: ResetCause) -> String {
         ResetCause::Pin => "pin".to_owned(),
         ResetCause::PowerOn => "power".to_owned(),
         other => format!("{other:?}"),
+    }
+}
+
+/// Required mode of a pin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Output,
+    Analog,
+    Function(u8),
+}
+
+/// Port, pins and mode of each connection, from the table of `docs/board.md`.
+const WIRED: [(usize, &[u8], Mode); 11] = [
+    (1, &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9], Mode::Output),
+    (0, &[0, 1, 4, 6, 7], Mode::Analog),
+    (2, &[0, 1, 2, 3, 4, 5], Mode::Analog),
+    (0, &[8, 9], Mode::Function(1)),
+    (1, &[12], Mode::Function(1)),
+    (1, &[10, 13, 15], Mode::Output),
+    (1, &[14], Mode::Function(3)),
+    (2, &[6, 7], Mode::Function(2)),
+    (0, &[2, 3], Mode::Function(7)),
+    (2, &[8, 9], Mode::Output),
+    (0, &[5], Mode::Output),
+];
+
+/// Word that the start-up code fills the stack with.
+const PAINT: u64 = 0xcccc_cccc;
+
+/// Size and deepest use of the stack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StackUse {
+    /// Bytes reserved for the stack.
+    pub size: u64,
+    /// Largest number of bytes in use since the last reset.
+    pub used: u64,
+}
+
+/// A difference between the emulated and the real part that the run met.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Gap {
+    /// Kind: `unmapped`, `refused`, `unimplemented`, `unrouted` or `told`.
+    pub kind: &'static str,
+    /// Address in hexadecimal, or instance and register.
+    pub place: String,
+    /// Details of the access.
+    pub detail: String,
+}
+
+impl Gap {
+    /// Returns why the gap is harmless, or `None` if it is not on the allow-list.
+    pub fn reason(&self) -> Option<&'static str> {
+        let address = self.place.strip_prefix("0x").and_then(|digits| u64::from_str_radix(digits, 16).ok());
+        if self.kind == "unmapped" && address.is_some_and(|address| SECTORS.contains(&address)) {
+            return Some("the flash interface keeps nothing that is programmed; this crate does, in `flash`");
+        }
+        ALLOWED.iter().find(|(kind, place, _)| *kind == self.kind && *place == self.place).map(|(_, _, why)| *why)
+    }
+}
+
+/// Allow-list: kind, place, and why the gap is harmless.
+const ALLOWED: [(&str, &str, &str); 1] = [(
+    "unmapped",
+    "0x40023894",
+    "RCC_DCKCFGR2 of the F446: clock choices of the CEC, I2C-FMP, USB, SDIO and SPDIF, which the image does not use",
+)];
+
+impl Rig {
+    /// Number of instructions retired since power-on.
+    pub fn instructions(&mut self) -> Result<u64, Error> {
+        self.with(|stand| stand.stop.instruction_count)
+    }
+
+    /// Time from the last conversion of each frame to its duty.
+    pub fn latency(&mut self) -> Result<Latency, Error> {
+        self.with(|stand| stand.bench.latency.clone())
+    }
+
+    /// Times at which the bridge was switched on or off.
+    pub fn bridge_edges(&mut self) -> Result<Vec<BridgeEdge>, Error> {
+        self.with(|stand| stand.bench.bridge_edges.clone())
+    }
+
+    /// Resets since power-on.
+    pub fn resets(&mut self) -> Result<Vec<Reset>, Error> {
+        self.with(|stand| {
+            let resets = stand.session.resets().iter();
+            resets.map(|reset| Reset { at_ns: reset.at.0, cause: cause(reset.cause) }).collect()
+        })
+    }
+
+    /// Pins whose mode does not fit the board's wiring.
+    pub fn miswired_pins(&mut self) -> Result<Vec<String>, Error> {
+        self.with(|stand| {
+            let chip = &mut stand.session.board_mut().part.chip;
+            let mut wrong = Vec::new();
+            for (port, pins, wanted) in WIRED {
+                let (_, registers) = chip.port(port);
+                for number in pins {
+                    let pin = Pin::new(*number).expect("ports have 16 pins");
+                    let is = match registers.get(Register::Moder) >> (2 * number) & 0b11 {
+                        1 => Some(Mode::Output),
+                        3 => Some(Mode::Analog),
+                        _ => Gpio::function(pin, registers).map(Mode::Function),
+                    };
+                    if is != Some(wanted) {
+                        let port = ['A', 'B', 'C'][port];
+                        wrong.push(format!("P{port}{number} must be {wanted:?} and is {is:?}"));
+                    }
+                }
+            }
+            wrong
+        })
+    }
+
+    /// Stack use since the last reset, or `None` if the image has no symbols for its stack.
+    pub fn stack_use(&mut self) -> Result<Option<StackUse>, Error> {
+        let ends = self.image().symbol("_stack_end").zip(self.image().symbol("_stack_start"));
+        let Some((low, high)) = ends.filter(|(low, high)| low < high) else { return Ok(None) };
+        self.with(move |stand| {
+            let painted = |address: &u64| stand.host.read(*address, Width::W32).is_ok_and(|word| word == PAINT);
+            let untouched = (low..high).step_by(4).take_while(painted).count() as u64 * 4;
+            Some(StackUse { size: high - low, used: high - low - untouched })
+        })
+    }
+
+    /// All gaps that the run has met.
+    pub fn gaps(&mut self) -> Result<Vec<Gap>, Error> {
+        self.with(|stand| {
+            let session = &*stand.session;
+            let gap = |kind, place, detail| Gap { kind, place, detail };
+            let hex = |address: u64| format!("{address:#010x}");
+            let mut gaps = Vec::new();
+            for entry in session.unmapped() {
+                gaps.push(gap("unmapped", hex(entry.address), format!("from {:#010x}", entry.program_counter)));
+            }
+            for (address, fault) in session.refused() {
+                gaps.push(gap("refused", hex(*address), format!("{fault:?}")));
+            }
+            for entry in session.unimplemented().values() {
+                let place = format!("{} {}", entry.instance, entry.register);
+                gaps.push(gap("unimplemented", place, format!("{} reads, {} writes", entry.reads, entry.writes)));
+            }
+            for (instance, number) in session.unrouted() {
+                gaps.push(gap("unrouted", format!("{instance} {number}"), String::new()));
+            }
+            for told in session.told() {
+                gaps.push(gap("told", format!("{} {}", told.instance, told.register), told.reason.to_owned()));
+            }
+            if let Some(value) = stand.bench.clock.wrong_pll {
+                gaps.push(gap("refused", "RCC PLLCFGR".into(), format!("divider Q or R below 2: {value:#010x}")));
+            }
+            gaps
+        })
+    }
+
+    /// Checks that all gaps so far are on the allow-list.
+    ///
+    /// # Errors
+    /// Lists the gaps that are not on it.
+    pub fn check_gaps(&mut self) -> Result<(), Error> {
+        let unknown: Vec<String> = self
+            .gaps()?
+            .iter()
+            .filter(|gap| gap.reason().is_none())
+            .map(|gap| format!("  {} {} ({})", gap.kind, gap.place, gap.detail))
+            .collect();
+        if unknown.is_empty() { Ok(()) } else { Err(Error::Gaps(unknown.join("\n"))) }
     }
 }

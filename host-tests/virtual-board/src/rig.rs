@@ -40,7 +40,7 @@ pub(crate) enum Order {
     Do(Job),
 }
 
-/// A run.
+/// A run. After the emulator has stopped, every method that returns a `Result` returns why.
 #[derive(Debug)]
 pub struct Rig {
     image: Firmware,
@@ -100,9 +100,6 @@ impl Rig {
     }
 
     /// Runs to an instant, rounded up to the world's grid; an instant already past is where the run stands.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn run_until_ns(&mut self, until_ns: u64) -> Result<(), Error> {
         if until_ns <= self.now_ns {
             return Ok(());
@@ -113,25 +110,16 @@ impl Rig {
 
     /// Sets out for an instant still to come, and does not wait: boards that share a world run side by side. What is
     /// posted or asked behind it happens there; [`Rig::await_reached`] is to be called once for each.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn set_out(&mut self, until_ns: u64) -> Result<(), Error> {
         self.order(Order::Run(until_ns.next_multiple_of(STEP_NS)))
     }
 
     /// Runs on for some ms.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn run_ms(&mut self, ms: u64) -> Result<(), Error> {
         self.run_until_ns(self.now_ns + ms * 1_000_000)
     }
 
     /// Does something where the run stands, between two instructions.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn with<T, F>(&mut self, job: F) -> Result<T, Error>
     where
         T: Send + 'static,
@@ -172,17 +160,11 @@ impl Rig {
     }
 
     /// What the converters have done.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn scan_counts(&mut self) -> Result<ScanCounts, Error> {
         self.with(|stand| stand.bench.front_end.lock().counts)
     }
 
     /// The digest of every duty and every byte so far.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn trace_hash(&mut self) -> Result<String, Error> {
         self.with(|stand| stand.bench.trace.hash())
     }
@@ -197,9 +179,6 @@ impl Rig {
     }
 
     /// Does something where the run will then stand, and does not wait.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn post<F>(&mut self, job: F) -> Result<(), Error>
     where
         F: FnOnce(&mut Stand<'_>) + Send + 'static,
@@ -208,9 +187,6 @@ impl Rig {
     }
 
     /// Asks something where the run will then stand, and does not wait: [`Rig::answer`] does.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn ask<T, F>(&mut self, job: F) -> Result<mpsc::Receiver<T>, Error>
     where
         T: Send + 'static,
@@ -225,9 +201,6 @@ impl Rig {
     }
 
     /// What was asked before.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn answer<T>(&mut self, asked: &mpsc::Receiver<T>) -> Result<T, Error> {
         asked.recv().map_err(|_| self.broken())
     }
@@ -238,9 +211,6 @@ impl Rig {
     }
 
     /// Waits until the run is where it set out for.
-    ///
-    /// # Errors
-    /// The emulator stopped.
     pub fn await_reached(&mut self) -> Result<(), Error> {
         self.now_ns = self.reached.recv().map_err(|_| self.broken())?;
         Ok(())

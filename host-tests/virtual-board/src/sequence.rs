@@ -1,8 +1,12 @@
-//! What a converter's registers say of its regular sequence: which input comes when, and for how long it is sampled.
+//! A converter's sequences as its registers describe them: the inputs in their order, and for how long each is sampled.
+//!
+//! The injected group follows each regular sequence by itself. It is no event of its own: its words appear in their
+//! registers when the core looks after the last conversion.
 
 use rigless::device::RegisterFile;
 use rigless::soc::FieldSpec;
-use rigless::soc::stm32f427::generated::adc1::{Register, cr1, sqr1, sqr2, sqr3};
+use rigless::soc::stm32f427::generated::adc1::{Register, cr1, jsqr, sqr1, sqr2, sqr3, sr};
+use serde::{Deserialize, Serialize};
 
 /// Cycles of a 12-bit conversion after sampling, RM0090 13.7.
 pub const CONVERSION_CYCLES: u64 = 12;
@@ -50,4 +54,44 @@ pub fn input(registers: &RegisterFile, rank: usize) -> usize {
 pub fn sampling_cycles(registers: &RegisterFile, input: usize) -> u64 {
     let (register, place) = if input < 10 { (Register::Smpr2, input) } else { (Register::Smpr1, input - 10) };
     SAMPLING_CYCLES[(registers.get(register) >> (3 * place) & 0b111) as usize]
+}
+
+/// Data registers of the injected group.
+const DATA: [Register; 4] = [Register::Jdr1, Register::Jdr2, Register::Jdr3, Register::Jdr4];
+
+/// Inputs of the injected group in their order. A group of fewer than four uses the last places (RM0390, ADC_JSQR).
+pub fn injected_inputs(registers: &RegisterFile) -> Vec<usize> {
+    let sequence = registers.get(Register::Jsqr);
+    let places = [jsqr::JSQ1, jsqr::JSQ2, jsqr::JSQ3, jsqr::JSQ4];
+    places[3 - jsqr::JL.get(sequence) as usize..].iter().map(|place| place.get(sequence) as usize).collect()
+}
+
+/// Words of a group under way.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Injected {
+    words: Vec<u16>,
+    done_ns: u64,
+}
+
+impl Injected {
+    /// These words, done at an instant.
+    pub fn new(words: Vec<u16>, done_ns: u64) -> Self {
+        Self { words, done_ns }
+    }
+
+    /// Whether conversions are under way.
+    pub fn runs(&self, now_ns: u64) -> bool {
+        now_ns < self.done_ns
+    }
+
+    /// Shows what is done by now, and the flag of it in a status.
+    pub fn show(&mut self, now_ns: u64, status: u64, registers: &mut RegisterFile) -> u64 {
+        if self.runs(now_ns) || self.words.is_empty() {
+            return status;
+        }
+        for (register, word) in DATA.into_iter().zip(self.words.drain(..)) {
+            registers.set(register, word.into());
+        }
+        sr::JEOC.set(status, 1)
+    }
 }

@@ -32,7 +32,6 @@ pub mod pwm_timer;
 pub mod report;
 pub mod rig;
 pub mod scan_timer;
-pub mod scan_updates;
 pub mod scene;
 mod sequence;
 pub mod serve;

@@ -5,7 +5,6 @@
 //! [`crate::front_end::Scan`]: the timer sleeps through the others, and catches up with them.
 
 use crate::front_end::Shared;
-use crate::scan_updates::Updates;
 use rigless::device::{Device, DeviceContext, Level, RegisterFile, RequestChange};
 use rigless::snapshot::{Error, Reader, Store, Writer};
 use rigless::soc::RegisterSpec;
@@ -225,5 +224,87 @@ impl Store for ScanTimer {
         *self = from.take()?;
         self.front_end = front_end;
         Ok(())
+    }
+}
+
+const NS: u128 = 1_000_000_000;
+
+/// Times of the updates of a running timer, exact to a cycle of its clock.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+struct Updates {
+    hz: u64,
+    /// Where cycles are counted from.
+    epoch_ns: u64,
+    /// The cycle of the last update, or of the start, and from one to the next; none while the timer stands.
+    running: Option<(u64, u64)>,
+}
+
+impl Updates {
+    /// The clock has this rate from an instant on.
+    fn clock(&mut self, hz: u64, at_ns: u64) {
+        *self = Self { hz, epoch_ns: at_ns, running: None };
+    }
+
+    /// The timer starts from 0 and has an update every so many cycles.
+    fn start(&mut self, at_ns: u64, cycles: u64) {
+        let since = u128::from(at_ns - self.epoch_ns) * u128::from(self.hz) / NS;
+        self.running = Some((since as u64, cycles));
+    }
+
+    /// The timer stands.
+    fn stop(&mut self) {
+        self.running = None;
+    }
+
+    /// Whether the timer runs.
+    fn running(&self) -> bool {
+        self.running.is_some()
+    }
+
+    /// The instants of so many updates to come; none while the timer stands.
+    fn next_ns(&self, count: usize) -> impl DoubleEndedIterator<Item = u64> + use<> {
+        let Self { hz, epoch_ns, running } = *self;
+        let (last, cycles) = running.unwrap_or_default();
+        let count = if running.is_some() { count as u64 } else { 0 };
+        (1..=count).map(move |nth| {
+            let cycle = u128::from(last + nth * cycles);
+            epoch_ns + (cycle * NS).div_ceil(u128::from(hz.max(1))) as u64
+        })
+    }
+
+    /// So many updates have passed.
+    fn pass(&mut self, count: usize) {
+        if let Some((last, cycles)) = &mut self.running {
+            *last += count as u64 * *cycles;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn updates_are_at_the_first_whole_instant_behind_their_cycle() {
+        let mut updates = Updates::default();
+        updates.clock(168_000_000, 1_000);
+        assert_eq!(updates.next_ns(3).next(), None);
+        // 7 cycles are 41.7 ns; the start lies 100 ns, 16.8 cycles, behind the epoch.
+        updates.start(1_100, 7);
+        assert_eq!(updates.next_ns(3).collect::<Vec<_>>(), [1_137, 1_179, 1_221]);
+        updates.pass(2);
+        assert_eq!(updates.next_ns(1).collect::<Vec<_>>(), [1_221]);
+        updates.stop();
+        assert!(!updates.running());
+    }
+
+    #[test]
+    fn a_day_of_updates_loses_no_cycle() {
+        let mut updates = Updates::default();
+        updates.clock(168_000_000, 0);
+        updates.start(0, 1_524);
+        let day: u64 = 86_400 * 168_000_000 / 1_524;
+        updates.pass(day as usize - 1);
+        assert_eq!(updates.next_ns(1).next(), Some((u128::from(day) * 1_524 * 125).div_ceil(21) as u64));
     }
 }

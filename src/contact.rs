@@ -4,36 +4,27 @@
 //! it does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to
 //! the taxels that do see it, by [`Fit`] from frame to frame. `docs/contact.md` gives the method and the measured errors.
 
-mod arith;
-mod doubt;
-mod fit_level;
-mod fitted;
-mod follow;
-mod guess;
-mod order;
-mod reading;
-mod step;
-mod sums;
-mod view;
+mod equations;
+mod fit;
+mod prediction;
 
-pub use fit_level::FitLevel;
-pub use follow::Fit;
-pub use reading::Contact;
-pub use sums::from_sums;
+pub use fit::Fit;
 
 use crate::config::Config;
+use crate::frame::Shape;
 use crate::pressure::Picture;
-use step::{Bits, Misfit};
-use view::Scale;
+use crate::units::{Millimetres, Newtons};
+use equations::{Bits, Misfit};
+use fixed::types::I8F24;
+use prediction::Scale;
 
 /// What the fit is made of, for other ways to read a picture that it is measured against. It may change at any time.
 #[doc(hidden)]
 pub mod parts {
-    pub use super::arith::{Divisor, between, clamp_to, high, root};
-    pub use super::guess::{CENTRE_BITS, Guess, Prediction, SLOPE_BITS, interval};
-    pub use super::step::{Comparison, Equations, Misfit};
-    pub use super::view::{PEAK_BITS, Scale, View};
+    pub use super::equations::{Comparison, Equations, Misfit};
+    pub use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, View, interval};
     pub use super::{TAXELS_MIN, confidence, covers};
+    pub use crate::arith::{Divisor, between, clamp_to, high, root};
     pub use crate::config::geometry::{ONE, PLACE_BITS, SQUARE_BITS};
 }
 
@@ -43,6 +34,160 @@ pub const CONFIDENCE_LEAST: u8 = 128;
 const RESIDUAL_MAX: u32 = 459;
 /// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
 pub const TAXELS_MIN: i32 = 5;
+
+/// What a frame says of the contact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Contact {
+    /// Total normal force.
+    pub force: Newtons,
+    /// Indentation of the tip, from the force by the model.
+    pub indentation: Millimetres,
+    /// Centre of pressure along the columns, from the array's middle.
+    pub centre_x: Millimetres,
+    /// Centre of pressure along the rows, from the array's middle.
+    pub centre_y: Millimetres,
+    /// Contact radius, by the model.
+    pub radius: Millimetres,
+    /// Highest pressure on a taxel, Pa.
+    pub peak_pa: u32,
+    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
+    pub confidence: u8,
+    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit
+    /// says how much.
+    pub doubt: u8,
+    /// Taxels left out because they are dead or saturated; 255 stands for more.
+    pub bad_taxels: u8,
+}
+
+/// How much work the loop puts into the contact of each frame. The numbers are stable: hosts store them.
+///
+/// A refinement of the model takes each row of the array once, so many rows in a frame at most. Where it is spread over
+/// frames, it begins in one of its own. How often it comes is said for ten rows; an array with fewer rows than the fit
+/// level takes has them all in every frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum FitLevel {
+    /// Force by the sum of the taxels; the centre stays at the array's middle.
+    Sum = 0,
+    /// Force by the sum, centre by the moments.
+    Moments = 1,
+    /// The model, a row a frame: refined every 11th frame.
+    #[default]
+    OneRow = 2,
+    /// The model, two rows a frame: refined every 6th frame.
+    TwoRows = 3,
+    /// The model, five rows a frame: refined every 3rd frame.
+    FiveRows = 4,
+    /// The model, all rows and their solution in every frame.
+    AllRows = 5,
+}
+
+impl FitLevel {
+    /// All of them, least first.
+    pub const ALL: [Self; 6] = [Self::Sum, Self::Moments, Self::OneRow, Self::TwoRows, Self::FiveRows, Self::AllRows];
+
+    /// The fit level of this number; the largest where there is none.
+    pub const fn from_number(number: u8) -> Self {
+        match number {
+            0 => Self::Sum,
+            1 => Self::Moments,
+            2 => Self::OneRow,
+            3 => Self::TwoRows,
+            4 => Self::FiveRows,
+            _ => Self::AllRows,
+        }
+    }
+
+    /// The next lower one, or the least.
+    pub const fn lower(self) -> Self {
+        Self::from_number((self as u8).saturating_sub(1))
+    }
+
+    /// The next higher one, or the largest.
+    pub const fn higher(self) -> Self {
+        Self::from_number(self as u8 + 1)
+    }
+
+    /// Rows of an array of so many that the model takes in a frame at most.
+    pub(crate) const fn rows(self, all: usize) -> usize {
+        let rows = match self {
+            Self::Sum | Self::Moments => 0,
+            Self::OneRow => 1,
+            Self::TwoRows => 2,
+            Self::FiveRows => 5,
+            Self::AllRows => all,
+        };
+        if rows < all { rows } else { all }
+    }
+}
+
+/// Fractional bits of a centre of pressure in half pitches.
+const CENTRE_RATIO_BITS: u32 = 11;
+
+/// Bits of a sum that leave its largest moment, `side - 1` times as much, 31 with [`CENTRE_RATIO_BITS`].
+const fn sum_bits(side: usize) -> u32 {
+    if side <= 16 { 16 } else { 15 }
+}
+
+/// Reads the contact off the sums.
+///
+/// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
+/// never below zero. The centre is that of the pressure, zero where there is no force.
+pub fn from_sums<const ROWS: usize, const COLUMNS: usize>(
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> Contact {
+    let force = picture.force(config);
+    let centre = if force >= config.contact_off { centre_of_pressure(picture, config) } else { Default::default() };
+    contact_of_force(force, centre, picture, config)
+}
+
+/// A contact of this force: indentation and radius by the model, the rest by the picture.
+fn contact_of_force<const ROWS: usize, const COLUMNS: usize>(
+    force: Newtons,
+    centre: [Millimetres; 2],
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> Contact {
+    let indentation = config.tip.indentation(force);
+    let [centre_x, centre_y] = centre;
+    Contact {
+        force,
+        indentation,
+        centre_x,
+        centre_y,
+        radius: config.tip.contact_radius(indentation),
+        peak_pa: picture.peak_pa(config),
+        confidence: 255,
+        doubt: 0,
+        bad_taxels: picture.bad_count.min(u16::from(u8::MAX)) as u8,
+    }
+}
+
+/// Moments over sum in half pitches, as lengths; the resolution is 1/2048 of half a pitch.
+#[inline(always)]
+fn centre_of_pressure<const ROWS: usize, const COLUMNS: usize>(
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> [Millimetres; 2] {
+    // All are shifted alike so that of ten rows and columns the sum keeps 16 bits and the moment, at most nine times as
+    // large, 20.
+    let shift = (32 - picture.sum.leading_zeros()).saturating_sub(const { sum_bits(Shape::<ROWS, COLUMNS>::SIDE) });
+    let sum = (picture.sum >> shift).max(1);
+    let half_pitch = i64::from(config.half_pitch.to_bits());
+    // Two divisions one after the other; the compiler would make a loop of a closure over both.
+    [
+        along::<COLUMNS>(picture.moment_x >> shift, sum, half_pitch),
+        along::<ROWS>(picture.moment_y >> shift, sum, half_pitch),
+    ]
+}
+
+#[inline(always)]
+fn along<const SIDE: usize>(moment: i32, sum: i32, half_pitch: i64) -> Millimetres {
+    let most = (SIDE as i32 - 1) * sum;
+    let half_pitches = (moment.max(-most).min(most) << CENTRE_RATIO_BITS) / sum;
+    Millimetres(I8F24::from_bits(((i64::from(half_pitches) * half_pitch) >> CENTRE_RATIO_BITS) as i32))
+}
 
 /// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a
 /// unit of these is 8 nm, and nothing overflows.
@@ -114,6 +259,6 @@ pub fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scal
     let drop = Bits::<ROWS, COLUMNS>::ALL;
     let larger = mean(misfit.inside, misfit.taxels).max(mean(misfit.outside, misfit.others));
     let mean = larger.min(u32::MAX >> drop) << drop;
-    let residual = arith::root(mean.saturating_sub(scale.converter_square()));
+    let residual = crate::arith::root(mean.saturating_sub(scale.converter_square()));
     (255 - (residual * 255 / RESIDUAL_MAX).min(255)) as u8
 }

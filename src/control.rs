@@ -22,7 +22,6 @@
 //! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so
 //! a change of mode is bumpless.
 
-pub(crate) mod arith;
 pub mod creep;
 pub mod drive;
 pub mod observer;
@@ -31,10 +30,10 @@ pub mod profile;
 pub mod warmth;
 pub mod winding;
 
+use crate::arith::{clamp_bits, high, product};
 use crate::config::{BRAKE_SHARE_Q8, Config};
 use crate::state::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
-use arith::{clamp_bits, high, product};
 use drive::Drive;
 use observer::Observer;
 use pace::Pace;

@@ -8,10 +8,10 @@
 //! surface is not known from the front, because the touch was there before torque was, or where an object follows the
 //! tip, the place of rest moves back as long as each half millimetre lowers the force. A residue does not do that.
 
+use crate::arith::product;
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::SpeedLoop;
-use crate::control::arith::product;
 use crate::control::creep::Creep;
 use crate::control::profile::Reference;
 use crate::state::{Limits, Mode};

@@ -2,9 +2,9 @@
 //!
 //! # Reading on
 //!
-//! The modules stand in signal order; read them top to bottom to follow a sample from the converter to the bridge.
-//! Nothing here uses floating point after configuration but the first guess of a [`root`], which is then set right in
-//! integers.
+//! The modules are declared in signal order: read them top to bottom to follow a sample from the converter to the
+//! bridge. After configuration, floating point is used only for the first estimate of a square root, which
+//! [`arith::floor_sqrt`] then corrects in integers.
 #![no_std]
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -20,7 +20,7 @@ pub use fixed;
 
 pub mod units;
 
-pub mod root;
+pub mod arith;
 
 pub mod params;
 

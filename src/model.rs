@@ -17,14 +17,14 @@
 //! assert_eq!(force.0.to_string(), "3.14159"); // pi 0.25 N/mm^2 (2 mm)^2
 //! assert_eq!(tip.contact_radius(Millimetres::from_bits(2 << 24)), Millimetres::from_bits(6 << 24));
 //! ```
+//!
+//! Functions of a point of the contact name it by its distance `r` from the contact's centre. Arithmetic is of 32 and 64
+//! bits only, except where a [`Gain`] is made.
 
-mod arith;
-mod geometry;
 mod pressure;
 
-use crate::root::{nearest_root, root_below};
+use crate::arith::{floor_sqrt, nearest_root, root_below};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre};
-use arith::{Gain, square};
 
 /// The smallest tip radius a.
 pub const RADIUS_MIN: Millimetres = Millimetres::from_bits(4 << 24);
@@ -209,4 +209,107 @@ impl Tip {
     fn contact_square(&self, depth: u32) -> u64 {
         u64::from(depth) * u64::from(2 * self.radius.to_bits().unsigned_abs() - depth)
     }
+}
+
+impl Tip {
+    /// Height of the undeformed surface over the hemisphere's base at `r`: `z = sqrt(a^2 - r^2)` (eq. 1).
+    ///
+    /// It is also the free length of the column at `r`, `L` (eq. 15). Correctly rounded. `r` counts as within -a to a.
+    pub fn particle_length(&self, r: Millimetres) -> Millimetres {
+        Millimetres::from_bits(root(square(self.radius_bits()) - square(self.distance(r))) as i32)
+    }
+
+    /// How far the column at `r` is compressed: `dL = sqrt(a^2 - r^2) - (a - d)` inside the contact, 0 outside (eq. 16;
+    /// the length QC of eq. 4).
+    ///
+    /// Correctly rounded: both terms are multiples of the unit, and the root is the nearest one.
+    pub fn compression(&self, r: Millimetres, d: Millimetres) -> Millimetres {
+        let length = self.particle_length(r).to_bits();
+        Millimetres::from_bits((length - self.rest(self.depth(d)) as i32).max(0))
+    }
+
+    /// The radius in units of the last place.
+    const fn radius_bits(&self) -> u32 {
+        self.radius().to_bits().unsigned_abs()
+    }
+
+    /// What is left between plane and centre, `a - d`, in units of the last place.
+    const fn rest(&self, depth: u32) -> u32 {
+        self.radius_bits() - depth
+    }
+
+    /// A distance from the contact's centre, at most a, in units of the last place.
+    fn distance(&self, r: Millimetres) -> u32 {
+        r.to_bits().unsigned_abs().min(self.radius_bits())
+    }
+}
+
+/// A positive constant with 64 significant bits: `mantissa * 2^-shift`, the top bit of the mantissa set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Gain {
+    mantissa: u64,
+    shift: u32,
+}
+
+impl Gain {
+    /// `number * 2^-exponent`, rounded to 64 significant bits.
+    ///
+    /// `number` has at least 65 and at most 127 bits.
+    const fn new(number: u128, exponent: u32) -> Self {
+        let spare = 64 - number.leading_zeros();
+        let rounded = (number >> (spare - 1)).div_ceil(2);
+        if rounded >> 64 == 0 {
+            Self { mantissa: rounded as u64, shift: exponent - spare }
+        } else {
+            Self { mantissa: 1 << 63, shift: exponent - spare - 1 }
+        }
+    }
+
+    /// The product with `x`, rounded to nearest. For gains below 1/2.
+    const fn round(self, x: u64) -> u64 {
+        self.round_short(x, 0)
+    }
+
+    /// The same without the last `drop` bits of the product.
+    const fn round_short(self, x: u64, drop: u32) -> u64 {
+        let shift = self.shift - 64 + drop;
+        (mul_high(x, self.mantissa) + (1 << shift >> 1)) >> shift
+    }
+
+    /// The product with `x`, rounded down. For gains from 1 and products below 2^58.
+    const fn floor(self, x: u64) -> u64 {
+        mul_high(x << (64 - self.shift), self.mantissa)
+    }
+}
+
+/// The upper half of a product of 64 by 64 bits, by four products of 32 by 32.
+const fn mul_high(x: u64, y: u64) -> u64 {
+    let (x1, x0) = (x >> 32, x & 0xffff_ffff);
+    let (y1, y0) = (y >> 32, y & 0xffff_ffff);
+    let middle = x1 * y0 + ((x0 * y0) >> 32);
+    let other = x0 * y1 + (middle & 0xffff_ffff);
+    x1 * y1 + (middle >> 32) + (other >> 32)
+}
+
+/// A quotient rounded down; 0 when the denominator is, which no caller's is: so it has no panic to prove absent.
+const fn quotient(numerator: u64, denominator: u64) -> u64 {
+    match numerator.checked_div(denominator) {
+        Some(quotient) => quotient,
+        None => 0,
+    }
+}
+
+/// A quotient rounded to nearest.
+const fn nearest_quotient(numerator: u64, denominator: u64) -> u64 {
+    quotient(numerator + denominator / 2, denominator)
+}
+
+/// The square of a length in Q24, in Q48.
+const fn square(x: u32) -> u64 {
+    x as u64 * x as u64
+}
+
+/// The square root of a Q48 number below 2^62, in Q24, rounded to nearest.
+fn root(square_q48: u64) -> u32 {
+    floor_sqrt(4 * square_q48).div_ceil(2)
 }

@@ -29,14 +29,15 @@ fn public_functions(text: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn no_public_function_of_the_model_is_forgotten() {
     let root = Path::new(env!("FINGERTIP_ROOT"));
-    let mut files = vec![root.join("src/model.rs"), root.join("src/root.rs")];
+    let mut files = vec![root.join("src/model.rs")];
     for folder in ["src/model", "host-tests/paper/src"] {
         files.extend(fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path()));
     }
     // Units only wrap a number.
     files.retain(|file| !file.ends_with("units.rs"));
     let compared: BTreeSet<&str> = names().map(|name| name.rsplit("::").next().unwrap_or(name)).collect();
-    let mut found = 0;
+    assert!(compared.contains("floor_sqrt"));
+    let mut found = 1;
     for file in files {
         let text = fs::read_to_string(&file).unwrap();
         for function in public_functions(&text).filter(|name| !ACCESSORS.contains(name)) {

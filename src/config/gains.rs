@@ -13,7 +13,7 @@
 //! loop, never a swinging one. Each further pace is half as quick and answers with a quarter. At rest a count is worth
 //! 1/64 of that.
 
-use crate::root::floor_sqrt;
+use crate::arith::floor_sqrt;
 
 /// Paces, quickest first.
 pub const PACES: usize = 4;

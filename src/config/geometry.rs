@@ -11,8 +11,8 @@
 //! `L1 = sqrt(1 - r^2 - h^2/6 + h r)` and `L2 = sqrt(1 - r^2 - h^2/6 - h r)` are the columns' lengths at the near and
 //! the far end of the spread.
 
+use crate::arith::floor_sqrt;
 use crate::params::Params;
-use crate::root::floor_sqrt;
 
 /// Fractional bits of a squared distance, of a column's length and of s.
 pub const SQUARE_BITS: u32 = 28;

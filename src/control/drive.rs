@@ -1,7 +1,7 @@
 //! Between the law and the bridge: voltage, current and slew limits, and the supply.
 
-use super::arith::nearest_share;
 use super::winding::WHOLE;
+use crate::arith::nearest_share;
 use crate::config::Config;
 use crate::state::Limits;
 use crate::units::Duty;

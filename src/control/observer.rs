@@ -12,7 +12,7 @@
 //! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts anew at the new place,
 //! at rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
 
-use super::arith::{nearest_product, nearest_share};
+use crate::arith::{nearest_product, nearest_share};
 use crate::config::Config;
 use crate::config::gains::Gains;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};

@@ -10,7 +10,7 @@
 //!
 //! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
 
-use super::arith::product;
+use crate::arith::product;
 use crate::config::gains::Gains;
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 

@@ -1,10 +1,9 @@
 //! Pressure over the contact and what sums it: equations 12 to 16, figure 7.
 
-use crate::root::floor_sqrt;
+use crate::arith::floor_sqrt;
 use core::num::{NonZeroU16, NonZeroU64};
 
-use super::Tip;
-use super::arith::{mul_high, nearest_quotient, quotient, root, square};
+use super::{Tip, mul_high, nearest_quotient, quotient, root, square};
 use crate::units::{Kilopascals, Millimetres, Newtons, NewtonsPerMillimetre, Strain};
 
 /// A quotient below 1: `significand * 2^-shift` with a relative error below 2^-30.
@@ -149,7 +148,7 @@ impl Tip {
     }
 
     /// The modulus in units of the last place.
-    pub(super) fn modulus_bits(&self) -> u64 {
+    fn modulus_bits(&self) -> u64 {
         u64::from(self.modulus().to_bits().unsigned_abs())
     }
 }

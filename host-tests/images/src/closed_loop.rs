@@ -4,12 +4,12 @@
 //! The array is small enough for a microcontroller with 16 KB of RAM.
 
 use crate::record::Digest;
+use fingertip::arith::floor_sqrt;
 use fingertip::command::Command;
 use fingertip::config::{Shaped, newtons};
 use fingertip::frame::{Frame, Sense};
 use fingertip::params::Params;
 use fingertip::pipeline::{Pipeline, Taring};
-use fingertip::root::floor_sqrt;
 use fingertip::shipped::CLOCKS;
 use fingertip::units::{Duty, Millimetres};
 

@@ -4,8 +4,8 @@
 
 use crate::angle::{angle_of, arc_tangent, sine_cosine};
 use crate::units::{MillimetresPerRadian, Radians, SquareMillimetres};
+use fingertip::arith::floor_sqrt;
 use fingertip::model::Tip;
-use fingertip::root::floor_sqrt;
 use fingertip::units::{Kilopascals, Millimetres, Newtons, Strain};
 
 /// Below the cosine of every touching angle, in Q63: it is 1/20 at the deepest indentation.

@@ -3,8 +3,8 @@
 use core::num::NonZeroU16;
 
 use super::{Mix, Source};
+use fingertip::arith::floor_sqrt;
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
-use fingertip::root::floor_sqrt;
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
 use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
 use paper::{Displacement, LimitSurface, force_on, pressure_of, strain_of};

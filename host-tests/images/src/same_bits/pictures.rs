@@ -1,7 +1,7 @@
 //! Pictures for the fit: contacts by the model, on and beside the array, that spoil bit by bit.
 
 use super::model::Sample;
-use fingertip::root::floor_sqrt;
+use fingertip::arith::floor_sqrt;
 use fingertip::shipped::{COLUMNS, Config, Picture, ROWS, TAXELS};
 use fingertip::units::Millimetres;
 

@@ -2,7 +2,7 @@
 
 use super::scalar::{Call, Tools, Variant};
 use core::arch::naked_asm;
-use fingertip::root::floor_sqrt;
+use fingertip::arith::floor_sqrt;
 use fixed::types::I16F16;
 use micromath::F32Ext;
 

@@ -6,22 +6,21 @@
 //! ratio changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as
 //! the sum itself.
 
-use super::arith::{Divisor, clamp_to};
-use super::fit_level::FitLevel;
-use super::fitted::{Fitted, RATIO_BITS};
-use super::guess::{Guess, Prediction};
-use super::order::row_step;
-use super::step::{Comparison, Equations};
-use super::sums::from_sums;
-use super::view::{Scale, View};
-use super::{CONFIDENCE_LEAST, TAXELS_MIN, confidence, covers, doubt};
-use crate::config::Shaped;
+use super::equations::{Comparison, Equations};
+use super::prediction::{Guess, Prediction, Scale, View};
+use super::{
+    CONFIDENCE_LEAST, Contact, FitLevel, TAXELS_MIN, confidence, contact_of_force, covers, from_sums, hidden, overhang,
+};
+use crate::arith::{Divisor, clamp_to};
 use crate::config::geometry::ONE;
-use crate::contact::Contact;
+use crate::config::{Config, Shaped};
 use crate::frame::Shape;
 use crate::pressure::Picture;
 use crate::units::{Millimetres, Newtons};
+use fixed::types::I16F16;
 
+/// Fractional bits of the ratio of the force to the sum.
+const RATIO_BITS: u32 = 16;
 /// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be
 /// found.
 const ASTRAY_MAX: u8 = 12;
@@ -157,7 +156,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         if self.fit_level.rows(ROWS) == 0 || force < config.contact_off {
             self.lose();
             let sums = from_sums(picture, config);
-            let doubt = if force < config.contact_off { 0 } else { doubt::of_sums(&sums, picture, config) };
+            let doubt = if force < config.contact_off { 0 } else { doubt_of_sums(&sums, picture, config) };
             let centre = [sums.centre_x, sums.centre_y];
             let [centre_x, centre_y] = if self.fit_level == FitLevel::Sum { [Millimetres::ZERO; 2] } else { centre };
             return Contact { doubt, centre_x, centre_y, ..sums };
@@ -185,7 +184,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             // A fit given up in this frame.
             (None, None) => from_sums(picture, config),
         };
-        self.doubt = doubt::follow(self.doubt, self.target_doubt(&contact, picture, config));
+        self.doubt = follow_doubt(self.doubt, self.target_doubt(&contact, picture, config));
         Contact { confidence: self.confidence, doubt: (self.doubt >> 8) as u8, ..contact }
     }
 
@@ -297,8 +296,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     fn target_doubt(&self, contact: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> u8 {
         match self.fitted {
             _ if self.covered => 0,
-            Some(fitted) => doubt::of_fit(fitted.ratio, self.confidence),
-            None => doubt::of_sums(contact, picture, config),
+            Some(fitted) => doubt_of_fit(fitted.ratio, self.confidence),
+            None => doubt_of_sums(contact, picture, config),
         }
     }
 
@@ -311,5 +310,107 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
     /// Back to the sums.
     fn forget(&mut self) {
         (self.next, self.fitted, self.astray, self.afresh) = (None, None, 0, 0);
+    }
+}
+
+/// A row a frame is taken in steps of so many rows, so that what changes meanwhile is not taken for a slope: three, or
+/// the next number that shares no divisor with the number of rows, so that the steps come to each of them once.
+const fn row_step(rows: usize) -> usize {
+    let mut step = 3;
+    while divisor(step, rows) != 1 {
+        step += 1;
+    }
+    step
+}
+
+/// The largest divisor of both.
+const fn divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { divisor(b, a % b) }
+}
+
+/// A contact of which the array sees a part.
+#[derive(Clone, Copy, Debug)]
+struct Fitted {
+    /// Of the force to the sum.
+    ratio: i32,
+    /// Of pressure, from the array's middle.
+    centre: [Millimetres; 2],
+}
+
+impl Fitted {
+    /// The contact, where the sum makes this force.
+    fn contact<const ROWS: usize, const COLUMNS: usize>(
+        self,
+        force: Newtons,
+        picture: &Picture<ROWS, COLUMNS>,
+        config: &Config,
+    ) -> Contact {
+        let wide = (i64::from(force.to_bits()) * i64::from(self.ratio)) >> RATIO_BITS;
+        let force = Newtons(I16F16::from_bits(wide.min(i64::from(i32::MAX)) as i32));
+        contact_of_force(force, self.centre, picture, config)
+    }
+}
+
+/// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two
+/// fifths.
+const RATIO_DOUBTED: [i32; 2] = [(5 << RATIO_BITS) / 4, (7 << RATIO_BITS) / 4];
+/// Shares of the force hidden by bad taxels, Q8, between which the sums are doubted.
+const HIDDEN: [i32; 2] = [1 << 5, 1 << 7];
+/// Confidences between which a fit is a good likeness.
+const CONFIDENCE: [i32; 2] = [96, 160];
+
+/// Of a fit. Where little is hidden, any fit does; where much is, only a good likeness says how much.
+fn doubt_of_fit(ratio: i32, confidence: u8) -> u8 {
+    let hidden = ramp(ratio, RATIO_DOUBTED);
+    let unlike = u8::MAX - ramp(confidence.into(), CONFIDENCE);
+    ((u32::from(hidden) * (u32::from(unlike) + 1)) >> 8) as u8
+}
+
+/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on; none while bad
+/// taxels hide an eighth of the force, all where they hide half of it.
+fn doubt_of_sums<const ROWS: usize, const COLUMNS: usize>(
+    sums: &Contact,
+    picture: &Picture<ROWS, COLUMNS>,
+    config: &Config,
+) -> u8 {
+    let hidden = ramp(hidden(sums, picture, config).unwrap_or(0).cast_signed(), HIDDEN);
+    let half_pitch = config.half_pitch.to_bits() >> 4;
+    hidden.max(ramp(overhang::<ROWS, COLUMNS>(sums, config), [half_pitch, 3 * half_pitch]))
+}
+
+/// Q8: it comes within some 8 frames and goes within some 64.
+fn follow_doubt(doubt: u32, target: u8) -> u32 {
+    let target = u32::from(target) << 8;
+    if target > doubt { doubt + (target - doubt).div_ceil(8) } else { doubt - (doubt - target).div_ceil(64) }
+}
+
+/// 0 up to `from`, 255 from `to` on, and a line between.
+fn ramp(value: i32, [from, to]: [i32; 2]) -> u8 {
+    let way = i64::from(value.max(from).min(to)) - i64::from(from);
+    (way * 255 / (i64::from(to) - i64::from(from)).max(1)) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FitLevel, divisor, row_step};
+
+    #[test]
+    fn every_row_comes_once() {
+        assert_eq!([3, 4, 8, 9, 10, 15, 16].map(row_step), [4, 3, 3, 4, 3, 4, 3]);
+        for rows in 3..=16 {
+            assert_eq!(divisor(row_step(rows), rows), 1);
+            let mut seen: std::vec::Vec<_> = (0..rows).map(|frame| frame * row_step(rows) % rows).collect();
+            seen.sort_unstable();
+            assert!(seen.into_iter().eq(0..rows));
+            for fit_level in [FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
+                let most = fit_level.rows(rows);
+                let frames = (1..).find(|frames| frames * most >= rows).unwrap();
+                let stride = rows.div_ceil(most);
+                assert_eq!(frames, stride);
+                let taken = |frame: usize| (frame..rows).step_by(stride);
+                assert!((0..frames).all(|frame| (1..=most).contains(&taken(frame).count())));
+                assert_eq!((0..frames).flat_map(taken).count(), rows);
+            }
+        }
     }
 }

@@ -4,9 +4,8 @@
 //! s^2. A reading's error grows with the reading, so a taxel's weight falls with the model's pressure, from 1 to 1/4 at
 //! the peak.
 
-use super::arith::{Divisor, clamp_to, high};
-use super::guess::{CENTRE_BITS, Guess, Prediction, SLOPE_BITS, TaxelModel, square};
-use super::view::{PEAK_BITS, Scale, View};
+use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, TaxelModel, View, square};
+use crate::arith::{Divisor, clamp_to, high};
 use crate::config::geometry::{Geometry, PLACE_BITS};
 
 /// A residual stops at half of the peak.

@@ -1,44 +1,31 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This file and those below it, each for a stage of the loop, are the only places with floating point: single
-//! precision, and only + - * /, so the host and the target agree to the bit. The formulas and their reasons stand in
-//! `docs/control.md`.
+//! This module is the only one with floating point: single precision, and only + - * /, so the host and the target agree
+//! to the bit. `docs/control.md` gives the formulas and their reasons.
 
-pub mod bounds;
-mod codes;
-pub mod curve;
-mod error;
-pub mod gains;
-pub(crate) mod geometry;
-pub mod heat;
-pub mod motions;
-mod numbers;
+pub(crate) mod array;
+mod bounds;
+mod diagnostics;
+mod motor;
 #[cfg(test)]
-mod rates;
-mod shaped;
-pub mod warm;
-pub mod warnings;
+mod tests;
 
-pub use error::ConfigError;
-pub use geometry::Geometry;
-pub use shaped::Shaped;
-pub use warnings::Warning;
+pub use array::{ArrayDrift, Curve, Geometry};
+pub(crate) use bounds::SPAN_PARTS;
+pub use bounds::{Bounds, Motions};
+pub use diagnostics::{ConfigError, Warning};
+pub(crate) use motor::ALLOWANCE_BITS;
+pub use motor::{GAIN_SETS, Gains, Heat, Lag};
 
+use crate::frame::Shape;
 use crate::model::{Tip, TipError};
 use crate::params::{ParamError, Params};
 use crate::scan::{Clocks, ScanTiming};
 use crate::units::{Duty, Kilopascals, Millimetres, MillimetresPerSecond, Newtons};
-use bounds::{Bounds, Drives};
-use codes::{codes_at_full_range, force_seen, sag_max, saturated_codes};
-use curve::Curve;
+use array::{codes_at_full_range, force_seen, places, sag_max, saturated_codes};
+use bounds::{Driven, Drives};
+use core::ops::{Deref, DerefMut};
 use fixed::types::{I8F24, I16F16};
-use gains::{Gains, PACES};
-use heat::Heat;
-use motions::{Driven, Motions};
-pub use numbers::newtons;
-pub(crate) use numbers::{exp2, millimetres, narrow, speed};
-use numbers::{thousandths, wide};
-use warm::Warm;
 
 /// The least supply must give this part of the largest voltage: 1/4.
 const SUPPLY_PART: i32 = 4;
@@ -112,7 +99,7 @@ pub struct Config {
     /// Encoder counts that the travel can hold.
     pub counts_max: i32,
     /// The loop's gains, quickest first.
-    pub paces: [Gains; PACES],
+    pub gain_sets: [Gains; GAIN_SETS],
     /// How far the way still to go may be off at rest.
     pub calm_band: Millimetres,
     /// Frames of calm at the quickest pace before the next.
@@ -148,7 +135,7 @@ pub struct Config {
     /// What the guard goes by.
     pub bounds: Bounds,
     /// How the array's readings drift with temperature.
-    pub warm: Warm,
+    pub drift: ArrayDrift,
     /// How the winding heats up.
     pub heat: Heat,
     /// The bounds of the motions that measure the drive.
@@ -232,7 +219,7 @@ impl Config {
         let newtons_per_sum = pitch_mm * pitch_mm * 1e-3 / (16.0 * codes_per_kpa);
         let creep = p.creep_permille as f32 * 1e-3;
         let mm_per_count_q40 = wide(mm_per_count * exp2(40));
-        let paces = gains::paces(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
+        let gain_sets = motor::gain_sets(frame_s, mm_per_count, g * p.voltage_max_mv as f32 * 1e-3);
         let voltage_limit = narrow(g * p.voltage_max_mv as f32 * 1e-3 * exp2(8));
         let current_limit = narrow(g * resistance * p.current_max_ma as f32 * 1e-3 * exp2(8));
         let voltage_shift = voltage_limit.max(1).leading_zeros() - 1;
@@ -261,11 +248,11 @@ impl Config {
             jump: narrow((JUMP_FRAMES * p.speed_max_um_per_s as f32 * 1e-3 * frame_s).max(JUMP_MM) * exp2(24))
                 .cast_unsigned(),
             counts_max: ((i64::from(i32::MAX) << 16) / mm_per_count_q40.max(1)).min(i32::MAX.into()) as i32,
-            paces,
+            gain_sets,
             calm_band: Millimetres(I8F24::from_bits(
                 narrow((CALM_MM + CALM_COUNTS * mm_per_count) * exp2(24)).min(CALM_MAX),
             )),
-            calm_frames: (CALM_TIME_CONSTANTS / (paces[0].slope_per_s as f32 * frame_s)) as u32,
+            calm_frames: (CALM_TIME_CONSTANTS / (gain_sets[0].slope_per_s as f32 * frame_s)) as u32,
             damping_q17_per_s: narrow(c * exp2(17)),
             voltage_limit,
             current_limit,
@@ -278,12 +265,12 @@ impl Config {
             speed_max: speed(p.speed_max_um_per_s),
             approach: speed(p.approach_um_per_s),
             near: Millimetres(I8F24::from_bits(narrow(
-                p.approach_um_per_s as f32 * 1e-3 / paces[0].slope_per_s as f32 * exp2(24),
+                p.approach_um_per_s as f32 * 1e-3 / gain_sets[0].slope_per_s as f32 * exp2(24),
             ))),
             travel_max: millimetres(p.travel_max_um),
             clearance: millimetres(p.clearance_um),
             bounds,
-            warm: Warm::new(p, shape),
+            drift: ArrayDrift::new(p, shape),
             heat: Heat::new(p, frame_s, current_limit),
             motions: Motions::new(p, &Driven { frame_s, mm_per_count, damping: c }),
             force_fault: newtons(p.force_fault_mn),
@@ -309,4 +296,100 @@ fn tip(p: &Params) -> Result<Tip, ConfigError> {
 fn brake(motor: i32) -> [i32; 3] {
     let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
     [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]
+}
+
+/// 2^n, exactly.
+pub(crate) const fn exp2(n: u32) -> f32 {
+    (1u64 << n) as f32
+}
+
+/// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
+// Kept apart, as the next: a dozen copies would fill a sixtieth of the flash.
+#[inline(never)]
+fn wide(value: f32) -> i64 {
+    value.clamp(-4e18, 4e18) as i64
+}
+
+/// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
+pub(crate) fn narrow(value: f32) -> i32 {
+    wide(value).min(i64::from(i32::MAX)) as i32
+}
+
+/// `value / 1000` in units of 2^-bits, rounded.
+#[inline(never)]
+const fn thousandths(value: i32, bits: u32) -> i32 {
+    ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
+}
+
+pub(crate) fn millimetres(um: i32) -> Millimetres {
+    Millimetres(I8F24::from_bits(thousandths(um, 24)))
+}
+
+/// A force in N from mN, rounded.
+pub fn newtons(mn: i32) -> Newtons {
+    Newtons(I16F16::from_bits(thousandths(mn, 16)))
+}
+
+pub(crate) fn speed(um_per_s: i32) -> MillimetresPerSecond {
+    MillimetresPerSecond(I16F16::from_bits(thousandths(um_per_s, 16)))
+}
+
+/// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`]
+/// in it.
+///
+/// ```
+/// use fingertip::config::Shaped;
+/// use fingertip::params::Params;
+/// use fingertip::scan::Clocks;
+///
+/// // Of a microcontroller with a timer and a core of 64 MHz, and converters of 16 MHz.
+/// let clocks = Clocks {
+///     timer_hz: 64_000_000,
+///     core_hz: 64_000_000,
+///     converter_hz: 16_000_000,
+///     converters: 2,
+///     sample_cycles: &[4, 8, 16],
+///     conversion_cycles: 13,
+///     trigger_cycles: 4,
+///     slot_step: 1,
+///     frame_ns: None,
+/// };
+/// let config = Shaped::<4, 4>::new(&Params { sample_cycles: 8, ..Params::DEFAULT }, &clocks)?;
+/// assert_eq!(config.timing.frame_ns, 26_406); // five slots of 338 ticks
+/// # Ok::<(), fingertip::config::ConfigError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Shaped<const ROWS: usize, const COLUMNS: usize> {
+    config: Config,
+    /// Middles of the columns in tip radii, Q15.
+    pub(crate) columns: [i32; COLUMNS],
+    /// Middles of the rows.
+    pub(crate) rows: [i32; ROWS],
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
+    /// Checks the parameters and derives the loop's constants, with the clocks of a board.
+    ///
+    /// # Errors
+    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each
+    /// other.
+    pub fn new(params: &Params, clocks: &Clocks) -> Result<Self, ConfigError> {
+        const { Shape::<ROWS, COLUMNS>::CHECKED };
+        let config = Config::new(params, [ROWS, COLUMNS], clocks)?;
+        Ok(Self { config, columns: places(params), rows: places(params) })
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Deref for Shaped<ROWS, COLUMNS> {
+    type Target = Config;
+
+    fn deref(&self) -> &Config {
+        &self.config
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> DerefMut for Shaped<ROWS, COLUMNS> {
+    fn deref_mut(&mut self) -> &mut Config {
+        &mut self.config
+    }
 }

@@ -25,7 +25,7 @@ pub mod parts {
     pub use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, View, interval};
     pub use super::{TAXELS_MIN, confidence, covers};
     pub use crate::arith::{Divisor, between, clamp_to, high, root};
-    pub use crate::config::geometry::{ONE, PLACE_BITS, SQUARE_BITS};
+    pub use crate::config::array::{ONE, PLACE_BITS, SQUARE_BITS};
 }
 
 /// A contact with less confidence than this is not a hemisphere on a plane.

@@ -10,53 +10,69 @@
 //! with the tip's travel x, the voltage V, g = k_t N / (R m), c = k_t^2 N^2 / (R m), m = J N^2 (N the motor's angle for
 //! a travel of the tip) and everything else, the contact force and friction among it, in the disturbance w.
 //!
-//! Its parts, each a file: [`profile`] turns the way still to go into the fastest speed from which the tip can still
-//! stop there; [`pace`] says how quick the loop is, by the [`gains`](crate::config::gains) of the paces; [`observer`]
-//! estimates x, v and w from the encoder and the voltage; [`drive`] keeps the voltage within its limits, of which [`winding`]
-//! lowers the current's before the motor is too warm. The law that joins them is
+//! [`Reference::towards`] turns the distance to go into the fastest speed from which the tip can still stop there;
+//! [`GainSchedule`] selects one of the gain sets of [`Gains`]; [`Observer`] estimates x, v and w
+//! from the encoder and the voltage; [`Drive`] keeps the voltage within its limits, and [`Winding`] lowers the limit of
+//! the current before the motor is too warm. The law that joins them is
 //!
 //! ```text
 //! g V = k_v (v_ref - v) + a_ref + c v - w
 //! ```
 //!
-//! What was asked beyond a limit never enters the observer, so nothing winds up; and every mode only chooses v_ref, so
-//! a change of mode is bumpless.
+//! The observer gets the voltage after all limits, so nothing winds up; and every mode only chooses v_ref, so a change
+//! of mode is bumpless.
+//!
+//! # Speed reference
+//!
+//! The time-optimal speed over the distance e with a deceleration a is sqrt(2 a |e|). Its slope is infinite at e = 0, so
+//! near the goal a line of slope k takes over where both agree in value and slope (a proximate time-optimal servo):
+//!
+//! ```text
+//! |e| <= a / (2 k^2):  v_ref = k e                                 a_ref = -k v
+//! beyond:              v_ref = +-(sqrt(2 a |e|) - a / (2 k))      a_ref = -v a / sqrt(2 a |e|)
+//! ```
+//!
+//! a_ref is the slope of v_ref along the motion: what the loop needs to stay on the curve without a lag.
+//!
+//! # Gain schedule
+//!
+//! Rest and speed want different bandwidths. The calmest gain set is for distances within twice a band that encoder
+//! counts and noise explain, each quicker set for distances twice as long. When the mean distance is longer, the loop
+//! becomes quicker at once; when it was half as long for four of the loop's own time constants, the loop becomes calmer.
+//! So a loop that swings slows down, whatever made it swing. Only gains change, never the state of observer and drive,
+//! so a change of the gain set moves nothing.
 
-pub mod creep;
-pub mod drive;
-pub mod observer;
-pub mod pace;
-pub mod profile;
-pub mod warmth;
-pub mod winding;
+mod compensation;
+mod drive;
+mod observer;
+
+pub use compensation::{Creep, TemperatureDrift};
+pub use drive::{Drive, WINDING_WORDS, Winding};
+pub use observer::Observer;
 
 use crate::arith::{clamp_bits, high, product};
-use crate::config::{BRAKE_SHARE_Q8, Config};
+use crate::config::{BRAKE_SHARE_Q8, Config, GAIN_SETS, Gains};
 use crate::state::Limits;
 use crate::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
-use drive::Drive;
-use observer::Observer;
-use pace::Pace;
-use profile::Reference;
-use winding::{SHARE_BITS, Winding};
+use drive::SHARE_BITS;
 
 /// The state of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpeedLoop {
-    /// Where the tip is, how fast it goes and what pushes it.
+    /// Estimate of travel, speed and disturbance.
     pub observer: Observer,
-    /// The limits between the law and the bridge.
+    /// Limits of the voltage between the law and the bridge.
     pub drive: Drive,
-    /// How quick the loop is.
-    pub pace: Pace,
-    /// How warm the motor's winding is.
+    /// The gain set in use.
+    pub schedule: GainSchedule,
+    /// Estimate of the winding's temperature.
     pub winding: Winding,
 }
 
 impl SpeedLoop {
     /// At rest.
     pub const fn new() -> Self {
-        Self { observer: Observer::new(), drive: Drive::new(), pace: Pace::QUICK, winding: Winding::new() }
+        Self { observer: Observer::new(), drive: Drive::new(), schedule: GainSchedule::QUICK, winding: Winding::new() }
     }
 
     /// The duty that makes the tip follow a speed reference.
@@ -73,7 +89,7 @@ impl SpeedLoop {
         self.drive.duty(supply_mv, config)
     }
 
-    /// The law, and the limits of what it asks for: the voltage.
+    /// Computes the voltage by the law, and limits it.
     #[inline(always)]
     pub fn pull(&mut self, reference: Reference, supply_mv: u16, config: &Config, limits: &mut Limits) {
         // Speeds are held to 2,048 mm/s, which is beyond every reference, and to twice that where they are subtracted:
@@ -82,7 +98,7 @@ impl SpeedLoop {
         let behind = clamp_bits(reference.speed.to_bits().saturating_sub(speed), 30);
         // c v, the acceleration that the back-EMF takes away.
         let back_emf = high(speed << 3, config.damping_q17_per_s);
-        let wanted = high(behind << 2, self.pace.gains(config).speed_q18_per_s)
+        let wanted = high(behind << 2, self.schedule.gains(config).speed_q18_per_s)
             + (reference.acceleration.to_bits() >> 4)
             + back_emf
             - (self.observer.disturbance.to_bits() >> 4);
@@ -91,48 +107,52 @@ impl SpeedLoop {
         self.drive.apply(wanted, back_emf, supply_mv, config, limits);
     }
 
-    /// Takes the encoder's count of this frame into the observer, which then stands at this instant.
+    /// Updates observer and winding with the encoder's count of this frame.
     #[inline(always)]
     pub fn observe(&mut self, encoder: i32, config: &Config) {
         self.winding.observe(self.drive.acceleration(), config);
-        self.observer.update(encoder, self.drive.acceleration(), self.pace.gains(config), config);
+        self.observer.update(encoder, self.drive.acceleration(), self.schedule.gains(config), config);
     }
 
-    /// The speed to follow over a way still to go, at most `limit`; whether it was held to that.
+    /// Returns the speed reference for a distance to go, at most `limit`, and true if that limit reduced it.
     ///
-    /// Once the loop is calm, a way within `slack` is none: a tip that sticks would else be driven from count to count
-    /// for ever.
+    /// Once the loop is calm, a distance within `slack` counts as 0: otherwise a tip that sticks would be driven from
+    /// count to count for ever.
     #[inline(always)]
     pub fn towards(
         &mut self,
-        way: Millimetres,
+        distance: Millimetres,
         slack: Millimetres,
         limit: MillimetresPerSecond,
         config: &Config,
     ) -> (Reference, bool) {
-        self.pace.note(way, config);
-        let way = if self.pace.calm() { Millimetres(way.0 - way.0.max(-slack.0).min(slack.0)) } else { way };
-        let brake = self.brake(way, config);
-        let reference = Reference::towards(way, self.observer.speed, brake, self.pace.gains(config));
-        // A motor that may be driven with less brakes with less, also where it meets something.
+        self.schedule.note(distance, config);
+        let distance = if self.schedule.calm() {
+            Millimetres(distance.0 - distance.0.max(-slack.0).min(slack.0))
+        } else {
+            distance
+        };
+        let brake = self.brake(distance, config);
+        let reference = Reference::towards(distance, self.observer.speed, brake, self.schedule.gains(config));
+        // A motor with less current brakes less, so it moves more slowly: it may meet something.
         let limit = MillimetresPerSecond::from_bits(product(limit.to_bits(), self.winding.share(), SHARE_BITS));
         let limited = reference.limited(limit);
         (limited, limited != reference)
     }
 
-    /// The bridge is open: no current flows, so neither voltage nor back-EMF acts.
+    /// Takes note that the bridge is open: no current flows, so neither voltage nor back-EMF acts.
     pub fn coast(&mut self) {
         self.drive = Drive::new();
-        self.pace = Pace::QUICK;
+        self.schedule = GainSchedule::QUICK;
     }
 
-    /// The motor is shorted: only the back-EMF acts.
+    /// Takes note that the motor is shorted: only the back-EMF acts.
     pub fn short(&mut self, config: &Config) {
         self.coast();
         self.drive.short(self.back_emf(config));
     }
 
-    /// No farther than to the end of the travel.
+    /// Returns the distance, at most that to the end of the travel.
     pub fn within_travel(&self, distance: Millimetres, config: &Config, limits: &mut Limits) -> Millimetres {
         let left = Millimetres(config.travel_max.0.saturating_sub(self.observer.travel.0));
         if left < distance {
@@ -141,21 +161,21 @@ impl SpeedLoop {
         distance.min(left)
     }
 
-    /// c v, what the back-EMF takes away at this speed, Q8 mm/s^2.
+    /// Deceleration by the back-EMF at the present speed, c v, Q8 mm/s^2.
     fn back_emf(&self, config: &Config) -> i32 {
         let speed = clamp_bits(self.observer.speed.to_bits(), 28);
         clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4
     }
 
-    /// The deceleration that the motor can surely give to a motion in the direction of `way`, with the current that its
-    /// winding leaves.
+    /// Deceleration that the motor can surely give to a motion in the direction of `distance`, with the current that the
+    /// winding's temperature allows.
     ///
-    /// The contact force brakes a tip that presses in and drives one that lets go: the disturbance says how much.
+    /// The contact force brakes a tip that presses in and accelerates one that releases: the disturbance contains it.
     #[inline(always)]
-    pub fn brake(&self, way: Millimetres, config: &Config) -> MillimetresPerSecond2 {
+    pub fn brake(&self, distance: Millimetres, config: &Config) -> MillimetresPerSecond2 {
         let disturbance = product(self.observer.disturbance.to_bits(), BRAKE_SHARE_Q8, 8);
         let [least, usual, most] = config.brake.map(|brake| product(brake, self.winding.share(), SHARE_BITS));
-        let pressing = way >= Millimetres::ZERO;
+        let pressing = distance >= Millimetres::ZERO;
         let whole = if pressing { usual.saturating_sub(disturbance) } else { usual.saturating_add(disturbance) };
         MillimetresPerSecond2::from_bits(whole.max(least).min(most))
     }
@@ -165,4 +185,116 @@ impl Default for SpeedLoop {
     fn default() -> Self {
         Self::new()
     }
+}
+
+/// The mean distance moves by 1/8 of the difference in each frame, which reduces white noise to a quarter.
+const MEAN_BITS: u32 = 3;
+
+/// The gain set in use, and the mean distance that selects it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct GainSchedule {
+    number: usize,
+    /// Mean distance to go, Q24 mm.
+    mean: i32,
+    calm_frames: u32,
+}
+
+impl GainSchedule {
+    /// The quickest gain set.
+    pub const QUICK: Self = Self { number: 0, mean: 0, calm_frames: 0 };
+
+    /// The gain set in use.
+    #[inline(always)]
+    pub fn gains<'a>(&self, config: &'a Config) -> &'a Gains {
+        &config.gain_sets[self.number % GAIN_SETS]
+    }
+
+    /// True unless the quickest gain set is in use.
+    #[inline(always)]
+    pub fn calm(&self) -> bool {
+        self.number > 0
+    }
+
+    /// Takes the distance to go of this frame.
+    #[inline(always)]
+    pub fn note(&mut self, distance: Millimetres, config: &Config) {
+        let band = config.calm_band.to_bits();
+        // Limited, so that a long distance is soon forgotten.
+        let held = distance.to_bits().max(-16 * band).min(16 * band);
+        self.mean += (held - self.mean) >> MEAN_BITS;
+        let mean = self.mean.saturating_abs();
+        while self.number > 0 && mean > reach(band, self.number) {
+            (self.number, self.calm_frames) = (self.number - 1, 0);
+        }
+        if self.number + 1 < GAIN_SETS && mean <= reach(band, self.number + 1) / 2 {
+            self.calm_frames += 1;
+            if self.calm_frames > config.calm_frames << self.number {
+                (self.number, self.calm_frames) = (self.number + 1, 0);
+            }
+        } else {
+            self.calm_frames = 0;
+        }
+    }
+}
+
+/// Longest distance for which a gain set is quick enough: two bands for the calmest, twice that for each quicker set.
+const fn reach(band: i32, number: usize) -> i32 {
+    band << (GAIN_SETS - number)
+}
+
+/// Speed and acceleration that the speed loop follows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reference {
+    /// Speed.
+    pub speed: MillimetresPerSecond,
+    /// Acceleration that keeps the tip on the curve.
+    pub acceleration: MillimetresPerSecond2,
+}
+
+impl Reference {
+    /// Returns the fastest reference over `distance` that ends at rest, at the present speed `speed`, with a deceleration
+    /// `brake` of up to 1000 m/s^2.
+    #[inline(always)]
+    pub fn towards(
+        distance: Millimetres,
+        speed: MillimetresPerSecond,
+        brake: MillimetresPerSecond2,
+        gains: &Gains,
+    ) -> Self {
+        let (distance_bits, speed_bits) = (distance.to_bits(), speed.to_bits());
+        let brake_bits = brake.to_bits().max(1);
+        let slope = gains.slope_per_s;
+        // a / (2 k^2): Q8 to Q24 mm.
+        let linear = (i64::from(brake_bits) * i64::from(gains.half_over_slope2_q40)) >> 24;
+        let (reference, acceleration) = if i64::from(distance_bits.unsigned_abs()) <= linear {
+            (product(distance_bits, slope, 8), product(speed_bits, slope, 8))
+        } else {
+            // Q8 mm/s^2 times Q24 mm is Q32 mm^2/s^2; its root is Q16 mm/s, and good enough as the FPU gives it.
+            let (root, _) = lanes::root_and_product(2 * brake_bits.cast_unsigned(), distance_bits.unsigned_abs(), 0);
+            let root = root.cast_signed();
+            let magnitude = root.wrapping_sub(product(brake_bits, gains.half_over_slope_q32, 24));
+            let reference = if distance_bits < 0 { magnitude.wrapping_neg() } else { magnitude };
+            (reference, product(brake_bits, share_q12(speed_bits, root), 12))
+        };
+        Self {
+            speed: MillimetresPerSecond::from_bits(reference),
+            acceleration: MillimetresPerSecond2::from_bits(acceleration.saturating_neg()),
+        }
+    }
+
+    /// Limits the speed to `limit`. A limited speed is constant, so its acceleration is 0.
+    #[inline(always)]
+    pub fn limited(self, limit: MillimetresPerSecond) -> Self {
+        let held = self.speed.max(MillimetresPerSecond::from_bits(limit.to_bits().saturating_neg())).min(limit);
+        if held == self.speed { self } else { Self { speed: held, acceleration: MillimetresPerSecond2::ZERO } }
+    }
+}
+
+/// Returns speed / root in Q12, limited to +-1.25, by one 32-bit division.
+#[inline(always)]
+fn share_q12(speed: i32, root: i32) -> i32 {
+    let speed = speed.clamp(-1 << 29, (1 << 29) - 1) << 2;
+    // Never 0, nor the -1 by which a division can overflow.
+    let root = (root.cast_unsigned() >> 10 | 1).cast_signed();
+    (speed / root).clamp(-5120, 5120)
 }

@@ -11,9 +11,7 @@
 use crate::arith::product;
 use crate::config::Config;
 use crate::contact::Contact;
-use crate::control::SpeedLoop;
-use crate::control::creep::Creep;
-use crate::control::profile::Reference;
+use crate::control::{Creep, Reference, SpeedLoop};
 use crate::state::{Limits, Mode};
 use crate::touch::{SURE, Stage, Touch};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};

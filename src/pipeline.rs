@@ -9,9 +9,7 @@ use crate::activity::{Activity, Halt};
 use crate::command::Command;
 use crate::config::Shaped;
 use crate::contact::{self, Contact, Fit};
-use crate::control::SpeedLoop;
-use crate::control::warmth::Warmth;
-use crate::control::winding::Winding;
+use crate::control::{SpeedLoop, TemperatureDrift, Winding};
 use crate::frame::{Frame, Sense, Shape};
 use crate::grip::{Goal, Grip};
 use crate::measure::strokes::{self, Kept};
@@ -47,7 +45,7 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     torque: bool,
     motion: SpeedLoop,
     touch: Touch,
-    warmth: Warmth,
+    warmth: TemperatureDrift,
     monitor: Monitor,
     guard: Guard,
     activity: Activity,
@@ -70,7 +68,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             fit: Fit::default(),
             motion: SpeedLoop::new(),
             touch: Touch::default(),
-            warmth: Warmth::default(),
+            warmth: TemperatureDrift::default(),
             monitor: Monitor::default(),
             guard: Guard::default(),
             activity: Activity::Off(Halt::OPEN),
@@ -389,7 +387,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.budget = Budget::new();
         self.fit = Fit::default();
         self.motion = SpeedLoop { winding, ..SpeedLoop::new() };
-        (self.touch, self.warmth) = (Touch::default(), Warmth::default());
+        (self.touch, self.warmth) = (Touch::default(), TemperatureDrift::default());
         (self.monitor, self.guard) = (Monitor::default(), Guard::default());
         self.activity = Activity::Off(Halt::OPEN);
         self.status = Status { taken, missed_frames, ..Status::default() };

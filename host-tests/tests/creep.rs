@@ -1,7 +1,7 @@
 //! Creep that is taken off a held force: what is found of it, its bounds, and what never hears of it.
 
 use fingertip::config::newtons;
-use fingertip::control::creep::Creep;
+use fingertip::control::Creep;
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::{Fault, Mode};

@@ -1,7 +1,7 @@
 //! Filters and integrators in the loop over 10^9 steps, by their cycles; `long-run` also takes the steps one by one.
 
 use fastrand::Rng;
-use fingertip::control::observer::Observer;
+use fingertip::control::Observer;
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::{Fault, Mode};
@@ -48,11 +48,11 @@ fn the_observer_recovers_from_anything() {
             let mut observer = Observer::new();
             let (reach, frames) = (1 << rng.u32(1..31), rng.u32(1..200));
             for _ in 0..frames {
-                observer.update(rng.i32(-reach..reach), rng.i32(..), &config.paces[0], &config);
+                observer.update(rng.i32(-reach..reach), rng.i32(..), &config.gain_sets[0], &config);
             }
             let encoder = rng.i32(-50_000..50_000);
             let (_, rest) =
-                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config.paces[0], &config))
+                cycle(&observer, 100_000, |observer| observer.update(encoder, 0, &config.gain_sets[0], &config))
                     .expect("a cycle");
             let measured = rest.measured(encoder, &config).to_bits();
             assert!((rest.travel.to_bits() - measured).abs() <= 1, "{rest:?} at {measured}");

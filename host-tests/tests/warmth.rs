@@ -3,7 +3,7 @@
 use fingertip::chip::{Chip, FRAMES, Factory};
 use fingertip::command::Command;
 use fingertip::config::newtons;
-use fingertip::control::warmth::Warmth;
+use fingertip::control::TemperatureDrift;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, TARE_FRAMES};
 use fingertip::state::Mode;
@@ -23,8 +23,8 @@ fn celsius(degrees: i32) -> Option<Celsius> {
 }
 
 /// From a tare at one temperature to another, long after.
-fn warmed(from: i32, to: i32, config: &Config) -> Warmth {
-    let mut warmth = Warmth::default();
+fn warmed(from: i32, to: i32, config: &Config) -> TemperatureDrift {
+    let mut warmth = TemperatureDrift::default();
     // What it was before the tare is forgotten.
     (0..30_000).for_each(|frame| warmth.observe(celsius(if frame == 0 { from + 7 } else { from }), config));
     warmth.zero(1 << 16);
@@ -46,9 +46,9 @@ fn gain_goes_by_the_calibration_and_zero_by_the_tare() {
 #[test]
 fn at_coefficients_of_zero_and_before_a_reading_there_is_none() {
     let off = config(0, 0);
-    assert_eq!(warmed(0, 100, &off), Warmth::default());
+    assert_eq!(warmed(0, 100, &off), TemperatureDrift::default());
     let on = config(3_600, 10);
-    let mut warmth = Warmth::default();
+    let mut warmth = TemperatureDrift::default();
     warmth.observe(None, &on);
     assert_eq!(warmth.force(newtons(3_000), &on), Newtons::ZERO);
     let mut warmth = warmed(25, 45, &on);
@@ -72,7 +72,7 @@ fn a_reading_that_stays_away_and_comes_back_moves_nothing() {
 fn the_zero_s_temperature_moves_as_the_baseline_does() {
     let config = config(0, 10);
     let mut warmth = warmed(45, 25, &config);
-    let at = |warmth: &Warmth| warmth.force(newtons(3_000), &config).0.to_num::<f64>();
+    let at = |warmth: &TemperatureDrift| warmth.force(newtons(3_000), &config).0.to_num::<f64>();
     assert!((at(&warmth) + 0.045).abs() < 1e-3);
     // Nothing of the baseline, a hundredth, a half, all of it.
     for (share, left) in [(0, 1.0), (655, 0.99), (1 << 15, 0.495), (1 << 16, 0.0)] {
@@ -125,7 +125,7 @@ fn the_reading_exceeds_the_goal_by_its_drift() {
 #[test]
 fn it_follows_slowly() {
     let config = config(3_600, 0);
-    let mut warmth = Warmth::default();
+    let mut warmth = TemperatureDrift::default();
     warmth.observe(celsius(25), &config);
     // A reading that is wrong for a frame moves it by a thousandth of that.
     warmth.observe(celsius(125), &config);
@@ -146,7 +146,7 @@ proptest! {
             ..images::CONFIRMED
         };
         let config = Config::shipped(&params).unwrap();
-        let mut warmth = Warmth::default();
+        let mut warmth = TemperatureDrift::default();
         for (chip, frames, zeroes) in chips {
             for _ in 0..frames {
                 warmth.observe(chip.map(Celsius::from_bits), &config);

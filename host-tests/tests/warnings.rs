@@ -1,8 +1,7 @@
 //! Doubtful configurations: what is warned of, and that the line for the pitch separates good fits from bad ones.
 
 use fingertip::command::Command;
-use fingertip::config::Shaped;
-use fingertip::config::{newtons, warnings::Warning};
+use fingertip::config::{Shaped, Warning, newtons};
 use fingertip::contact::FitLevel;
 use fingertip::fixed::types::I8F24;
 use fingertip::frame::{Frame, Sense};

@@ -2,8 +2,7 @@
 //! it does to the current.
 
 use fingertip::config::newtons;
-use fingertip::control::SpeedLoop;
-use fingertip::control::winding::Winding;
+use fingertip::control::{SpeedLoop, Winding};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::{Limits, Mode};

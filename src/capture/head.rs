@@ -1,7 +1,7 @@
 //! A capture's beginning: what the loop knew before its first frame.
 
 use super::{Ended, VERSION, digest};
-use crate::control::winding;
+use crate::control::WINDING_WORDS;
 use crate::params::Params;
 use crate::pipeline::Taken;
 use crate::pressure::Gains;
@@ -23,8 +23,8 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     pub missed_frames: u32,
     /// Requests taken up before.
     pub taken: Taken,
-    /// What is known of the motor's winding, as [`Winding`](winding::Winding) tells it.
-    pub winding: [u32; winding::WORDS],
+    /// What is known of the motor's winding, as [`Winding`](crate::control::Winding) tells it.
+    pub winding: [u32; WINDING_WORDS],
     /// From frame to frame.
     pub frame_ns: u32,
     /// The parameters in force.
@@ -36,7 +36,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 /// First bytes of a capture.
 pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
 /// Bytes before the parameters.
-const FIXED: usize = 40 + 4 * winding::WORDS;
+const FIXED: usize = 40 + 4 * WINDING_WORDS;
 
 /// A number for the names and the order of the parameters (FNV-1a of 32 bits).
 pub const LAYOUT: u32 = {

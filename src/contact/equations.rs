@@ -6,7 +6,7 @@
 
 use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, Scale, TaxelModel, View, square};
 use crate::arith::{Divisor, clamp_to, high};
-use crate::config::geometry::{Geometry, PLACE_BITS};
+use crate::config::array::{Geometry, PLACE_BITS};
 
 /// A residual stops at half of the peak.
 const RESIDUAL_LIMIT: i32 = 1 << (PEAK_BITS - 1);

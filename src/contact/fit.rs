@@ -12,7 +12,7 @@ use super::{
     CONFIDENCE_LEAST, Contact, FitLevel, TAXELS_MIN, confidence, contact_of_force, covers, from_sums, hidden, overhang,
 };
 use crate::arith::{Divisor, clamp_to};
-use crate::config::geometry::ONE;
+use crate::config::array::ONE;
 use crate::config::{Config, Shaped};
 use crate::frame::Shape;
 use crate::pressure::Picture;

@@ -6,7 +6,7 @@
 
 use crate::arith::{between, clamp_to, high, reciprocal, root};
 use crate::config::Shaped;
-use crate::config::geometry::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
+use crate::config::array::{Geometry, NODE_BITS, NODES, Node, ONE, PLACE_BITS, SQUARE_BITS};
 use crate::model::Tip;
 use crate::pressure::{CODE_BITS, Picture};
 use crate::units::Millimetres;

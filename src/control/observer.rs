@@ -9,12 +9,11 @@
 //! l1 = 1 - beta^3,   l2 = 1.5 (1 - beta)^2 (1 + beta) / T,   l3 = (1 - beta)^3 / T^2
 //! ```
 //!
-//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts anew at the new place,
-//! at rest. To correct by a part of it would not do: three integrators behind an error that is cut swing for ever.
+//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts again at the new place,
+//! at rest. A limited correction would not work: three integrators behind a limited error swing for ever.
 
 use crate::arith::{nearest_product, nearest_share};
-use crate::config::Config;
-use crate::config::gains::Gains;
+use crate::config::{Config, Gains};
 use crate::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// The estimate at the last frame.
@@ -24,7 +23,7 @@ pub struct Observer {
     pub travel: Millimetres,
     /// Tip speed.
     pub speed: MillimetresPerSecond,
-    /// Acceleration by everything but the voltage: contact, friction, and what the parameters get wrong.
+    /// Acceleration by everything but voltage and back-EMF: contact, friction, and errors of the parameters.
     pub disturbance: MillimetresPerSecond2,
     origin: i32,
 }
@@ -45,7 +44,7 @@ impl Observer {
         Self { origin: encoder, ..Self::new() }
     }
 
-    /// Makes this count the zero of the travel; the motion goes on. Returns the travel there before.
+    /// Makes this count the zero of the travel, without a change of the motion. Returns the travel there before.
     pub fn zero(&mut self, encoder: i32, config: &Config) -> Millimetres {
         let travel = self.measured(encoder, config);
         self.travel = Millimetres(self.travel.0.saturating_sub(travel.0));
@@ -58,12 +57,12 @@ impl Observer {
         self.origin
     }
 
-    /// Travel that an encoder count means, held to the type's range but for a count.
+    /// Travel at an encoder count, limited to the type's range less a count.
     pub fn measured(&self, encoder: i32, config: &Config) -> Millimetres {
         config.travel(encoder.wrapping_sub(self.origin))
     }
 
-    /// One frame on: `acceleration` is what voltage and back-EMF gave since the last one (Q8 mm/s^2).
+    /// Advances by a frame; `acceleration` is that by voltage and back-EMF since the last frame (Q8 mm/s^2).
     #[inline(always)]
     pub fn update(&mut self, encoder: i32, acceleration: i32, gains: &Gains, config: &Config) {
         // Q8 mm/s^2 times T (Q37) to Q16 mm/s, and the mean speed over the frame times T to Q24 mm.

@@ -12,8 +12,7 @@
 use super::{Ended, Standing};
 use crate::config::Config;
 use crate::contact::Contact;
-use crate::control::SpeedLoop;
-use crate::control::profile::Reference;
+use crate::control::{Reference, SpeedLoop};
 use crate::pressure::Picture;
 use crate::state::Limits;
 use crate::units::{Celsius, Millimetres, MillimetresPerSecond};

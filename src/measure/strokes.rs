@@ -15,8 +15,7 @@
 //! within the way that was felt. Whatever else happens shorts the motor at once and waits until it rests.
 
 use super::{Ended, Standing, Task};
-use crate::config::Config;
-use crate::config::motions::{Motions, SPAN_PARTS};
+use crate::config::{Config, Motions, SPAN_PARTS};
 use crate::units::Newtons;
 
 /// From the end of a frame, when the encoder is read, to the moment at which the voltage of its step acts, ns, by the

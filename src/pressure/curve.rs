@@ -6,7 +6,7 @@
 //! parabola would turn. So a reading keeps its sign, and a larger one is never a smaller force.
 
 use super::{CODE_BITS, Picture, TARE_BITS, row::weight};
-use crate::config::curve::Curve;
+use crate::config::Curve;
 use lanes::Row;
 
 /// A code of the full range.

@@ -3,8 +3,7 @@
 use crate::command::Command;
 use crate::config::Config;
 use crate::contact::Contact;
-use crate::control::SpeedLoop;
-use crate::control::observer::Observer;
+use crate::control::{Observer, SpeedLoop};
 use crate::frame::{Sense, Shape};
 use crate::pressure::Picture;
 use crate::state::Fault;

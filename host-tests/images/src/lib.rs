@@ -8,8 +8,7 @@ extern crate std;
 
 use fingertip::config::Config;
 use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
-use fingertip::control::profile::Reference;
+use fingertip::control::{Reference, SpeedLoop};
 use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
 use fingertip::state::Limits;

@@ -2,11 +2,8 @@
 
 use super::{Machine, Outcome};
 use crate::finger::config;
-use fingertip::config::gains::PACES;
-use fingertip::control::SpeedLoop;
-use fingertip::control::drive::Drive;
-use fingertip::control::observer::Observer;
-use fingertip::control::winding::Winding;
+use fingertip::config::GAIN_SETS;
+use fingertip::control::{Drive, Observer, SpeedLoop, Winding};
 use fingertip::params::Params;
 use fingertip::shipped::{Array, Config, Frame, ROWS, SLOTS, TARE_FRAMES};
 use fingertip::state::Limits;
@@ -82,7 +79,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
             start: Observer::new(),
             inputs: 2,
             step: Box::new(move |observer: &mut Observer| {
-                let gains = &config.paces[pace];
+                let gains = &config.gain_sets[pace];
                 pair.iter()
                     .for_each(|(encoder, acceleration)| observer.update(*encoder, *acceleration, gains, &config));
             }),
@@ -97,7 +94,7 @@ fn observers(scan: &str, config: &Config) -> Vec<Machine<Observer>> {
             ],
         }
     };
-    inputs.into_iter().flat_map(|input| [0, PACES - 1].map(|pace| machine(input, pace))).collect()
+    inputs.into_iter().flat_map(|input| [0, GAIN_SETS - 1].map(|pace| machine(input, pace))).collect()
 }
 
 /// The wanted acceleration, held or in turns.

@@ -2,7 +2,7 @@
 
 use crate::config;
 use fingertip::config::Config;
-use fingertip::control::drive::Drive;
+use fingertip::control::Drive;
 use fingertip::state::Limits;
 use fingertip::units::Duty;
 

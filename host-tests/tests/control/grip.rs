@@ -4,11 +4,9 @@ mod release;
 mod touch;
 
 use crate::{config, mm};
-use fingertip::config::Config;
-use fingertip::config::newtons;
+use fingertip::config::{Config, newtons};
 use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
-use fingertip::control::profile::Reference;
+use fingertip::control::{Reference, SpeedLoop};
 use fingertip::grip::{Goal, Grip};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::{Felt, Stage, Touch};
@@ -34,7 +32,7 @@ fn at(travel: Millimetres) -> SpeedLoop {
 fn calm_at(travel: Millimetres, config: &Config) -> SpeedLoop {
     let mut motion = at(travel);
     for _ in 0..10 * config.calm_frames {
-        motion.pace.note(Millimetres::ZERO, config);
+        motion.schedule.note(Millimetres::ZERO, config);
     }
     motion
 }

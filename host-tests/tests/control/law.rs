@@ -2,8 +2,7 @@
 
 use crate::{config, mm};
 use fingertip::config::Config;
-use fingertip::control::SpeedLoop;
-use fingertip::control::profile::Reference;
+use fingertip::control::{Reference, SpeedLoop};
 use fingertip::state::Limits;
 use fingertip::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
@@ -21,7 +20,7 @@ fn the_profile_is_the_line_near_the_goal_and_the_root_beyond() {
     let mut rng = fastrand::Rng::with_seed(6);
     let mut near = 0;
     for case in 0..20_000 {
-        let gains = &config.paces[case % config.paces.len()];
+        let gains = &config.gain_sets[case % config.gain_sets.len()];
         let slope = f64::from(gains.speed_q18_per_s) / 2_f64.powi(18) / 3.0;
         let brake = 10_f64.powf(rng.f64() * 2.0 + 3.5);
         let way = (rng.f64() - 0.5) * 10_f64.powf(rng.f64() * 4.0 - 2.5);
@@ -56,7 +55,7 @@ fn no_speed_asks_for_more_than_a_quarter_beyond_the_brake() {
     for (bits, sign) in [(i32::MAX, -1.0), (1 << 29, -1.0), (-1 << 29, 1.0), (i32::MIN, 1.0)] {
         for way in [mm(5.0), mm(-5.0)] {
             let now = MillimetresPerSecond::from_bits(bits);
-            let reference = Reference::towards(way, now, acceleration(10_000.0), &config.paces[0]);
+            let reference = Reference::towards(way, now, acceleration(10_000.0), &config.gain_sets[0]);
             let found: f64 = reference.acceleration.0.to_num();
             assert!((found - sign * 12_500.0).abs() < 10.0, "{found} at {now:?}");
         }
@@ -78,7 +77,7 @@ fn beyond_the_limit_there_is_no_curve_to_stay_on() {
 #[test]
 fn the_law_is_the_documented_one() {
     let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: 1 << 30, ..config() };
-    let gain = f64::from(config.paces[0].speed_q18_per_s) / 2_f64.powi(18);
+    let gain = f64::from(config.gain_sets[0].speed_q18_per_s) / 2_f64.powi(18);
     let damping = f64::from(config.damping_q17_per_s) / 2_f64.powi(17);
     let mut rng = fastrand::Rng::with_seed(7);
     for _ in 0..10_000 {
@@ -136,7 +135,7 @@ fn a_calm_loop_leaves_a_way_within_the_slack() {
     let quick = SpeedLoop::new();
     let mut calm = quick;
     for _ in 0..10 * config.calm_frames {
-        calm.pace.note(Millimetres::ZERO, &config);
+        calm.schedule.note(Millimetres::ZERO, &config);
     }
     assert!(speed_over(quick, 0.004, slack) > MillimetresPerSecond::ZERO);
     for way in [0.004, 0.001, 0.0, -0.004] {

@@ -2,7 +2,7 @@
 
 use crate::config;
 use fingertip::config::Config;
-use fingertip::control::observer::Observer;
+use fingertip::control::Observer;
 use fingertip::units::{Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 
 /// The equations of the observer's documentation.
@@ -18,7 +18,7 @@ impl Reference {
     /// For a pace: its poles are 2.5 times as quick as the speed loop.
     fn new(pace: usize, config: &Config) -> Self {
         let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-        let speed_gain = f64::from(config.paces[pace].speed_q18_per_s) / 2_f64.powi(18);
+        let speed_gain = f64::from(config.gain_sets[pace].speed_q18_per_s) / 2_f64.powi(18);
         let half = 0.5 * 2.5 * speed_gain * frame_s;
         Self { beta: (1.0 - half) / (1.0 + half), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }
     }
@@ -41,7 +41,7 @@ fn it_follows_its_equations_at_each_pace() {
     let config = config();
     let count_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
     let mut rng = fastrand::Rng::with_seed(5);
-    for pace in 0..config.paces.len() {
+    for pace in 0..config.gain_sets.len() {
         let (mut observer, mut reference) = (Observer::new(), Reference::new(pace, &config));
         let (mut counts, mut fastest, mut hardest) = (0, 0.0_f64, 0.0_f64);
         for frame in 0..2_000 {
@@ -50,7 +50,7 @@ fn it_follows_its_equations_at_each_pace() {
             }
             counts += rng.i32(-2..=2);
             let driven = rng.i32(-100_000..=100_000);
-            observer.update(counts, driven * 256, &config.paces[pace], &config);
+            observer.update(counts, driven * 256, &config.gain_sets[pace], &config);
             reference.update(f64::from(counts) * count_mm, driven.into());
             let is = [
                 observer.travel.0.to_num::<f64>() - reference.travel,
@@ -76,7 +76,7 @@ fn what_no_motion_makes_is_a_jump_to_rest_at_the_new_place() {
         for (jump, jumps) in [(error, false), (error - 1, true)] {
             let config = Config { jump, ..config.clone() };
             let mut observer = Observer::zeroed_at(77);
-            observer.update(77_i32.wrapping_add(counts), 0, &config.paces[0], &config);
+            observer.update(77_i32.wrapping_add(counts), 0, &config.gain_sets[0], &config);
             let rests = observer.speed == MillimetresPerSecond::ZERO;
             assert_eq!((rests, observer.disturbance == MillimetresPerSecond2::ZERO), (jumps, jumps), "{counts}");
             if jumps {

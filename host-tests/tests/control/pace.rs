@@ -1,22 +1,21 @@
 //! When the loop is quicker, and when it is calmer, frame by frame.
 
 use crate::config;
-use fingertip::config::Config;
-use fingertip::config::gains::PACES;
-use fingertip::control::pace::Pace;
+use fingertip::config::{Config, GAIN_SETS};
+use fingertip::control::GainSchedule;
 use fingertip::params::Params;
 use fingertip::shipped;
 use fingertip::units::Millimetres;
 
 /// The pace's number, by the gains that it gives.
-fn number(pace: &Pace, config: &Config) -> usize {
-    let number = config.paces.iter().position(|gains| gains == pace.gains(config)).expect("one of the paces");
+fn number(pace: &GainSchedule, config: &Config) -> usize {
+    let number = config.gain_sets.iter().position(|gains| gains == pace.gains(config)).expect("one of the gain sets");
     assert_eq!(pace.calm(), number > 0);
     number
 }
 
 /// After each of so many frames with a way of so many bits.
-fn run(pace: &mut Pace, way: i32, frames: u32, config: &Config) -> Vec<usize> {
+fn run(pace: &mut GainSchedule, way: i32, frames: u32, config: &Config) -> Vec<usize> {
     let mut note = |_| {
         pace.note(Millimetres::from_bits(way), config);
         number(pace, config)
@@ -25,23 +24,23 @@ fn run(pace: &mut Pace, way: i32, frames: u32, config: &Config) -> Vec<usize> {
 }
 
 /// At the calmest pace, with a mean way of 0.
-fn calmest(config: &Config) -> Pace {
-    let mut pace = Pace::QUICK;
+fn calmest(config: &Config) -> GainSchedule {
+    let mut pace = GainSchedule::QUICK;
     run(&mut pace, 0, 10 * config.calm_frames, config);
-    assert_eq!(number(&pace, config), PACES - 1);
+    assert_eq!(number(&pace, config), GAIN_SETS - 1);
     pace
 }
 
 #[test]
 fn without_a_way_each_pace_lasts_twice_as_long_as_the_one_before() {
     let config = config();
-    let mut pace = Pace::QUICK;
-    for slower in 0..PACES - 1 {
+    let mut pace = GainSchedule::QUICK;
+    for slower in 0..GAIN_SETS - 1 {
         let lasts = config.calm_frames << slower;
         assert_eq!(run(&mut pace, 0, lasts, &config), vec![slower; lasts as usize]);
         assert_eq!(run(&mut pace, 0, 1, &config), [slower + 1]);
     }
-    assert_eq!(run(&mut pace, 0, 1_000, &config), [PACES - 1; 1_000], "there is none calmer");
+    assert_eq!(run(&mut pace, 0, 1_000, &config), [GAIN_SETS - 1; 1_000], "there is none calmer");
 }
 
 /// Two bands at the calmest pace, twice that at each quicker one. A mean that comes down to its way meets it to the
@@ -73,7 +72,7 @@ fn half_as_long_a_way_is_calm() {
     let band = config.calm_band.to_bits();
     for (at, calm) in [(0, 4 * band), (1, 2 * band), (2, band)] {
         for (way, next) in [(calm, at + 1), (calm + 1, at)] {
-            let mut pace = Pace::QUICK;
+            let mut pace = GainSchedule::QUICK;
             run(&mut pace, i32::MAX, 100, &config);
             run(&mut pace, calm + 1, 20 * config.calm_frames, &config);
             assert_eq!(number(&pace, &config), at, "at {calm}");
@@ -101,7 +100,7 @@ fn a_long_way_is_soon_met_and_soon_forgotten() {
 #[test]
 fn a_way_in_between_makes_the_calm_begin_anew() {
     let config = config();
-    let mut pace = Pace::QUICK;
+    let mut pace = GainSchedule::QUICK;
     run(&mut pace, 0, config.calm_frames - 2, &config);
     // The third frame of 16 bands makes a mean of 5.3, which is again below 4 after three without a way.
     run(&mut pace, i32::MAX, 3, &config);
@@ -112,7 +111,7 @@ fn a_way_in_between_makes_the_calm_begin_anew() {
 
 /// Checks that all gains of a pace follow from this speed gain k_v.
 fn is_made_for(speed_gain: f64, pace: usize, config: &Config) {
-    let gains = &config.paces[pace];
+    let gains = &config.gain_sets[pace];
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     let slope = speed_gain / 3.0;
     let half = 0.5 * 2.5 * speed_gain * frame_s;
@@ -138,7 +137,7 @@ fn a_fine_encoder_leaves_the_pace_to_the_time() {
     let config =
         shipped::Config::shipped(&Params { encoder_counts_per_turn: 65_536, ..Params::DEFAULT }).expect("allowed");
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
-    for pace in 0..config.paces.len() {
+    for pace in 0..config.gain_sets.len() {
         is_made_for(0.2 / frame_s / f64::from(1 << pace), pace, &config);
     }
 }
@@ -153,12 +152,12 @@ fn a_coarse_encoder_makes_a_slower_loop() {
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     assert!((120.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
     let mut at_the_least = 0;
-    for pace in 0..config.paces.len() {
+    for pace in 0..config.gain_sets.len() {
         let speed_gain = quickest / f64::from(1 << pace);
         at_the_least += usize::from(speed_gain < 60.0);
         is_made_for(speed_gain.max(60.0), pace, &config);
     }
-    assert!(at_the_least < config.paces.len() - 1, "{quickest} /s");
+    assert!(at_the_least < config.gain_sets.len() - 1, "{quickest} /s");
 }
 
 /// Nor is a count taken for more than 60 mm/s by an observer 2.5 times as quick: where the motor drives the tip almost
@@ -170,7 +169,7 @@ fn a_count_is_no_more_than_so_fast() {
     let quickest = 60.0 / (2.5 * q_mm);
     let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
     assert!((480.0..0.2 / frame_s).contains(&quickest), "{quickest} /s");
-    for pace in 0..config.paces.len() {
+    for pace in 0..config.gain_sets.len() {
         is_made_for(quickest / f64::from(1 << pace), pace, &config);
     }
 }

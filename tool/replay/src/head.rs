@@ -2,7 +2,7 @@
 
 use crate::Refusal;
 use fingertip::capture::{Ended, Head, LAYOUT, MAGIC};
-use fingertip::control::winding;
+use fingertip::control::WINDING_WORDS;
 use fingertip::params::Params;
 use fingertip::pipeline::Taken;
 use fingertip::pressure::Gains;
@@ -35,7 +35,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Hea
     let taken = Taken::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
     let taken = taken.ok_or(Refusal::Damaged)?;
     let frame_ns = u32::from_le_bytes(next()?);
-    let mut winding = [0; winding::WORDS];
+    let mut winding = [0; WINDING_WORDS];
     for word in &mut winding {
         *word = u32::from_le_bytes(next()?);
     }

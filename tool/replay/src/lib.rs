@@ -9,7 +9,7 @@ pub use frames::{Frames, Refusal, Taken};
 
 use fingertip::capture::{Head, digest};
 use fingertip::config::Shaped;
-use fingertip::control::winding::Winding;
+use fingertip::control::Winding;
 use fingertip::pipeline::{Pipeline, Status};
 use fingertip::pressure::Calibration;
 use fingertip::scan::Clocks;

@@ -37,7 +37,7 @@ use board::{clocks, crash, guard, options, pins, stack, trace};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
-use fingertip::control::winding::Winding;
+use fingertip::control::Winding;
 use fingertip::link::snapshot::CrashCause;
 use fingertip::params::Params;
 use fingertip::pipeline::Taken;

@@ -2,7 +2,7 @@
 //! finger, made anew each time that they are asked for.
 
 use bringup::script::{Bench, RECORDS};
-use fingertip::control::winding::Winding;
+use fingertip::control::Winding;
 use fingertip::pipeline::Taken;
 use fingertip::shipped::Pipeline;
 use images::record::Record;

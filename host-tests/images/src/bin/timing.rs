@@ -16,10 +16,7 @@ use call::pass_on;
 use cortex_m_semihosting::debug;
 use fingertip::contact;
 use fingertip::contact::Contact;
-use fingertip::control::SpeedLoop;
-use fingertip::control::profile::Reference;
-use fingertip::control::warmth::Warmth;
-use fingertip::control::winding::Winding;
+use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::grip::{Goal, Grip};
 use fingertip::params::Params;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
@@ -57,7 +54,7 @@ struct Bench<'a> {
     limits: Limits,
     duty: Duty,
     winding: Winding,
-    warmth: Warmth,
+    warmth: TemperatureDrift,
     drift: Newtons,
     press: &'static mut Press,
 }
@@ -217,7 +214,7 @@ fn main() -> ! {
         limits: Limits::default(),
         duty: Duty::ZERO,
         winding: Winding::new(),
-        warmth: Warmth::default(),
+        warmth: TemperatureDrift::default(),
         drift: Newtons::ZERO,
         press: PRESS.init_with(Press::new),
     };

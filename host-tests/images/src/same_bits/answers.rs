@@ -2,7 +2,7 @@
 
 use super::Mix;
 use fingertip::contact::Contact;
-use fingertip::control::profile::Reference;
+use fingertip::control::Reference;
 use fingertip::shipped::Picture;
 
 /// What the profile asks for.

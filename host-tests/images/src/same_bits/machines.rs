@@ -6,14 +6,8 @@ use super::model::Sample;
 use super::pictures::Pictures;
 use super::{Mix, frames};
 use crate::single::{self, Refined};
-use fingertip::contact::Contact;
-use fingertip::contact::{self, FitLevel};
-use fingertip::control::SpeedLoop;
-use fingertip::control::drive::Drive;
-use fingertip::control::observer::Observer;
-use fingertip::control::profile::Reference;
-use fingertip::control::warmth::Warmth;
-use fingertip::control::winding::Winding;
+use fingertip::contact::{self, Contact, FitLevel};
+use fingertip::control::{Drive, Observer, Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::grip::{Goal, Grip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
@@ -35,7 +29,7 @@ pub struct Machines {
     observer: Observer,
     drive: Drive,
     winding: Winding,
-    warmth: Warmth,
+    warmth: TemperatureDrift,
     motion: SpeedLoop,
     grip: Grip,
     touch: Touch,
@@ -56,7 +50,7 @@ impl Machines {
             observer: Observer::new(),
             drive: Drive::new(),
             winding: Winding::new(),
-            warmth: Warmth::default(),
+            warmth: TemperatureDrift::default(),
             motion: SpeedLoop::new(),
             grip: Grip::default(),
             touch: Touch::default(),
@@ -151,7 +145,7 @@ pub const STEPS: [Step; 20] = [
     ("Observer::measured", |m, s, mix| mix.add(m.observer.measured(s.words[0], &m.config).to_bits())),
     ("Observer::update", |m, s, mix| {
         let [encoder, acceleration, ..] = s.words;
-        m.observer.update(encoder >> 24, acceleration, &m.config.paces[(s.share_q32 & 3) as usize], &m.config);
+        m.observer.update(encoder >> 24, acceleration, &m.config.gain_sets[(s.share_q32 & 3) as usize], &m.config);
         mix.add(m.observer.travel.to_bits());
         mix.add(m.observer.speed.to_bits());
         mix.add(m.observer.disturbance.to_bits());
@@ -181,7 +175,7 @@ pub const STEPS: [Step; 20] = [
         mix.add(m.winding.temperature(&m.config).to_bits());
         mix.add(m.winding.share());
     }),
-    ("Warmth::force", |m, s, mix| {
+    ("TemperatureDrift::force", |m, s, mix| {
         m.warmth.observe((s.share_q32 & 15 != 0).then_some(Celsius::from_bits(s.words[0])), &m.config);
         if s.share_q32 & 0xf0 == 0 {
             m.warmth.zero(s.share_q32 as i32 & 0x1_ffff);
@@ -222,7 +216,7 @@ fn towards(machines: &Machines, sample: &Sample) -> Reference {
         Millimetres::from_bits(way),
         MillimetresPerSecond::from_bits(speed),
         brake,
-        machines.motion.pace.gains(&machines.config),
+        machines.motion.schedule.gains(&machines.config),
     )
 }
 

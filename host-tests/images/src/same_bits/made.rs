@@ -2,12 +2,7 @@
 
 use super::machines::Machines;
 use super::{Mix, Source, frames};
-use fingertip::config::curve::Curve;
-use fingertip::config::gains::Gains;
-use fingertip::config::heat::{Heat, Lag};
-use fingertip::config::motions::Motions;
-use fingertip::config::warm::Warm;
-use fingertip::config::{self, ConfigError};
+use fingertip::config::{self, ArrayDrift, ConfigError, Curve, Gains, Heat, Lag, Motions};
 use fingertip::params::Params;
 use fingertip::pressure::CalibrationError;
 use fingertip::scan::ScanTiming;
@@ -111,7 +106,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         count,
         jump,
         counts_max,
-        paces,
+        gain_sets,
         calm_band,
         calm_frames,
         damping_q17_per_s,
@@ -130,7 +125,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
         clearance,
         bounds,
         heat,
-        warm,
+        drift,
         motions,
         force_fault,
         force_max,
@@ -158,7 +153,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [creep_share_q32, creep_leak_q32, frame_ns, jump, voltage_shift, duty_gain, share_per_mv_q32] {
         mix.add(*number);
     }
-    let Warm { gain_q32_per_k, gain_at_q16, zero_q24_per_k } = *warm;
+    let ArrayDrift { gain_q32_per_k, gain_at_q16, zero_q24_per_k } = *drift;
     for number in [gain_q32_per_k, gain_at_q16, zero_q24_per_k] {
         mix.add(number);
     }
@@ -180,7 +175,7 @@ fn add_config(mix: &mut Mix, config: &Config) {
     for number in [*frame_s_q37, *counts_max, calm_frames.cast_signed()] {
         mix.add(number);
     }
-    for gains in paces {
+    for gains in gain_sets {
         let Gains { observer, speed_q18_per_s, slope_per_s, half_over_slope_q32, half_over_slope2_q40 } = gains;
         for number in observer {
             mix.add(*number);

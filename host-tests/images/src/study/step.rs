@@ -4,12 +4,8 @@ use super::call::pass_on;
 use super::inputs::Inputs;
 use crate::host::{fail, say};
 use fingertip::command::Command;
-use fingertip::contact::Contact;
-use fingertip::contact::{self, FitLevel};
-use fingertip::control::SpeedLoop;
-use fingertip::control::profile::Reference;
-use fingertip::control::warmth::Warmth;
-use fingertip::control::winding::Winding;
+use fingertip::contact::{self, Contact, FitLevel};
+use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::frame::Sense;
 use fingertip::grip::{Goal, Grip};
 use fingertip::pipeline::Taken;
@@ -43,7 +39,7 @@ struct Bench<'a> {
     touch: Touch,
     guard: Guard,
     winding: Winding,
-    warmth: Warmth,
+    warmth: TemperatureDrift,
     drift: Newtons,
     reference: Reference,
     limits: Limits,
@@ -171,7 +167,7 @@ impl<'a> Bench<'a> {
             touch: Touch::default(),
             guard: Guard::default(),
             winding: Winding::new(),
-            warmth: Warmth::default(),
+            warmth: TemperatureDrift::default(),
             drift: Newtons::ZERO,
             reference: Reference::default(),
             limits: Limits::default(),

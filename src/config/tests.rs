@@ -1,10 +1,10 @@
 //! Every number that follows from the frame time, over all shapes and rates, against double precision.
 
 use super::Config;
+use super::{ConfigError, GAIN_SETS};
 use crate::params::Params;
 use crate::scan::tests::CLOCKS;
 use crate::scan::{Clocks, ScanError};
-use crate::{config::ConfigError, config::gains::PACES};
 
 /// A number within this share of what double precision makes of it, and a unit of its last place.
 fn near(name: &str, number: f64, exact: f64, share: f64) {
@@ -25,7 +25,7 @@ fn check(config: &Config) {
     near("slew_limit", config.slew_limit.into(), slew.min(i32::MAX.into()), 1e-5);
     let jump = (4e-3 * f64::from(p.speed_max_um_per_s) * frame_s).max(0.5);
     near("jump", config.jump.into(), jump * two(24), 1e-5);
-    near("calm_frames", config.calm_frames.into(), 4.0 / (f64::from(config.paces[0].slope_per_s) * frame_s), 1e-5);
+    near("calm_frames", config.calm_frames.into(), 4.0 / (f64::from(config.gain_sets[0].slope_per_s) * frame_s), 1e-5);
     near("frames_per_s", config.bounds.frames_per_s.into(), 1.0 / frame_s, 1e-6);
     let tau_s = f64::max(0.005 * (config.count.0.to_num::<f64>() / 0.008).clamp(1.0, 8.0), 8.0 * frame_s);
     near("leak", config.bounds.leak.into(), frame_s / tau_s * two(16), 1e-4);
@@ -35,10 +35,10 @@ fn check(config: &Config) {
         near("rise", lag.rise_q31.into(), 1.25 * step_s / (f64::from(time_ms) * 1e-3) * two(31), 1e-5);
         near("fall", lag.fall_q31.into(), 0.8 * step_s / (f64::from(time_ms) * 1e-3) * two(31), 1e-5);
     }
-    let quickest = f64::from(config.paces[0].speed_q18_per_s) / two(18);
+    let quickest = f64::from(config.gain_sets[0].speed_q18_per_s) / two(18);
     assert!(quickest <= f64::max(0.2 / frame_s, 60.0) * 1.000_01);
-    for number in 0..PACES {
-        let gains = &config.paces[number];
+    for number in 0..GAIN_SETS {
+        let gains = &config.gain_sets[number];
         let speed = f64::from(gains.speed_q18_per_s) / two(18);
         near("speed", speed, (quickest / two(number as i32)).max(60.0), 1e-5);
         near("slope", gains.slope_per_s.into(), speed / 3.0, 0.0);

@@ -2,30 +2,26 @@
 //!
 //! A column shows `n = K G / (1 + R_on S)` codes above its undriven level, where S is the sum of the driven row's
 //! conductances and K the front end's codes per siemens. The row's own sum of codes N = K S / (1 + R_on S) therefore
-//! tells the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
+//! gives the sag exactly: 1 + R_on S = 1 / (1 - rho N) with rho = R_on / K. So `m = n / (1 - rho N)` is what the
 //! taxel would show behind a perfect row driver, and m times the taxel's gain, less its tare, is its pressure.
 //!
-//! [`Array::read`] makes all of it in one pass over the frame ([`lanes::portable_pass`] is the arithmetic): every
-//! taxel's pressure, what they add up to, the highest of them, and whether any may be dead or saturated.
+//! [`Array::read`] computes all of it in one pass over the frame ([`lanes::portable_pass`] is the arithmetic): every
+//! taxel's pressure, sum and moments, the highest taxel, and whether any may be dead or saturated.
 
 mod calibration;
-mod curve;
-mod gains;
 mod picture;
-mod row;
-mod suspect;
 mod tare;
-mod touched;
 
-pub use calibration::{Calibration, CalibrationError};
-pub use gains::Gains;
+pub use calibration::{Calibration, CalibrationError, Gains};
 pub use picture::Picture;
 
 use crate::config::Config;
 use crate::frame::{Frame, Shape};
-use lanes::{BOOST_BITS, Codes, GAIN_BITS, Row};
-use row::Sound;
-use touched::Touched;
+use calibration::all;
+use lanes::{
+    BOOST_BITS, Codes, Common, GAIN_BITS, Row, SIGNS, Total, codes_at, each_pair, filled, moment_bits, pairs, sum_drop,
+};
+use tare::Touched;
 
 /// Fractional bits of a corrected code.
 pub const CODE_BITS: u32 = lanes::CODE_BITS;
@@ -106,19 +102,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
         let sound = Sound::new(&frame.codes.undriven, config);
         let total = lanes::pass(&frame.codes, &mut self.rows, &sound.common, &mut self.picture.taxels);
-        let largest = row::larger_lane(total.largest);
+        let largest = larger_lane(total.largest);
         self.picture.peak = total.peak;
         self.picture.undriven_max = sound.undriven_max;
         self.picture.peak_codes = largest.wrapping_add(config.dead_codes);
         let [sum, moment_x, moment_y] = self.tare_sums;
-        let [total_sum, total_x, total_y] = row::sixteenths::<ROWS, COLUMNS>(&total);
+        let [total_sum, total_x, total_y] = sixteenths::<ROWS, COLUMNS>(&total);
         self.picture.sum = total_sum.wrapping_sub(sum);
         self.picture.moment_x = total_x.wrapping_sub(moment_x);
         self.picture.moment_y = total_y.wrapping_sub(moment_y);
         // A tare learns what the taxels read, not what they carry.
         if let Some(curve) = config.curve.filter(|_| self.tare_frames >= Self::TARE_FRAMES) {
             self.baseline_line = self.picture.taxels.get(self.baseline_row).copied();
-            curve::bend(curve, &mut self.picture, &self.rows);
+            picture::bend(curve, &mut self.picture, &self.rows);
         }
         if sound.suspects(largest) {
             self.leave_out(frame, &sound, &before, config);
@@ -140,10 +136,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let Codes { rows, undriven } = &frame.codes;
         let mut highest = 0;
         for (number, ((codes, row), mask)) in rows.iter().zip(&self.rows).zip(&self.mask).enumerate() {
-            if !sound.suspects(row::larger_lane(row.largest)) {
+            if !sound.suspects(larger_lane(row.largest)) {
                 continue;
             }
-            let bad = suspect::bad([codes, undriven], config);
+            let bad = bad_columns([codes, undriven], config);
             if bad != 0 {
                 self.picture.peak_codes = 0;
             }
@@ -175,7 +171,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         let mut count = 0;
         for (codes, mask) in rows.iter().zip(&self.mask) {
             if sound.suspects(sound.largest(codes)) {
-                count += (suspect::bad([codes, undriven], config) & !mask).count_ones();
+                count += (bad_columns([codes, undriven], config) & !mask).count_ones();
             }
         }
         count
@@ -202,4 +198,104 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.touched = Touched::NONE;
         self.start_tare();
     }
+}
+
+/// Bits by which a total is coarser than a row's sum or moment: the upper half of a product with the boost.
+const COARSER: u32 = 32 - BOOST_BITS;
+
+/// A frame's sound codes, between dead and saturated.
+struct Sound<const COLUMNS: usize> {
+    /// For the pass.
+    pub common: Common<COLUMNS>,
+    /// The highest undriven level.
+    pub undriven_max: u16,
+    /// The smallest sum of [`Sound::largest`] and the highest undriven level that may belong to a bad taxel.
+    suspect: u32,
+}
+
+impl<const COLUMNS: usize> Sound<COLUMNS> {
+    /// From the slot with nothing driven.
+    #[inline(always)]
+    pub fn new(undriven: &[u16; COLUMNS], config: &Config) -> Self {
+        let Config { dead_codes, saturated_codes, sag_q32, .. } = *config;
+        let common = Common {
+            undriven: *undriven,
+            dead: lanes::pair(dead_codes as i16, dead_codes as i16),
+            sag: lanes::pair(sag_q32 as i16, sag_q32 as i16),
+        };
+        let suspect = u32::from(saturated_codes) - u32::from(dead_codes);
+        Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
+    }
+
+    /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a
+    /// dead one is huge as an unsigned number.
+    #[inline(always)]
+    pub fn suspects(&self, largest: u16) -> bool {
+        u32::from(largest) + u32::from(self.undriven_max) >= self.suspect
+    }
+
+    /// That of a row.
+    #[inline(always)]
+    pub fn largest(&self, codes: &[u16; COLUMNS]) -> u16 {
+        let Common { undriven, dead, .. } = &self.common;
+        highest::<COLUMNS>(|at| lanes::sub(lanes::sub(codes_at(codes, at), codes_at(undriven, at)), *dead))
+    }
+}
+
+/// The highest of all lanes of a row, unsigned.
+#[inline(always)]
+fn highest<const COLUMNS: usize>(of: impl Fn(usize) -> u32) -> u16 {
+    let mut most = 0;
+    each_pair::<COLUMNS>(|at| {
+        let pair = filled::<COLUMNS>(of(at), at);
+        most = if at == 0 { pair } else { lanes::larger(pair, most) };
+    });
+    larger_lane(most)
+}
+
+/// The larger of two lanes, unsigned.
+#[inline(always)]
+const fn larger_lane(pair: u32) -> u16 {
+    let (low, high) = (pair as u16, (pair >> 16) as u16);
+    if low > high { low } else { high }
+}
+
+/// Sum and moments of a pass in sixteenths, rounded.
+#[inline(always)]
+fn sixteenths<const ROWS: usize, const COLUMNS: usize>(total: &Total) -> [i32; 3] {
+    let sum_bits = const { GAIN_BITS - COARSER - sum_drop(ROWS, COLUMNS) };
+    let rounded = |value: i32, bits: u32| (value >> (bits - CODE_BITS - 1)).wrapping_add(1) >> 1;
+    // Row n of ten was in the sum 10 - n times: 11 less twice that is its weight. It may wrap, what is made of it fits.
+    let moment_y = (total.first >> 2).wrapping_mul(ROWS as i32 + 1).wrapping_sub(total.running.wrapping_mul(2));
+    [
+        rounded(total.first, sum_bits),
+        rounded(total.second, const { moment_bits(COLUMNS) - COARSER }),
+        rounded(moment_y, sum_bits - 2),
+    ]
+}
+
+/// Twice a place's distance from the middle of so many, in pitches.
+#[inline(always)]
+const fn weight(place: usize, of: usize) -> i32 {
+    2 * place as i32 + 1 - of as i32
+}
+
+/// A bit for each column of a row that is dead or saturated. Any codes and levels are taken.
+#[cold]
+#[inline(never)]
+fn bad_columns<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], config: &Config) -> u32 {
+    let both = |codes: u16| lanes::pair(codes as i16, codes as i16);
+    let (dead, sound) = (both(config.dead_codes), both(config.saturated_codes - 1));
+    let mut bad = 0;
+    each_pair::<COLUMNS>(|at| {
+        let (code, undriven) = (codes_at(codes, at), codes_at(undriven, at));
+        let net = lanes::sub(code, undriven);
+        // The sign of each lane tells whether its taxel is bad; those of the first place are shifted most.
+        bad = bad >> 1 | (lanes::sub(net, dead) | lanes::sub(sound, code)) & SIGNS;
+    });
+    let half = pairs(COLUMNS);
+    let first = bad >> (16 - half) & all(half);
+    let second = bad >> (32 - half);
+    // An odd row's last pair has one column only.
+    (first | second << half) & all(COLUMNS)
 }

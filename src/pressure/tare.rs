@@ -1,6 +1,16 @@
 //! The reading without contact: measured at once by a tare, followed slowly by the baseline.
+//!
+//! # Touch during a tare
+//!
+//! A contact is a patch: some rows carry more than the rest. Gains, preload and amplifiers differ from taxel to taxel, so
+//! their differences average out over a row, where a contact adds up. The row that carries most is compared with the row
+//! that carries least.
+//!
+//! Compared with a clean tare before, it must carry more by half of what begins a contact. Without a clean tare only the
+//! shape is known, and preload may be uneven: then it must also carry half as much again as the other row.
 
-use super::{Array, CODE_BITS, Picture, TARE_BITS, row};
+use super::{Array, CODE_BITS, Picture, TARE_BITS};
+use crate::config::Config;
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     /// Frames of a tare: of ten rows 160, 16 ms at 10 kHz.
@@ -68,14 +78,64 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             *tare = tare.wrapping_add(((i64::from(*value) * i64::from(weight)) >> CODE_BITS) as i32);
             let tare = *tare >> (TARE_BITS - CODE_BITS);
             sum += tare;
-            moment += tare * row::weight(column, COLUMNS);
+            moment += tare * super::weight(column, COLUMNS);
         }
         let [line, line_x] = &mut self.tare_lines[row];
         let more = sum - *line;
         let [all, all_x, all_y] = &mut self.tare_sums;
         *all = all.wrapping_add(more);
         *all_x = all_x.wrapping_add(moment - *line_x);
-        *all_y = all_y.wrapping_add(more * row::weight(row, ROWS));
+        *all_y = all_y.wrapping_add(more * super::weight(row, ROWS));
         (*line, *line_x) = (sum, moment);
+    }
+}
+
+/// What each row would carry if all of its taxels were good, in sixteenths of a corrected code; none where too few are.
+type Lines<const ROWS: usize> = [Option<i32>; ROWS];
+
+/// What a tare says of a contact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Touched<const ROWS: usize> {
+    /// Something touched during the last tare.
+    pub flag: bool,
+    /// The last tare without a contact.
+    clean: Option<Lines<ROWS>>,
+}
+
+impl<const ROWS: usize> Touched<ROWS> {
+    /// Nothing known.
+    pub const NONE: Self = Self { flag: false, clean: None };
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
+    /// A row tells what a taxel usually carries where at least so many of its taxels are good: half of them.
+    const ROW_LEAST: u32 = COLUMNS as u32 / 2;
+
+    /// Whether something seems to have touched the tip during the last tare that was judged.
+    pub fn tared_touching(&self) -> bool {
+        self.touched.flag
+    }
+
+    /// Judges the tare that was just completed.
+    #[inline(never)]
+    pub fn judge_tare(&mut self, config: &Config) {
+        let mut now: Lines<ROWS> = [None; ROWS];
+        for ((now, [line, _]), bad) in now.iter_mut().zip(self.tare_lines).zip(self.picture.bad) {
+            let good = (COLUMNS as u32).saturating_sub(bad.count_ones());
+            *now = (good >= Self::ROW_LEAST).then(|| line.wrapping_mul(COLUMNS as i32) / good.max(1).cast_signed());
+        }
+        let clean = self.touched.clean.unwrap_or([Some(0); ROWS]);
+        let (mut most, mut least) = (i32::MIN, i32::MAX);
+        for (now, clean) in now.into_iter().zip(clean) {
+            if let (Some(now), Some(clean)) = (now, clean) {
+                let more = now.saturating_sub(clean);
+                (most, least) = (most.max(more), least.min(more));
+            }
+        }
+        let uneven = if self.touched.clean.is_some() { 0 } else { least / 2 };
+        self.touched.flag = most > least && most.saturating_sub(least) > config.touch_line.max(uneven);
+        if !self.touched.flag {
+            self.touched.clean = Some(now);
+        }
     }
 }

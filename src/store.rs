@@ -16,21 +16,15 @@
 //! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it
 //! counts, and [`Loaded::sound`] says that something was lost.
 
-mod format;
 mod journal;
-mod names;
-mod taken;
 
-use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
-
-use crate::contact::FitLevel;
-use crate::params::Params;
-use crate::pressure::Gains;
-
-pub use format::{SLOT_BYTES, words};
 pub use journal::{Flash, Journal, Loaded, SaveError, Sector};
-pub use names::{gains_number, number};
-pub use taken::{Remark, settle};
+
+use crate::config::ConfigError;
+use crate::contact::FitLevel;
+use crate::params::{ParamError, Params};
+use crate::pressure::Gains;
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 
 /// The largest ID of a device on the bus.
 pub const ID_MAX: u8 = 252;
@@ -100,4 +94,306 @@ impl<const ROWS: usize, const COLUMNS: usize> Default for Record<ROWS, COLUMNS> 
     fn default() -> Self {
         Self::DEFAULT
     }
+}
+
+/// Values that stand before the parameters.
+const HEAD_COUNT: usize = 4;
+/// How many values this firmware has without the gains.
+const COUNT: usize = HEAD_COUNT + Params::COUNT;
+
+/// Name, least and largest value of those before the parameters. The names are stored: they stay.
+const HEAD: [(&str, i32, i32); HEAD_COUNT] = [
+    ("id", 0, ID_MAX as i32),
+    ("baud_code", 0, BAUD_RATES.len() as i32 - 1),
+    ("return_delay_2us", 0, 254),
+    ("fit_level", 0, FitLevel::AllRows as i32),
+];
+
+/// The number under which a value is stored: the CRC-32 (ISO-HDLC) of its name.
+pub const fn number(name: &str) -> u32 {
+    CRC.checksum(name.as_bytes())
+}
+
+/// The numbers of this firmware's values, in order.
+static NUMBERS: [u32; COUNT] = numbers();
+
+const fn numbers() -> [u32; COUNT] {
+    let mut numbers = [0; COUNT];
+    let mut place = 0;
+    while place < COUNT {
+        let name = if place < HEAD_COUNT { HEAD[place].0 } else { Params::RANGES[place - HEAD_COUNT].0 };
+        numbers[place] = number(name);
+        place += 1;
+    }
+    numbers
+}
+
+/// The number under which an array's first two gains are stored; the next two are stored under the next one. Of another
+/// array's it is another.
+pub const fn gains_number(rows: usize, columns: usize) -> u32 {
+    let shape =
+        [b'0' + rows as u8 / 10, b'0' + rows as u8 % 10, b'x', b'0' + columns as u8 / 10, b'0' + columns as u8 % 10];
+    let mut digest = CRC.digest();
+    digest.update(b"gains_");
+    digest.update(&shape);
+    digest.finalize()
+}
+
+/// Whether no other value is stored under the numbers of an array's gains.
+const fn gains_stand_apart(rows: usize, columns: usize) -> bool {
+    let numbers = numbers();
+    let mut place = 0;
+    while place < COUNT {
+        if (numbers[place].wrapping_sub(gains_number(rows, columns)) as usize) < rows * columns {
+            return false;
+        }
+        place += 1;
+    }
+    true
+}
+
+const _: () = {
+    let numbers = numbers();
+    let mut one = 0;
+    while one < COUNT {
+        let mut other = 0;
+        while other < one {
+            assert!(numbers[one] != numbers[other], "two names have the same number: rename one");
+            other += 1;
+        }
+        one += 1;
+    }
+};
+
+/// Name, least and largest value, in order.
+fn ranges() -> impl Iterator<Item = (&'static str, i32, i32)> {
+    HEAD.into_iter().chain(Params::RANGES.iter().map(|(name, _, min, max)| (*name, *min, *max)))
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
+    /// The values in order, without the gains.
+    fn values(&self) -> [i32; COUNT] {
+        let head = [self.id, self.baud_code, self.return_delay_2us, self.fit_level as u8];
+        let mut values = [0; COUNT];
+        let all = head.into_iter().map(i32::from).chain(self.params.to_array());
+        for (place, value) in values.iter_mut().zip(all) {
+            *place = value;
+        }
+        values
+    }
+
+    /// The inverse, for values in their ranges; gains of 1.
+    fn from_values(values: &[i32; COUNT]) -> Self {
+        let [id, baud_code, return_delay_2us, fit_level, rest @ ..] = values;
+        let [id, baud_code, return_delay_2us, fit_level] =
+            [id, baud_code, return_delay_2us, fit_level].map(|value| *value as u8);
+        Self {
+            id,
+            baud_code,
+            return_delay_2us,
+            fit_level: FitLevel::from_number(fit_level),
+            params: Params::from_array(rest),
+            gains: Gains::ONE,
+        }
+    }
+}
+
+/// What is to be told of a start.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Remark {
+    /// There is no whole record, but the flash is not blank: the defaults count. It is a fault.
+    NoneWhole,
+    /// What was written after the newest whole record is damaged, most likely cut short: the values before it count. It
+    /// is a fault.
+    Torn,
+    /// A value is out of its range: its default counts. It is a fault.
+    Refused(ParamError),
+    /// Another firmware had a value whose name this one does not know.
+    Unknown {
+        /// The number of its name.
+        number: u32,
+        /// The value.
+        value: i32,
+    },
+    /// The record has no such value: its default counts.
+    New(&'static str),
+}
+
+/// The values that this firmware knows, and whether all of those were taken.
+///
+/// Gains are taken all or not at all.
+#[inline(never)]
+fn take<const ROWS: usize, const COLUMNS: usize>(
+    found: &Found<'_>,
+    mut tell: impl FnMut(Remark),
+) -> (Record<ROWS, COLUMNS>, bool) {
+    let mut values = Record::<ROWS, COLUMNS>::DEFAULT.values();
+    let mut sound = true;
+    let (mut gains, mut taken) = (Gains::ONE, 0);
+    let first = const { gains_number(ROWS, COLUMNS) };
+    for (number, value) in found.values() {
+        let word = number.wrapping_sub(first) as usize;
+        if word < Gains::<ROWS, COLUMNS>::WORDS {
+            taken += usize::from(gains.set_word(word, value.cast_unsigned()));
+            continue;
+        }
+        let mut known = values.iter_mut().zip(ranges()).zip(&NUMBERS);
+        match known.find(|(_, own)| **own == number) {
+            None => tell(Remark::Unknown { number, value }),
+            Some(((place, (_, min, max)), _)) if (min..=max).contains(&value) => *place = value,
+            Some(((_, (name, min, max)), _)) => {
+                sound = false;
+                tell(Remark::Refused(ParamError { name, value, min, max }));
+            }
+        }
+    }
+    for ((name, ..), own) in ranges().zip(&NUMBERS) {
+        if !found.values().any(|(number, _)| number == *own) {
+            tell(Remark::New(name));
+        }
+    }
+    let mut record = Record::from_values(&values);
+    if taken == Gains::<ROWS, COLUMNS>::WORDS {
+        record.gains = gains;
+    } else if found.values().any(|(number, _)| (number.wrapping_sub(first) as usize) < Gains::<ROWS, COLUMNS>::WORDS) {
+        sound = false;
+        let [min, max] = [Gains::<ROWS, COLUMNS>::MIN, Gains::<ROWS, COLUMNS>::MAX].map(i32::from);
+        tell(Remark::Refused(ParamError { name: "gains", value: taken as i32, min, max }));
+    }
+    (record, sound)
+}
+
+/// Makes something of the parameters; those that contradict each other go back to their defaults, and `tell` hears why.
+///
+/// None where even the defaults make nothing.
+pub fn settle<T>(
+    params: &mut Params,
+    mut make: impl FnMut(&Params) -> Result<T, ConfigError>,
+    mut tell: impl FnMut(ConfigError),
+) -> Option<T> {
+    // Each round but the last puts one back at the least.
+    for _ in 0..=Params::COUNT {
+        match make(params) {
+            Ok(made) => return Some(made),
+            Err(error) => {
+                tell(error);
+                give_up(params, error);
+            }
+        }
+    }
+    None
+}
+
+/// Puts what the error names back to its default, and everything where that is no change.
+#[inline(never)]
+fn give_up(params: &mut Params, error: ConfigError) {
+    let names = match error {
+        ConfigError::Param(error) => [error.name; 2],
+        ConfigError::Scan(_) => ["settle_ns", "sample_cycles"],
+        ConfigError::Order([(low, _), (high, _)]) => [low, high],
+        ConfigError::Seen { .. } => ["codes_per_kpa_milli", "contact_on_mn"],
+        ConfigError::Supply(..) => ["voltage_max_mv", "supply_min_mv"],
+    };
+    let mut values = params.to_array();
+    let mut changed = false;
+    for (value, (name, default, ..)) in values.iter_mut().zip(&Params::RANGES) {
+        if names.contains(name) {
+            changed |= *value != *default;
+            *value = *default;
+        }
+    }
+    *params = if changed { Params::from_array(&values) } else { Params::DEFAULT };
+}
+
+const MAGIC: [u8; 4] = *b"FTPR";
+const HEADER_BYTES: usize = 12;
+/// More values than this no firmware writes.
+const VALUES_MAX: usize = 512;
+/// What flash reads after an erase.
+const BLANK: u8 = 0xFF;
+/// Where records may begin: every so many bytes.
+const GRID: usize = 16;
+
+/// From a record of this firmware whose gains are all 1 to the next one.
+pub const SLOT_BYTES: usize = slot_bytes(COUNT);
+
+/// From a record of so many values to the next one.
+const fn slot_bytes(count: usize) -> usize {
+    (HEADER_BYTES + 8 * count + 4).next_multiple_of(GRID)
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
+    /// From the longest record of this array to the next one.
+    pub const SLOT_MAX: usize = {
+        assert!(gains_stand_apart(ROWS, COLUMNS), "the gains' numbers are those of other values: rename one");
+        slot_bytes(COUNT + Gains::<ROWS, COLUMNS>::WORDS)
+    };
+
+    fn stored_gains(&self) -> usize {
+        if self.gains == Gains::ONE { 0 } else { Gains::<ROWS, COLUMNS>::WORDS }
+    }
+
+    /// From this record to the next one.
+    pub fn slot_bytes(&self) -> usize {
+        slot_bytes(COUNT + self.stored_gains())
+    }
+}
+
+/// A record as it is written to flash, word by word, up to where the next one may begin.
+pub fn words<const ROWS: usize, const COLUMNS: usize>(
+    record: &Record<ROWS, COLUMNS>,
+    sequence: u32,
+) -> impl Iterator<Item = u32> {
+    let (gains, length) = (record.stored_gains(), record.slot_bytes() / 4);
+    let header = [u32::from_le_bytes(MAGIC), sequence, (COUNT + gains) as u32];
+    let values = NUMBERS.iter().zip(record.values()).flat_map(|(number, value)| [*number, value as u32]);
+    let first = const { gains_number(ROWS, COLUMNS) };
+    let gains = (0..gains).flat_map(move |word| [first.wrapping_add(word as u32), record.gains.word(word)]);
+    let body = header.into_iter().chain(values).chain(gains);
+    let mut check = CRC.digest();
+    body.clone().for_each(|word| check.update(&word.to_le_bytes()));
+    body.chain([check.finalize()]).chain(core::iter::repeat(u32::from_le_bytes([BLANK; 4]))).take(length)
+}
+
+/// A whole record in flash.
+#[derive(Clone, Copy)]
+struct Found<'a> {
+    /// Number of the record: each is one more than the one before.
+    pub sequence: u32,
+    /// From its start to where the next may begin.
+    pub bytes: usize,
+    values: &'a [[u8; 8]],
+}
+
+impl Found<'_> {
+    /// Numbers and values.
+    pub fn values(&self) -> impl Iterator<Item = (u32, i32)> {
+        self.values
+            .iter()
+            .map(|&[a, b, c, d, e, f, g, h]| (u32::from_le_bytes([a, b, c, d]), i32::from_le_bytes([e, f, g, h])))
+    }
+}
+
+/// The record that begins here, if one does and is whole.
+fn read_record(bytes: &[u8]) -> Option<Found<'_>> {
+    let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
+    let [magic, sequence, count] = *header.as_chunks().0 else { return None };
+    let count = u32::from_le_bytes(count) as usize;
+    if magic != MAGIC || count > VALUES_MAX {
+        return None;
+    }
+    let (values, check) = rest.split_at_checked(8 * count)?;
+    let body = bytes.get(..HEADER_BYTES + values.len())?;
+    let whole = check.first_chunk() == Some(&CRC.checksum(body).to_le_bytes());
+    let values = values.as_chunks().0;
+    whole.then_some(Found { sequence: u32::from_le_bytes(sequence), bytes: slot_bytes(count), values })
+}
+
+/// Where the last thing in the sector ends: all behind it is blank.
+fn end_of_records(sector: &[u8]) -> usize {
+    let used = sector.chunks_exact(GRID).rposition(|chunk| {
+        let (words, _) = chunk.as_chunks::<4>();
+        words.iter().any(|word| *word != [BLANK; 4])
+    });
+    used.map_or(0, |place| (place + 1) * GRID)
 }

@@ -8,8 +8,7 @@
 //!   sector where the newest one's is full: each start says so until the next save, which goes behind that. An erase
 //!   that was cut short at such a time looks the same, and is told too.
 
-use super::format::{self, Found, GRID, words};
-use super::{Record, Remark, taken};
+use super::{BLANK, Found, GRID, Record, Remark, end_of_records, read_record, take, words};
 
 /// One of the two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +102,7 @@ impl Journal {
     ) -> Loaded<ROWS, COLUMNS> {
         let [own, other] = self.stands;
         let bytes = flash.bytes(self.current);
-        let found = own.newest.and_then(|whole| Some((whole, format::read(bytes.get(whole.start..)?)?)));
+        let found = own.newest.and_then(|whole| Some((whole, read_record(bytes.get(whole.start..)?)?)));
         let Some((whole, found)) = found else {
             let blank = own.end == 0 && other.end == 0;
             if !blank {
@@ -118,7 +117,7 @@ impl Journal {
         if torn {
             tell(Remark::Torn);
         }
-        let (record, taken) = taken::take(&found, tell);
+        let (record, taken) = take(&found, tell);
         Loaded { record, sound: taken && !torn }
     }
 
@@ -188,7 +187,7 @@ fn write<F: Flash, W: Iterator<Item = u32>>(
 ) -> Result<(), SaveError<F::Error>> {
     for (place, word) in words().enumerate() {
         between();
-        if word.to_le_bytes() != [format::BLANK; 4] {
+        if word.to_le_bytes() != [BLANK; 4] {
             flash.program(sector, start + 4 * place, word).map_err(SaveError::Flash)?;
         }
     }
@@ -216,9 +215,9 @@ struct Whole {
 
 impl Stand {
     fn of(sector: &[u8]) -> Self {
-        let end = format::end(sector);
+        let end = end_of_records(sector);
         let newest = (0..end / GRID).rev().map(|place| place * GRID).find_map(|start| {
-            let Found { sequence, bytes, .. } = format::read(sector.get(start..)?)?;
+            let Found { sequence, bytes, .. } = read_record(sector.get(start..)?)?;
             Some(Whole { start, end: start + bytes, sequence })
         });
         Self { end: newest.map_or(end, |newest| newest.end.max(end)), newest }

@@ -30,18 +30,14 @@
 //! | Control Table Backup | `01 "CTRL"` is `save_parameters`; there is no older backup to restore (`02 "CTRL"`): range error |
 //! | Factory Reset, Reboot | as the protocol has them; Factory Reset needs torque off and saves |
 
-pub mod crc;
 pub mod packet;
-pub mod receiver;
-pub mod sender;
 pub mod server;
 pub mod settings;
 pub mod snapshot;
 mod stand;
 pub mod table;
-mod turn;
 
-pub use sender::{REPLY_MAX, Reply};
+pub use packet::{REPLY_MAX, Reply};
 pub use server::Server;
 pub use settings::{Actions, Settings};
 pub use snapshot::{Captured, Crash, CrashCause, Health, ResetCause, Snapshot};

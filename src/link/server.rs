@@ -10,13 +10,12 @@ use crate::scan::Clocks;
 use crate::store::Record;
 use crate::units::Newtons;
 
-use super::packet::StatusError;
-use super::receiver::{Event, Receiver};
-use super::sender::Reply;
+use super::packet::{Event, Receiver, Reply, StatusError};
+
 use super::settings::{Actions, Saved, Settings};
 use super::snapshot::Snapshot;
 use super::stand::Stand;
-use super::turn::Turn;
+use answer::Turn;
 
 /// The longest Reg Write: all gains of 10 x 10 taxels at once.
 pub const REG_WRITE_MAX: usize = 200;
@@ -55,7 +54,7 @@ struct Registered {
 
 /// What the device knows.
 #[derive(Clone, Debug)]
-pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
+pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub counters: Counters,
     registered: Option<Registered>,
@@ -97,13 +96,13 @@ pub(super) struct State<const ROWS: usize, const COLUMNS: usize> {
 #[derive(Clone, Debug)]
 pub struct Server<const ROWS: usize, const COLUMNS: usize> {
     receiver: Receiver,
-    state: State<ROWS, COLUMNS>,
+    state: Device<ROWS, COLUMNS>,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     /// A device with these stored settings, torque off; it judges new ones by the board's clocks.
     pub fn new(record: Record<ROWS, COLUMNS>, clocks: &'static Clocks) -> Self {
-        let state = State {
+        let state = Device {
             settings: Settings::new(record),
             counters: Counters::default(),
             registered: None,
@@ -193,7 +192,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
     }
 }
 
-impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
     /// Whether a Reg Write waits.
     pub fn registered(&self) -> bool {
         self.registered.is_some()

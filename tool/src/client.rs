@@ -4,9 +4,7 @@ use crate::error::Error;
 use crate::line::Line;
 use crate::table::{self, Value};
 use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, Packet, instruction};
-use fingertip::link::receiver::{Event, Receiver};
-use fingertip::link::sender::Sender;
+use fingertip::link::packet::{BROADCAST, Event, Packet, Receiver, Sender, instruction};
 use fingertip::link::table::Register;
 use std::time::{Duration, Instant};
 

@@ -2,8 +2,7 @@
 
 use fingertip::link::Reply;
 use fingertip::link::packet::instruction::{READ, REBOOT, SYNC_READ, WRITE};
-use fingertip::link::receiver::{Event, Receiver};
-use fingertip::link::sender::Sender;
+use fingertip::link::packet::{Event, Receiver, Sender};
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Mode};
 use sim::effects::set::Named;

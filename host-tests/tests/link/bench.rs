@@ -2,15 +2,12 @@
 
 use fingertip::capture::Standing;
 use fingertip::command::Command;
-use fingertip::link::packet::{Packet, StatusError};
-use fingertip::link::receiver::{Event, Receiver};
-use fingertip::link::sender::Sender;
+use fingertip::link::packet::{Event, Packet, Receiver, Sender, StatusError};
 use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taken, Taring};
 use fingertip::pressure::TARE_BITS;
-use fingertip::shipped::Record;
-use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, SLOTS, Server, Snapshot};
+use fingertip::shipped::{CLOCKS, COLUMNS, Frame, ROWS, Record, SLOTS, Server, Snapshot};
 use fingertip::state::{Fault, Mode};
 
 /// The ID of the device under test.

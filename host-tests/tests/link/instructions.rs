@@ -3,9 +3,7 @@
 use fingertip::contact::FitLevel;
 use fingertip::link::Actions;
 use fingertip::params::Params;
-use fingertip::shipped::Record;
-use fingertip::shipped::Settings;
-use fingertip::shipped::address;
+use fingertip::shipped::{Record, Settings, address};
 
 use crate::bench::{Answer, Bench, ID, hex, packet};
 
@@ -143,7 +141,7 @@ fn a_packet_too_long_to_keep_is_refused() {
     // 400 parameters and their CRC, put together by hand.
     let mut bytes = hex("FF FF FD 00 01 93 01 03");
     bytes.extend([0; 400]);
-    let crc = fingertip::link::crc::update(0, &bytes);
+    let crc = fingertip::link::packet::update_crc(0, &bytes);
     bytes.extend(crc.to_le_bytes());
     let replies = bench.hear(&bytes);
     assert_eq!(replies.iter().map(|reply| reply[8]).collect::<Vec<_>>(), [5]);

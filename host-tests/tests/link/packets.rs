@@ -1,7 +1,6 @@
 //! Packets on the wire: the examples that the protocol's manual prints, stuffing, and any slicing of any bytes.
 
-use fingertip::link::crc;
-use fingertip::link::receiver::{Event, LENGTH_MAX, Receiver};
+use fingertip::link::packet::{CRC_START, Event, LENGTH_MAX, Receiver, update_crc};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -32,7 +31,7 @@ fn published_packets_are_understood_and_made_alike() {
     for text in PUBLISHED {
         let bytes = hex(text);
         let (body, crc) = bytes.split_at(bytes.len() - 2);
-        assert_eq!(crc::update(crc::START, body).to_le_bytes(), crc, "{text}");
+        assert_eq!(update_crc(CRC_START, body).to_le_bytes(), crc, "{text}");
         let expected = (bytes[4], bytes[7], body[8..].to_vec());
         let (packets, events) = receive(&mut Receiver::new(), &bytes);
         assert_eq!((packets, events), (vec![expected], vec![]), "{text}");

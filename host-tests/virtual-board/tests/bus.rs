@@ -8,8 +8,7 @@ use crate::common::{
 };
 use dynamixel2::{ReadError, TransferError};
 use fingertip::link::Reply;
-use fingertip::link::crc;
-use fingertip::link::sender::Sender;
+use fingertip::link::packet::{CRC_START, Sender, update_crc};
 use fingertip::params::Params;
 use fingertip::shipped::{CLOCKS, Config, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
@@ -135,7 +134,7 @@ fn fast_bulk_read_is_answered_in_one_packet() {
     let wire: Vec<u8> = rig.take_received().expect("it runs").iter().map(|timed| timed.byte).collect();
     assert_eq!(wire[..10], [0xFF, 0xFF, 0xFD, 0, 0xFE, 67, 0, 0x55, 0, 1]);
     let (body, checksum) = wire.split_at(wire.len() - 2);
-    assert_eq!((wire.len(), checksum), (74, &crc::update(crc::START, body).to_le_bytes()[..]));
+    assert_eq!((wire.len(), checksum), (74, &update_crc(CRC_START, body).to_le_bytes()[..]));
     assert_eq!(body[10], Mode::Force as u8);
 }
 

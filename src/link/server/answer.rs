@@ -1,13 +1,13 @@
-//! Replies: whether, when and with what.
+//! Replies: whether, when and with what; and whose turn it is after a Sync Read, a Bulk Read, and the fast kinds of both.
+//!
+//! The devices answer in the order of the list. Each waits for the one before it by listening to the bus.
 
-use crate::link::crc;
-use crate::link::packet::{Packet, StatusError, instruction};
-use crate::link::sender::{REPLY_MAX, Reply, Sender, error_byte};
+use super::Device;
+use crate::link::packet::{
+    BROADCAST, CRC_START, HEADER, Packet, REPLY_MAX, Reply, Sender, StatusError, error_byte, instruction, update_crc,
+};
 use crate::link::snapshot::Snapshot;
 use crate::link::table::{self, READ_MAX, View};
-use crate::link::turn::{Request, Shared, Turn};
-
-use super::State;
 
 /// Who makes a pause as long as this in a packet that the devices share, at the slowest speed too, sends it no further:
 /// what comes then is another's.
@@ -16,7 +16,7 @@ const SILENCE_MS: u32 = 5;
 // The largest part of a shared packet, its beginning included, fits into a reply.
 const _: () = assert!(8 + 2 + READ_MAX as usize + 2 <= REPLY_MAX);
 
-impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
     /// Answers an instruction that returns no data, under the ID and the status return level that it found: it may have
     /// changed them.
     pub(super) fn answer(&mut self, id: u8, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
@@ -70,7 +70,7 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
             Ok(_) => table::read(View { state: self, snapshot }, request.address, request.length, &mut put),
             Err(_) => (0..request.length).for_each(|_| put(0)),
         }
-        for byte in crc::update(shared.crc, reply).to_le_bytes() {
+        for byte in update_crc(shared.crc, reply).to_le_bytes() {
             reply.push(byte).ok();
         }
     }
@@ -115,4 +115,91 @@ impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
 
 fn checked<const ROWS: usize, const COLUMNS: usize>(request: Request) -> Result<Request, StatusError> {
     table::check_read::<ROWS, COLUMNS>(request.address, request.length).map(|()| request)
+}
+
+/// Bytes of the reply to a fast read before the first device's part.
+const FAST_HEAD: usize = 8;
+/// Bytes that each device adds to its data: error, ID and CRC.
+const FAST_EXTRA: u16 = 4;
+
+/// What was asked of this device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request {
+    pub address: u16,
+    pub length: u16,
+}
+
+/// What this device waits for before it answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turn {
+    /// Nothing is asked.
+    None,
+    /// The status packet of this device.
+    After(u8, Request),
+    /// This much more of the packet that the devices share.
+    Shared(Shared, Request),
+}
+
+/// Follows the packet that the devices share, byte by byte: its data is not stuffed, unlike that of other packets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shared {
+    /// The packet's length field.
+    length: u16,
+    heard: u16,
+    /// How much the devices before this one send, the packet's beginning included; nothing for the first.
+    ahead: u16,
+    /// Of all that was heard.
+    pub crc: u16,
+}
+
+impl Shared {
+    /// For the device at `place` of those that send so many bytes of data each; none where the packet were too long.
+    pub fn new(place: usize, lengths: impl Iterator<Item = u16>) -> Option<Self> {
+        let (mut whole, mut ahead) = (1_u16, 0);
+        for (other, length) in lengths.enumerate() {
+            if other == place && place > 0 {
+                // The packet's length leaves out all before the instruction, the head does not.
+                ahead = whole.checked_add(FAST_HEAD as u16 - 1)?;
+            }
+            whole = whole.checked_add(length.checked_add(FAST_EXTRA)?)?;
+        }
+        Some(Self { length: whole, heard: 0, ahead, crc: CRC_START })
+    }
+
+    /// How the packet begins.
+    fn head(&self) -> [u8; FAST_HEAD] {
+        let [low, high] = self.length.to_le_bytes();
+        let [a, b, c, d] = HEADER;
+        [a, b, c, d, BROADCAST, low, high, instruction::STATUS]
+    }
+
+    /// Whether this device begins the packet.
+    pub fn first(&self) -> bool {
+        self.ahead == 0
+    }
+
+    /// What this device sends before its part: the packet's beginning, where it is the first.
+    pub fn opening(&self) -> impl Iterator<Item = u8> {
+        self.head().into_iter().take(if self.first() { FAST_HEAD } else { 0 })
+    }
+
+    /// Takes a byte of the bus; false where it does not belong to the packet.
+    pub fn hear(&mut self, byte: u8) -> bool {
+        let fits = self.head().get(usize::from(self.heard)).is_none_or(|&expected| expected == byte);
+        self.heard = self.heard.saturating_add(1);
+        self.crc = update_crc(self.crc, &[byte]);
+        fits
+    }
+
+    /// How much of the packet comes behind this device's part, which has so many bytes of data.
+    pub fn behind(&self, length: u16) -> u16 {
+        // The length leaves out the seven bytes before the instruction.
+        let own = self.ahead.max(FAST_HEAD as u16).saturating_add(length).saturating_add(FAST_EXTRA);
+        self.length.saturating_add(FAST_HEAD as u16 - 1).saturating_sub(own)
+    }
+
+    /// Whether all that comes before this device's part was heard.
+    pub fn due(&self) -> bool {
+        self.heard >= self.ahead
+    }
 }

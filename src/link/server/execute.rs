@@ -2,15 +2,16 @@
 
 use heapless::Vec;
 
-use crate::link::packet::{BROADCAST, Packet, StatusError, instruction};
-use crate::link::sender::{Reply, Sender};
+use crate::link::packet::{BROADCAST, Packet, Reply, Sender, StatusError, instruction};
+
 use crate::link::settings::Saved;
 use crate::link::snapshot::Snapshot;
 use crate::link::table::{self, Staged, View, address};
-use crate::link::turn::{Request, Shared, Turn};
+
 use crate::store::Record;
 
-use super::{Registered, State};
+use super::answer::{Request, Shared, Turn};
+use super::{Device, Registered};
 
 /// Bytes of the longest status packet to a Ping, 10 bits each: what a device with a higher ID waits for.
 const PING_SLOT_BITS: u32 = 14 * 10;
@@ -19,7 +20,7 @@ const CLEAR_FAULT: [u8; 5] = [0x02, b'E', b'R', b'C', b'L'];
 /// Control Table Backup: store.
 const STORE: [u8; 5] = [0x01, b'C', b'T', b'R', b'L'];
 
-impl<const ROWS: usize, const COLUMNS: usize> State<ROWS, COLUMNS> {
+impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
     /// A whole packet with a good CRC.
     pub(super) fn packet(&mut self, packet: Packet<'_>, snapshot: &Snapshot<'_, ROWS, COLUMNS>, reply: &mut Reply) {
         if packet.instruction == instruction::STATUS {

@@ -2,7 +2,7 @@
 
 use crate::capture;
 use crate::link::packet::StatusError;
-use crate::link::server::{Counters, State};
+use crate::link::server::{Counters, Device};
 use crate::link::settings::Settings;
 use crate::link::snapshot::Snapshot;
 use crate::link::stand::Stand;
@@ -16,7 +16,7 @@ use super::{Cell, param_place, registers};
 /// What a read sees.
 #[derive(Clone, Copy)]
 pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    pub state: &'a State<ROWS, COLUMNS>,
+    pub state: &'a Device<ROWS, COLUMNS>,
     pub snapshot: &'a Snapshot<'a, ROWS, COLUMNS>,
 }
 

@@ -1,6 +1,6 @@
 //! Reads bits, and the numbers that a capture folds into them.
 
-use fingertip::capture::{ESCAPE, digest};
+use fingertip::capture::{ESCAPE, digest_words};
 
 /// Reads the bits of a capture's frames.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ pub fn check(bytes: &[u8], bits: u32) -> u32 {
         word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
         u32::from_le_bytes(word)
     });
-    digest::words(0, words)
+    digest_words(0, words)
 }
 
 /// Undoes the folding of a difference of 16 bits.

@@ -7,7 +7,7 @@ mod head;
 
 pub use frames::{Frames, Refusal, Taken};
 
-use fingertip::capture::{Head, digest};
+use fingertip::capture::{Head, digest_step, digest_words, short_digest};
 use fingertip::config::Shaped;
 use fingertip::control::Winding;
 use fingertip::pipeline::{Pipeline, Status};
@@ -91,19 +91,19 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
     for (frame, taken) in (0..).zip(frames) {
         let taken = taken?;
         let (duty, status) = pipeline.step(&taken.frame, &taken.sense, &taken.command);
-        running = digest::add(running, duty, status);
+        running = digest_step(running, duty, status);
         let fields = [
             (Field::Duty, i64::from(taken.duty.0), i64::from(duty.0)),
             (Field::Mode, taken.mode.into(), status.mode as i64),
             (Field::Fault, taken.fault.into(), status.fault.map_or(0, |fault| fault as i64)),
-            (Field::Digest, taken.digest.into(), digest::short(running).into()),
+            (Field::Digest, taken.digest.into(), short_digest(running).into()),
         ];
         let first = fields.into_iter().find(|(_, captured, replayed)| captured != replayed);
         difference =
             difference.or(first.map(|(field, captured, replayed)| Difference { frame, field, captured, replayed }));
         each(&taken, status);
     }
-    let running = digest::words(running, std::iter::once(head.ended as u32));
+    let running = digest_words(running, std::iter::once(head.ended as u32));
     if running != head.digest && difference.is_none() {
         let frame = head.frames.saturating_sub(1);
         let [captured, replayed] = [head.digest, running].map(i64::from);

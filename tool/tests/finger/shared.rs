@@ -2,8 +2,7 @@
 
 use crate::served::Served;
 use fingertip::link::Reply;
-use fingertip::link::packet::{BROADCAST, instruction};
-use fingertip::link::sender::Sender;
+use fingertip::link::packet::{BROADCAST, Sender, instruction};
 use fingertip::shipped::address;
 use fingertip_cli::Client;
 use fingertip_cli::client::Reach;

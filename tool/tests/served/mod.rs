@@ -4,7 +4,7 @@
 use fingertip::link::Reply;
 use fingertip::link::packet::BROADCAST;
 use fingertip::link::packet::instruction::REBOOT;
-use fingertip::link::sender;
+use fingertip::link::packet::Sender;
 use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
@@ -351,7 +351,7 @@ impl Drop for Served {
 /// An instruction to all, which nobody answers, without parameters.
 fn instruction(number: u8) -> Vec<u8> {
     let mut packet = Reply::new();
-    sender::Sender::new(&mut packet, BROADCAST, number).finish();
+    Sender::new(&mut packet, BROADCAST, number).finish();
     packet.to_vec()
 }
 

@@ -1,12 +1,10 @@
 //! The effects of this family: the controller's clock, interference, and packets of the host.
 
-use crate::effects::{Build, Part};
-use crate::effects::{normal, waiting_s};
+use crate::effects::{Build, Part, normal, waiting_s};
 use crate::key::{Key, Kind};
 use crate::registry::{Description, Family};
 use fastrand::Rng;
-use fingertip::link::crc;
-use fingertip::link::packet::{HEADER, instruction};
+use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 
 pub(super) const CLOCK_TOLERANCE: Description = Description {
     name: "clock_tolerance",
@@ -122,8 +120,8 @@ pub(super) const CORRUPTED_PACKETS: Description = Description {
         Part::Packets(Box::new(move |sent_s| {
             let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(rng.f64() < flips) << bit);
             let body = BODY.map(|byte| byte ^ flipped());
-            let sum = crc::update(crc::START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
-            (crc::update(crc::START, &body) == sum).then_some(sent_s)
+            let sum = update_crc(CRC_START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
+            (update_crc(CRC_START, &body) == sum).then_some(sent_s)
         }))
     },
 };

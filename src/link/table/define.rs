@@ -1,4 +1,10 @@
-//! The form of a register's definition, and what is made of it: addresses, documentation, reading and writing.
+//! Registers: their form, the macro that defines them, and the list of all of them for documentation and hosts.
+//!
+//! From a definition the macro makes addresses, documentation, reading and writing.
+
+use super::registers::{FIXED, address};
+use super::{indirect, mirrors, pictures};
+use crate::params::Params;
 
 macro_rules! count {
     () => {
@@ -96,3 +102,153 @@ macro_rules! control_table {
         }
     };
 }
+
+/// Who may write a register, and when.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// Nobody.
+    ReadOnly,
+    /// The host, at any time.
+    ReadWrite,
+    /// The host, while torque is off.
+    TorqueOff,
+    /// The host, while torque is off; kept in flash once `save_parameters` was written.
+    Stored,
+    /// The same at any time.
+    StoredLive,
+}
+
+/// How a register's bytes make a number, little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// 8 bits.
+    U8,
+    /// 8 bits, two's complement.
+    I8,
+    /// 16 bits.
+    U16,
+    /// 16 bits, two's complement.
+    I16,
+    /// 32 bits.
+    U32,
+    /// 32 bits, two's complement.
+    I32,
+}
+
+impl Kind {
+    /// Bytes on the bus.
+    pub const fn width(self) -> u16 {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 => 4,
+        }
+    }
+
+    /// The number that `bytes` make, or none where there are not enough of them.
+    pub(super) fn decode(self, bytes: &[u8]) -> Option<i64> {
+        Some(match self {
+            Self::U8 => i64::from(u8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I8 => i64::from(i8::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U16 => i64::from(u16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I16 => i64::from(i16::from_le_bytes(*bytes.first_chunk()?)),
+            Self::U32 => i64::from(u32::from_le_bytes(*bytes.first_chunk()?)),
+            Self::I32 => i64::from(i32::from_le_bytes(*bytes.first_chunk()?)),
+        })
+    }
+}
+
+/// A register as its documentation has it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Register {
+    /// The constant in [`address`](super::address), or the field of [`Params`](crate::params::Params).
+    pub name: &'static str,
+    /// Of its first byte.
+    pub address: u16,
+    /// How its bytes make a number.
+    pub kind: Kind,
+    /// How many numbers stand side by side: 1, but for the pictures of the array.
+    pub count: u16,
+    /// Who may write it.
+    pub access: Access,
+    /// Physical unit; empty where it is a plain number.
+    pub unit: &'static str,
+    /// What a step of the number means, in that unit: the resolution.
+    pub scale: u16,
+    /// The least value.
+    pub min: i64,
+    /// The largest value.
+    pub max: i64,
+    /// After a factory reset where it is stored, after a reset where it can be written.
+    pub default: Option<i64>,
+    /// What it means.
+    pub doc: &'static str,
+}
+
+impl Register {
+    /// Bytes on the bus.
+    pub const fn bytes(&self) -> u16 {
+        self.kind.width() * self.count
+    }
+}
+
+/// How many registers there are.
+pub const COUNT: usize =
+    FIXED.len() + mirrors::REGISTERS.len() + indirect::REGISTERS.len() + Params::COUNT + pictures::COUNT;
+
+/// Every register of an array of this shape, in the order of the addresses.
+pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; COUNT] {
+    let mut all = [FIXED[0]; COUNT];
+    let mut count = 0;
+    count = add(&mut all, count, FIXED);
+    count = add(&mut all, count, mirrors::REGISTERS);
+    count = add(&mut all, count, &indirect::REGISTERS);
+    count = add(&mut all, count, &params());
+    add(&mut all, count, &pictures::registers::<ROWS, COLUMNS>());
+    all
+}
+
+/// Puts more registers, themselves in order, among those that are there.
+const fn add(all: &mut [Register], count: usize, more: &[Register]) -> usize {
+    let (mut from, mut with, mut to) = (count, more.len(), count + more.len());
+    while with > 0 {
+        to -= 1;
+        if from > 0 && all[from - 1].address > more[with - 1].address {
+            from -= 1;
+            all[to] = all[from];
+        } else {
+            with -= 1;
+            all[to] = more[with];
+        }
+    }
+    count + more.len()
+}
+
+const fn params() -> [Register; Params::COUNT] {
+    let mut all = [FIXED[0]; Params::COUNT];
+    let mut place = 0;
+    while place < all.len() {
+        let (name, default, min, max) = Params::RANGES[place];
+        all[place] = Register {
+            name,
+            address: address::PARAMS + 4 * place as u16,
+            kind: Kind::I32,
+            count: 1,
+            access: Access::Stored,
+            unit: "",
+            scale: 1,
+            min: min as i64,
+            max: max as i64,
+            default: Some(default as i64),
+            doc: Params::DOCS[place],
+        };
+        place += 1;
+    }
+    all
+}
+
+// The parameters end where the state before the pressures begins, and that ends where these do.
+const _: () = assert!(
+    address::PARAMS as usize + 4 * Params::COUNT <= mirrors::address::PICTURE_TIME_US as usize
+        && mirrors::address::PICTURE_CONFIDENCE + 1 == pictures::FIRST
+);

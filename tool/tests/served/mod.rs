@@ -3,8 +3,8 @@
 
 use fingertip::link::Reply;
 use fingertip::link::packet::BROADCAST;
-use fingertip::link::packet::instruction::REBOOT;
 use fingertip::link::packet::Sender;
+use fingertip::link::packet::instruction::REBOOT;
 use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};

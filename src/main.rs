@@ -12,7 +12,7 @@ use board::flash::Store;
 use board::log::{log_boot, log_refusal, log_remark, log_save_error, log_unfit};
 use board::scan::Scan;
 use board::watchdog::Watchdogs;
-use board::{bus, clocks, crash, guard, link_task, options, pins, stack, trace, watch};
+use board::{bus, clocks, crash, guard, link_task, log, pins, stack, trace};
 use defmt::{info, unwrap, warn};
 use defmt_rtt as _;
 use embassy_executor::{InterruptExecutor, Spawner};
@@ -93,7 +93,7 @@ async fn main(spawner: Spawner) {
     let led = Output::new(p.PA5, Level::Low, Speed::Low);
 
     spawner.spawn(unwrap!(link_task::run(bus, record, boot).ok()));
-    spawner.spawn(unwrap!(watch::run(led).ok()));
+    spawner.spawn(unwrap!(log::run(led).ok()));
     CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
 
@@ -120,7 +120,7 @@ fn unfit(clocked: bool) -> Option<Fault> {
     if !clocked {
         return Some(Fault::NoClock);
     }
-    (!options::brown_out_resets()).then_some(Fault::BrownOutLevel)
+    (!board::flash::brown_out_resets()).then_some(Fault::BrownOutLevel)
 }
 
 /// Makes the core. Its parts are functions of their own, because a configuration and a pipeline that are being made are

@@ -3,13 +3,18 @@
 //!
 //! Software starts it once a frame and takes its codes in the next. All three take 51 us, the supply the first 5; where
 //! a frame is shorter than that, it is started in every other.
+//!
+//! Clock, power and sampling time are set alike for all three converters.
 
+use embassy_stm32::pac::adc::Adc;
+use embassy_stm32::pac::adc::vals::SampleTime;
+use embassy_stm32::pac::adccommon::vals::Adcpre;
 use embassy_stm32::peripherals::{ADC1, PA0};
 use embassy_stm32::{Peri, pac, rcc};
 use fingertip::chip::{Chip, Factory};
 use fingertip::units::Celsius;
 
-use super::{converter, health, pins};
+use super::{health, pins};
 
 /// Full scale: 3.3 V behind the divider by 11.
 const FULL_SCALE_MV: u32 = 3_300 * 11;
@@ -33,14 +38,14 @@ impl Analogue {
     pub fn new(_adc: Peri<'static, ADC1>, pin: Peri<'static, PA0>) -> Self {
         pins::analog([pin.into()]);
         rcc::enable_and_reset::<ADC1>();
-        converter::set_clock();
+        set_clock();
         // The battery's divider, on the sensor's input too, stays off.
         pac::ADC123_COMMON.ccr().modify(|w| w.set_tsvrefe(true));
-        converter::set_sequence(pac::ADC1, [SUPPLY], converter::sample_time(84));
+        set_sequence(pac::ADC1, [SUPPLY], sample_time(84));
         // Reference and sensor want 10 us (DS10693): 480 cycles are 23.
         pac::ADC1.smpr1().write(|w| {
             for channel in [REFERENCE, SENSOR] {
-                w.set_smp(usize::from(channel) - 10, converter::sample_time(480));
+                w.set_smp(usize::from(channel) - 10, sample_time(480));
             }
         });
         // Of two, the third and the fourth place are taken (RM0390, ADC_JSQR).
@@ -90,4 +95,41 @@ impl Analogue {
 fn start() {
     pac::ADC1.sr().write_value(pac::adc::regs::Sr(0));
     pac::ADC1.cr2().modify(|w| w.set_swstart(true));
+}
+
+/// 84 MHz / 4 = 21 MHz for all converters, each on its own.
+pub fn set_clock() {
+    pac::ADC123_COMMON.ccr().modify(|w| w.set_adcpre(Adcpre::DIV4));
+}
+
+/// A converter wants 3 us from power-up to its first conversion (DS10693, t_STAB).
+pub fn stabilise() {
+    cortex_m::asm::delay(3 * 168);
+}
+
+/// The register's code for a sampling time that `ScanTiming` let through; the longest for any other.
+pub const fn sample_time(cycles: u16) -> SampleTime {
+    match cycles {
+        3 => SampleTime::CYCLES3,
+        15 => SampleTime::CYCLES15,
+        28 => SampleTime::CYCLES28,
+        56 => SampleTime::CYCLES56,
+        84 => SampleTime::CYCLES84,
+        112 => SampleTime::CYCLES112,
+        144 => SampleTime::CYCLES144,
+        _ => SampleTime::CYCLES480,
+    }
+}
+
+/// The channels of a regular sequence, in order, and one sampling time for all.
+pub fn set_sequence<const N: usize>(adc: Adc, channels: [u8; N], time: SampleTime) {
+    const { assert!(N <= 6, "SQR3 holds six ranks") };
+    adc.sqr1().write(|w| w.set_l(N as u8 - 1));
+    adc.sqr3().write(|w| {
+        for (rank, channel) in channels.into_iter().enumerate() {
+            w.set_sq(rank, channel);
+        }
+    });
+    adc.smpr2().write(|w| (0..10).for_each(|channel| w.set_smp(channel, time)));
+    adc.smpr1().write(|w| (0..9).for_each(|channel| w.set_smp(channel, time)));
 }

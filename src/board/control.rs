@@ -1,16 +1,15 @@
 //! The control task: one turn a frame, on an executor that only the guard and the scan interrupt.
 //!
 //! Nothing here waits, allocates, logs or holds a lock for longer than a copy of a snapshot.
+//! A capture's start, a new configuration, new gains and a save take longer than a frame: the scan stops for them and
+//! starts again.
 
-mod elapsed;
-mod pauses;
-
-use elapsed::{BusClock, FrameClock};
 use fingertip::capture::Ended;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
+use fingertip::params::Params;
 use fingertip::pipeline::Bridge as Wanted;
-use fingertip::shipped::{Frame, Pipeline};
+use fingertip::shipped::{Calibration, Config, Frame, Pipeline};
 use fingertip::state::{Fault, Mode};
 use fingertip::units::CoreCycles;
 
@@ -18,13 +17,12 @@ use super::analogue::Analogue;
 use super::bridge::{self, Bridge};
 use super::capture::Keeper;
 use super::encoder::Encoder;
-use super::exchange::{HEARD, Heard, PICTURE, Report, STANDING, Standing};
+use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED, STANDING, Standing};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
-use super::health;
 use super::scan::{Completed, Scan, WAKE};
-use super::trace;
 use super::watchdog::Watchdogs;
+use super::{health, trace};
 
 /// The first frame may come this many frame times after the start, before the guard trips.
 const FRAMES_TO_START: u32 = 4;
@@ -247,4 +245,134 @@ impl State {
             picture.tare.iter_mut().zip(pipeline.array().tare()).for_each(|(to, tare)| *to = *tare);
         });
     }
+}
+
+const TICKS_PER_MS: u32 = guard::HZ / 1_000;
+
+/// The stopwatch in microseconds, beyond its wrap.
+pub struct FrameClock {
+    last: u32,
+    part_ticks: u32,
+    time_us: u32,
+}
+
+impl FrameClock {
+    /// From 0 on.
+    pub const fn new() -> Self {
+        Self { last: 0, part_ticks: 0, time_us: 0 }
+    }
+
+    /// The time of an instant at most half a wrap of the stopwatch later than the last one. A frame that ended before
+    /// its loss was noticed counts as from then.
+    pub fn at_us(&mut self, instant: u32) -> u32 {
+        let passed = instant.wrapping_sub(self.last);
+        if passed.cast_signed() < 0 {
+            return self.time_us;
+        }
+        let ticks = passed + self.part_ticks;
+        self.last = instant;
+        self.part_ticks = ticks % guard::TICKS_PER_US;
+        self.time_us = self.time_us.wrapping_add(ticks / guard::TICKS_PER_US);
+        self.time_us
+    }
+}
+
+/// How long the bus has been silent, measured where a hanging link cannot stop the clock.
+pub struct BusClock {
+    packets: u32,
+    last: u32,
+    part_ticks: u32,
+    silent_ms: u16,
+}
+
+impl BusClock {
+    /// Heard just now.
+    pub const fn new() -> Self {
+        Self { packets: 0, last: 0, part_ticks: 0, silent_ms: 0 }
+    }
+
+    /// Milliseconds since the count of packets last changed.
+    pub fn silent_ms(&mut self, packets: u32) -> u16 {
+        let now = guard::now();
+        self.part_ticks += now.wrapping_sub(self.last);
+        self.last = now;
+        if packets != self.packets {
+            self.packets = packets;
+            self.part_ticks = 0;
+            self.silent_ms = 0;
+        }
+        while self.part_ticks >= TICKS_PER_MS {
+            self.part_ticks -= TICKS_PER_MS;
+            self.silent_ms = self.silent_ms.saturating_add(1);
+        }
+        self.silent_ms
+    }
+}
+
+impl State {
+    fn rest(&mut self) {
+        self.parts.scan.stop();
+        guard::rest();
+    }
+
+    /// Begins a capture where it is due. The pipeline is made anew, which may take most of a frame: the scan starts anew.
+    fn capture(&mut self) {
+        self.keeper.take_asked();
+        if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
+            self.parts.bridge.apply(Wanted::Open);
+            self.rest();
+            self.keeper.begin(self.parts.pipeline);
+            self.restart_scan();
+        }
+    }
+
+    /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and
+    /// the scan starts anew.
+    fn configure(&mut self) {
+        let Some(params) = PARAMS.take(|params| *params) else { return };
+        self.keeper.end(Ended::Configured);
+        self.parts.bridge.apply(Wanted::Open);
+        self.rest();
+        self.parts.watchdogs.allow_long();
+        if !set_config(self.parts.pipeline, &params) {
+            self.stop(Fault::BrokenParameters);
+        }
+        self.restart_scan();
+    }
+
+    /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
+    fn calibrate(&mut self) {
+        if let Some(gains) = GAINS.take(|gains| *gains) {
+            self.keeper.end(Ended::Configured);
+            self.parts.bridge.apply(Wanted::Open);
+            self.rest();
+            self.parts.pipeline.calibrate(&Calibration::of(&gains));
+            self.restart_scan();
+        }
+    }
+
+    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so
+    /// the scan is stopped and starts anew, and the bridge stays as it is.
+    #[inline(never)]
+    fn save(&mut self) {
+        let Some(record) = SAVE.take(|record| *record) else { return };
+        if !matches!(self.parts.pipeline.status().mode, Mode::Off | Mode::Fault) {
+            return SAVED.signal(Err(NotSaved::Busy));
+        }
+        self.rest();
+        let Control { store, watchdogs, .. } = &mut self.parts;
+        watchdogs.allow_long();
+        let saved = store.save(&record, || watchdogs.pet());
+        self.restart_scan();
+        SAVED.signal(saved.map_err(NotSaved::Failed));
+    }
+}
+
+/// A function of its own, because a configuration is large and takes stack only here.
+#[inline(never)]
+fn set_config(pipeline: &mut Pipeline, params: &Params) -> bool {
+    Config::shipped(params).is_ok_and(|config| {
+        pipeline.configure(&config);
+        true
+    })
 }

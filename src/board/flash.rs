@@ -1,10 +1,9 @@
-//! The stored parameters: flash sectors 6 and 7, above the image.
+//! The stored parameters in flash sectors 6 and 7, above the image, and the option bytes as the last reset loaded them.
 
-use embassy_stm32::Peri;
 use embassy_stm32::flash::{Blocking, Error, Flash};
-use embassy_stm32::pac;
 use embassy_stm32::pac::flash::vals::Psize;
 use embassy_stm32::peripherals::FLASH;
+use embassy_stm32::{Peri, pac};
 use fingertip::shipped::{Loaded, Record};
 use fingertip::store::{self, Journal, Remark, Sector};
 
@@ -108,4 +107,18 @@ fn drop_cached_data() {
     acr.modify(|w| w.set_dcrst(true));
     acr.modify(|w| w.set_dcrst(false));
     acr.modify(|w| w.set_dcen(true));
+}
+
+/// The code of level 3 in the register: it resets before the supply is below 2.7 V, the least for 168 MHz with five wait
+/// states (docs/board.md, Option bytes).
+const LEVEL_3: u8 = 0b00;
+
+/// All of them.
+pub fn option_bytes() -> u32 {
+    pac::FLASH.optcr().read().0
+}
+
+/// Whether a supply that is too low for the core's speed resets it. From the factory it does not.
+pub fn brown_out_resets() -> bool {
+    pac::FLASH.optcr().read().bor_lev() == LEVEL_3
 }

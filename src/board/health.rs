@@ -5,8 +5,8 @@ use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 use embassy_stm32::usart;
 use fingertip::link::snapshot::Health;
 
+use super::flash;
 use super::guard::{self, Stopwatch};
-use super::options;
 
 /// What was wrong with a frame that is not whole.
 #[derive(Clone, Copy)]
@@ -88,7 +88,7 @@ pub fn set_stack_bytes(bytes: u16) {
 pub fn health() -> Health {
     let late_ns = u64::from(LATE.load(Ordering::Relaxed)) * 1_000 / u64::from(guard::TICKS_PER_US);
     Health {
-        option_bytes: options::loaded(),
+        option_bytes: flash::option_bytes(),
         analogue_mv: ANALOGUE_MV.load(Ordering::Relaxed),
         stack_bytes: STACK_BYTES.load(Ordering::Relaxed),
         late_ns: u16::try_from(late_ns).unwrap_or(u16::MAX),

@@ -1,16 +1,18 @@
-//! What is logged in more than one word, without the text formatting that it would cost the flash.
-//!
-//! Modes, faults and causes are logged by their stable numbers.
+//! The log and the LED. Modes, faults and causes are logged by their stable numbers, which takes less flash than text.
 
 use defmt::{error, info, warn};
+use embassy_stm32::gpio::Output;
+use embassy_time::Timer;
 use fingertip::config::ConfigError;
 use fingertip::params::ParamError;
 use fingertip::scan::ScanError;
-use fingertip::state::Fault;
+use fingertip::state::{Fault, Mode};
 use fingertip::store::Remark;
 
 use super::crash::Boot;
+use super::exchange::{HEARD, STANDING, Standing};
 use super::flash::SaveError;
+use super::{health, stack};
 
 /// Why this run began.
 pub fn log_boot(boot: Boot) {
@@ -72,4 +74,35 @@ pub fn log_refusal(error: ConfigError) {
 
 fn log_parameter(error: ParamError) {
     error!("{=str} = {=i32}, allowed {=i32} to {=i32}", error.name, error.value, error.min, error.max);
+}
+
+const PERIOD_MS: u64 = 20;
+/// 5 Hz.
+const BLINK_PERIODS: u32 = 5;
+
+/// On with torque, fast blink on fault, off otherwise.
+#[embassy_executor::task]
+pub async fn run(mut led: Output<'static>) {
+    let mut last = Standing::default();
+    let mut paint = stack::Paint::default();
+    for period in 0u32.. {
+        let now = STANDING.get();
+        if (now.mode, now.fault) != (last.mode, last.fault) {
+            match now.fault {
+                Some(fault) => warn!("fault {=u8}", fault as u8),
+                None => info!("mode {=u8}", now.mode as u8),
+            }
+        }
+        if now.missed_frames != last.missed_frames {
+            warn!("{=u32} frames missed", now.missed_frames);
+        }
+        last = now;
+        if let Some(bytes) = paint.look() {
+            health::set_stack_bytes(bytes);
+        }
+        let blink = (period / BLINK_PERIODS).is_multiple_of(2);
+        let on = if now.mode == Mode::Fault { blink } else { HEARD.get().command.torque };
+        led.set_level(on.into());
+        Timer::after_millis(PERIOD_MS).await;
+    }
 }

@@ -8,7 +8,6 @@ pub mod bus;
 pub mod capture;
 pub mod clocks;
 pub mod control;
-pub mod converter;
 pub mod crash;
 pub mod encoder;
 pub mod exchange;
@@ -17,12 +16,10 @@ pub mod guard;
 pub mod health;
 pub mod link_task;
 pub mod log;
-pub mod options;
 pub mod pins;
 pub mod scan;
 pub mod stack;
 pub mod trace;
-pub mod watch;
 pub mod watchdog;
 
 /// Sets every priority of the table in `docs/firmware.md`; embassy leaves most of them at the highest.

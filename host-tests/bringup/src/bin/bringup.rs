@@ -33,7 +33,7 @@ mod stages;
 use board::analogue::Analogue;
 use board::bridge::Bridge;
 use board::scan::Scan;
-use board::{clocks, crash, guard, options, pins, stack, trace};
+use board::{clocks, crash, flash, guard, pins, stack, trace};
 use bringup::script::Bench;
 use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
@@ -96,7 +96,7 @@ fn main() -> ! {
         report::figure("lsi_khz", hz * 1e-3);
     }
     report::figure("core_per_stopwatch", oscillators::core_per_stopwatch());
-    report::figure("brown_out_bits", (options::loaded() >> 2 & 0b11) as f32);
+    report::figure("brown_out_bits", (flash::option_bytes() >> 2 & 0b11) as f32);
     let [window, independent] = kept.cycles.map(|cycles| cycles as f32 / CYCLES_PER_US as f32);
     report::figure("window_watchdog_us", window);
     report::figure("independent_watchdog_ms", independent * 1e-3);

@@ -3,4 +3,3 @@
 
 pub mod guard;
 pub mod monitor;
-mod unseen;

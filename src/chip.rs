@@ -1,50 +1,50 @@
 //! The microcontroller's own temperature and its analogue supply, by its sensor and its internal reference.
 //!
-//! The sensor's voltage is a line through two codes that the factory read at 3.3 V. What a code means now the reference
-//! tells, whose code at 3.3 V the factory read too: both are measured by the same converter, so that the supply drops
-//! out of their ratio. Means over [`FRAMES`] frames are taken, as a code is 0.3 K.
+//! The sensor's voltage is a line through two codes that the factory read at 3.3 V. The factory also read the code of
+//! the internal reference at 3.3 V. Sensor and reference are measured by the same converter, so the present supply
+//! drops out of their ratio. Means over [`FRAMES`] frames are taken, as a code is 0.3 K.
 
 use crate::units::Celsius;
 use fixed::types::I16F16;
 
-/// Frames of a mean: 26 ms.
+/// Number of frames of a mean: 26 ms.
 pub const FRAMES: u32 = 256;
 
-/// The analogue supply of the factory's codes.
+/// Analogue supply of the factory's codes, mV.
 const FACTORY_MV: u32 = 3_300;
-/// The sensor's temperatures at them, degrees Celsius.
+/// Temperatures of the factory's codes of the sensor, degrees Celsius.
 const FACTORY_C: [i32; 2] = [30, 110];
-/// A code of a converter.
+/// Bits of a converter's code.
 const CODE: u16 = 0xfff;
-/// Codes of a reference of 1.0 to 1.4 V at 3.3 V: 1.18 to 1.24 V by its sheet.
+/// Plausible codes of the reference: 1.0 to 1.4 V at 3.3 V; 1.18 to 1.24 V by its data sheet.
 const REFERENCE_CODES: core::ops::RangeInclusive<u16> = 1_241..=1_737;
-/// Codes between the sensor's two temperatures: 1.3 to 5.2 mV/K; 2.5 mV/K by its sheet.
+/// Plausible difference of the sensor's codes: 1.3 to 5.2 mV/K; 2.5 mV/K by its data sheet.
 const SENSOR_CODES: core::ops::RangeInclusive<i32> = 128..=512;
-/// Analogue supplies that are believed, mV.
+/// Plausible analogue supplies, mV.
 const BELIEVED_MV: core::ops::RangeInclusive<u16> = 1_600..=4_000;
-/// Temperatures that are believed, degrees Celsius in Q16: -60 to 160.
+/// Plausible temperatures, degrees Celsius in Q16: -60 to 160.
 const BELIEVED_C: core::ops::RangeInclusive<i64> = -60 << 16..=160 << 16;
 /// Fractional bits of a mean code.
 const MEAN_BITS: u32 = 4;
 
-/// What the factory read at 3.3 V and keeps in the microcontroller, codes of 12 bits.
+/// Codes that the factory read at 3.3 V and keeps in the microcontroller, 12 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Factory {
-    /// The internal reference.
+    /// Code of the internal reference.
     pub reference: u16,
-    /// The sensor at 30 degrees Celsius and at 110.
+    /// Codes of the sensor at 30 and at 110 degrees Celsius.
     pub sensor: [u16; 2],
 }
 
-/// The mean over the last [`FRAMES`] frames, and the sums of the next.
+/// Means over the last [`FRAMES`] frames, and the sums of the next.
 #[derive(Clone, Copy, Debug)]
 pub struct Chip {
-    /// The reference's code at 3.3 V; 0 where nothing sensible was kept.
+    /// Code of the reference at 3.3 V; 0 if the factory's code is implausible.
     reference: u32,
-    /// The sensor's code at 30 degrees Celsius, and Kelvin for a code in Q16.
+    /// Code of the sensor at 30 degrees Celsius, and Kelvin per code in Q16.
     line: Option<(i32, i32)>,
     frames: u32,
-    /// Whether codes came in each of them.
+    /// True if every frame so far had codes.
     whole: bool,
     reference_sum: u32,
     sensor_sum: u32,
@@ -53,7 +53,7 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// Nothing is known before the first mean. Of codes that make no sense, as blank memory's, nothing ever is.
+    /// Creates a state without a mean. With implausible codes, as of blank memory, no mean is ever known.
     pub fn new(factory: Factory) -> Self {
         let [cold, hot] = factory.sensor.map(i32::from);
         let sound = SENSOR_CODES.contains(&(hot - cold)) && hot <= i32::from(CODE);
@@ -70,18 +70,18 @@ impl Chip {
         }
     }
 
-    /// The analogue supply in mV; 0 where it is not known.
+    /// Analogue supply, mV; 0 if it is not known.
     pub fn analogue_mv(&self) -> u16 {
         self.analogue_mv
     }
 
-    /// The microcontroller's temperature; none where it is not known.
+    /// Temperature of the microcontroller; none if it is not known.
     pub fn temperature(&self) -> Option<Celsius> {
         self.temperature
     }
 
-    /// Takes a frame's codes of the reference and the sensor, none where the converter did not give new ones; tells
-    /// whether a mean is over. One that lacks a frame tells nothing.
+    /// Takes a frame's codes of the reference and the sensor, none if the converter has no new ones. Returns true at
+    /// the end of a mean. A mean that lacks a frame is dropped.
     #[inline(always)]
     pub fn observe(&mut self, codes: Option<[u16; 2]>) -> bool {
         match codes.map(|codes| codes.map(|code| u32::from(code & CODE))) {

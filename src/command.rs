@@ -1,9 +1,9 @@
-//! What the host asks of the loop.
+//! Requests of the host to the loop.
 
 use crate::contact::FitLevel;
 use crate::units::Newtons;
 
-/// What the host asks of the loop; a snapshot, replaced as a whole.
+/// Requests of the host to the loop: a snapshot, replaced as a whole.
 ///
 /// ```
 /// use fingertip::command::Command;
@@ -16,21 +16,21 @@ use crate::units::Newtons;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Command {
-    /// Whether the bridge may be driven.
+    /// True if the bridge may be driven.
     pub torque: bool,
-    /// The force to hold, 0 to let go.
+    /// Force to hold; 0 releases.
     pub goal: Newtons,
-    /// Bus watchdog in ms; 0 is off.
+    /// Time of the bus watchdog, ms; 0 is off.
     pub bus_watchdog_ms: u16,
-    /// How much work may be put into the contact.
+    /// Largest amount of work per frame for the contact.
     pub fit_level: FitLevel,
-    /// A change of this number asks for a tare.
+    /// Request number of a tare: a change requests one.
     pub tare_request: u8,
-    /// Whether a tare is made, and torque may be enabled after it, although something touches the tip: every force then
-    /// reads less by what presses.
+    /// True if a tare is made, and torque may be enabled after it, although something touches the tip: every force
+    /// then reads less by what presses.
     pub tare_forced: bool,
-    /// A change of this number clears a fault.
+    /// Request number of a clear: a change clears a fault.
     pub clear_request: u8,
-    /// A change of this number asks for a [`crate::measure::Task`], which its lowest bits name.
+    /// Request number of a measurement: a change requests the [`crate::measure::Task`] in its lowest bits.
     pub measure_request: u8,
 }

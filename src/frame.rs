@@ -1,8 +1,9 @@
 //! One scan of the array, as the converters leave it in memory.
 //!
-//! Everything that goes by the array has its rows and columns as parameters: `ROWS` driven rows and `COLUMNS` sensed
-//! columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. That last one reads what the
-//! columns show with nothing selected: the amplifiers' offsets, and a row that is stuck in the driven state.
+//! Every type that depends on the array's shape has the rows and columns as parameters: `ROWS` driven rows and
+//! `COLUMNS` sensed columns, a [`Shape`]. A scan has a slot for each row and one with no row driven. The last slot
+//! reads the columns with nothing selected: it shows the amplifiers' offsets, and a row that is stuck in the driven
+//! state.
 
 use crate::units::{Celsius, CoreCycles};
 pub use lanes::Codes;
@@ -16,7 +17,7 @@ pub const CODE_MAX: u16 = 4_095;
 pub struct Shape<const ROWS: usize, const COLUMNS: usize>;
 
 impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
-    /// Whoever takes a shape evaluates this.
+    /// Check of the shape at compile time. Every type with a shape evaluates this constant.
     pub(crate) const CHECKED: () = assert!(
         3 <= ROWS && ROWS <= 16 && 3 <= COLUMNS && COLUMNS <= 32,
         "an array has 3 to 16 rows and 3 to 32 columns"
@@ -25,10 +26,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
     pub const TAXELS: usize = ROWS * COLUMNS;
     /// Steps of a scan.
     pub const SLOTS: usize = ROWS + 1;
-    /// Columns that the first converter reads: the pairs of codes that come at the same instant. Of an odd number the
-    /// second one reads one fewer.
+    /// Columns that the first converter reads, which is the number of pairs of codes read at the same instant. With
+    /// an odd number of columns the second converter reads one fewer.
     pub const BANK_COLUMNS: usize = lanes::pairs(COLUMNS);
-    /// The larger of both.
+    /// The larger of rows and columns.
     pub(crate) const SIDE: usize = if ROWS > COLUMNS { ROWS } else { COLUMNS };
 }
 
@@ -44,9 +45,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Shape<ROWS, COLUMNS> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame<const ROWS: usize, const COLUMNS: usize> {
-    /// The first half of the columns in the low halves of words, the second in the high ones.
+    /// Codes in pairs: the first half of the columns in the low halves of words, the second half in the high ones.
     pub codes: Codes<ROWS, COLUMNS>,
-    /// Counts frames scanned, missed ones too; wraps.
+    /// Number of the frame; counts missed frames too, and wraps.
     pub sequence: u32,
 }
 
@@ -69,19 +70,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Frame<ROWS, COLUMNS> {
     }
 }
 
-/// What the control step learns beside the frame, sampled at the frame's end.
+/// Measurements beside the frame, sampled at the frame's end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sense {
     /// Quadrature count of the motor's encoder, unwrapped; grows as the tip presses in.
     pub encoder: i32,
     /// The bridge's supply in mV.
     pub supply_mv: u16,
-    /// Since the last valid packet on the bus, ms; holds at its top.
+    /// Time since the last valid packet on the bus, ms; saturates.
     pub bus_silent_ms: u16,
-    /// The bridge's driver reports a fault (its nFAULT pin, which also broke the PWM in hardware).
+    /// True while the bridge's driver reports a fault (its nFAULT pin, which also broke the PWM in hardware).
     pub bridge_fault: bool,
-    /// The microcontroller's temperature; none where it was not measured.
+    /// Temperature of the microcontroller; none if it was not measured.
     pub chip: Option<Celsius>,
-    /// From the last frame's end to its duty; 0 where that was not measured.
+    /// Time from the last frame's end to its duty; 0 if it was not measured.
     pub answer: CoreCycles,
 }

@@ -32,7 +32,7 @@ pub const GAIN_ONE: u16 = 1 << GAIN_BITS;
 /// Largest gain.
 pub const GAIN_MAX: u16 = (1 << 15) - 1;
 
-/// Per-taxel calibration and the last picture.
+/// Calibration of every taxel, and the tactile image of the last frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     picture: Picture<ROWS, COLUMNS>,
@@ -47,7 +47,7 @@ pub struct Array<const ROWS: usize, const COLUMNS: usize> {
     tare_frames: u32,
     touched: Touched<ROWS>,
     baseline_row: usize,
-    /// What that row read above its tare, where its picture says what it carries instead.
+    /// Readings of that row above its tare, if its image holds what they carry instead.
     baseline_line: Option<[i32; COLUMNS]>,
 }
 
@@ -75,26 +75,26 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
     }
 
-    /// The picture of the last frame.
+    /// Tactile image of the last frame.
     pub fn picture(&self) -> &Picture<ROWS, COLUMNS> {
         &self.picture
     }
 
-    /// The gain of a taxel, Q14; 0 where it is masked, or there is none.
+    /// Gain of a taxel, Q14; 0 for a masked taxel, and out of range.
     pub fn gain(&self, row: usize, column: usize) -> u16 {
         let gain = self.rows.get(row).and_then(|row| row.gains.get(lanes::place(column, COLUMNS)));
         gain.copied().unwrap_or(0).cast_unsigned()
     }
 
-    /// The tare of every row's taxels: corrected codes with [`TARE_BITS`] fractional bits.
+    /// Tare of every row's taxels: corrected codes with [`TARE_BITS`] fractional bits.
     pub fn tare(&self) -> impl Iterator<Item = &[i32; COLUMNS]> {
         self.rows.iter().map(|row| &row.tare)
     }
 
-    /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are taken: what a sound array cannot
-    /// show becomes a bad taxel.
+    /// Reads a frame: every taxel, their sums, the peak and the flags. Any codes are accepted: a code that a sound
+    /// array cannot show makes its taxel bad.
     pub fn read(&mut self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> &Picture<ROWS, COLUMNS> {
-        // Where none was bad, none is so again.
+        // Without a bad taxel in the last frame none is bad again.
         let mut before = None;
         if self.picture.bad_count != 0 {
             before = Some(self.picture.bad);
@@ -122,8 +122,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         &self.picture
     }
 
-    /// Takes dead and saturated taxels out of the picture and its sums, and tells which they are. An array that is
-    /// broken anyhow must not take long: its taxels are all zero, and its sums mean nothing.
+    /// Removes dead and saturated taxels from the image and its sums, and flags them. A broken array must not take
+    /// longer: its taxels are set to zero at once, and its sums mean nothing.
     #[cold]
     #[inline(never)]
     fn leave_out(
@@ -163,8 +163,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         }
     }
 
-    /// Taxels that a frame shows as dead or saturated, masked ones aside: [`Array::read`] without the readings, and
-    /// quicker.
+    /// Number of taxels that a frame shows as dead or saturated, without masked ones: [`Array::read`] without the
+    /// readings, and quicker.
     pub fn bad_taxels(&self, frame: &Frame<ROWS, COLUMNS>, config: &Config) -> u32 {
         let Codes { rows, undriven } = &frame.codes;
         let sound = Sound::new(undriven, config);
@@ -177,7 +177,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         count
     }
 
-    /// Forgets all but the gains and the mask.
+    /// Resets everything but the gains and the mask.
     pub fn renew(&mut self) {
         let (rows, mask) = (self.rows, self.mask);
         *self = Self::new();
@@ -187,7 +187,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         (self.mask, self.picture.bad) = (mask, mask);
     }
 
-    /// Replaces the calibration; the tare, which was measured with the old one, is forgotten.
+    /// Replaces the calibration, and drops the tare, which was measured with the old one.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         let Calibration { weights, mask } = calibration;
         for (row, [gains, moments]) in self.rows.iter_mut().zip(weights) {
@@ -203,9 +203,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
 /// Bits by which a total is coarser than a row's sum or moment: the upper half of a product with the boost.
 const COARSER: u32 = 32 - BOOST_BITS;
 
-/// A frame's sound codes, between dead and saturated.
+/// Limits of sound codes of a frame, between dead and saturated.
 struct Sound<const COLUMNS: usize> {
-    /// For the pass.
+    /// Input of the pass.
     pub common: Common<COLUMNS>,
     /// The highest undriven level.
     pub undriven_max: u16,
@@ -214,7 +214,7 @@ struct Sound<const COLUMNS: usize> {
 }
 
 impl<const COLUMNS: usize> Sound<COLUMNS> {
-    /// From the slot with nothing driven.
+    /// Computes the limits from the slot with no row driven.
     #[inline(always)]
     pub fn new(undriven: &[u16; COLUMNS], config: &Config) -> Self {
         let Config { dead_codes, saturated_codes, sag_q32, .. } = *config;
@@ -227,14 +227,14 @@ impl<const COLUMNS: usize> Sound<COLUMNS> {
         Self { common, undriven_max: highest::<COLUMNS>(|at| codes_at(undriven, at)), suspect }
     }
 
-    /// Whether a taxel may be dead or saturated where this is the largest code less what a dead one shows: that of a
-    /// dead one is huge as an unsigned number.
+    /// Returns true if a taxel may be dead or saturated, from the largest of the codes less the code of a dead taxel.
+    /// A code below that of a dead taxel is huge as an unsigned number.
     #[inline(always)]
     pub fn suspects(&self, largest: u16) -> bool {
         u32::from(largest) + u32::from(self.undriven_max) >= self.suspect
     }
 
-    /// That of a row.
+    /// Returns this largest number of a row.
     #[inline(always)]
     pub fn largest(&self, codes: &[u16; COLUMNS]) -> u16 {
         let Common { undriven, dead, .. } = &self.common;
@@ -242,7 +242,7 @@ impl<const COLUMNS: usize> Sound<COLUMNS> {
     }
 }
 
-/// The highest of all lanes of a row, unsigned.
+/// Returns the highest of all lanes of a row, unsigned.
 #[inline(always)]
 fn highest<const COLUMNS: usize>(of: impl Fn(usize) -> u32) -> u16 {
     let mut most = 0;
@@ -253,14 +253,14 @@ fn highest<const COLUMNS: usize>(of: impl Fn(usize) -> u32) -> u16 {
     larger_lane(most)
 }
 
-/// The larger of two lanes, unsigned.
+/// Returns the larger of two lanes, unsigned.
 #[inline(always)]
 const fn larger_lane(pair: u32) -> u16 {
     let (low, high) = (pair as u16, (pair >> 16) as u16);
     if low > high { low } else { high }
 }
 
-/// Sum and moments of a pass in sixteenths, rounded.
+/// Returns sum and moments of a pass in sixteenths, rounded.
 #[inline(always)]
 fn sixteenths<const ROWS: usize, const COLUMNS: usize>(total: &Total) -> [i32; 3] {
     let sum_bits = const { GAIN_BITS - COARSER - sum_drop(ROWS, COLUMNS) };
@@ -274,13 +274,13 @@ fn sixteenths<const ROWS: usize, const COLUMNS: usize>(total: &Total) -> [i32; 3
     ]
 }
 
-/// Twice a place's distance from the middle of so many, in pitches.
+/// Returns twice the distance of a place from the middle of `of` places, in pitches.
 #[inline(always)]
 const fn weight(place: usize, of: usize) -> i32 {
     2 * place as i32 + 1 - of as i32
 }
 
-/// A bit for each column of a row that is dead or saturated. Any codes and levels are taken.
+/// Returns a bit for each column of a row that is dead or saturated. Any codes and levels are accepted.
 #[cold]
 #[inline(never)]
 fn bad_columns<const COLUMNS: usize>([codes, undriven]: [&[u16; COLUMNS]; 2], config: &Config) -> u32 {

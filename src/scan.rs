@@ -57,7 +57,7 @@ pub struct Clocks {
     pub sample_cycles: &'static [u16],
     /// Converter cycles of a conversion, after sampling.
     pub conversion_cycles: u32,
-    /// From the trigger to the start of sampling and from the last code to memory, in converter cycles, rounded up.
+    /// Time from the trigger to the start of sampling and from the last code to memory, converter cycles, rounded up.
     pub trigger_cycles: u32,
     /// Slot and frame are whole multiples of this number of ticks, for a PWM that keeps step with the frames. 1 or 0
     /// if the board has no such PWM.
@@ -69,13 +69,13 @@ pub struct Clocks {
 
 /// Least frequency of a clock, Hz.
 const HZ_LEAST: u32 = 100_000;
-/// Longest frame time that a board may ask for, ns. It lies a little below [`FRAMES_PER_S_LEAST`].
+/// Longest frame time that a board may request, ns. It lies a little below [`FRAMES_PER_S_LEAST`].
 const FRAME_NS_MAX: u32 = 15_000_000;
 /// The loop's numbers hold a frame time below 1/64 s.
 const FRAMES_PER_S_LEAST: u32 = 64;
 
 impl Clocks {
-    /// Refuses the first number that no board has.
+    /// Refuses a number out of its range.
     fn check(&self) -> Result<(), ScanError> {
         let frame_ns = self.frame_ns.unwrap_or(1);
         let (name, value, min, max) = if self.timer_hz < HZ_LEAST {
@@ -95,28 +95,28 @@ impl Clocks {
     }
 }
 
-/// How a scan is timed: [`crate::config::Shaped::new`] works it out. Row `n` is driven for [`ScanTiming::slot`]; its
+/// Timing of a scan, computed by [`crate::config::Shaped::new`]. Row `n` is driven for [`ScanTiming::slot`]; its
 /// conversions start after [`ScanTiming::settle`] and end before the next row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ScanTiming {
-    /// From the row's edge to the trigger of its conversions; 16 bits.
+    /// Time from the row's edge to the trigger of its conversions; 16 bits.
     pub settle: ScanTicks,
-    /// From row to row; 16 bits.
+    /// Time from row to row; 16 bits.
     pub slot: ScanTicks,
-    /// How long each column is sampled, converter cycles.
+    /// Sampling time of each column, converter cycles.
     pub sample_cycles: u16,
-    /// Rows of the array, and one slot with no row driven.
+    /// Number of slots: the rows of the array, and one slot with no row driven.
     pub slots: u16,
     /// Idle time behind the last slot. It may exceed 16 bits.
     pub idle: ScanTicks,
-    /// From frame to frame, ns, rounded.
+    /// Time from frame to frame, ns, rounded.
     pub frame_ns: u32,
-    /// What control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left for
-    /// the tasks below it.
+    /// Time that control has from a frame's end to its new duty: three quarters of the frame's time. The rest is left
+    /// for the tasks of lower priority.
     pub deadline: CoreCycles,
 }
 
-/// Why a scan cannot be timed so.
+/// Reason why a scan cannot be timed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ScanError {
@@ -133,24 +133,24 @@ pub enum ScanError {
     },
     /// The converters have no such sampling time.
     SampleCycles {
-        /// What was asked for.
+        /// Requested sampling time.
         cycles: u16,
-        /// What they have.
+        /// Sampling times of the converters.
         allowed: &'static [u16],
     },
     /// The slot exceeds the timer's 16 bits: `ticks` of at most 65535.
     SlotTooLong {
-        /// What the settle time and the conversions add up to.
+        /// Sum of the settle time and the conversions.
         ticks: u32,
     },
     /// The frame is longer than the loop's arithmetic holds.
     FrameTooLong {
-        /// What its slots add up to.
+        /// Sum of its slots.
         ticks: u32,
-        /// It must be less than this.
+        /// Upper bound, exclusive.
         end: u32,
     },
-    /// The frame time asked for is shorter than the scan.
+    /// The requested frame time is shorter than the scan.
     FrameTooShort {
         /// [`Clocks::frame_ns`].
         frame_ns: u32,
@@ -182,8 +182,8 @@ impl core::fmt::Display for ScanError {
 impl core::error::Error for ScanError {}
 
 impl ScanTiming {
-    /// The tightest scan of an array that gives each row `settle_ns` before its conversions, and idle time up to the
-    /// frame time that the board asks for.
+    /// Computes the tightest scan of an array that gives each row `settle_ns` before its conversions, with idle time
+    /// up to the frame time that the board requests.
     ///
     /// # Errors
     /// A clock out of its range, a sampling time that the converters lack, a slot beyond the timer's range, a frame
@@ -238,7 +238,7 @@ impl ScanTiming {
         })
     }
 
-    /// From frame to frame.
+    /// Time from frame to frame.
     pub const fn frame(self) -> ScanTicks {
         ScanTicks(self.slot.0 * self.slots as u32 + self.idle.0)
     }

@@ -11,14 +11,14 @@
 //! | 6 press | backs off, seeks the contact, presses twice to 0.3 a or 7/8 of the largest force, to measure tip and array | done, refused or stopped: as from off |
 //! | 5 fault | brakes; a bridge that reports a fault sleeps | the fault is cleared with torque off: off |
 //!
-//! Strokes are asked for in off, with torque off; a press in approach, force or release. [`crate::activity`] owns the
+//! Strokes are requested in off, with torque off; a press in approach, force or release. [`crate::activity`] owns the
 //! state behind each mode.
 //!
-//! Torque off leads to off from every mode but fault. A tare that is asked for leads to tare from every mode but fault,
-//! and from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (what
-//! holds the loop back just now) comes and goes by itself. The numbers are stable: hosts may store them.
+//! Torque off leads to off from every mode but fault. A requested tare leads to tare from every mode but fault, and
+//! from a fault that is cleared in the same frame. A fault (stop) is latched until it is cleared; a limit (a present
+//! restriction of the loop) sets and clears by itself. The numbers are stable: hosts may store them.
 
-/// What the controller is doing.
+/// Activity of the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Mode {
@@ -31,7 +31,7 @@ pub enum Mode {
     Approach = 2,
     /// Holding the goal force.
     Force = 3,
-    /// Letting go, then holding clear of the object.
+    /// Releasing the object, then holding clear of it.
     Release = 4,
     /// Stopped by a fault.
     Fault = 5,
@@ -42,17 +42,17 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// All of them; the first has the number 0.
+    /// All modes; the first has the number 0.
     pub const ALL: [Self; 8] =
         [Self::Off, Self::Tare, Self::Approach, Self::Force, Self::Release, Self::Fault, Self::Press, Self::Strokes];
 }
 
-/// Why the motor was stopped.
+/// Reason why the motor was stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum Fault {
-    /// No frame within 1.75 frame times of the last one: the scan stands.
+    /// No frame came within 1.75 frame times of the last one: the scan has stopped.
     LostFrames = 1,
     /// More taxels are dead or saturated than allowed, or all together read far less than at the tare.
     ArrayBroken = 2,
@@ -60,7 +60,7 @@ pub enum Fault {
     RowStuck = 3,
     /// The array does not follow the motion that the encoder reports.
     ArrayFrozen = 4,
-    /// The encoder does not follow what the motor is driven to: it stands, or the motor is blocked.
+    /// The encoder does not follow the motor's voltage: the encoder is stuck, or the motor is blocked.
     EncoderFrozen = 5,
     /// The contact force passed its limit.
     OverForce = 6,
@@ -80,20 +80,20 @@ pub enum Fault {
     Crash = 13,
     /// The tip left its envelope: an end of the travel, a retreat without end, or speed where nothing is touched.
     Runaway = 14,
-    /// The encoder runs against what the motor is driven to: its channels or the motor's leads are swapped.
+    /// The encoder counts against the motor's voltage: its channels or the motor's leads are swapped.
     Reversed = 15,
     /// The motor presses on something that the array does not see.
     Unseen = 16,
-    /// The external clock was not there at the start: what is timed is known to a few percent only. Stands until the
-    /// next start.
+    /// The external clock was missing at the start, so times are known to a few percent only. The fault remains until
+    /// the next start.
     NoClock = 17,
-    /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have another
-    /// brown-out level than 3. Stands until they are programmed.
+    /// The microcontroller would not be reset before its supply is too low for its speed: the option bytes have
+    /// another brown-out level than 3. The fault remains until they are programmed.
     BrownOutLevel = 18,
 }
 
 impl Fault {
-    /// All of them; the first has the number 1.
+    /// All faults; the first has the number 1.
     pub const ALL: [Self; 18] = [
         Self::LostFrames,
         Self::ArrayBroken,
@@ -116,14 +116,14 @@ impl Fault {
     ];
 }
 
-/// What holds the loop back just now: a set of flags, stable by bit.
+/// Present restrictions of the loop: a set of flags, stable by bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Limits(pub u16);
 
 impl Limits {
     /// The voltage or the supply is used up.
     pub const VOLTAGE: u16 = 1 << 0;
-    /// The current limit (by the motor's model) holds the voltage back.
+    /// The current limit (by the motor's model) reduces the voltage.
     pub const CURRENT: u16 = 1 << 1;
     /// The speed limit is reached.
     pub const SPEED: u16 = 1 << 2;
@@ -137,20 +137,20 @@ impl Limits {
     pub const NOT_TARED: u16 = 1 << 6;
     /// A frame was missed since the last step.
     pub const FRAME_MISSED: u16 = 1 << 7;
-    /// The voltage's slew limit holds it back.
+    /// The slew limit delays a change of the voltage.
     pub const SLEW: u16 = 1 << 8;
-    /// There is no time for the fit level that was asked for; see [`crate::pipeline::budget`].
+    /// There is no time for the requested fit level; see [`crate::pipeline::budget`].
     pub const FIT_LEVEL: u16 = 1 << 9;
     /// Something touched the tip during the last tare: what the array shows is less by that, and torque is refused.
     pub const TARED_TOUCHING: u16 = 1 << 10;
-    /// The force is known only from below (saturated, cut off, without confidence): the travel since the touch bounds
-    /// it from above.
+    /// The force is known only from below (saturated, cut off, or without confidence): the travel since the touch
+    /// bounds it from above.
     pub const FROM_BELOW: u16 = 1 << 11;
-    /// The guard holds the duty back, see [`crate::safety::guard`].
+    /// The guard blocks the duty, see [`crate::safety::guard`].
     pub const GUARD: u16 = 1 << 12;
-    /// The winding's temperature, by the motor's model, holds the current back.
+    /// The estimated temperature of the winding reduces the current.
     pub const WINDING: u16 = 1 << 13;
-    /// Nobody has confirmed which way the motor goes: torque is refused.
+    /// The motor's direction is not confirmed: torque is refused.
     pub const DIRECTION: u16 = 1 << 14;
     /// Torque has been on since before the tare or the configuration: it drives nothing until it was off.
     pub const TORQUE_HELD: u16 = 1 << 15;
@@ -160,7 +160,7 @@ impl Limits {
         self.0 |= flag;
     }
 
-    /// Whether a flag is set.
+    /// Returns true if a flag is set.
     pub fn has(self, flag: u16) -> bool {
         self.0 & flag != 0
     }

@@ -1,11 +1,12 @@
-//! What a step reports beside the duty, and the same as numbers: what digests of runs are made of.
+//! Report of a step beside the duty. Its digest fields make the digests of runs.
 
 use crate::contact::{Contact, FitLevel};
 use crate::measure::Standing;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, Newtons};
 
-/// The numbers of the requests last taken up: a command's number that differs still waits, for a frame or for torque.
+/// Numbers of the requests that the loop acknowledged last. A number of the command that differs still waits, for a
+/// frame or for torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Taken {
     /// See [`crate::command::Command::tare_request`].
@@ -16,59 +17,59 @@ pub struct Taken {
     pub measure: u8,
 }
 
-/// How the tare that was last asked for stands. The numbers are stable.
+/// State of the tare that was requested last. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Taring {
-    /// None was asked for since reset.
+    /// No tare was requested since reset.
     #[default]
     None = 0,
-    /// It is under way.
+    /// The tare is under way.
     Running = 1,
-    /// It is done.
+    /// The tare is done.
     Done = 2,
-    /// A fault was there, or ended it; or something was pressed, and the zero before remains.
+    /// The tare was refused or ended by a fault, or something was pressed: the zero before remains.
     Refused = 3,
 }
 
-/// What a step reports.
+/// Report of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Status {
-    /// The frame it was made from.
+    /// Number of the step's frame.
     pub sequence: u32,
-    /// Frames missed since the pipeline was made; wraps.
+    /// Number of frames missed since the pipeline was made; wraps.
     pub missed_frames: u32,
-    /// What the controller is doing.
+    /// Activity of the controller.
     pub mode: Mode,
-    /// Why it stopped, where it did.
+    /// Reason why the motor was stopped, if it was.
     pub fault: Option<Fault>,
-    /// What holds it back.
+    /// Limits that reduce the duty or refuse a request.
     pub limits: Limits,
-    /// The fit level in use: what was asked for, or what there is time for.
+    /// Fit level in use: the requested one, or the largest that the time allows.
     pub fit_level: FitLevel,
-    /// What the frame says.
+    /// Contact of the frame.
     pub contact: Contact,
-    /// What of the contact's force is taken for the array's creep: the force that is held is less by this.
+    /// Part of the contact's force that is taken for creep of the array: the held force is less by this.
     pub creep: Newtons,
-    /// The microcontroller's temperature, where it was measured.
+    /// Temperature of the microcontroller, if it was measured.
     pub chip: Option<Celsius>,
-    /// What the goal's force reads more than it is, for the array's temperature.
+    /// Amount by which a force of the goal's size reads too high because of the array's temperature.
     pub drift: Newtons,
-    /// The motor's winding, by the current of the motor's model.
+    /// Temperature of the motor's winding, estimated from the current of the motor's model.
     pub winding: Celsius,
     /// Tip travel from where torque was first enabled.
     pub travel: Millimetres,
     /// Tip speed by the observer.
     pub speed: MillimetresPerSecond,
-    /// The duty that was returned.
+    /// Duty that the step returned.
     pub duty: Duty,
-    /// In off and tare: the tip still moves, so the motor is shorted.
+    /// True in off and tare while the tip still moves: the motor is shorted.
     pub braking: bool,
-    /// The motion that measures.
+    /// Progress of the motion that measures.
     pub measure: Standing,
-    /// The tare.
+    /// State of the tare.
     pub tare: Taring,
-    /// The requests taken up.
+    /// Acknowledged requests.
     pub taken: Taken,
 }
 
@@ -88,9 +89,9 @@ pub enum Bridge {
 impl Status {
     /// The state of the H-bridge that the board sets after this frame.
     ///
-    /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many millimetres
-    /// if the motor coasted. Shorted, the motor is pushed back slowly. So does a finger whose torque is turned off, until
-    /// the tip is at rest.
+    /// A fault brakes: a tip that presses holds the energy of its indentation, and would fly back for many
+    /// millimetres if the motor coasted. A shorted motor is pushed back slowly. A finger whose torque is turned off
+    /// brakes as well, until the tip is at rest.
     pub fn bridge(&self) -> Bridge {
         match self.mode {
             Mode::Fault if self.fault == Some(Fault::Bridge) => Bridge::Asleep,
@@ -103,13 +104,13 @@ impl Status {
 }
 
 impl Taken {
-    /// The numbers in a word, whose upper byte is 0.
+    /// Packs the numbers into a word, whose upper byte is 0.
     pub(crate) fn word(self) -> u32 {
         let Self { tare, clear, measure } = self;
         u32::from_le_bytes([tare, clear, measure, 0])
     }
 
-    /// Reads the word that a capture has of the numbers; `None` where its upper byte is not 0.
+    /// Reads the word that a capture has of the numbers; `None` if its upper byte is not 0.
     pub fn from_word(word: u32) -> Option<Self> {
         let [tare, clear, measure, none] = word.to_le_bytes();
         (none == 0).then_some(Self { tare, clear, measure })
@@ -117,7 +118,7 @@ impl Taken {
 }
 
 impl Status {
-    /// Hands over every field, and the duty that the step returned with it.
+    /// Passes every field on as digest fields, with the duty that the step returned.
     pub fn words(&self, duty: Duty, mut each: impl FnMut(u32)) {
         // Taken apart field by field, so that a field cannot be forgotten.
         let Self {

@@ -1,11 +1,11 @@
 //! Quantities: one fixed-point type each, with its unit in the name.
 //!
-//! The inner value is public: arithmetic happens on `.0`, and the wrapper says what the number means where it
-//! crosses a function's border.
+//! The inner value is public for arithmetic on `.0`. The wrapper gives the number its unit where it crosses a
+//! function's border.
 
 use fixed::types::{I2F30, I8F24, I16F16, I24F8};
 
-/// Makes one type for each quantity: a wrapper of the fixed-point type, public inside, with its bits as an integer.
+/// Defines one wrapper of a fixed-point type for each quantity.
 #[macro_export]
 macro_rules! quantities {
     ($($(#[$doc:meta])* $name:ident($inner:ty);)*) => { $(
@@ -14,7 +14,7 @@ macro_rules! quantities {
         pub struct $name(pub $inner);
 
         impl $name {
-            /// Nothing of it.
+            /// Zero.
             pub const ZERO: Self = Self(<$inner>::ZERO);
 
             /// From the raw integer: the value in units of the last place.
@@ -68,8 +68,8 @@ pub struct CoreCycles(pub u32);
 pub struct Duty(pub i16);
 
 impl Duty {
-    /// No voltage at the motor.
+    /// Duty of no voltage at the motor.
     pub const ZERO: Self = Self(0);
-    /// The whole supply.
+    /// Duty of the whole supply.
     pub const FULL: i16 = i16::MAX;
 }

@@ -3,12 +3,12 @@
 use super::{GAIN_BITS, GAIN_MAX, GAIN_ONE, weight};
 use lanes::place;
 
-/// All columns of a row.
+/// Mask of all columns of a row.
 pub(super) const fn all(columns: usize) -> u32 {
     u32::MAX >> (u32::BITS - columns as u32)
 }
 
-/// A calibration that cannot be.
+/// Reason to refuse a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CalibrationError {
     /// The gain of `taxels[row][column]`, Q14, is not within 1 to [`GAIN_MAX`].
@@ -17,16 +17,16 @@ pub enum CalibrationError {
         row: usize,
         /// The taxel's column.
         column: usize,
-        /// What was asked for.
+        /// Requested value.
         value: u16,
     },
     /// The mask of a row has bits beyond its columns.
     Mask {
         /// The row.
         row: usize,
-        /// What was asked for.
+        /// Requested value.
         value: u32,
-        /// All that are allowed.
+        /// Largest mask that is allowed.
         all: u32,
     },
 }
@@ -44,7 +44,7 @@ impl core::fmt::Display for CalibrationError {
 
 impl core::error::Error for CalibrationError {}
 
-/// Gains of all taxels, and a mask of those that are left out.
+/// Gains of all taxels, and a mask of taxels to leave out.
 ///
 /// ```
 /// use fingertip::pressure::{Calibration, GAIN_ONE};
@@ -58,12 +58,12 @@ impl core::error::Error for CalibrationError {}
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Calibration<const ROWS: usize, const COLUMNS: usize> {
     pub(super) weights: [Weights<COLUMNS>; ROWS],
-    /// A bit for each column that is left out.
+    /// Bits of the columns that are left out, for each row.
     pub(super) mask: [u32; ROWS],
 }
 
-/// The gains of a row in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9 of ten, with
-/// [`lanes::moment_bits`]: in 16 bits. In the order of a frame's codes; zero where the taxel is left out.
+/// Gains of a row in Q14, and the gains times twice the column's distance from the middle, -9, -7 .. 9 of ten, with
+/// [`lanes::moment_bits`]: both in 16 bits. In the order of a frame's codes; zero for a taxel that is left out.
 type Weights<const COLUMNS: usize> = [[i16; COLUMNS]; 2];
 
 const fn weights<const COLUMNS: usize>(gains: &[u16; COLUMNS]) -> Weights<COLUMNS> {
@@ -82,10 +82,10 @@ const fn weights<const COLUMNS: usize>(gains: &[u16; COLUMNS]) -> Weights<COLUMN
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Calibration<ROWS, COLUMNS> {
-    /// Gains of one, and every taxel counts.
+    /// Calibration with gains of one and no taxel left out.
     pub const NONE: Self = Self { weights: [weights(&[GAIN_ONE; COLUMNS]); ROWS], mask: [0; ROWS] };
 
-    /// Of gains, and every taxel counts.
+    /// Calibration with these gains and no taxel left out.
     pub fn of(gains: &Gains<ROWS, COLUMNS>) -> Self {
         let mut calibration = Self::NONE;
         calibration.weights.iter_mut().zip(gains.rows()).for_each(|(to, gains)| *to = weights(gains));
@@ -114,7 +114,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibration<ROWS, COLUMNS> {
     }
 }
 
-/// A gain for each taxel, `gains[row][column]`, Q14: [`GAIN_ONE`] is 1. From a half to just below 2.
+/// Gain of each taxel, `gains[row][column]`, Q14: [`GAIN_ONE`] is 1. From a half to just below 2. A host sends them,
+/// and the flash stores them.
 ///
 /// ```
 /// use fingertip::pressure::GAIN_ONE;
@@ -129,26 +130,26 @@ impl<const ROWS: usize, const COLUMNS: usize> Calibration<ROWS, COLUMNS> {
 pub struct Gains<const ROWS: usize, const COLUMNS: usize>([[u16; COLUMNS]; ROWS]);
 
 impl<const ROWS: usize, const COLUMNS: usize> Gains<ROWS, COLUMNS> {
-    /// The least gain: a half.
+    /// Least gain: a half.
     pub const MIN: u16 = GAIN_ONE / 2;
-    /// The largest.
+    /// Largest gain.
     pub const MAX: u16 = GAIN_MAX;
-    /// All taxels alike.
+    /// Gains of one.
     pub const ONE: Self = Self([[GAIN_ONE; COLUMNS]; ROWS]);
-    /// Words of 32 bits that hold them, two in each.
+    /// Number of words of 32 bits that hold the gains, two in each.
     pub const WORDS: usize = (ROWS * COLUMNS).div_ceil(2);
 
-    /// By row and column.
+    /// Gains by row and column.
     pub const fn rows(&self) -> &[[u16; COLUMNS]; ROWS] {
         &self.0
     }
 
-    /// Of a taxel, row by row; 1 where there is none.
+    /// Gain of a taxel, counted row by row; 1 out of range.
     pub fn get(&self, place: usize) -> u16 {
         self.0.as_flattened().get(place).copied().unwrap_or(GAIN_ONE)
     }
 
-    /// Sets a taxel's, row by row; false where there is no such taxel, or no such gain.
+    /// Sets the gain of a taxel, counted row by row. Returns false if there is no such taxel, or no such gain.
     pub fn set(&mut self, place: usize, gain: u16) -> bool {
         let allowed = (Self::MIN..=Self::MAX).contains(&gain);
         match self.0.as_flattened_mut().get_mut(place) {
@@ -160,12 +161,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Gains<ROWS, COLUMNS> {
         }
     }
 
-    /// Two taxels in a word, the first one in its low half; of an odd number the last half is a gain of 1.
+    /// Gains of two taxels in a word, the first one in its low half. With an odd number of taxels the last half is a
+    /// gain of 1.
     pub fn word(&self, word: usize) -> u32 {
         u32::from(self.get(2 * word)) | u32::from(self.get(2 * word + 1)) << 16
     }
 
-    /// The inverse of [`Gains::word`]; false where one of them cannot be.
+    /// Sets two gains from a word, the inverse of [`Gains::word`]. Returns false if one of them cannot be.
     pub fn set_word(&mut self, word: usize, value: u32) -> bool {
         let last = 2 * word + 1 == ROWS * COLUMNS;
         let high = (value >> 16) as u16;

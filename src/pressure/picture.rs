@@ -14,36 +14,37 @@ use crate::units::Newtons;
 use fixed::types::I16F16;
 use lanes::Row;
 
-/// The array's readings above tare and what they add up to, in sixteenths of a corrected code.
+/// Tactile image: the array's readings above tare and what they add up to, in sixteenths of a corrected code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picture<const ROWS: usize, const COLUMNS: usize> {
-    /// `taxels[row][column]`, zero where the taxel is masked, dead or saturated, and all zero where the array is
-    /// broken.
+    /// Readings as `taxels[row][column]`; zero if the taxel is masked, dead or saturated, and all zero if the array
+    /// is broken.
     pub taxels: [[i32; COLUMNS]; ROWS],
-    /// Sum over all taxels that are not bad. Where more are bad than [`crate::params::Params::bad_taxels_max`] allows,
-    /// the array is broken, and bad ones may be in it.
+    /// Sum over all taxels that are not bad. If more are bad than [`crate::params::Params::bad_taxels_max`] allows,
+    /// the array is broken, and the sum may contain bad taxels.
     pub sum: i32,
     /// Sum weighted by twice the column's distance from the middle, in pitches: -9, -7 .. 9 of ten.
     pub moment_x: i32,
     /// Sum weighted by twice the row's distance from the middle, in pitches.
     pub moment_y: i32,
-    /// The highest taxel, at least 0.
+    /// Highest taxel, at least 0.
     pub peak: i32,
-    /// The highest code of a taxel above its column's undriven level: how near the array is to saturation. 0 where a
-    /// taxel is dead or saturated, masked ones too.
+    /// Highest code of a taxel above its column's undriven level, which shows how near the array is to saturation. 0
+    /// if a taxel is dead or saturated, masked ones too.
     pub peak_codes: u16,
-    /// A bit for each column that is masked, dead or saturated, for each row.
+    /// Bits of the columns that are masked, dead or saturated, for each row.
     pub bad: [u32; ROWS],
-    /// Taxels that are dead or saturated, and not masked.
+    /// Number of taxels that are dead or saturated, and not masked.
     pub bad_count: u16,
-    /// Those of them that were so in the frame before: a burst of interference does not hit the same ones twice.
+    /// Number of bad taxels that were also bad in the frame before: a burst of interference does not hit the same
+    /// taxels twice.
     pub bad_again: u16,
-    /// The highest undriven column level.
+    /// Highest undriven level of a column.
     pub undriven_max: u16,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
-    /// Nothing seen.
+    /// Image before the first frame.
     pub const EMPTY: Self = Self {
         taxels: [[0; COLUMNS]; ROWS],
         sum: 0,
@@ -57,8 +58,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
         undriven_max: 0,
     };
 
-    /// Notes bad taxels of a row, a bit each, and takes them out while the array is not broken; the highest of them, at
-    /// least 0.
+    /// Flags bad taxels of a row, a bit each, and removes them while the array is not broken. Returns the highest of
+    /// them, at least 0.
     pub(super) fn leave_out(&mut self, row: usize, bad: u32, config: &Config) -> i32 {
         let (Some(taxels), Some(bits)) = (self.taxels.get_mut(row), self.bad.get_mut(row)) else { return 0 };
         *bits |= bad;
@@ -79,10 +80,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
         highest
     }
 
-    /// The highest taxel anew, where some were left out.
+    /// Finds the highest taxel again, after some were removed.
     pub(super) fn find_peak(&mut self) {
         let mut peak = 0;
-        // Some at a time written out: the compiler would keep the loop where it builds for size.
+        // Five at a time: the compiler would keep the loop when it builds for size.
         let (blocks, rest) = self.taxels.as_flattened().as_chunks();
         for [a, b, c, d, e] in blocks {
             peak = peak.max(*a).max(*b).max(*c).max(*d).max(*e);
@@ -93,33 +94,33 @@ impl<const ROWS: usize, const COLUMNS: usize> Picture<ROWS, COLUMNS> {
         self.peak = peak;
     }
 
-    /// Bits dropped from the force of a sixteenth of a code, so that its product with the largest sum fits 64 bits:
-    /// with the largest pitch and the front end's least gain that force is 2^38.04 in its unit, and a taxel shows at
+    /// Bits dropped from the force per sixteenth of a code, so that its product with the largest sum fits 64 bits.
+    /// With the largest pitch and the front end's least gain that force is 2^38.04 in its unit, and a taxel shows at
     /// most 2^17.6 sixteenths. Codes that the converter does not have may wrap it.
     const FORCE_DROP: u32 = if ROWS * COLUMNS <= 128 { 0 } else { 4 };
 
-    /// The sum as a force: the taxels' area times their pressure, never below zero, and stopped at the type's end.
+    /// Force by the sum: the taxels' area times their pressure, never below zero, and limited to the type's range.
     #[inline(always)]
     pub fn force(&self, config: &Config) -> Newtons {
         let product = i64::from(self.sum.max(0)).wrapping_mul(config.newtons_per_sum_q48 >> Self::FORCE_DROP);
         let upper = product >> (32 - Self::FORCE_DROP);
-        // Of so few taxels it is below 2^31.
+        // With at most 128 taxels the force is below 2^31.
         let force_bits = if Self::FORCE_DROP == 0 { upper as i32 } else { upper.min(i32::MAX.into()) as i32 };
         Newtons(I16F16::from_bits(force_bits.max(0)))
     }
 
-    /// The peak as a pressure in Pa.
+    /// Pressure of the highest taxel, Pa.
     pub fn peak_pa(&self, config: &Config) -> u32 {
         ((i64::from(self.peak.max(0)) * config.pascals_per_sum_q32) >> 32) as u32
     }
 }
 
-/// A code of the full range.
+/// Fractional bits of a code as a share of the full range.
 const RANGE_BITS: u32 = 12;
-/// No taxel carries more: three times the full range, which is what a line may read there.
+/// Largest load of a taxel: three times the full range, which is what a line may read there.
 const LARGEST: i32 = 3 << (RANGE_BITS + CODE_BITS);
 
-/// What a reading above a tare carries, in sixteenths of a code of the full range. Within one unit of the formula.
+/// Load of a reading above a tare, in sixteenths of a code of the full range. Within one unit of the formula.
 ///
 /// A reading and its tare of codes of 12 bits, gains below 2 and a boost below 1.5 stay below 2^18.6.
 #[inline(always)]
@@ -132,7 +133,7 @@ fn carried(curve: Curve, taxel: i32, tare: i32) -> i32 {
     carried.min(LARGEST).max(-LARGEST)
 }
 
-/// Turns a picture's readings into what they carry, and sums it up anew.
+/// Replaces an image's readings by the loads, and computes the sums again.
 #[inline(never)]
 pub(super) fn bend<const ROWS: usize, const COLUMNS: usize>(
     curve: Curve,
@@ -155,7 +156,7 @@ pub(super) fn bend<const ROWS: usize, const COLUMNS: usize>(
     (picture.sum, picture.moment_x, picture.moment_y, picture.peak) = (sum, moment_x, moment_y, peak);
 }
 
-/// The upper half of a product, rounded.
+/// Returns the upper half of a product, rounded.
 #[inline(always)]
 const fn upper(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64 + (1 << 31)) >> 32) as i32

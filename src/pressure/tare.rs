@@ -13,16 +13,16 @@ use super::{Array, CODE_BITS, Picture, TARE_BITS};
 use crate::config::Config;
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
-    /// Frames of a tare: of ten rows 160, 16 ms at 10 kHz.
+    /// Number of frames of a tare: 160 with ten rows, 16 ms at 10 kHz.
     ///
-    /// Each learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32 times: that
-    /// leaves 0.18 of a reading's white noise in a taxel's tare, and the sums, which every frame adds to, 0.08 of ten
-    /// rows.
+    /// Each frame learns two rows, so that it takes no longer than a frame in contact, and each row is learned 32
+    /// times. That leaves 0.18 of a reading's white noise in a taxel's tare, and 0.08 with ten rows in the sums,
+    /// which every frame adds to.
     pub const TARE_FRAMES: u32 = 32 * Self::TARE_STRIDE;
-    /// Frames until a tare comes to the same row again, and from the one row of a frame to the other.
+    /// Frames between two visits of the same row during a tare. A frame reads two rows, this far apart.
     const TARE_STRIDE: u32 = ROWS.div_ceil(2) as u32;
 
-    /// Forgets the tare and starts to measure it anew.
+    /// Drops the tare and starts to measure it again.
     pub fn start_tare(&mut self) {
         self.rows.iter_mut().for_each(|row| row.tare = [0; COLUMNS]);
         self.tare_lines = [[0; 2]; ROWS];
@@ -31,12 +31,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.baseline_line = None;
     }
 
-    /// Another characteristic may count from now on.
+    /// Takes note that another characteristic may apply from now on.
     pub fn forget_line(&mut self) {
         self.baseline_line = None;
     }
 
-    /// Takes the picture last read into the tare's running means; true when the tare is complete.
+    /// Adds the last image to the tare's running means. Returns true when the tare is complete.
     pub fn continue_tare(&mut self) -> bool {
         let (visits, first) = (self.tare_frames / Self::TARE_STRIDE, self.tare_frames % Self::TARE_STRIDE);
         self.tare_frames = (self.tare_frames + 1).min(Self::TARE_FRAMES);
@@ -48,7 +48,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
             *tare = tare.wrapping_add(((i64::from(value) * weight + (1 << 15)) >> 16) as i32);
         }
         for row in [first, first + Self::TARE_STRIDE] {
-            // Of an odd number of rows the last frame of a round learns one.
+            // With an odd number of rows the last frame of a round learns one.
             if ROWS.is_multiple_of(2) || row < ROWS as u32 {
                 self.learn(row as usize, ((1 << 16) / (visits + 1)) as i32);
             }
@@ -57,10 +57,10 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
         self.tare_frames >= Self::TARE_FRAMES
     }
 
-    /// Lets the baseline learn a share (Q16) of what the next row reads above it. [`crate::touch::Touch::learns`] gives
-    /// the share, where there is one.
+    /// Lets the baseline learn a share (Q16) of the next row's reading above it. [`crate::touch::Touch::learns`]
+    /// gives the share.
     ///
-    /// Returns the share of the baseline that this renewed, Q16: with a round's last row that of the round, else 0.
+    /// Returns the share of the baseline that this renewed, Q16: that of the round with its last row, else 0.
     pub fn follow_drift(&mut self, weight: u32) -> i32 {
         let weight = weight.min(1 << 16).cast_signed();
         self.learn(self.baseline_row, weight);
@@ -90,28 +90,29 @@ impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
     }
 }
 
-/// What each row would carry if all of its taxels were good, in sixteenths of a corrected code; none where too few are.
+/// Load of each row if all of its taxels were good, in sixteenths of a corrected code; none for a row with too few
+/// good taxels.
 type Lines<const ROWS: usize> = [Option<i32>; ROWS];
 
-/// What a tare says of a contact.
+/// Evidence of a touch during a tare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Touched<const ROWS: usize> {
-    /// Something touched during the last tare.
+    /// True if something touched during the last tare.
     pub flag: bool,
-    /// The last tare without a contact.
+    /// Rows of the last tare without a contact.
     clean: Option<Lines<ROWS>>,
 }
 
 impl<const ROWS: usize> Touched<ROWS> {
-    /// Nothing known.
+    /// State before the first tare.
     pub const NONE: Self = Self { flag: false, clean: None };
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Array<ROWS, COLUMNS> {
-    /// A row tells what a taxel usually carries where at least so many of its taxels are good: half of them.
+    /// Least number of good taxels in a row that is judged: half of its taxels.
     const ROW_LEAST: u32 = COLUMNS as u32 / 2;
 
-    /// Whether something seems to have touched the tip during the last tare that was judged.
+    /// Returns true if something seems to have touched the tip during the last tare that was judged.
     pub fn tared_touching(&self) -> bool {
         self.touched.flag
     }

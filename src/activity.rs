@@ -1,8 +1,8 @@
-//! What the finger does: one variant for each activity, which owns the state of that activity.
+//! The activity of the finger: one variant for each, which owns the state of that activity.
 //!
-//! Entering an activity makes its state and leaving drops it, so no activity can find what another one left behind. What
-//! outlives them is few and observed in every frame: the tactile image with its baseline, the [`crate::touch`], the
-//! motion with its zero and winding, the temperature compensation, and the time budget.
+//! Entering an activity creates its state and leaving drops it, so no activity can find what another one left behind.
+//! The few states that outlive an activity are updated in every frame: the tactile image with its baseline, the
+//! [`crate::touch`], the motion with its zero and winding, the temperature compensation, and the time budget.
 
 use crate::config::Config;
 use crate::control::SpeedLoop;
@@ -12,22 +12,22 @@ use crate::state::{Fault, Mode};
 use crate::touch::Touch;
 use crate::units::{Millimetres, MillimetresPerSecond};
 
-/// A tip that moves by no more than this and a count of the encoder is at rest: 5 um, Q24 mm,
+/// Distance, besides a count of the encoder, within which a tip is at rest: 5 um, Q24 mm.
 const REST: i32 = (1 << 24) / 200;
-/// once it has done so for this time, ns.
+/// Time within that distance after which a tip is at rest, ns.
 const REST_NS: u32 = 20_000_000;
 
-/// What the finger does.
+/// Activity of the finger.
 #[derive(Clone, Debug)]
 pub enum Activity {
     /// The bridge is off.
     Off(Halt),
-    /// The zero of every taxel is measured, with the bridge off. Behind a release the tip is known to be free: what the
-    /// array reads is a residue.
+    /// The zero of every taxel is measured, with the bridge off. After a release the tip is known to be free: what
+    /// the array reads is a residue.
     Tare {
-        /// The motor's way to rest.
+        /// Braking of the motor.
         halt: Halt,
-        /// Whether the tip was released before.
+        /// True if the tip was released before.
         free: bool,
     },
     /// Approach, hold and release.
@@ -41,7 +41,7 @@ pub enum Activity {
 }
 
 impl Activity {
-    /// As reported.
+    /// Mode as reported.
     pub fn mode(&self, touch: &Touch) -> Mode {
         match self {
             Self::Off(_) => Mode::Off,
@@ -53,27 +53,27 @@ impl Activity {
         }
     }
 
-    /// Whether the motor is driven: then guard and monitor watch.
+    /// Returns true if the motor is driven: then guard and monitor judge the motion.
     pub fn drives(&self) -> bool {
         matches!(self, Self::Grip(_) | Self::Press(_) | Self::Strokes(_))
     }
 
-    /// Whether the contact is fitted to the model. A press must not lean on the configured modulus.
+    /// Returns true if the contact is fitted to the model. A press must not depend on the configured modulus.
     pub fn fits(&self) -> bool {
         !matches!(self, Self::Press(_) | Self::Strokes(_))
     }
 
-    /// Whether the baseline may follow what the array reads.
+    /// Returns true if the baseline may follow the array's readings.
     pub fn learns(&self) -> bool {
         matches!(self, Self::Off(_) | Self::Grip(_))
     }
 }
 
-/// The way to rest of a motor that is no longer driven: shorted until the tip stands, then open. An open bridge would let
+/// Braking of a motor that is no longer driven: shorted until the tip is at rest, then open. An open bridge would let
 /// a pressed tip fly back, and a moving one run into the object.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Halt {
-    /// Travel at which the tip was last seen to move.
+    /// Travel at which the tip last moved.
     at: Millimetres,
     /// Time since then while the motor is shorted, ns; none once the bridge is open.
     still_ns: Option<u32>,
@@ -82,15 +82,15 @@ pub struct Halt {
 impl Halt {
     /// At rest, with the bridge open.
     pub const OPEN: Self = Self { at: Millimetres::ZERO, still_ns: None };
-    /// The motor was driven just now.
+    /// A motor that was driven just now.
     pub const BRAKES: Self = Self { at: Millimetres::ZERO, still_ns: Some(0) };
 
-    /// Whether the tip is at rest, and the bridge open.
+    /// Returns true if the tip is at rest and the bridge open.
     pub fn rests(&self) -> bool {
         self.still_ns.is_none()
     }
 
-    /// Takes a frame; whether the motor is shorted.
+    /// Takes a frame. Returns true while the motor is shorted.
     pub fn brakes(&mut self, motion: &SpeedLoop, config: &Config) -> bool {
         let Some(still_ns) = &mut self.still_ns else { return false };
         let travel = motion.observer.travel;
@@ -105,7 +105,7 @@ impl Halt {
         self.still_ns.is_some()
     }
 
-    /// Whether the tip is slow enough for the motor to be driven from here. One that is not is braked first.
+    /// Returns true if the tip is slow enough for the motor to be driven from here. A faster one is braked first.
     pub fn slow(&mut self, motion: &SpeedLoop, config: &Config) -> bool {
         let MillimetresPerSecond(speed) = motion.observer.speed;
         let slow = speed.saturating_abs() <= config.approach.0 / 2;

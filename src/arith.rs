@@ -6,10 +6,10 @@
 //! The library's `isqrt` divides 64 bits by 64, which a Cortex-M4 does in software; a table and two Newton steps in
 //! integers take twice as long as this.
 
-/// More than the estimate can be wrong by: 1.5 x 2^-24 of at most 2^32, and a unit.
+/// Bound of the estimate's error: 1.5 x 2^-24 of at most 2^32, and a unit.
 const ESTIMATE_ERROR: u32 = 512;
 
-/// The largest number whose square is not above `x`.
+/// Returns the largest number whose square is not above `x`.
 ///
 /// ```
 /// use fingertip::arith::floor_sqrt;
@@ -37,15 +37,15 @@ pub fn floor_sqrt(x: u64) -> u32 {
     root >> (shift / 2)
 }
 
-/// A quarter of the root, sqrt(x y), too small by less than 7 x 2^-24 of itself and a unit, for a `y` from 2^24; and x
-/// times the gain.
+/// Returns a quarter of the root, sqrt(x y), too small by less than 7 x 2^-24 of itself and a unit, for a `y` from
+/// 2^24; and x times the gain.
 #[inline(always)]
 pub(crate) fn root_below(x: u32, y: u32, gain: u64) -> (u32, u64) {
     // The estimate is within 2.5 x 2^-24; a factor less 2^-21 of itself puts it below the exact one.
     lanes::root_and_product(x, y - (y >> 21), gain)
 }
 
-/// The nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`].
+/// Returns the nearest integer to the root of a square below 2^56, from a quarter of it by [`root_below`].
 ///
 /// `sixteenth` is the square without its last four bits, `fourfold` four times the square, both rounded down and modulo
 /// 2^32: remainders fit 32 bits, so only the last bits of squares are computed. That makes it twice as quick as
@@ -62,24 +62,24 @@ pub(crate) fn nearest_root(quarter: u32, sixteenth: u32, fourfold: u32) -> u32 {
     near + (beyond >> 31)
 }
 
-/// n - root^2.
+/// Returns n - root^2.
 fn remainder(n: u64, root: u32) -> i64 {
     n.wrapping_sub(u64::from(root) * u64::from(root)) as i64
 }
 
-/// `a b / 2^shift`, rounded down and held to 32 bits.
+/// Returns `a b / 2^shift`, rounded down and limited to 32 bits.
 #[inline(always)]
 pub(crate) fn product(a: i32, b: i32, shift: u32) -> i32 {
     held_wide((i64::from(a) * i64::from(b)) >> shift)
 }
 
-/// `a b / 2^shift`, rounded to nearest and held to 32 bits.
+/// Returns `a b / 2^shift`, rounded to nearest and limited to 32 bits.
 #[inline(always)]
 pub(crate) fn nearest_product(a: i32, b: i32, shift: u32) -> i32 {
     held_wide(nearest(a, b, shift))
 }
 
-/// a b / 2^31, rounded to nearest, for a `b` that is not negative: fits by itself.
+/// Returns a b / 2^31, rounded to nearest, for a `b` that is not negative: the result fits 32 bits.
 #[inline(always)]
 pub(crate) fn nearest_share(a: i32, b: i32) -> i32 {
     nearest(a, b, 31) as i32
@@ -90,33 +90,33 @@ fn nearest(a: i32, b: i32, shift: u32) -> i64 {
     (i64::from(a) * i64::from(b) + (1 << (shift - 1))) >> shift
 }
 
-/// Held to so many bits with the sign: one instruction.
+/// Limits a number to `bits` bits with the sign: one instruction.
 #[inline(always)]
 pub(crate) fn clamp_bits(value: i32, bits: u32) -> i32 {
     let limit = 1 << (bits - 1);
     value.max(-limit).min(limit - 1)
 }
 
-/// One comparison where `clamp` has two of 64 bits.
+/// Limits a number to 32 bits with one comparison, where `clamp` has two of 64 bits.
 #[inline(always)]
 fn held_wide(value: i64) -> i32 {
     let low = value as i32;
     if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }
 
-/// The upper half of a product.
+/// Returns the upper half of a product.
 #[inline(always)]
 pub const fn high(a: i32, b: i32) -> i32 {
     ((a as i64 * b as i64) >> 32) as i32
 }
 
-/// `a` plus the share `share_q31` of the way to `b`.
+/// Interpolates from `a` to `b` by the share `share_q31`.
 #[inline(always)]
 pub const fn between(a: i32, b: i32, share_q31: i32) -> i32 {
     a + 2 * high(b - a, share_q31)
 }
 
-/// `value` within `-limit` to `limit`.
+/// Limits `value` to `-limit` to `limit`.
 pub const fn clamp_to(value: i64, limit: i32) -> i32 {
     if value > limit as i64 {
         limit
@@ -127,7 +127,7 @@ pub const fn clamp_to(value: i64, limit: i32) -> i32 {
     }
 }
 
-/// 2^63 / n, off by less than 2^-29 of itself. The top bit of n counts as set.
+/// Returns 2^63 / n, off by less than 2^-29 of itself. The top bit of n counts as set.
 pub const fn reciprocal(n: u32) -> u32 {
     let n = n | 1 << 31;
     let coarse = (u32::MAX / (n >> 16)) << 15;
@@ -137,23 +137,23 @@ pub const fn reciprocal(n: u32) -> u32 {
     if fine >> 32 == 0 { fine as u32 } else { u32::MAX }
 }
 
-/// A divisor of several numbers.
+/// Divisor of several numbers.
 #[derive(Clone, Copy, Debug)]
 pub struct Divisor {
-    /// 2^62 over the divisor shifted up.
+    /// 2^62 over the shifted divisor.
     inverse: i32,
     shift: u32,
 }
 
 impl Divisor {
-    /// Of a number above 0; 0 counts as 1.
+    /// Prepares a division by a number above 0; 0 counts as 1.
     pub const fn new(divisor: u64) -> Self {
         let divisor = if divisor == 0 { 1 } else { divisor };
         let shift = divisor.leading_zeros();
         Self { inverse: (reciprocal(((divisor << shift) >> 32) as u32) >> 1) as i32, shift }
     }
 
-    /// `value * 2^bits` over the divisor; it stops at the ends of 32 bits.
+    /// Returns `value * 2^bits` over the divisor, limited to 32 bits.
     pub const fn divide(&self, value: i64, bits: u32) -> i32 {
         // Puts the value's top bit at 30.
         let magnitude = value.unsigned_abs();
@@ -178,7 +178,7 @@ impl Divisor {
     }
 }
 
-/// The root of a number, off by less than 2^-15 of itself.
+/// Returns the root of a number, off by less than 2^-15 of itself.
 pub const fn root(x: u32) -> u32 {
     if x == 0 {
         return 0;

@@ -27,37 +27,38 @@ use bounds::{Driven, Drives};
 use core::ops::{Deref, DerefMut};
 use fixed::types::{I8F24, I16F16};
 
-/// The least supply must give this part of the largest voltage: 1/4.
+/// Part of the largest voltage that the least supply must give: 1/4.
 const SUPPLY_PART: i32 = 4;
-/// The converter must see at least this number of least contacts: a contact begins at one, its surface is known at two,
-/// and a signal that fails in a step takes a quarter and one more.
+/// Number of least contacts that the converter must see: a contact begins at one, its surface is known at two, and a
+/// signal that fails in a step takes a quarter and one more.
 const SEEN_LEAST: i32 = 4;
-/// The band of the way at rest: this, for the array's noise, mm,
+/// Band of the distance at rest for the array's noise, mm.
 const CALM_MM: f32 = 0.008;
-/// and so many counts of the encoder;
+/// Number of encoder counts that are added to the band.
 const CALM_COUNTS: f32 = 3.0;
-/// at most 2 mm, of which the pace's arithmetic holds 32 (Q24).
+/// Largest band, Q24: 2 mm. The gain schedule's arithmetic holds 32 mm.
 const CALM_MAX: i32 = 2 << 24;
-/// Time constants of the quickest profile without a way to go before the loop is calmer.
+/// Number of time constants of the quickest profile within the band before the loop is calmer.
 const CALM_TIME_CONSTANTS: f32 = 4.0;
 
-/// Share of the braking that the profile counts on, Q8; the rest is left to the speed loop.
+/// Share of the motor's braking that the profile uses, Q8; the rest is left to the speed loop.
 pub(crate) const BRAKE_SHARE_Q8: i32 = 218;
-/// Largest braking that the profile's arithmetic takes: 1000 m/s^2 in Q8 mm/s^2.
+/// Largest braking in the profile's arithmetic: 1000 m/s^2 in Q8 mm/s^2.
 const BRAKE_MAX: i64 = 1_000_000 << 8;
-/// A jump of the encoder is farther than the tip goes at its largest speed in this many frames,
+/// Number of frames at the largest speed that a jump of the encoder exceeds.
 const JUMP_FRAMES: f32 = 4.0;
-/// and at least this far, mm.
+/// Least length of a jump of the encoder, mm.
 const JUMP_MM: f32 = 0.5;
 
-/// What the loop derives from [`Params`], the same for arrays of all shapes but for the scan's time; see [`Shaped`].
+/// Constants that the loop derives from [`Params`], the same for arrays of all shapes but for the scan's time; see
+/// [`Shaped`].
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// The parameters it was made from.
+    /// Parameters that the constants were computed from.
     pub params: Params,
-    /// How the scan is timed.
+    /// Timing of the scan.
     pub timing: ScanTiming,
-    /// The fingertip's model.
+    /// Model of the fingertip.
     pub tip: Tip,
 
     /// See [`Params::row_sag_ppb_per_code`], as a share in Q32.
@@ -66,97 +67,97 @@ pub struct Config {
     pub dead_codes: u16,
     /// Smallest code of a saturated taxel, see [`Params::headroom_codes`].
     pub saturated_codes: u16,
-    /// The characteristic, where it is not a line.
+    /// Characteristic of the array, if it is not a line.
     pub curve: Option<Curve>,
     /// Force for a sixteenth of a corrected code on one taxel, Q48 of the force's bit.
     pub newtons_per_sum_q48: i64,
     /// Pressure in Pa for a sixteenth of a corrected code, Q32.
     pub pascals_per_sum_q32: i64,
-    /// The array under the tip, for the fit.
+    /// Geometry of the array under the tip, for the fit.
     pub geometry: Geometry,
     /// Half of the pitch.
     pub half_pitch: Millimetres,
     /// See [`Params::contact_on_mn`].
     pub contact_on: Newtons,
-    /// Half of what the least contact adds to all taxels together, in sixteenths of a corrected code.
+    /// Half of the sum that the least contact adds to all taxels together, in sixteenths of a corrected code.
     pub touch_line: i32,
     /// See [`Params::contact_off_mn`].
     pub contact_off: Newtons,
 
-    /// Share of a held reading that is creep in the end, Q32; 0 where none is taken off.
+    /// Share of a held reading that is creep in the end, Q32; 0 turns the compensation off.
     pub creep_share_q32: u32,
-    /// Share of its way that the creep goes in a frame, Q32: at most a half.
+    /// Share of its distance to the target that the creep moves in a frame, Q32: at most a half.
     pub creep_leak_q32: u32,
 
-    /// Frame time in s, Q37: below 1/64 s. Of frames that take longer than 61 us, single precision has no bit more.
+    /// Frame time in s, Q37: below 1/64 s. Frames longer than 61 us use all bits of single precision.
     pub frame_s_q37: i32,
     /// Tip travel for an encoder count in mm, Q40.
     pub mm_per_count_q40: i64,
-    /// The same: the encoder's resolution.
+    /// Encoder resolution: tip travel for a count.
     pub count: Millimetres,
-    /// Error of the travel that is not motion but a jump of the encoder, Q24 mm.
+    /// Error of the travel that counts as a jump of the encoder, Q24 mm.
     pub jump: u32,
-    /// Encoder counts that the travel can hold.
+    /// Largest number of encoder counts in the travel's range.
     pub counts_max: i32,
-    /// The loop's gains, quickest first.
+    /// Gain sets of the loop, quickest first.
     pub gain_sets: [Gains; GAIN_SETS],
-    /// How far the way still to go may be off at rest.
+    /// Uncertainty of the distance to go at rest.
     pub calm_band: Millimetres,
-    /// Frames of calm at the quickest pace before the next.
+    /// Number of frames within the band at the quickest gain set before the next set.
     pub calm_frames: u32,
-    /// c in 1/s, Q17: at most 16,384, a motor that stops within less than a frame.
+    /// c in 1/s, Q17: at most 16,384, for a motor that stops within less than a frame.
     pub damping_q17_per_s: i32,
     /// g V_max, Q8 mm/s^2.
     pub voltage_limit: i32,
     /// g R i_max, Q8 mm/s^2.
     pub current_limit: i32,
-    /// Below this the supply is about to go under: 4 % above where the motor is stopped.
+    /// Supply below which the current is reduced, mV: 4 % above the fault level.
     pub supply_weak_mv: i32,
     /// Largest change of g V in a frame, Q8 mm/s^2.
     pub slew_limit: i32,
-    /// Least, usual and largest deceleration that the profile counts on, Q8 mm/s^2.
+    /// Least, usual and largest deceleration that the profile uses, Q8 mm/s^2.
     pub brake: [i32; 3],
-    /// Share of [`Params::voltage_max_mv`] that is a mV, Q32.
+    /// Share of [`Params::voltage_max_mv`] per mV, Q32.
     pub share_per_mv_q32: u32,
     /// Left shift that takes [`Config::voltage_limit`] to 31 bits.
     pub voltage_shift: u32,
-    /// Duty (Q15) for a g V shifted so, Q31, times the supply in mV.
+    /// Duty (Q15) for a shifted g V, Q31, times the supply in mV.
     pub duty_gain: u32,
     /// See [`Params::speed_max_um_per_s`].
     pub speed_max: MillimetresPerSecond,
     /// See [`Params::approach_um_per_s`].
     pub approach: MillimetresPerSecond,
-    /// Distance to the goal from which on the profile is not faster than that.
+    /// Distance to the goal below which the profile is not faster than the approach.
     pub near: Millimetres,
     /// See [`Params::travel_max_um`].
     pub travel_max: Millimetres,
     /// See [`Params::clearance_um`].
     pub clearance: Millimetres,
-    /// What the guard goes by.
+    /// Bounds of the guard.
     pub bounds: Bounds,
-    /// How the array's readings drift with temperature.
+    /// Drift of the array's readings with temperature.
     pub drift: ArrayDrift,
-    /// How the winding heats up.
+    /// Thermal model of the winding.
     pub heat: Heat,
-    /// The bounds of the motions that measure the drive.
+    /// Bounds of the motions that measure the drive.
     pub motions: Motions,
     /// See [`Params::force_fault_mn`].
     pub force_fault: Newtons,
     /// See [`Params::force_max_mn`].
     pub force_max: Newtons,
-    /// The largest force of a centred contact that the converter still sees whole: by the tip's model its peak stays a
+    /// Largest force of a centred contact that the converter still sees whole: by the tip's model its peak stays a
     /// twentieth below saturation. It may be less than [`Config::force_max`].
     pub force_seen: Newtons,
 }
 
 impl Config {
-    /// The travel that so many encoder counts mean, held to the type's range but for a count.
+    /// Converts encoder counts to travel, limited to the type's range less a count.
     pub fn travel(&self, counts: i32) -> Millimetres {
         let counts = counts.max(-self.counts_max).min(self.counts_max);
         Millimetres::from_bits(((i64::from(counts) * self.mm_per_count_q40) >> 16) as i32)
     }
 
-    /// g V of a voltage at the motor, up to [`Params::voltage_max_mv`] either way, Q8 mm/s^2.
+    /// Returns g V of a voltage at the motor, up to [`Params::voltage_max_mv`] either way, Q8 mm/s^2.
     pub fn push(&self, voltage_mv: i32) -> i32 {
         let most = self.params.voltage_max_mv.max(0).unsigned_abs();
         let share = voltage_mv.unsigned_abs().min(most).wrapping_mul(self.share_per_mv_q32);
@@ -164,13 +165,13 @@ impl Config {
         if voltage_mv < 0 { -push } else { push }
     }
 
-    /// See [`Shaped::new`], into which this goes: a configuration is large, and would be copied.
+    /// See [`Shaped::new`]. Inlined, because a configuration is large and would be copied.
     #[inline(always)]
     fn new(params: &Params, shape: [usize; 2], clocks: &Clocks) -> Result<Self, ConfigError> {
         params.check().map_err(ConfigError::Param)?;
         let p = params;
         let codes_milli = codes_at_full_range(p)?;
-        // By how much the one must be below the other, the two, and their names.
+        // Least difference, the lower and the higher parameter, and their names.
         for (apart, low, high, names) in [
             (1, p.contact_off_mn, p.contact_on_mn, ("contact_off_mn", "contact_on_mn")),
             (1, p.contact_on_mn, p.force_max_mn, ("contact_on_mn", "force_max_mn")),
@@ -291,8 +292,8 @@ fn tip(p: &Params) -> Result<Tip, ConfigError> {
     })
 }
 
-/// What the profile counts on, from the acceleration that the motor can give: the disturbance moves it between a
-/// quarter and twice of that.
+/// Returns the decelerations for the profile from the acceleration of the motor. The disturbance moves the usual one
+/// between a quarter and twice of it.
 fn brake(motor: i32) -> [i32; 3] {
     let share = i64::from(motor) * i64::from(BRAKE_SHARE_Q8);
     [(share >> 10).min(BRAKE_MAX) as i32, (share >> 8) as i32, (share >> 7).min(BRAKE_MAX) as i32]
@@ -303,19 +304,19 @@ pub(crate) const fn exp2(n: u32) -> f32 {
     (1u64 << n) as f32
 }
 
-/// A constant for the loop: well inside 62 bits, so that doubling it cannot overflow.
-// Kept apart, as the next: a dozen copies would fill a sixtieth of the flash.
+/// Converts a constant of the loop: within 62 bits, so that doubling it cannot overflow.
+// Not inlined, as the next: a dozen copies would fill a sixtieth of the flash.
 #[inline(never)]
 fn wide(value: f32) -> i64 {
     value.clamp(-4e18, 4e18) as i64
 }
 
-/// The same for what the loop multiplies with 32 bits: an acceleration within its type, 8388 m/s^2.
+/// Converts a constant that the loop multiplies with 32 bits, such as an acceleration within its type, 8388 m/s^2.
 pub(crate) fn narrow(value: f32) -> i32 {
     wide(value).min(i64::from(i32::MAX)) as i32
 }
 
-/// `value / 1000` in units of 2^-bits, rounded.
+/// Returns `value / 1000` in units of 2^-bits, rounded.
 #[inline(never)]
 const fn thousandths(value: i32, bits: u32) -> i32 {
     ((((value as i64) << (bits + 1)) / 1000 + 1) >> 1) as i32
@@ -325,7 +326,7 @@ pub(crate) fn millimetres(um: i32) -> Millimetres {
     Millimetres(I8F24::from_bits(thousandths(um, 24)))
 }
 
-/// A force in N from mN, rounded.
+/// Converts a force from mN to N, rounded.
 pub fn newtons(mn: i32) -> Newtons {
     Newtons(I16F16::from_bits(thousandths(mn, 16)))
 }
@@ -334,8 +335,8 @@ pub(crate) fn speed(um_per_s: i32) -> MillimetresPerSecond {
     MillimetresPerSecond(I16F16::from_bits(thousandths(um_per_s, 16)))
 }
 
-/// What the loop derives from [`Params`] for an array of this shape. What does not go by the shape takes the [`Config`]
-/// in it.
+/// Constants that the loop derives from [`Params`] for an array of this shape. Code that does not depend on the shape
+/// uses the [`Config`] in it.
 ///
 /// ```
 /// use fingertip::config::Shaped;
@@ -371,8 +372,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Shaped<ROWS, COLUMNS> {
     /// Checks the parameters and derives the loop's constants, with the clocks of a board.
     ///
     /// # Errors
-    /// Names the parameter, its value and its range, the scan that cannot be timed, or the two that contradict each
-    /// other.
+    /// Names the parameter with its value and its range, the scan that cannot be timed, or the two parameters that
+    /// contradict each other.
     pub fn new(params: &Params, clocks: &Clocks) -> Result<Self, ConfigError> {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         let config = Config::new(params, [ROWS, COLUMNS], clocks)?;

@@ -18,7 +18,7 @@ use equations::{Bits, Misfit};
 use fixed::types::I8F24;
 use prediction::Scale;
 
-/// What the fit is made of, for other ways to read a picture that it is measured against. It may change at any time.
+/// Parts of the fit, for other methods that are compared with it. They may change at any time.
 #[doc(hidden)]
 pub mod parts {
     pub use super::equations::{Comparison, Equations, Misfit};
@@ -28,14 +28,14 @@ pub mod parts {
     pub use crate::config::array::{ONE, PLACE_BITS, SQUARE_BITS};
 }
 
-/// A contact with less confidence than this is not a hemisphere on a plane.
+/// Least confidence at which a contact counts as a hemisphere on a plane.
 pub const CONFIDENCE_LEAST: u8 = 128;
 /// Root mean square residual, as a share of the peak in Q14, at which confidence reaches 0: 2.8 %.
 const RESIDUAL_MAX: u32 = 459;
-/// Fewer live taxels than this within the contact cannot hold the model's three unknowns against noise.
+/// Least number of live taxels within the contact: fewer cannot hold the model's three unknowns against noise.
 pub const TAXELS_MIN: i32 = 5;
 
-/// What a frame says of the contact.
+/// Contact in a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contact {
     /// Total normal force.
@@ -50,20 +50,20 @@ pub struct Contact {
     pub radius: Millimetres,
     /// Highest pressure on a taxel, Pa.
     pub peak_pa: u32,
-    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
+    /// Likeness of the image to a hemisphere on a plane: 0 none, 255 full.
     pub confidence: u8,
-    /// How far the force is known only from below: 0 not at all; 255 where much of the contact is hidden and no fit
-    /// says how much.
+    /// Uncertainty of the force: 0 none; 255 if much of the contact is hidden and no fit shows how much. Such a force
+    /// is known only from below.
     pub doubt: u8,
-    /// Taxels left out because they are dead or saturated; 255 stands for more.
+    /// Number of taxels left out because they are dead or saturated; 255 means 255 or more.
     pub bad_taxels: u8,
 }
 
-/// How much work the loop puts into the contact of each frame. The numbers are stable: hosts store them.
+/// Amount of work per frame for the contact. The numbers are stable: hosts store them.
 ///
-/// A refinement of the model takes each row of the array once, so many rows in a frame at most. Where it is spread over
-/// frames, it begins in one of its own. How often it comes is said for ten rows; an array with fewer rows than the fit
-/// level takes has them all in every frame.
+/// A refinement of the model takes each row of the array once. The fit level limits the rows in a frame. A refinement
+/// that is spread over frames begins in a frame of its own. The periods below are for ten rows; an array with fewer
+/// rows than the level allows has all of them in every frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum FitLevel {
@@ -83,10 +83,10 @@ pub enum FitLevel {
 }
 
 impl FitLevel {
-    /// All of them, least first.
+    /// All fit levels, least first.
     pub const ALL: [Self; 6] = [Self::Sum, Self::Moments, Self::OneRow, Self::TwoRows, Self::FiveRows, Self::AllRows];
 
-    /// The fit level of this number; the largest where there is none.
+    /// Returns the fit level of a number; the largest for an unknown number.
     pub const fn from_number(number: u8) -> Self {
         match number {
             0 => Self::Sum,
@@ -98,17 +98,17 @@ impl FitLevel {
         }
     }
 
-    /// The next lower one, or the least.
+    /// Returns the next lower level, or the least.
     pub const fn lower(self) -> Self {
         Self::from_number((self as u8).saturating_sub(1))
     }
 
-    /// The next higher one, or the largest.
+    /// Returns the next higher level, or the largest.
     pub const fn higher(self) -> Self {
         Self::from_number(self as u8 + 1)
     }
 
-    /// Rows of an array of so many that the model takes in a frame at most.
+    /// Number of rows that the model takes in a frame at most, of an array with `all` rows.
     pub(crate) const fn rows(self, all: usize) -> usize {
         let rows = match self {
             Self::Sum | Self::Moments => 0,
@@ -124,15 +124,15 @@ impl FitLevel {
 /// Fractional bits of a centre of pressure in half pitches.
 const CENTRE_RATIO_BITS: u32 = 11;
 
-/// Bits of a sum that leave its largest moment, `side - 1` times as much, 31 with [`CENTRE_RATIO_BITS`].
+/// Bits of a sum such that its largest moment, `side - 1` times as much, takes 31 bits with [`CENTRE_RATIO_BITS`].
 const fn sum_bits(side: usize) -> u32 {
     if side <= 16 { 16 } else { 15 }
 }
 
-/// Reads the contact off the sums.
+/// Computes the contact from the sums.
 ///
-/// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It is
-/// never below zero. The centre is that of the pressure, zero where there is no force.
+/// The force is the plain sum of the taxels times their area: right to 0.1 % for a contact that the array covers. It
+/// is never below zero. The centre is that of the pressure, zero without a force.
 pub fn from_sums<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
@@ -142,7 +142,7 @@ pub fn from_sums<const ROWS: usize, const COLUMNS: usize>(
     contact_of_force(force, centre, picture, config)
 }
 
-/// A contact of this force: indentation and radius by the model, the rest by the picture.
+/// Completes a contact of this force: indentation and radius by the model, the rest from the image.
 fn contact_of_force<const ROWS: usize, const COLUMNS: usize>(
     force: Newtons,
     centre: [Millimetres; 2],
@@ -164,18 +164,18 @@ fn contact_of_force<const ROWS: usize, const COLUMNS: usize>(
     }
 }
 
-/// Moments over sum in half pitches, as lengths; the resolution is 1/2048 of half a pitch.
+/// Centre of pressure as moments over sum; the resolution is 1/2048 of half a pitch.
 #[inline(always)]
 fn centre_of_pressure<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
 ) -> [Millimetres; 2] {
-    // All are shifted alike so that of ten rows and columns the sum keeps 16 bits and the moment, at most nine times as
+    // All are shifted alike. With ten rows and columns the sum keeps 16 bits and the moment, at most nine times as
     // large, 20.
     let shift = (32 - picture.sum.leading_zeros()).saturating_sub(const { sum_bits(Shape::<ROWS, COLUMNS>::SIDE) });
     let sum = (picture.sum >> shift).max(1);
     let half_pitch = i64::from(config.half_pitch.to_bits());
-    // Two divisions one after the other; the compiler would make a loop of a closure over both.
+    // Two divisions in sequence; the compiler would make a loop of a closure over both.
     [
         along::<COLUMNS>(picture.moment_x >> shift, sum, half_pitch),
         along::<ROWS>(picture.moment_y >> shift, sum, half_pitch),
@@ -189,20 +189,20 @@ fn along<const SIDE: usize>(moment: i32, sum: i32, half_pitch: i64) -> Millimetr
     Millimetres(I8F24::from_bits(((i64::from(half_pitches) * half_pitch) >> CENTRE_RATIO_BITS) as i32))
 }
 
-/// How far a contact reaches over the array's edge; below 0 where it does not. In 2^-20 mm: 24 bits hold 128 mm, half a
-/// unit of these is 8 nm, and nothing overflows.
+/// Distance by which a contact reaches over the array's edge; negative inside the array. In 2^-20 mm: 24 bits hold
+/// 128 mm, half a unit is 8 nm, and nothing overflows.
 fn overhang<const ROWS: usize, const COLUMNS: usize>(contact: &Contact, config: &Config) -> i32 {
     let [x, y, radius, half_pitch] =
         [contact.centre_x, contact.centre_y, contact.radius, config.half_pitch].map(|length| length.to_bits() >> 4);
     let [x, y] = [x.abs(), y.abs()];
-    // The sides of a square are equally far: only for it the farther coordinate decides.
+    // The sides of a square are equally far, so the farther coordinate decides.
     if ROWS == COLUMNS {
         return x.max(y) + radius - COLUMNS as i32 * half_pitch;
     }
     (x - COLUMNS as i32 * half_pitch).max(y - ROWS as i32 * half_pitch) + radius
 }
 
-/// Whether the whole contact lies on good taxels of the array.
+/// Returns true if the whole contact lies on good taxels of the array.
 pub fn covers<const ROWS: usize, const COLUMNS: usize>(
     contact: &Contact,
     picture: &Picture<ROWS, COLUMNS>,
@@ -211,7 +211,7 @@ pub fn covers<const ROWS: usize, const COLUMNS: usize>(
     overhang::<ROWS, COLUMNS>(contact, config) <= 0 && hidden(contact, picture, config).is_none()
 }
 
-/// The share of a contact's force that bad taxels hide, Q8; none where none of them is within reach of it.
+/// Share of a contact's force that bad taxels hide, Q8; none if no bad taxel is within reach of it.
 ///
 /// The pressure is taken for a parabola over the radius, whose mean is half of its peak: a taxel of the area A at the
 /// distance r from the centre has the share 2 A (1 - r^2 / r_c^2) / (pi r_c^2).
@@ -252,7 +252,8 @@ fn hidden<const ROWS: usize, const COLUMNS: usize>(
     })
 }
 
-/// 255 at no residual, falling to 0 at `RESIDUAL_MAX`; what the converter's steps leave does not count.
+/// Confidence: 255 at no residual, falling to 0 at `RESIDUAL_MAX`. The part of the residual that the converter's
+/// resolution explains is ignored.
 pub fn confidence<const ROWS: usize, const COLUMNS: usize>(misfit: &Misfit, scale: &Scale) -> u8 {
     let mean = |squares: i32, taxels: i32| squares.max(0).unsigned_abs() / taxels.max(1).unsigned_abs();
     // Squares count fewer bits than a share's square.

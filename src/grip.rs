@@ -1,12 +1,13 @@
-//! Approach, hold and release: what the speed loop is asked while the host asks for a force.
+//! Approach, hold and release: the speed reference while the host requests a force.
 //!
 //! Approach and hold follow the same curve, d_goal - d; an approach is only slower. So contact changes nothing but a
 //! limit.
 //!
-//! A release goes by geometry: its place of rest is the clearance behind the surface, whatever the array says on the way.
-//! Noise, creep, temperature and hysteresis can look like a contact in the air; none of them moves that place. Where the
-//! surface is not known from the front, because the touch was there before torque was, or where an object follows the
-//! tip, the place of rest moves back as long as each half millimetre lowers the force. A residue does not do that.
+//! A release is planned by geometry: its place of rest is the clearance behind the surface, whatever the array shows
+//! on the way. Noise, creep, temperature and hysteresis can look like a contact in the air; none of them moves that
+//! place. If the surface is not known from the front, because the touch was there before torque was, or if an object
+//! follows the tip, the place of rest moves back as long as each half millimetre lowers the force. A residue does not
+//! do that.
 
 use crate::arith::product;
 use crate::config::Config;
@@ -17,31 +18,31 @@ use crate::touch::{SURE, Stage, Touch};
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 use fixed::types::I8F24;
 
-/// How many times its indentation a tip may have gone into an object and still move at full speed forward: an object that
-/// yields moves with the tip.
+/// Largest depth in the object at which a tip still moves forward at full speed, as a multiple of its indentation: an
+/// object that yields moves with the tip.
 const DEEPER: i32 = 2;
-/// The same on the way back: a force that is too high must not wait.
+/// The same multiple on the way back: a force that is too high must not wait.
 const DEEPER_BACK: i32 = 5;
-/// How much farther than that, where there is hardly any indentation: 0.3 mm.
+/// Distance added to this depth, for a small indentation: 0.3 mm.
 const YIELDING: Millimetres = Millimetres::from_bits((1 << 24) * 3 / 10);
-/// How much the indentation may be off at rest, where the encoder is coarser than that: 0.4 um.
+/// Largest error of the indentation at rest, with an encoder that is coarser: 0.4 um.
 const FORCE_SLACK: Millimetres = Millimetres::from_bits((1 << 24) / 2_500);
-/// A release checks over this travel whether the force falls: 0.5 mm,
+/// Travel over which a release checks that the force falls: 0.5 mm.
 const CHECKED: I8F24 = I8F24::from_bits(1 << 23);
-/// and it must fall by 0.1 N, or by half of what it is: an object that yields by 2 mm/N loses 0.2 N of 7 N and nearly all
-/// of 0.2 N. What hysteresis and creep leave falls by a few percent in that time.
+/// Force by which it must fall: 0.1 N, or half of it if that is less. An object that yields by 2 mm/N loses 0.2 N of
+/// 7 N and nearly all of 0.2 N. The residue of hysteresis and creep falls by a few percent in that time.
 const FALLS: Newtons = Newtons::from_bits((1 << 16) / 10);
 /// Longest release after the bus fell silent, ns.
 const LAST_RELEASE_NS: u32 = 500_000_000;
-/// A shorted motor must be able to stop within the goal, three tenths of it and this force: 0.4 N.
+/// Force beyond the goal and three tenths of it within which a shorted motor must be able to stop: 0.4 N.
 const STOPPED: Newtons = Newtons::from_bits((4 << 16) / 10);
 
-/// What the host asks for.
+/// Goal of the host.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Goal {
-    /// The force to hold; 0 releases.
+    /// Force to hold; 0 releases.
     pub force: Newtons,
-    /// By how much the array reads more than that because of its temperature.
+    /// Amount by which the array reads more than that because of its temperature.
     pub drift: Newtons,
 }
 
@@ -62,9 +63,9 @@ struct Release {
     rest: Millimetres,
     /// The tip has slowed down; it does not speed up again.
     slow: bool,
-    /// Whether the force fell over the last checked travel.
+    /// True if the force fell over the last checked travel.
     falls: bool,
-    /// Where the check began, and with which force.
+    /// Travel and force at which the check began.
     from: (Millimetres, Newtons),
 }
 
@@ -81,7 +82,7 @@ impl Grip {
         clear && motion.observer.speed.0.saturating_abs() <= config.approach.0 / 16 || ns > LAST_RELEASE_NS
     }
 
-    /// What the finger is doing, as reported.
+    /// Mode as reported.
     pub fn mode(&self, touch: &Touch) -> Mode {
         match (&self.release, touch.stage()) {
             (Some(_), _) => Mode::Release,
@@ -90,7 +91,7 @@ impl Grip {
         }
     }
 
-    /// The speed to follow.
+    /// Returns the speed reference.
     #[inline(always)]
     pub fn reference(
         &mut self,
@@ -135,15 +136,15 @@ impl Grip {
         config: &Config,
         limits: &mut Limits,
     ) -> (Millimetres, MillimetresPerSecond, Millimetres) {
-        // A smaller force than a contact's would be lost and sought again for ever; one that the converter cannot see
+        // A force below that of a contact would be lost and sought again for ever; one that the converter cannot see
         // would be exceeded for ever.
         let most = config.force_max.min(config.force_seen);
         let held = goal.force.min(most).max(config.contact_on);
         if held != goal.force {
             limits.set(Limits::GOAL);
         }
-        // While the force is held the reading creeps away from it, and drifts with temperature. It is led no farther than
-        // where it may be.
+        // While the force is held, the reading creeps and drifts with temperature. The goal follows, but no farther
+        // than the limits.
         let beside = self.creep.force().0.saturating_add(goal.drift.0);
         let reading = Newtons(held.0.saturating_add(beside)).min(most).max(config.contact_on);
         let wanted = config.tip.indentation(reading);
@@ -151,25 +152,25 @@ impl Grip {
         let distance = Millimetres(wanted.0.saturating_sub(sensed.0));
         let back = distance < Millimetres::ZERO;
         let deep = contact.indentation.0.saturating_mul_int(if back { DEEPER_BACK } else { DEEPER });
-        // The array bears out how far the tip went into the object.
+        // The array confirms how far the tip went into the object.
         let borne_out = touch.placed()
             && contact.force >= config.contact_off
             && touch.deep(motion.observer.travel).0 <= deep.saturating_add(YIELDING.0);
-        // Where more of the contact may be hidden, the fit needs the time of an approach to find how much.
+        // If more of the contact may be hidden, the fit needs the time of an approach to find how much.
         let quick = touch.held() && borne_out && (back || contact.doubt <= SURE);
         let limit = match (quick, back) {
             (false, _) => config.approach,
-            // Behind the surface an object may come along, and no faster than a hand moves it. Nor does the tip fly from a
-            // force of which the array shows hardly any.
+            // Behind the surface an object may follow, and no faster than a hand moves it. Nor does the tip fly from
+            // a force of which the array shows hardly any.
             (true, true) if touch.deep(motion.observer.travel) < Millimetres::ZERO || contact.doubt > u8::MAX / 2 => {
                 MillimetresPerSecond(config.approach.0 + config.approach.0 / 4)
             }
             (true, true) => config.speed_max,
-            // So near the goal the profile is slower than an approach.
+            // This near to the goal the profile is slower than an approach.
             (true, false) if distance <= config.near => config.speed_max,
             (true, false) => stopping_speed(held, sensed, config).min(config.speed_max).max(config.approach),
         };
-        // An approach must come to the contact, however little is left.
+        // An approach must reach the contact, however short the distance.
         let slack = if touch.held() { config.count.min(FORCE_SLACK) } else { Millimetres::ZERO };
         (motion.within_travel(distance, config, limits), limit, slack)
     }
@@ -177,7 +178,7 @@ impl Grip {
 
 impl Release {
     fn new(contact: &Contact, touch: &mut Touch, travel: Millimetres) -> Self {
-        // The object may have come along towards the finger while it was held.
+        // The object may have moved towards the finger while it was held.
         if touch.held() && !touch.returns() {
             touch.moved_back(travel, contact.indentation);
         }
@@ -185,7 +186,7 @@ impl Release {
         Self { rest: travel, slow, falls: touch.held(), from: (travel, touch.shown()) }
     }
 
-    /// Moves the place of rest; whether the tip may move at full speed.
+    /// Moves the place of rest. Returns true if the tip may move at full speed.
     #[inline(always)]
     fn follow(&mut self, contact: &Contact, touch: &mut Touch, travel: Millimetres, config: &Config) -> bool {
         let ((from, force), shown) = (self.from, touch.shown());
@@ -224,10 +225,10 @@ impl Release {
     }
 }
 
-/// The indentation to control, brought forward from the middle of the scan to now.
+/// Returns the indentation to control, extrapolated from the middle of the scan to now.
 ///
-/// A force that is known only from below is no reason to press harder: the tip is then at most as deep as it moved since
-/// the touch, and the more of the contact may be hidden, the nearer to that it is taken to be.
+/// A force that is known only from below must not make the finger press harder: the tip is then at most as deep as it
+/// moved since the touch, and the more of the contact may be hidden, the nearer to that it is taken to be.
 #[inline(always)]
 fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config, limits: &mut Limits) -> Millimetres {
     let withheld = touch.withheld();
@@ -244,7 +245,7 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
         if contact.doubt > u8::MAX / 2 {
             limits.set(Limits::FROM_BELOW);
         }
-        // A force that the motor measured and the array did not bears out the doubt.
+        // A force that the motor measured and the array did not confirms the uncertainty.
         let doubt = if touch.felt() > Millimetres::ZERO { contact.doubt.saturating_mul(4) } else { contact.doubt };
         let doubtful = (i64::from(deeper.to_bits()) * i64::from(doubt)) / i64::from(u8::MAX);
         sensed = sensed.saturating_add(I8F24::from_bits(doubtful as i32));
@@ -252,8 +253,8 @@ fn sensed(contact: &Contact, touch: &Touch, motion: &SpeedLoop, config: &Config,
     Millimetres(sensed)
 }
 
-/// Speed from which a shorted motor stops before the force is three tenths and 0.4 N above the goal: it would roll out by
-/// v / c, of which the contact takes a fifth.
+/// Returns the speed from which a shorted motor stops before the force is three tenths and 0.4 N above the goal: it
+/// would roll out by v / c, of which the contact takes a fifth.
 #[inline(always)]
 fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> MillimetresPerSecond {
     let most = goal.0.saturating_add(goal.0 / 4).saturating_add(goal.0 / 20).saturating_add(STOPPED.0);
@@ -264,7 +265,7 @@ fn stopping_speed(goal: Newtons, sensed: Millimetres, config: &Config) -> Millim
     MillimetresPerSecond::from_bits(speed.min(i32::MAX.into()) as i32)
 }
 
-/// How far the tip moved since the middle of the scan: half a frame.
+/// Distance that the tip moved since the middle of the scan, which is half a frame ago.
 fn since_scan(speed: MillimetresPerSecond, config: &Config) -> I8F24 {
     I8F24::from_bits(product(speed.to_bits(), config.frame_s_q37, 30))
 }

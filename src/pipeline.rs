@@ -1,4 +1,4 @@
-//! One frame's way from codes to duty.
+//! The path of a frame from codes to duty.
 
 pub mod budget;
 mod requests;
@@ -28,7 +28,8 @@ const REPEATED_MAX: u32 = 2;
 
 /// The loop's state between frames. The example at the crate's top closes a loop with it.
 ///
-/// In the order of the fields: what every frame uses lies in the first 4 KiB, which an instruction reaches by itself.
+/// The order of the fields is deliberate: the fields that every frame uses lie in the first 4 KiB, which an
+/// instruction reaches with its offset.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
@@ -82,9 +83,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// One frame's way from codes to duty. Infallible: any frame, any sense, any command. The status is lent: to copy
-    /// it takes as long as the speed law.
-    // One function, however it is called: what it takes in turn has one caller each and goes into it.
+    /// Computes the duty from a frame. Infallible: accepts any frame, any sense and any command. The status is lent:
+    /// to copy it takes as long as the speed law.
+    // One function in the image: each function that it calls has one caller and is inlined into it.
     #[inline(never)]
     pub fn step(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command) -> (Duty, &Status) {
         let mut limits = self.count_frames(frame.sequence);
@@ -99,7 +100,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         let sound = monitor::array_sound(self.array.picture(), &self.config);
         let contact = self.contact(sound);
 
-        // What the host asks for, and whether the finger may go on as it does.
+        // Requests of the host, and reasons to stop.
         let tares = command.tare_request == self.status.taken.tare;
         let zeroes = self.tared || !tares || matches!(self.activity, Activity::Tare { .. });
         self.armed = zeroes && (self.armed || !self.torque);
@@ -111,7 +112,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             self.stop(fault);
         }
 
-        // What the finger does, and what the guard lets through of it.
+        // The duty of the activity, and the guard's limit of it.
         if sound && self.tared {
             let presses = self.activity.mode(&self.touch) != Mode::Release;
             let Self { touch, guard, config, array, motion, .. } = self;
@@ -154,7 +155,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// The contact in the tactile image. Before a tare the array's offsets look like one: none is reported then.
+    /// Computes the contact in the tactile image. Before a tare the array's offsets look like a contact, so none is
+    /// reported.
     fn contact(&mut self, sound: bool) -> Contact {
         let fits = sound && self.activity.fits();
         let contact = if !self.tared {
@@ -173,8 +175,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         contact
     }
 
-    /// The first reason to stop, the most direct evidence first. While the motor is not driven, only a tare has reasons:
-    /// a broken array, a silent bus and the bridge end it.
+    /// Returns the first reason to stop, the most direct evidence first. While the motor is not driven, only a tare
+    /// has reasons: a broken array, a silent bus and the bridge end it.
     fn judge(&mut self, contact: &Contact, sound: bool, sense: &Sense, command: &Command) -> Option<Fault> {
         let drives = self.activity.drives();
         let picture = self.array.picture();
@@ -204,7 +206,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         fault.or(unsafe_motion).or_else(|| self.judge_bus(sense, command))
     }
 
-    /// A host that fell silent cannot end a press: the finger releases the object by itself, then stops.
+    /// Returns a fault for a silent bus. A silent host cannot end a press, so the finger releases the object by
+    /// itself, then stops.
     fn judge_bus(&mut self, sense: &Sense, command: &Command) -> Option<Fault> {
         let silent = command.bus_watchdog_ms != 0 && sense.bus_silent_ms >= command.bus_watchdog_ms;
         if silent && matches!(self.activity, Activity::Press(_)) {
@@ -230,7 +233,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// A frame of the activity: the duty that it wants. An activity that ends makes way for the next one.
+    /// Runs a frame of the activity, and returns the duty that it wants. An activity that ends makes way for the next
+    /// one.
     #[inline(always)]
     fn act(
         &mut self,
@@ -295,7 +299,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             motion.coast()
         }
         let Activity::Tare { halt, free } = activity else { return };
-        // Not in the frame that asked for it, which was read with the tare before.
+        // Not in the frame with the request, which was read with the tare before.
         if tares && array.continue_tare() {
             if !*free {
                 array.judge_tare(config);
@@ -336,9 +340,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// A look at a frame that is still being scanned, filled up from the frame before: shorts the motor where its array
-    /// seems broken, and tells whether. A taxel that fails just after it was read is seen a frame later; without this
-    /// look the motor would be driven until that frame's end. Whether it is a fault is for the step to say.
+    /// Checks a frame that is still being scanned, filled up from the frame before. Shorts the motor if its array
+    /// seems broken, and returns true. A taxel that fails just after it was read is seen a frame later; without this
+    /// check the motor would be driven until that frame's end. The step decides if it is a fault.
     pub fn check_part(&mut self, frame: &Frame<ROWS, COLUMNS>) -> bool {
         let broken = self.activity.drives()
             && self.array.bad_taxels(frame, &self.config) > self.config.params.bad_taxels_max.max(0) as u32;
@@ -349,7 +353,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         broken
     }
 
-    /// Replaces the configuration; the mode goes to off, where it is not fault. The tare stays; one under way begins
+    /// Replaces the configuration; the mode becomes off unless it is fault. The tare is kept; a tare under way starts
     /// again, as does the contact's fit.
     pub fn configure(&mut self, config: &Shaped<ROWS, COLUMNS>) {
         self.config = config.clone();
@@ -357,8 +361,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.restart();
     }
 
-    /// Replaces the taxels' gains and mask; the mode goes to off, where it is not fault, and a new tare is needed; one
-    /// under way begins again.
+    /// Replaces the taxels' gains and mask; the mode becomes off unless it is fault, and a new tare is needed. A tare
+    /// under way starts again.
     pub fn calibrate(&mut self, calibration: &Calibration<ROWS, COLUMNS>) {
         self.array.calibrate(calibration);
         self.tared = false;
@@ -380,8 +384,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.report_activity();
     }
 
-    /// Makes all anew but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests with
-    /// these numbers count as taken up, and so many frames as missed before. The motor stays as warm as it is told.
+    /// Resets everything but the configuration and the taxels' gains: mode off, not tared, nothing measured. Requests
+    /// with the numbers in `taken` count as acknowledged, and `missed_frames` as missed before. The winding's
+    /// temperature is restored.
     pub fn renew(&mut self, taken: Taken, missed_frames: u32, winding: Winding) {
         self.array.renew();
         self.budget = Budget::new();
@@ -395,17 +400,17 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         (self.armed, self.torque) = (false, true);
     }
 
-    /// What the last step reported.
+    /// Report of the last step.
     pub fn status(&self) -> &Status {
         &self.status
     }
 
-    /// The array's last picture and its calibration.
+    /// The array with its last image and its calibration.
     pub fn array(&self) -> &Array<ROWS, COLUMNS> {
         &self.array
     }
 
-    /// What the last step adds to the record of a motion that measures.
+    /// Row that the last step adds to the record of a motion that measures.
     pub fn row(&self) -> Option<Row<'_, ROWS, COLUMNS>> {
         match &self.activity {
             Activity::Press(press) => press.part().map(|part| Row::Step(&self.step, part)),
@@ -417,7 +422,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// The encoder's count from which such a record counts: of travel 0, or where the strokes began.
+    /// Count of the encoder that is zero in such a record: of travel 0, or where the strokes began.
     pub fn measured_from(&self) -> i32 {
         if let Activity::Strokes(run) = &self.activity { run.origin() } else { self.motion.observer.origin() }
     }
@@ -427,7 +432,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         &self.config
     }
 
-    /// How warm the motor's winding is, and all that this follows from.
+    /// Thermal state of the motor's winding.
     pub fn winding(&self) -> &Winding {
         &self.motion.winding
     }

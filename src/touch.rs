@@ -54,8 +54,8 @@ pub enum Stage {
     Clear,
 }
 
-/// How well the surface is known. A force that has not risen by `contact_on_mn` may be a residue of an earlier contact,
-/// noise, or a faulty taxel.
+/// Knowledge of the surface's place. A force that has not risen by `contact_on_mn` may be a residue of an earlier
+/// contact, noise, or a faulty taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Place {
     /// The force has not risen yet. The surface is computed from the present travel and indentation.
@@ -69,7 +69,7 @@ enum Place {
     Known,
 }
 
-/// What the tip touches.
+/// Record of what the tip touches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Touch {
     stage: Stage,
@@ -99,7 +99,7 @@ pub struct Touch {
     away_ns: u32,
 }
 
-/// What a frame says about a touch.
+/// Inputs of the record in a frame.
 pub struct Felt<'a> {
     /// The contact by the array.
     pub contact: &'a Contact,
@@ -112,7 +112,8 @@ pub struct Felt<'a> {
 }
 
 impl Touch {
-    /// Takes a frame; `by_motor` is asked for the indentation that the motor felt, when a touch begins.
+    /// Takes a frame; `by_motor` returns the indentation by the force that the motor measured, and is called when a
+    /// touch begins.
     #[inline(always)]
     pub fn observe(&mut self, felt: &Felt, by_motor: impl Fn() -> Millimetres, config: &Config) {
         let Contact { force, doubt, .. } = *felt.contact;
@@ -219,7 +220,7 @@ impl Touch {
         self.stage
     }
 
-    /// Whether something is pressed.
+    /// Returns true if something is pressed.
     pub fn held(&self) -> bool {
         self.stage == Stage::Held
     }
@@ -249,7 +250,7 @@ impl Touch {
         self.shown
     }
 
-    /// How far the tip is in front of the surface.
+    /// Distance of the tip in front of the surface.
     pub fn deep(&self, travel: Millimetres) -> Millimetres {
         Millimetres(travel.0.saturating_sub(self.surface.0))
     }
@@ -269,7 +270,8 @@ impl Touch {
         self.withheld
     }
 
-    /// The object is pressed farther back than it was touched: it came along, or it springs back.
+    /// Moves the surface back: the object is pressed farther back than it was touched, because it moved with the
+    /// finger or springs back.
     pub fn moved_back(&mut self, travel: Millimetres, indentation: Millimetres) {
         self.surface = self.surface.min(Millimetres(travel.0.saturating_sub(indentation.0)));
         if self.place == Place::Before {
@@ -277,14 +279,14 @@ impl Touch {
         }
     }
 
-    /// A release has backed off: what the array reads from here on is a residue.
+    /// Takes note that a release has backed off: from here on the array reads a residue.
     pub fn clear(&mut self, force: Newtons) {
         if !matches!(self.stage, Stage::None | Stage::Clear) {
             (self.stage, self.least, self.frames, self.withheld) = (Stage::Clear, force, 0, Newtons::ZERO);
         }
     }
 
-    /// Another object is sought: what was released is not it.
+    /// Takes note that another object is sought.
     pub fn seek(&mut self) {
         if matches!(self.stage, Stage::Clear | Stage::Doubtful) {
             *self = Self::default();

@@ -25,14 +25,14 @@ use crate::units::{Kilopascals, Newtons};
 pub const SQUARE_BITS: u32 = 28;
 /// Fractional bits of a taxel's place.
 pub const PLACE_BITS: u32 = 15;
-/// Squared distance from node to node: 1/128.
+/// Fractional bits below a node: the squared distance from node to node is 1/128.
 pub const NODE_BITS: u32 = SQUARE_BITS - 7;
-/// Nodes of the table; the last stands at 1.5, where no contact within the radius reaches a taxel.
+/// Number of nodes of the table; the last one is at 1.5, where no contact within the radius reaches a taxel.
 pub const NODES: usize = 193;
 /// 1 in Q28.
 pub const ONE: i32 = 1 << SQUARE_BITS;
 
-/// The model at one distance.
+/// Model at one distance.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     /// G, Q26.
@@ -51,20 +51,20 @@ pub struct Geometry {
     /// h, Q28.
     #[doc(hidden)]
     pub pitch: i32,
-    /// How far from the array's middle a contact's centre may lie: a radius beyond its edge along the columns and the
-    /// rows, Q24.
+    /// Largest distance of a contact's centre from the array's middle: a radius beyond its edge along the columns and
+    /// the rows, Q24.
     pub(crate) reach: [i32; 2],
     /// 2^56 over the tip's radius in units of its last place.
     pub(crate) inverse_radius: i32,
-    /// What a taxel under the pressure Y shows, in sixteenths of a code, Q8.
+    /// Reading of a taxel under the pressure Y, in sixteenths of a code, Q8.
     pub(crate) modulus_q8: u32,
-    /// The model over the squared distance.
+    /// Model over the squared distance.
     #[doc(hidden)]
     pub nodes: [Node; NODES],
 }
 
 impl Geometry {
-    /// The geometry that these parameters describe. In integers; they must have been checked.
+    /// Computes the geometry in integers, from parameters that have been checked.
     pub(crate) fn new(params: &Params, codes_milli: i32, rows: usize, columns: usize) -> Self {
         let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
         let pitch = ((pitch_um << SQUARE_BITS) / radius_um) as i32;
@@ -73,8 +73,8 @@ impl Geometry {
         for (index, node) in nodes.iter_mut().enumerate().skip(1) {
             *node = Node::at((index as i64) << NODE_BITS, i64::from(pitch));
         }
-        // At the centre nothing is spread by the distance; a taxel there is under the rim only where the whole contact
-        // is smaller than a taxel.
+        // At the centre the distance spreads nothing; a taxel there is under the rim only if the whole contact is
+        // smaller than a taxel.
         let [centre, first, ..] = &mut nodes;
         let near_length = root(i64::from(ONE) - square(i64::from(pitch)) / 6);
         *centre = Node {
@@ -93,7 +93,7 @@ impl Geometry {
     }
 }
 
-/// Middles of so many columns or rows from the array's middle in tip radii, Q15.
+/// Middles of columns or rows, from the array's middle in tip radii, Q15.
 pub(crate) fn places<const SIDE: usize>(params: &Params) -> [i32; SIDE] {
     let (pitch_um, radius_um) = (i64::from(params.pitch_um), i64::from(params.tip_radius_um.max(1)));
     let mut places = [0; SIDE];
@@ -104,7 +104,7 @@ pub(crate) fn places<const SIDE: usize>(params: &Params) -> [i32; SIDE] {
 }
 
 impl Node {
-    /// The model at a squared distance above 0, for taxels with sides `pitch`; both in Q28.
+    /// Computes the model at a squared distance above 0, for taxels with sides `pitch`; both in Q28.
     fn at(distance_square: i64, pitch: i64) -> Self {
         let spread = ((pitch * i64::from(root(distance_square))) >> SQUARE_BITS).max(1);
         let square = i64::from(ONE) - distance_square - square(pitch) / 6;
@@ -118,17 +118,17 @@ impl Node {
     }
 }
 
-/// The square of a Q28 number.
+/// Returns the square of a Q28 number.
 const fn square(x: i64) -> i64 {
     (x * x) >> SQUARE_BITS
 }
 
-/// The root of a Q28 number; 0 where it is negative.
+/// Returns the root of a Q28 number; 0 for a negative one.
 fn root(x: i64) -> i32 {
     floor_sqrt(x.max(0).unsigned_abs() << SQUARE_BITS) as i32
 }
 
-/// The constants of f(u) = u (1 + p u / 4096) / (1 + p): see [`crate::params::Params::curve_permille`], which is p.
+/// Constants of f(u) = u (1 + p u / 4096) / (1 + p): see [`crate::params::Params::curve_permille`], which is p.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Curve {
     /// q = 1 / (1 + p), Q26.
@@ -141,7 +141,7 @@ impl Curve {
     /// Fractional bits of q.
     pub(crate) const FACTOR_BITS: u32 = 26;
 
-    /// By p in permille, at most 8,000; none is a line.
+    /// Constants for p in permille, at most 8,000; none for p = 0, which is a line.
     pub(crate) fn new(permille: i32) -> Option<Self> {
         let permille = permille.max(0).min(8_000);
         let whole = i64::from(1_000 + permille);
@@ -151,18 +151,19 @@ impl Curve {
     }
 }
 
-/// Share of the converter's range up to saturation that a peak may use,
+/// Share of the converter's range up to saturation that a peak may use.
 const SEEN: f32 = 0.95;
-/// less the columns' undriven level: it is known only while the scan runs, so it counts as the highest allowed, but not
-/// as more than this.
+/// Largest undriven level that is subtracted from the range. The level is known only while the scan runs, so the
+/// highest allowed one is assumed, up to this limit.
 const LEVEL_MAX: i32 = 1_024;
-/// The largest [`Params::row_sag_ppb_per_code`] that leaves a row of so many columns, all at the converter's top, a sag
-/// of 0.32: what the boost's series and 32 bits hold. Up to ten columns that is more than the parameter's own range.
+/// Largest [`Params::row_sag_ppb_per_code`] for which a row of `columns` columns, all at the converter's top, has a
+/// sag of 0.32: the limit of the boost's series and of 32 bits. Up to ten columns the parameter's own range is
+/// smaller.
 pub(super) const fn sag_max(columns: usize) -> i32 {
     (320_000_000 / (4_095 * columns)) as i32
 }
 
-/// The codes for a kPa at the full range, thousandths: fewer where the characteristic is not a line. Rounded, at most by
+/// Codes per kPa at the full range, in thousandths: fewer if the characteristic is not a line. Rounded, at most by
 /// 5e-4 of them.
 pub(super) fn codes_at_full_range(p: &Params) -> Result<i32, ConfigError> {
     let whole = 1_000 + p.curve_permille;
@@ -179,24 +180,24 @@ pub(super) const fn saturated_codes(p: &Params) -> u16 {
     CODE_MAX - p.headroom_codes as u16
 }
 
-/// See [`super::Config::force_seen`]. The sag of the row, which lets the converter see more, is left out.
+/// See [`super::Config::force_seen`]. The sag of the row, with which the converter sees more, is ignored.
 pub(super) fn force_seen(p: &Params, codes_milli: i32, tip: &Tip) -> Newtons {
     let codes = SEEN * f32::from(saturated_codes(p)) - p.undriven_max_codes.min(LEVEL_MAX) as f32;
     let grown = p.curve_permille as f32 * 1e-3;
-    // See `Curve`: what so many codes carry, in those of the full range.
+    // Load of these codes by [`Curve`], in codes of the full range.
     let codes = codes * (1.0 + grown * codes / 4_096.0) / (1.0 + grown);
     let peak_kpa = codes / (codes_milli as f32 * 1e-3);
     tip.force(tip.indentation_from_peak(Kilopascals::from_bits(narrow(peak_kpa * exp2(16)))))
 }
 
-/// The array's drift.
+/// Drift of the array with temperature; see [`crate::control::TemperatureDrift`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ArrayDrift {
-    /// Change of the gain for a K, Q32.
+    /// Change of the gain per K, Q32.
     pub gain_q32_per_k: i32,
-    /// The temperature at which the gain is right, degrees Celsius in Q16.
+    /// Temperature at which the gain is right, degrees Celsius in Q16.
     pub gain_at_q16: i32,
-    /// Change of the whole array's zero for a K, N in Q24.
+    /// Change of the whole array's zero per K, N in Q24.
     pub zero_q24_per_k: i32,
 }
 
@@ -212,7 +213,7 @@ impl ArrayDrift {
         }
     }
 
-    /// Whether there is any.
+    /// Returns true if the array drifts.
     pub(crate) fn on(&self) -> bool {
         self.gain_q32_per_k != 0 || self.zero_q24_per_k != 0
     }

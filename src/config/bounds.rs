@@ -5,49 +5,53 @@ use crate::model::Tip;
 use crate::params::Params;
 use crate::units::{Millimetres, MillimetresPerSecond, Newtons};
 
-/// Time over which the guard compares motor and encoder, s, but at least this number of frames,
+/// Time over which the guard compares motor and encoder, s.
 const TAU_S: f32 = 0.005;
+/// Least number of frames in that time.
 const TAU_FRAMES: f32 = 8.0;
-/// for an encoder whose counts are no farther apart than this, mm; the others need longer, up to so many times.
+/// Encoder resolution for which [`TAU_S`] is long enough, mm.
 const COUNT_MM: f32 = 0.008;
+/// Largest factor by which a coarser encoder lengthens the time. It grows with the distance of the counts.
 const LONGER: f32 = 8.0;
-/// It must expect a change of the speed by this, mm/s, or by a quarter of what the largest voltage does in that time;
+/// Change of the speed that the guard must expect before it compares, mm/s. The change is at most a quarter of what
+/// the largest voltage makes in the time.
 const CHANGE: f32 = 40.0;
-/// by so many times what friction takes in that time, where that is more;
+/// Least expected change as a multiple of the change by friction in the time.
 const RUBBED: f32 = 3.0;
-/// and by what so many counts in that time may be wrong by.
+/// Encoder counts in the time by which the expected change may be wrong.
 const COUNTS: f32 = 16.0;
-/// The part of the friction that varies along the travel.
+/// Part of the friction that varies along the travel.
 const VARIES: f32 = 0.25;
-/// What the model of a sound motor is off by while it goes steadily, mm/s.
+/// Error of the model of a sound motor in steady motion, mm/s.
 const OFF: f32 = 0.5;
 
-/// The ends and speeds that the guard holds, and its model of the motor.
+/// Ends and speeds that the guard enforces, and its model of the motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bounds {
     /// Distance that the tip may go behind the zero of its travel: from the largest force to the clearance, and 1 mm.
     pub back: Millimetres,
-    /// Where nothing is pressed: 1.5 times the approach speed.
+    /// Largest speed while nothing is pressed: 1.5 times the approach speed.
     pub speed_loose: MillimetresPerSecond,
-    /// Ever: 1.5 times the largest speed.
+    /// Largest speed at any time: 1.5 times the largest speed of the loop.
     pub speed_any: MillimetresPerSecond,
-    /// Frames in a second.
+    /// Number of frames in a second.
     pub frames_per_s: i32,
-    /// A frame's share of tau, Q16: at most an eighth.
+    /// Frame time over tau, Q16: at most an eighth.
     pub leak: i32,
-    /// What a force of 1 N does to the tip, Q8 mm/s^2, and over tau, Q16 mm/s.
+    /// Acceleration of the tip by a force of 1 N, Q8 mm/s^2.
     pub acceleration_per_n: i32,
-    /// See [`Bounds::acceleration_per_n`].
+    /// Change of the tip's speed by a force of 1 N over tau, Q16 mm/s.
     pub change_per_n: i32,
-    /// The change of speed that must be expected before it counts, Q16 mm/s.
+    /// Change of the speed that must be expected before it counts, Q16 mm/s.
     pub change_least: i32,
-    /// What the speed may change less than expected in the air: friction that varies, and the encoder's counts, Q16 mm/s.
+    /// Difference to the expected change in the air that is normal: varying friction, and the encoder's counts, Q16
+    /// mm/s.
     pub change_free: i32,
-    /// The part of such a change that counts and model may be wrong by.
+    /// Part of such a difference by which encoder counts and model may be wrong, Q16 mm/s.
     pub change_unsure: i32,
 }
 
-/// What the configuration knows of frame, encoder and motor.
+/// Constants of frame, encoder and motor from the configuration.
 pub(crate) struct Drives {
     pub frame_s: f32,
     pub mm_per_count: f32,
@@ -82,97 +86,105 @@ impl Bounds {
     }
 }
 
-/// The way is felt this far to each side, strokes rest here, and any motion beyond the last is shorted, mm.
+/// Distance to each side within which pulses feel the friction, mm.
 const FELT_MM: f32 = 0.8;
+/// Distance to each side at which strokes rest, mm.
 const STROKE_MM: f32 = 0.7;
+/// Distance beyond which any motion is shorted, mm.
 const FARTHEST_MM: f32 = 1.2;
-/// Rise of the voltage of a quick pulse, as by this force at the tip, N/s, and of a slow one: by the back-EMF of the
-/// fastest stroke in this time, s.
+/// Rise of the voltage of a quick pulse, as the force that it makes at the tip, N/s.
 const JOG_N_PER_S: f32 = 50.0;
+/// Time in which the voltage of a slow pulse rises to the back-EMF of the fastest stroke, s.
 const RISE_S: f32 = 0.36;
-/// A pulse ends this far, mm, or this long, s, after it began to move.
+/// Distance after which a pulse ends, mm.
 const PULSE_MM: f32 = 0.04;
+/// Time of motion after which a pulse ends, s.
 const PULSE_S: f32 = 0.05;
-/// A pulse, or the start of a stroke, may need this force more than the easiest pulse, N.
+/// Force by which a pulse, or the start of a stroke, may exceed the easiest pulse, N.
 const FEEL_N: f32 = 0.17;
-/// What a stroke has at least beyond the voltage at which pulses moved: as by this force at the tip, N, and no more than
-/// this share of the back-EMF of the fastest one.
+/// Least voltage of a stroke beyond that at which pulses moved, as a force at the tip, N.
 const START_N: f32 = 0.05;
+/// Upper limit of that voltage, as a share of the back-EMF of the fastest stroke.
 const START_PART: f32 = 0.1;
-/// Speed of the fastest stroke, mm/s, at most that of an approach, and what rolls on for this far, mm, when shorted.
+/// Speed of the fastest stroke, mm/s, at most that of an approach.
 const SPEED_MM_PER_S: f32 = 28.0;
+/// Distance that the fastest stroke may roll on when shorted, mm.
 const ROLL_MM: f32 = 0.25;
-/// The way that a shorted motor rolls on, in time constants of the parameters.
+/// Distance that a shorted motor rolls on, in time constants of the parameters.
 const ROLL: f32 = 1.4;
-/// A stroke takes this long at most, s.
+/// Longest time of a stroke, s.
 const STROKE_S: f32 = 0.5;
-/// A fall of the speed as by this force, mN, over the span, s, ends a stroke.
+/// Force that ends a stroke, mN: the speed falls over the span as by this force.
 const PUSH_MN: i32 = 300;
+/// Span over which the speed is compared, s.
 const SPAN_S: f32 = 0.016;
-/// The number of parts of a span: the count is kept at the end of each.
+/// Number of parts of a span: the count is kept at the end of each.
 pub const SPAN_PARTS: usize = 16;
-/// At rest: no count for this long, within this long, s.
+/// Time without a count after which the tip is at rest, s.
 const STILL_S: f32 = 0.012;
+/// Longest time to wait for rest, s.
 const REST_S: f32 = 0.5;
-/// A touch: the array's force, mN, or that of a contact where this is less.
+/// Force of the array that counts as a touch, mN; the force of a contact if that is less.
 const TOUCH_MN: i32 = 40;
-/// Against its direction nothing moves by more counts, and farther, mm.
+/// Largest motion against the direction of a stroke, counts.
 const BACK: i32 = 4;
+/// Largest motion against the direction of a stroke, mm, if that is farther.
 const BACK_MM: f32 = 0.03;
-/// Counts and uV that the motions calculate with at most.
+/// Largest number of counts in the motions' arithmetic.
 const COUNTS_MAX: f32 = 1_048_576.0;
+/// Largest voltage in the motions' arithmetic, uV.
 const UV_MAX: f32 = 50_000_000.0;
 
-/// Lengths in encoder counts, times in frames, voltages in uV.
+/// Bounds of the motions that measure the drive; see [`crate::measure::strokes`]. Lengths in encoder counts, times in frames, voltages in uV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motions {
-    /// How far the way is felt, where strokes rest, and beyond what everything is shorted.
+    /// Distance to each side within which pulses feel the friction.
     pub felt: i32,
-    /// See [`Motions::felt`].
+    /// Distance to each side at which strokes rest.
     pub stroke: i32,
-    /// See [`Motions::felt`].
+    /// Distance beyond which everything is shorted.
     pub farthest: i32,
-    /// Against its direction nothing moves by more.
+    /// Largest motion against the direction.
     pub back: i32,
-    /// A pulse ends after this distance or this time of motion.
+    /// Distance after which a pulse ends.
     pub pulse: i32,
-    /// See [`Motions::pulse`].
+    /// Time of motion after which a pulse ends.
     pub pulse_frames: u32,
-    /// Rise of the voltage of a quick pulse and of others in a frame.
+    /// Rise of the voltage of a quick pulse in a frame.
     pub jog_rise_uv: i32,
-    /// See [`Motions::jog_rise_uv`].
+    /// Rise of the voltage of other pulses and of strokes in a frame.
     pub rise_uv: i32,
-    /// What a pulse may need more than the easiest one.
+    /// Voltage by which a pulse may exceed the easiest one.
     pub feel_uv: i32,
-    /// What a stroke has at least beyond the voltage at which pulses moved.
+    /// Least voltage of a stroke beyond that at which pulses moved.
     pub start_uv: i32,
-    /// The back-EMF of the fastest stroke.
+    /// Back-EMF of the fastest stroke.
     pub fastest_uv: i32,
-    /// That of a count in a span, Q8.
+    /// Back-EMF of a count in a span, Q8.
     pub uv_per_count_q8: i32,
     /// Voltage for a force at the tip at standstill.
     pub uv_per_newton: i32,
-    /// A part of the span over which the speed is looked at.
+    /// Time of a part of the span over which the speed is compared.
     pub span_part: u32,
-    /// What a force that ends a stroke takes off the counts of a span, and that force.
+    /// Counts that the force [`Motions::push_mn`] takes off a span.
     pub push: i32,
-    /// See [`Motions::push`].
+    /// Force that ends a stroke, mN.
     pub push_mn: i32,
-    /// How far a shorted motor rolls on, for the counts of a quarter of a span, Q8.
+    /// Distance that a shorted motor rolls on, for the counts of a quarter of a span, Q8.
     pub roll_q8: i32,
-    /// The tip is at rest after this time without a count; and how long to wait for it.
+    /// Time without a count after which the tip is at rest.
     pub still: u32,
-    /// See [`Motions::still`].
+    /// Longest time to wait for rest.
     pub rest: u32,
-    /// Time of a stroke at most.
+    /// Longest time of a stroke.
     pub longest: u32,
-    /// The force that is a touch.
+    /// Force that counts as a touch.
     pub touch: Newtons,
     /// Length of a count, Q16 um.
     um_per_count_q16: i64,
 }
 
-/// What the configuration knows of frame, encoder and motor.
+/// Constants of frame, encoder and motor from the configuration.
 pub(crate) struct Driven {
     pub frame_s: f32,
     pub mm_per_count: f32,
@@ -221,17 +233,17 @@ impl Motions {
         }
     }
 
-    /// Frames of a span.
+    /// Number of frames of a span.
     pub fn span(&self) -> u32 {
         self.span_part.saturating_mul(SPAN_PARTS as u32)
     }
 
-    /// A length, um.
+    /// Converts counts to a length, um.
     pub fn um(&self, counts: i32) -> i32 {
         ((i64::from(counts) * self.um_per_count_q16) >> 16) as i32
     }
 
-    /// The force at the tip that a voltage makes at standstill, mN.
+    /// Converts a voltage to the force at the tip that it makes at standstill, mN.
     pub fn millinewtons(&self, uv: i32) -> i32 {
         (i64::from(uv) * 1_000).checked_div(self.uv_per_newton.into()).unwrap_or(0) as i32
     }

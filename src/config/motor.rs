@@ -18,30 +18,30 @@ use super::{exp2, narrow, wide};
 use crate::arith::floor_sqrt;
 use crate::params::Params;
 
-/// Paces, quickest first.
+/// Number of gain sets, quickest first.
 pub const GAIN_SETS: usize = 4;
 
 /// Bandwidth of the quickest speed loop in frames: k_v = 1 / (5 T). The duty acts about a third of a frame after the
 /// encoder was read and half a frame later on average through the hold; with a whole frame of reserve that is 1.5 T or
 /// 17 degrees at the crossover.
 const SPEED_GAIN_FRAMES: f32 = 5.0;
-/// The position's slope k is this much slower than the speed loop: k = k_v / 3. The feed-forward a_ref puts the poles
-/// of the linear zone at exactly -k_v and -k, so they need no further distance.
+/// Ratio of the speed loop's bandwidth to the position's slope: k = k_v / 3. The feed-forward a_ref puts the poles of
+/// the linear zone at exactly -k_v and -k, so they need no further distance.
 const POSITION_TO_SPEED: f32 = 3.0;
-/// The observer's poles are this much faster than the speed loop that they serve.
+/// Ratio of the observer's poles to the bandwidth of the speed loop.
 const OBSERVER_TO_SPEED: f32 = 2.5;
-/// What a count of q does to g V, in k_v^2 q.
+/// Change of g V by a count of q, in k_v^2 q.
 const KICK: f32 = 5.8;
-/// Share of the largest voltage that a count may move at the quickest pace.
+/// Largest change of the voltage by a count at the quickest gain set, as a share of the largest voltage.
 const KICK_MOST: f32 = 0.75;
-/// Speed that a count may be taken for at the quickest pace, mm/s.
+/// Largest speed that a count is taken for at the quickest gain set, mm/s.
 const SPEED_MOST: f32 = 60.0;
-/// The slowest speed loop, in 1/s: what the profile's arithmetic holds.
+/// Slowest speed loop, 1/s: the limit of the profile's arithmetic.
 const SPEED_GAIN_LEAST: f32 = 60.0;
-/// The quickest, in 1/s: what its fixed-point format holds.
+/// Quickest speed loop, 1/s: the limit of its fixed-point format.
 const SPEED_GAIN_MOST: f32 = 8_000.0;
 
-/// The gains of observer, law and profile for one pace.
+/// Gains of observer, law and profile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Gains {
     /// l1 (Q31), l2 in 1/s (Q16) and l3 in 1/s^2 of the observer.
@@ -56,7 +56,7 @@ pub struct Gains {
     pub half_over_slope2_q40: i32,
 }
 
-/// All gain_sets for a frame time in s, a travel of `mm_per_count` and a largest g V in mm/s^2.
+/// Computes all gain sets for a frame time in s, a travel of `mm_per_count` and a largest g V in mm/s^2.
 pub(crate) fn gain_sets(frame_s: f32, mm_per_count: f32, voltage_limit: f32) -> [Gains; GAIN_SETS] {
     let by_time = 1.0 / (SPEED_GAIN_FRAMES * frame_s);
     // In Q8, of at most 2^31 /s^2.
@@ -72,7 +72,7 @@ pub(crate) fn gain_sets(frame_s: f32, mm_per_count: f32, voltage_limit: f32) -> 
 }
 
 impl Gains {
-    /// Of a speed loop in 1/s.
+    /// Computes the gains for the bandwidth of the speed loop, 1/s.
     fn new(speed_gain: f32, frame_s: f32) -> Self {
         let slope = speed_gain / POSITION_TO_SPEED;
         // A pole at the rate w, by the bilinear transform.
@@ -93,48 +93,49 @@ impl Gains {
     }
 }
 
-/// Frames of a step of the model, as a power of two: at most 256,
+/// Number of frames of a step of the model, as a power of two: at most 256.
 const FRAMES_BITS: u32 = 8;
-/// and fewer where these would take longer than this, s. The shortest time constant is 2 s.
+/// Longest step of the model, s: longer frames make fewer of them a step. The shortest time constant is 2 s.
 const STEP_S: f32 = 0.0625;
-/// The current falls from its limit to none over 2 to the power of this many K below the largest temperature: 16.
+/// Range of the temperature over which the current falls from its limit to 0, as a power of two of K: the last 16 K
+/// below the largest temperature.
 pub const ALLOWANCE_BITS: u32 = 4;
-/// Heat counts so many times as much, a rise is so many times quicker, and a fall slower.
+/// Factor by which heat is overestimated, a rise is quicker, and a fall is slower.
 const MARGIN: f32 = 1.25;
-/// It starts no nearer to the largest temperature than this, K.
+/// Least distance of the initial temperature from the largest one, K.
 const START_K: f32 = 24.0;
-/// Where the current limit lies once it is shifted, bits.
+/// Position of the shifted current limit's top bit.
 const LIMIT_BITS: u32 = 24;
 
-/// One of the two lags.
+/// One of the two lags of the thermal model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lag {
-    /// K in Q30 for a mean square current of 2^-24 of the shifted one's unit, rounded up.
+    /// K in Q30 per mean square current of 2^-24 of the shifted current's unit, rounded up.
     pub gain: u32,
-    /// Share of a step in its way up, Q31: at most a half.
+    /// Share of the difference that a step takes upwards, Q31: at most a half.
     pub rise_q31: i32,
-    /// The same on the way down.
+    /// Share of the difference that a step takes downwards, Q31.
     pub fall_q31: i32,
 }
 
-/// The winding's model.
+/// Thermal model of the winding; see [`crate::control::Winding`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heat {
-    /// Frames of a step of the model, as a power of two: at most 256.
+    /// Number of frames of a step of the model, as a power of two: at most 256.
     pub frames_bits: u32,
-    /// The largest g R i that it takes, Q8 mm/s^2: four times the current limit, where that is within its type.
+    /// Largest g R i of the model, Q8 mm/s^2: four times the current limit, within its type.
     pub most: i32,
-    /// Shift that takes the current limit to 25 bits: to the right, or
+    /// Right shift that takes the current limit to 25 bits.
     pub down: u32,
-    /// to the left.
+    /// Left shift that takes the current limit to 25 bits.
     pub up: u32,
-    /// Winding over housing, housing over ambient.
+    /// Lags of winding over housing and of housing over ambient.
     pub lags: [Lag; 2],
-    /// The housing over ambient after a reset, K in Q30.
+    /// Temperature of the housing over ambient after a reset, K in Q30.
     pub start_q30: i64,
-    /// The largest temperature over ambient, K in Q30.
+    /// Largest temperature over ambient, K in Q30.
     pub room_q30: i64,
-    /// Ambient, degrees Celsius in Q16.
+    /// Ambient temperature, degrees Celsius in Q16.
     pub ambient_q16: i32,
 }
 
@@ -159,7 +160,8 @@ impl Heat {
             Lag { gain, rise_q31: q31(MARGIN * share), fall_q31: q31(share / MARGIN) }
         };
         let room_k = (p.winding_max_c - p.ambient_c) as f32;
-        // As if the motor was at its largest temperature for long, and the winding has cooled to the housing since.
+        // As if the motor had been at its largest temperature for long, and the winding had cooled to the housing
+        // since.
         let both = (p.winding_k_per_w + p.housing_k_per_w).max(1) as f32;
         let start_k = (room_k * p.housing_k_per_w as f32 / both).min(room_k - START_K);
         Self {

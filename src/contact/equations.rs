@@ -8,33 +8,33 @@ use super::prediction::{CENTRE_BITS, Guess, PEAK_BITS, Prediction, SLOPE_BITS, S
 use crate::arith::{Divisor, clamp_to, high};
 use crate::config::array::{Geometry, PLACE_BITS};
 
-/// A residual stops at half of the peak.
+/// Limit of a residual: half of the peak.
 const RESIDUAL_LIMIT: i32 = 1 << (PEAK_BITS - 1);
 /// Fractional bits of shares and of the solution before it is scaled.
 const SHARE_BITS: u32 = 24;
-/// The farthest that ln(s) moves in one step, Q28: 1/8.
+/// Largest change of ln(s) in one step, Q28: 1/8.
 const HEIGHT_STEP: i32 = 1 << 25;
-/// The farthest that a centre moves along one axis, Q24: 1/4 of the radius.
+/// Largest change of a centre along one axis in one step, Q24: 1/4 of the radius.
 const CENTRE_STEP: i32 = 1 << 21;
-/// What is left of a diagonal element after elimination is at least this share of it: the guard of Levenberg.
+/// Least remainder of a diagonal element after elimination, as a share of it: the guard of Levenberg.
 const GUARD_BITS: u32 = 14;
 
-/// How far the model and the picture are apart; squares count 2^-28 of the peak's, less `Bits::ALL` bits: 2^-24 of
-/// ten rows and columns.
+/// Difference of the model and the image. Squares are in units of 2^-28 of the peak's square, less `Bits::ALL` bits:
+/// 2^-24 with ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Misfit {
     /// Sum of the squared residuals of live taxels within the model's contact.
     pub inside: i32,
-    /// How many these are.
+    /// Number of these taxels.
     pub taxels: i32,
     /// Sum of the squares of the other live taxels.
     pub outside: i32,
-    /// How many these are.
+    /// Number of these taxels.
     pub others: i32,
 }
 
 impl Misfit {
-    /// Of no taxels.
+    /// Misfit of no taxels.
     pub const NONE: Self = Self { inside: 0, taxels: 0, outside: 0, others: 0 };
 }
 
@@ -63,7 +63,7 @@ struct Row<const ROWS: usize, const COLUMNS: usize> {
 pub struct Bits<const ROWS: usize, const COLUMNS: usize>;
 
 impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
-    /// From a taxel's part of its row: none up to 14 columns, 2 of 32.
+    /// Bits dropped from a taxel's part of its row: none up to 14 columns, 2 with 32.
     const TAXEL: u32 = {
         let mut drop = 0;
         while (COLUMNS as u64 * 9) << 24 >> drop >= 1 << 31 {
@@ -71,7 +71,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
         }
         drop
     };
-    /// From a row's sums: 4 of 10 x 10, 5 of 16 x 16 and 16 x 32.
+    /// Bits dropped from a row's sums: 4 with 10 x 10, 5 with 16 x 16 and 16 x 32.
     const ROW: u32 = {
         let mut drop = 4;
         while ((ROWS * COLUMNS) as u64 * 9) << 25 >> (Self::TAXEL + drop) >= 1 << 31 {
@@ -79,32 +79,32 @@ impl<const ROWS: usize, const COLUMNS: usize> Bits<ROWS, COLUMNS> {
         }
         drop
     };
-    /// From both.
+    /// Bits dropped in both steps.
     pub const ALL: u32 = Self::TAXEL + Self::ROW;
 }
 
-/// The normal equations, Q26 less `Bits::ALL`: Q22 of ten rows and columns.
+/// Normal equations, Q26 less `Bits::ALL`: Q22 with ten rows and columns.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Equations<const ROWS: usize, const COLUMNS: usize> {
     matrix: [i32; 6],
     right: [i32; 3],
-    /// At the guess.
+    /// Misfit at the guess.
     pub misfit: Misfit,
 }
 
-/// What a row's taxels are compared with.
+/// Inputs of a comparison of a row.
 #[derive(Clone, Copy)]
 pub struct Comparison<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// What the guess makes of each taxel.
+    /// Prediction of each taxel from the guess.
     pub prediction: &'a Prediction<ROWS, COLUMNS>,
-    /// The picture.
+    /// Tactile image.
     pub view: &'a View<'a, ROWS, COLUMNS>,
-    /// Where the taxels are.
+    /// Geometry of the taxels.
     pub geometry: &'a Geometry,
 }
 
 impl Misfit {
-    /// How far the model and a row are apart, where it is not to be refined.
+    /// Adds a row's difference to the model, if the model is not to be refined.
     #[inline(never)]
     pub fn compare_row<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
@@ -145,13 +145,13 @@ impl Misfit {
     }
 }
 
-/// A residual, stopped at half of the peak.
+/// Limits a residual to half of the peak.
 #[inline(always)]
 fn residual(of: i32) -> i32 {
     of.max(-RESIDUAL_LIMIT).min(RESIDUAL_LIMIT - 1)
 }
 
-/// The weight: 1 less 3/4 of the model's pressure over the peak, Q13.
+/// Returns the weight, Q13: 1 less 3/4 of the model's pressure over the peak.
 #[inline(always)]
 fn weight(pressure: i32) -> i32 {
     (1 << SLOPE_BITS) - ((3 * pressure.min(1 << PEAK_BITS)) >> 3)
@@ -179,16 +179,16 @@ impl<const ROWS: usize, const COLUMNS: usize> Row<ROWS, COLUMNS> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
-    /// Without a taxel.
+    /// Equations of no taxels.
     pub const NONE: Self = Self { matrix: [0; 6], right: [0; 3], misfit: Misfit::NONE };
 
-    /// Takes in a row.
+    /// Adds a row.
     #[inline(never)]
     pub fn take_row(&mut self, comparison: Comparison<ROWS, COLUMNS>, row: usize) {
         self.take_row_by(comparison, row, |model, _| weight(model.pressure));
     }
 
-    /// Takes in a row; `weigh` gives a taxel's weight, Q13, and may work its pressure out anew: it is given the squared
+    /// Adds a row; `weigh` returns a taxel's weight, Q13, and may change its pressure: its arguments are the squared
     /// distance, Q28, and the place, Q15.
     #[inline(always)]
     pub fn take_row_by(
@@ -226,7 +226,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
 
     fn add(&mut self, row: &Row<ROWS, COLUMNS>, dy: i32) {
         let drop = Bits::<ROWS, COLUMNS>::ROW;
-        // A row within reach lies within two radii, so this fits; elsewhere the sums are 0.
+        // A row within reach lies within two radii, so this fits; for other rows the sums are 0.
         let dy = dy << (32 - PLACE_BITS - drop);
         let [ss, sx, sy, xx, xy, yy] = &mut self.matrix;
         *ss += row.height_height >> drop;
@@ -242,7 +242,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Equations<ROWS, COLUMNS> {
         self.misfit.add_row::<ROWS, COLUMNS>(&row.misfit);
     }
 
-    /// The next guess.
+    /// Solves for the next guess.
     pub fn solve(&self, guess: &Guess, scale: &Scale, geometry: &Geometry) -> Guess {
         let [ss, sx, sy, xx, xy, yy] = self.matrix;
         let [s, x, y] = self.right;

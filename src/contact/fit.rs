@@ -1,10 +1,10 @@
 //! A contact followed from frame to frame, with little work in each.
 //!
-//! A refinement is spread over frames: it begins in a frame of its own, each row of the array is then taken once, so
-//! many in a frame as the fit level says, and the solution comes with the last of them. What it tells is how many times
-//! larger the contact's force is than the sum of the taxels over those frames: 1 where the array sees all of it. That
-//! ratio changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as
-//! the sum itself.
+//! A refinement is spread over frames: it begins in a frame of its own, takes each row of the array once, as many
+//! rows in a frame as the fit level allows, and is solved with the last of them. Its result is the ratio of the
+//! contact's force to the sum of the taxels over those frames: 1 if the array sees all of the contact. The ratio
+//! changes slowly, while the sum follows every frame. So the force is the sum times the last ratio, as quick as the
+//! sum itself.
 
 use super::equations::{Comparison, Equations};
 use super::prediction::{Guess, Prediction, Scale, View};
@@ -21,30 +21,30 @@ use fixed::types::I16F16;
 
 /// Fractional bits of the ratio of the force to the sum.
 const RATIO_BITS: u32 = 16;
-/// Refinements in a row without any confidence after which the guess is given up: more than any contact needs to be
-/// found.
+/// Number of refinements in a row without any confidence after which the guess is given up. Any contact is found with
+/// fewer.
 const ASTRAY_MAX: u8 = 12;
-/// Refinements after which a new start is near a solution: until then what was found before counts.
+/// Number of refinements after which a new start is near a solution. Until then the earlier solution is kept.
 const AFRESH: u8 = 4;
-/// With fewer live taxels than this in the model's contact there are other contacts that look the same.
+/// Least number of live taxels in the model's contact: with fewer, other contacts look the same.
 const TAXELS_LEAST: i32 = 8;
-/// With fewer, a contact that was not there before must be a good likeness to count: a wrong one can be several times
-/// as large.
+/// Number of live taxels below which a new contact must match the model well to count: a wrong one can be several
+/// times as large.
 const TAXELS_SURE: i32 = 12;
-/// The largest ratio: at least a 64th of the force must be seen.
+/// Largest ratio: at least a 64th of the force must be seen.
 const RATIO_MAX: i32 = 64 << RATIO_BITS;
 
-/// The ratio follows a good likeness at once, another by a quarter of the way: what one of them gets wrong must not
-/// push the finger.
+/// The ratio follows a good match at once, and a poor one by a quarter of the difference: the error of one refinement
+/// must not push the finger.
 const RATIO_FOLLOWS_BITS: u32 = 2;
-/// A ratio this near to 1 is 1: 1/64.
+/// Difference from 1 below which a ratio counts as 1: 1/64.
 const RATIO_SAME: i32 = 1 << (RATIO_BITS - 6);
-/// Fractional bits of what the indentation follows the force by.
+/// Fractional bits of the slope of the indentation over the force.
 const FOLLOWS_BITS: u32 = 12;
-/// The farthest that the indentation follows the force within a refinement: 1/16 of the radius.
+/// Largest change of the indentation with the force within a refinement: 1/16 of the radius.
 const FOLLOWS_MAX: i32 = ONE / 16;
 
-/// A contact's fit between frames.
+/// Fit of a contact, between frames.
 ///
 /// ```
 /// use fingertip::contact::Fit;
@@ -61,37 +61,37 @@ const FOLLOWS_MAX: i32 = ONE / 16;
 pub struct Fit<const ROWS: usize, const COLUMNS: usize> {
     fit_level: FitLevel,
     at_work: bool,
-    /// Whether a refinement has begun.
+    /// True once a refinement has begun.
     begun: bool,
-    /// Frames taken in since then.
+    /// Number of frames in the refinement.
     frames: u8,
-    /// Whether the array sees the whole contact, as at the beginning.
+    /// True if the array saw the whole contact when the refinement began.
     covered: bool,
-    /// The contact supposed.
+    /// Guess of the contact.
     guess: Guess,
-    /// The same, worked out for the taxels.
+    /// Prediction of the taxels by the guess.
     prediction: Prediction<ROWS, COLUMNS>,
-    /// By the peak at the beginning.
+    /// Scale by the peak when the refinement began.
     scale: Scale,
-    /// The sum's force at the beginning.
+    /// Force by the sum when the refinement began.
     force: Newtons,
-    /// Over all frames taken in, in its smallest units.
+    /// Sum of the forces of the refinement's frames, in units of the last place.
     forces: i64,
-    /// How far the indentation follows the sum's force: d over twice that force.
+    /// Slope of the indentation over the force by the sum: d over twice that force.
     follows: i32,
     equations: Equations<ROWS, COLUMNS>,
-    /// Of the array that all this was found on, in tip radii.
+    /// Pitch of the array in tip radii: another pitch drops the fit.
     pitch: i32,
     confidence: u8,
     /// See [`Contact::doubt`], Q8.
     doubt: u32,
-    /// Refinements without any confidence since the last that had some.
+    /// Number of refinements without any confidence since the last one with some.
     astray: u8,
-    /// Refinements of a new start that do not count yet.
+    /// Number of refinements of a new start that do not count yet.
     afresh: u8,
-    /// What the last refinement made of the guess.
+    /// Guess for the next refinement.
     next: Option<Guess>,
-    /// What the last refinement with some confidence says.
+    /// Result of the last refinement with some confidence.
     fitted: Option<Fitted>,
 }
 
@@ -102,7 +102,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Default for Fit<ROWS, COLUMNS> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
-    /// Nothing seen yet.
+    /// Creates a fit before the first frame.
     pub const fn new(fit_level: FitLevel) -> Self {
         const { Shape::<ROWS, COLUMNS>::CHECKED };
         Self {
@@ -128,7 +128,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// From the next frame on. A refinement under way is begun anew; what the last one found stays.
+    /// Sets the fit level from the next frame on. A refinement under way starts again; the result of the last one is
+    /// kept.
     pub fn set_fit_level(&mut self, fit_level: FitLevel) {
         if fit_level != self.fit_level {
             self.fit_level = fit_level;
@@ -136,19 +137,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// Whether the last frame took the model.
+    /// Returns true if the last frame used the model.
     pub fn at_work(&self) -> bool {
         self.at_work
     }
 
-    /// Reads the next frame's contact. Any picture is taken.
+    /// Computes the contact of the next frame. Any image is accepted.
     ///
-    /// Without a contact, and until a refinement of one has some confidence, it is what [`from_sums`] says. Confidence
+    /// Without a contact, and until a refinement has some confidence, the result is that of [`from_sums`]. Confidence
     /// is that of the last refinement, 255 before the first.
     pub fn read(&mut self, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> Contact {
         let force = picture.force(config);
         self.at_work = false;
-        // The sums' bound holds for one table of nodes, which is the pitch's.
+        // The bound of the sums holds for one table of nodes, which depends on the pitch.
         if self.pitch != config.geometry.pitch {
             self.lose();
             self.pitch = config.geometry.pitch;
@@ -161,7 +162,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             let [centre_x, centre_y] = if self.fit_level == FitLevel::Sum { [Millimetres::ZERO; 2] } else { centre };
             return Contact { doubt, centre_x, centre_y, ..sums };
         }
-        // At the beginning, and while the sums are all there is.
+        // The sums are needed at the beginning of a refinement, and while there is no result.
         let begins = !self.begun;
         let sums = (begins || self.fitted.is_none()).then(|| from_sums(picture, config));
         if let (true, Some(sums)) = (begins, &sums)
@@ -171,7 +172,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             return *sums;
         }
         self.at_work = true;
-        // The start has a frame of its own, where a refinement is spread over frames.
+        // A refinement that is spread over frames has a frame of its own for its start.
         if !begins || self.fit_level.rows(ROWS) == ROWS {
             self.take(force, picture, config);
             if usize::from(self.frames) * self.fit_level.rows(ROWS) >= ROWS {
@@ -181,19 +182,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         let contact = match (self.fitted, sums) {
             (Some(fitted), _) => fitted.contact(force, picture, config),
             (None, Some(sums)) => sums,
-            // A fit given up in this frame.
+            // A fit that was given up in this frame.
             (None, None) => from_sums(picture, config),
         };
         self.doubt = follow_doubt(self.doubt, self.target_doubt(&contact, picture, config));
         Contact { confidence: self.confidence, doubt: (self.doubt >> 8) as u8, ..contact }
     }
 
-    /// Begins a refinement. False where the peak is too low for the model.
+    /// Begins a refinement. Returns false if the peak is too low for the model.
     fn start(&mut self, sums: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> bool {
         let Some(scale) = Scale::new(picture.peak, &config.geometry) else {
             return false;
         };
-        // Where a contact is cut off, the sums' centre lies too far in, and their radius is too small: the fit knows
+        // For a contact that is cut off, the sums' centre lies too far in and their radius is too small: the fit is
         // better.
         self.covered = match self.fitted {
             Some(fitted) => covers(&fitted.contact(sums.force, picture, config), picture, config),
@@ -212,7 +213,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         true
     }
 
-    /// Takes in the frame's share of the rows.
+    /// Adds the frame's share of the rows.
     fn take(&mut self, force: Newtons, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) {
         let view = View { picture, scale: self.scale };
         self.prediction.height = self.followed(&self.guess, force);
@@ -225,15 +226,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
             } else {
                 self.equations.take_row(comparison, row);
             }
-            // As many frames as it takes: a row of every so many.
+            // Each frame takes every n-th row, for n frames.
             row += ROWS.div_ceil(rows.max(1));
         }
         self.forces += i64::from(force.to_bits());
         self.frames += 1;
     }
 
-    /// What is left between the plane and the hemisphere's centre, where the sum's force has become this one: d goes
-    /// with the root of the force.
+    /// Distance between the plane and the hemisphere's centre after a change of the sum's force: d is proportional to
+    /// the root of the force.
     fn followed(&self, guess: &Guess, force: Newtons) -> i32 {
         let more = i64::from(force.to_bits()) - i64::from(self.force.to_bits());
         guess.height.saturating_sub(clamp_to((more * i64::from(self.follows)) >> FOLLOWS_BITS, FOLLOWS_MAX))
@@ -250,7 +251,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         let few = self.equations.misfit.taxels < TAXELS_MIN;
         self.astray = if self.confidence > 0 && !few { 0 } else { self.astray + 1 };
         if few || self.astray > ASTRAY_MAX {
-            // Another start may find it. What was found before is kept meanwhile: the force must not jump.
+            // Another start may find the contact. The last result is kept meanwhile: the force must not jump.
             (self.next, self.afresh) = (None, AFRESH);
             if self.astray > ASTRAY_MAX {
                 self.astray = 0;
@@ -264,7 +265,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         let taxels = self.equations.misfit.taxels;
         let likely = self.confidence >= CONFIDENCE_LEAST || taxels >= TAXELS_SURE;
         if self.afresh == 0 && taxels >= TAXELS_LEAST && (likely || self.fitted.is_some() && self.confidence > 0) {
-            // At the mean of the frames, where noise counts least.
+            // At the mean of the frames, where noise has the least effect.
             let mean = Divisor::new(self.frames.into()).divide(self.forces, 0);
             let height = self.followed(&guess, Newtons::from_bits(mean));
             let mean_guess = Guess::new(height, guess.x, guess.y, &config.geometry);
@@ -274,9 +275,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// Takes a refinement's ratio, and its centre where it has one.
+    /// Takes a refinement's ratio, and its centre if it has one.
     fn settle(&mut self, ratio: i32, centre: Option<[Millimetres; 2]>) {
-        // Less than what the taxels carry is no force to press for: only a good likeness may say so.
+        // A force below the sum of the taxels needs a good match.
         let ratio = if self.confidence >= CONFIDENCE_LEAST { ratio } else { ratio.max(1 << RATIO_BITS) };
         match (&mut self.fitted, centre) {
             (Some(fitted), centre) => {
@@ -292,7 +293,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// How far the force is known only from below in this frame.
+    /// Uncertainty of the force in this frame.
     fn target_doubt(&self, contact: &Contact, picture: &Picture<ROWS, COLUMNS>, config: &Shaped<ROWS, COLUMNS>) -> u8 {
         match self.fitted {
             _ if self.covered => 0,
@@ -301,20 +302,20 @@ impl<const ROWS: usize, const COLUMNS: usize> Fit<ROWS, COLUMNS> {
         }
     }
 
-    /// No contact, none that the model can say anything of, or another model.
+    /// Drops the fit: there is no contact, none that the model can describe, or another model.
     pub(crate) fn lose(&mut self) {
         self.forget();
         (self.begun, self.confidence, self.doubt) = (false, 255, 0);
     }
 
-    /// Back to the sums.
+    /// Drops the result, so that the sums count.
     fn forget(&mut self) {
         (self.next, self.fitted, self.astray, self.afresh) = (None, None, 0, 0);
     }
 }
 
-/// A row a frame is taken in steps of so many rows, so that what changes meanwhile is not taken for a slope: three, or
-/// the next number that shares no divisor with the number of rows, so that the steps come to each of them once.
+/// Step from row to row if a frame takes one row, so that a change during the refinement is not taken for a slope:
+/// three, or the next number without a common divisor with the number of rows, so that the steps visit each row once.
 const fn row_step(rows: usize) -> usize {
     let mut step = 3;
     while divisor(step, rows) != 1 {
@@ -323,22 +324,22 @@ const fn row_step(rows: usize) -> usize {
     step
 }
 
-/// The largest divisor of both.
+/// Returns the largest common divisor.
 const fn divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { divisor(b, a % b) }
 }
 
-/// A contact of which the array sees a part.
+/// Result of a refinement for a contact of which the array sees a part.
 #[derive(Clone, Copy, Debug)]
 struct Fitted {
-    /// Of the force to the sum.
+    /// Ratio of the force to the sum.
     ratio: i32,
-    /// Of pressure, from the array's middle.
+    /// Centre of pressure, from the array's middle.
     centre: [Millimetres; 2],
 }
 
 impl Fitted {
-    /// The contact, where the sum makes this force.
+    /// Returns the contact for a force by the sum.
     fn contact<const ROWS: usize, const COLUMNS: usize>(
         self,
         force: Newtons,
@@ -351,23 +352,24 @@ impl Fitted {
     }
 }
 
-/// Ratios of the force to the sum between which a doubtful fit is doubted: from a fifth of the force hidden to two
-/// fifths.
+/// Ratios of the force to the sum between which the uncertainty of a poor match rises: from a fifth of the force
+/// hidden to two fifths.
 const RATIO_DOUBTED: [i32; 2] = [(5 << RATIO_BITS) / 4, (7 << RATIO_BITS) / 4];
-/// Shares of the force hidden by bad taxels, Q8, between which the sums are doubted.
+/// Shares of the force hidden by bad taxels, Q8, between which the uncertainty of the sums rises.
 const HIDDEN: [i32; 2] = [1 << 5, 1 << 7];
-/// Confidences between which a fit is a good likeness.
+/// Confidences between which a fit becomes a good match.
 const CONFIDENCE: [i32; 2] = [96, 160];
 
-/// Of a fit. Where little is hidden, any fit does; where much is, only a good likeness says how much.
+/// Uncertainty of a fit. While little is hidden, any fit is good enough; while much is hidden, only a good match
+/// shows how much.
 fn doubt_of_fit(ratio: i32, confidence: u8) -> u8 {
     let hidden = ramp(ratio, RATIO_DOUBTED);
     let unlike = u8::MAX - ramp(confidence.into(), CONFIDENCE);
     ((u32::from(hidden) * (u32::from(unlike) + 1)) >> 8) as u8
 }
 
-/// Of the sums: none while the rim is within half a pitch of the edge, all from a pitch and a half on; none while bad
-/// taxels hide an eighth of the force, all where they hide half of it.
+/// Uncertainty of the sums: 0 while the rim is within half a pitch of the edge, full from a pitch and a half on; 0
+/// while bad taxels hide an eighth of the force, full if they hide half of it.
 fn doubt_of_sums<const ROWS: usize, const COLUMNS: usize>(
     sums: &Contact,
     picture: &Picture<ROWS, COLUMNS>,
@@ -378,13 +380,14 @@ fn doubt_of_sums<const ROWS: usize, const COLUMNS: usize>(
     hidden.max(ramp(overhang::<ROWS, COLUMNS>(sums, config), [half_pitch, 3 * half_pitch]))
 }
 
-/// Q8: it comes within some 8 frames and goes within some 64.
+/// Moves the uncertainty, Q8, towards its target: up within about 8 frames, down within about 64. The loop uses it,
+/// so it must not jump when a rim touches the array's edge.
 fn follow_doubt(doubt: u32, target: u8) -> u32 {
     let target = u32::from(target) << 8;
     if target > doubt { doubt + (target - doubt).div_ceil(8) } else { doubt - (doubt - target).div_ceil(64) }
 }
 
-/// 0 up to `from`, 255 from `to` on, and a line between.
+/// Returns 0 up to `from`, 255 from `to` on, and a line between.
 fn ramp(value: i32, [from, to]: [i32; 2]) -> u8 {
     let way = i64::from(value.max(from).min(to)) - i64::from(from);
     (way * 255 / (i64::from(to) - i64::from(from)).max(1)) as u8

@@ -1,8 +1,4 @@
-//! A contact supposed, and what the model makes of it for each taxel.
-//!
-//! # View
-//!
-//! The picture in shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
+//! A guess of the contact, and the model's prediction of each taxel from it.
 
 use crate::arith::{between, clamp_to, high, reciprocal, root};
 use crate::config::Shaped;
@@ -15,14 +11,14 @@ use crate::units::Millimetres;
 pub const CENTRE_BITS: u32 = 24;
 /// Fractional bits of a slope.
 pub const SLOPE_BITS: u32 = 13;
-/// The deepest indentation that the fit looks for: 7/8 of the radius.
+/// Least s, for the deepest indentation of the fit: 7/8 of the radius.
 pub const HEIGHT_MIN: i32 = ONE / 8;
-/// The shallowest: 1/1024 of the radius.
+/// Largest s, for the shallowest indentation of the fit: 1/1024 of the radius.
 pub const HEIGHT_MAX: i32 = ONE - ONE / 1024;
-/// The largest squared distance of a taxel that a contact can reach.
+/// Largest squared distance of a taxel that a contact can reach.
 const SQUARE_MAX: u32 = 3 << (SQUARE_BITS - 1);
 
-/// A contact, in tip radii.
+/// Guess of a contact, in tip radii.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Guess {
     /// s = 1 - d, Q28.
@@ -34,14 +30,14 @@ pub struct Guess {
 }
 
 impl Guess {
-    /// The nearest that the fit covers: the centre within a radius of the array.
+    /// Returns the nearest guess that the fit covers: the centre within a radius of the array.
     pub fn new(height: i32, x: i32, y: i32, geometry: &Geometry) -> Self {
         let [reach_x, reach_y] = geometry.reach;
         let centre = |value: i32, reach: i32| clamp_to(value.into(), reach);
         Self { height: height.min(HEIGHT_MAX).max(HEIGHT_MIN), x: centre(x, reach_x), y: centre(y, reach_y) }
     }
 
-    /// From lengths.
+    /// Converts lengths to a guess.
     pub fn from_lengths(d: Millimetres, x: Millimetres, y: Millimetres, geometry: &Geometry) -> Self {
         let share = |length: Millimetres, bits: u32| {
             let wide = i64::from(length.to_bits()) * i64::from(geometry.inverse_radius);
@@ -71,47 +67,47 @@ impl Guess {
     }
 }
 
-/// A number of radii as a length.
+/// Converts a number of radii to a length.
 fn scale(radii: i32, tip: &Tip, bits: u32) -> i32 {
     ((i64::from(radii) * i64::from(tip.radius().to_bits())) >> bits) as i32
 }
 
-/// What the model says of a taxel: pressure as a share of the peak, and its slopes.
+/// Prediction of a taxel: pressure as a share of the peak, and its slopes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TaxelModel {
     /// Pressure, Q14 of the peak.
     pub pressure: i32,
-    /// How the pressure falls with ln(s), in Y, Q13: `-dp / d ln(s)`.
+    /// Slope of the pressure over ln(s), in Y, Q13: `-dp / d ln(s)`.
     pub by_height: i32,
-    /// How it falls with the squared distance, times 2 s^2, in Y, Q13.
+    /// Slope of the pressure over the squared distance, negative, times 2 s^2, in Y, Q13.
     pub by_square: i32,
 }
 
-/// A guess worked out for all taxels.
+/// Prediction of all taxels from a guess.
 #[derive(Clone, Debug)]
 pub struct Prediction<const ROWS: usize, const COLUMNS: usize> {
     /// s, Q28.
     pub height: i32,
     /// s^3, Q27.
     height_cube_q27: i32,
-    /// Taxels nearer than this, squared, lie inside the contact.
+    /// Squared distance below which a taxel lies inside the contact.
     pub inside: u32,
-    /// Taxels from here on, squared, lie outside of it.
+    /// Squared distance from which on a taxel lies outside the contact.
     pub outside: u32,
     /// Twice the modulus in shares of the peak, Q14.
     twice_modulus: i32,
     modulus: i32,
     modulus_shift: u32,
-    /// Places of the columns from the contact's centre, Q15.
+    /// Places of the columns relative to the contact's centre, Q15.
     pub dx: [i32; COLUMNS],
-    /// Their squares, Q28.
+    /// Squares of these places, Q28.
     pub dx_square: [u32; COLUMNS],
-    /// Places of the rows from it, Q15.
+    /// Places of the rows relative to the contact's centre, Q15.
     pub dy: [i32; ROWS],
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
-    /// Of nothing.
+    /// Prediction of no contact.
     pub const NONE: Self = Self {
         height: 0,
         height_cube_q27: 0,
@@ -125,7 +121,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         dy: [0; ROWS],
     };
 
-    /// Of a guess, in shares of this scale's peak.
+    /// Predicts the taxels from a guess, in shares of this scale's peak.
     pub fn new(guess: &Guess, scale: &Scale, config: &Shaped<ROWS, COLUMNS>) -> Self {
         let geometry = &config.geometry;
         // The rim's radius, widened by what a taxel's size adds to its mean squared distance, Q15.
@@ -148,7 +144,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         }
     }
 
-    /// A taxel at a squared distance below [`Prediction::outside`].
+    /// Predicts a taxel at a squared distance below [`Prediction::outside`].
     #[inline(always)]
     pub fn taxel(&self, square: u32, nodes: &[Node; NODES]) -> TaxelModel {
         let ([low, up], share) = interval(nodes, square);
@@ -167,7 +163,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
         let compressed = (length - self.height).max(0);
         // (L1 - s) / (h r), Q14, below 8.
         let ratio = high(compressed, between(low.inverse_spread, up.inverse_spread, share)).min((8 << 14) - 1);
-        // Under the rim the column is hardly longer than s, so both slopes are taken for the same.
+        // Under the rim the column is hardly longer than s, so both slopes are taken as equal.
         let slope = high(ratio << 3, self.height).min(3 << (SLOPE_BITS - 1));
         TaxelModel {
             pressure: high(high(compressed, self.modulus), ratio << 14) >> (self.modulus_shift - 7),
@@ -177,20 +173,20 @@ impl<const ROWS: usize, const COLUMNS: usize> Prediction<ROWS, COLUMNS> {
     }
 }
 
-/// Places from a centre, Q15.
+/// Returns places relative to a centre, Q15.
 #[inline(always)]
 fn from<const SIDE: usize>(places: &[i32; SIDE], centre: i32) -> [i32; SIDE] {
     places.map(|place| place - (centre >> (CENTRE_BITS - PLACE_BITS)))
 }
 
-/// The nodes around a squared distance, and its share of the way between them in Q31.
+/// Returns the nodes around a squared distance, and its relative position between them in Q31.
 #[inline(always)]
 pub fn interval(nodes: &[Node; NODES], square: u32) -> ([&Node; 2], i32) {
     let index = ((square >> NODE_BITS) as usize).min(NODES - 2);
     ([&nodes[index], &nodes[index + 1]], ((square << (32 - NODE_BITS)) >> 1) as i32)
 }
 
-/// The square of a place, Q28; it stops at 4.
+/// Returns the square of a place, Q28, at most 4.
 #[inline(always)]
 pub fn square(place: i32) -> u32 {
     let place = place.unsigned_abs().min(u32::from(u16::MAX));
@@ -199,38 +195,39 @@ pub fn square(place: i32) -> u32 {
 
 /// Fractional bits of a pressure as a share of the peak.
 pub const PEAK_BITS: u32 = 14;
-/// The lowest peak that is looked at: one code.
+/// Lowest peak that is fitted: one code.
 const PEAK_MIN: i32 = 1 << CODE_BITS;
-/// The highest peak that the converter, the sag and the gain can make.
+/// Highest peak that converter, sag and gain allow.
 const PEAK_MAX: i32 = 1 << 18;
-/// Y over the peak at most: 512. Below that indentation of a / 512 the model says nothing that the sum does not.
+/// Largest modulus as a share of the peak: 512. Below that indentation of a / 512 the model gives no more than the
+/// sum.
 const MODULUS_MAX: u32 = 1 << (PEAK_BITS + 9);
-/// Y over the peak at least: beyond, the tip would be pressed flat.
+/// Least modulus as a share of the peak. With less, the tip would be pressed flat.
 const MODULUS_MIN: u32 = 1 << (PEAK_BITS - 1);
 
-/// A picture and its scale.
+/// Tactile image and its scale.
 pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// The picture.
+    /// Tactile image.
     pub picture: &'a Picture<ROWS, COLUMNS>,
-    /// By its peak.
+    /// Scale by the image's peak.
     pub scale: Scale,
 }
 
-/// What makes a taxel a share of the peak.
+/// Scale of an image to shares of its highest taxel: 2^14 is the peak, so products fit 32 bits whatever the load.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
     /// 2^34 over the peak.
     inverse_peak: i32,
     /// Y in shares of the peak, Q14.
     pub modulus: i32,
-    /// Puts the modulus' top bit at 30.
+    /// Left shift that puts the modulus' top bit at 30.
     pub modulus_shift: u32,
     /// 2^(62 - modulus_shift) over the modulus.
     pub inverse_modulus: u32,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> View<'_, ROWS, COLUMNS> {
-    /// A taxel as a share of the peak, Q14; a taxel of less than -2^18 has no meaning.
+    /// Returns a taxel as a share of the peak, Q14. Taxels below -2^18 have no meaning.
     #[inline(always)]
     pub fn share(&self, taxel: i32) -> i32 {
         self.scale.share(taxel)
@@ -238,10 +235,10 @@ impl<const ROWS: usize, const COLUMNS: usize> View<'_, ROWS, COLUMNS> {
 }
 
 impl Scale {
-    /// Of nothing.
+    /// Scale of no contact.
     pub const NONE: Self = Self { inverse_peak: 0, modulus: 0, modulus_shift: 0, inverse_modulus: 0 };
 
-    /// In shares of this peak; None where it is too low for the model.
+    /// Scale by a peak; none if the peak is too low for the model.
     pub fn new(peak: i32, geometry: &Geometry) -> Option<Self> {
         if peak < PEAK_MIN {
             return None;
@@ -266,7 +263,7 @@ impl Scale {
         high(taxel << (PEAK_BITS - 2), self.inverse_peak)
     }
 
-    /// The square of what the converter's steps do to a share: a third of a code's square.
+    /// Square of the converter's resolution as a share: a third of a code's square.
     pub fn converter_square(&self) -> u32 {
         let code = self.share(1 << CODE_BITS).unsigned_abs();
         code * code / 3

@@ -1,39 +1,39 @@
-//! The time that the loop has, and the fit level that fits it.
+//! The time of a step, and the fit level that it allows.
 //!
-//! The core has no clock: whoever calls the step measures how long the last one took. The fit level that was asked for
-//! is in use as long as the dearest frame expected at it ends before the deadline, less a margin. It falls by one where
-//! that is no longer so, at once; it rises by one where the next fit level is expected to fit after [`WINDOW`] frames,
-//! and after a fall only later and later, so that it does not hunt. A fit level that is not expected to fit is not
-//! tried.
+//! The core has no clock: the caller of the step measures the time of the last one. The requested fit level is in use
+//! as long as the longest frame expected at it ends before the deadline, less a margin. The level falls by one at
+//! once when that is no longer so. It rises by one when the next level is expected to fit after [`WINDOW`] frames.
+//! After each fall it waits longer, so that it does not hunt. A level that is not expected to fit is not tried.
 
 use crate::contact::FitLevel;
 use crate::units::CoreCycles;
 
-/// Frames over which the time is watched before the fit level rises: two refinements at the least fit level, and more.
+/// Number of frames over which the time is observed before the fit level rises: more than two refinements at the
+/// least fit level.
 pub const WINDOW: u32 = 32;
-/// Windows to wait at most after a fall: 0.8 s at 10 kHz.
+/// Largest number of windows to wait after a fall: 0.8 s at 10 kHz.
 pub const WAIT_MAX: u32 = 256;
 
-/// What is expected.
+/// Expected times, and the fit level in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget<const ROWS: usize, const COLUMNS: usize> {
     fit_level: FitLevel,
-    /// What was asked for, and the deadline, when last looked at.
+    /// Last requested fit level, and last deadline in cycles.
     asked: (FitLevel, u32),
-    /// Whether the model was at work in the frame whose time comes next.
+    /// True if the model was used in the frame whose time comes next.
     modelled: bool,
-    /// The longest time of a frame without the model, ticks.
+    /// Longest time of a frame without the model, cycles.
     without_model: u32,
-    /// The longest of this window's frames.
+    /// Longest time of this window's frames, cycles.
     longest: u32,
     frames: u32,
-    /// Windows to let pass before the fit level may rise, and after the next fall.
+    /// Number of windows before the fit level may rise, and that number after the next fall.
     wait: u32,
     wait_next: u32,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
-    /// Nothing measured yet: the least fit level.
+    /// Creates a budget at the least fit level, without a measured time.
     pub const fn new() -> Self {
         Self {
             fit_level: FitLevel::Sum,
@@ -47,13 +47,14 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         }
     }
 
-    /// What the dearest frame takes beyond one by the sums: its most and its least, cycles of the core.
+    /// Time that the longest frame takes beyond one by the sums: its upper and its lower bound, cycles of the core.
     ///
-    /// Estimated cycles on a Cortex-M4F with the flash's waits, all taxels under the contact, rounded up
-    /// (`cargo xtask timing`, `docs/study.md`): of 10 x 10 the start of a refinement 2,100 at most, its solution
-    /// 1,600, a row 1,000. Of other shapes a row goes by its taxels, and the start by the places along both sides.
+    /// Estimated cycles on a Cortex-M4F with the flash's wait states, all taxels under the contact, rounded up
+    /// (`cargo xtask timing`, `docs/study.md`): with 10 x 10 taxels the start of a refinement takes at most 2,100,
+    /// its solution 1,600, a row 1,000. For other shapes a row is computed from its taxels, and the start from the
+    /// sum of both sides.
     pub const fn model_cycles(fit_level: FitLevel) -> [u32; 2] {
-        // A table, worked out by the compiler.
+        // A table that the compiler computes.
         Self::MODEL_CYCLES[fit_level as usize]
     }
 
@@ -77,13 +78,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         [(start + rows * row + solution) as u32, (1_300 + rows * row / 5 + more) as u32]
     }
 
-    /// Of a time, what is to be used: an eighth is left for what was never measured.
+    /// Part of a deadline that may be used: an eighth is left for what was never measured.
     pub const fn usable(deadline: u32) -> u32 {
         deadline - deadline / 8
     }
 
-    /// The fit level for the next frame, where the last one took `taken` of its deadline. A time of 0 was not measured:
-    /// then it is the fit level asked for.
+    /// Returns the fit level for the next frame, from the time that the last one took. A time of 0 was not measured:
+    /// then the requested level is used.
     pub fn next(&mut self, asked: FitLevel, taken: CoreCycles, deadline: CoreCycles) -> FitLevel {
         let (CoreCycles(taken), CoreCycles(deadline)) = (taken, deadline);
         if self.asked != (asked, deadline) {
@@ -99,7 +100,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         self.fit_level
     }
 
-    /// Whether the frame that was just worked on took the model.
+    /// Takes note if the present frame used the model.
     pub fn note(&mut self, modelled: bool) {
         if modelled != self.modelled {
             self.modelled = modelled;
@@ -122,11 +123,11 @@ impl<const ROWS: usize, const COLUMNS: usize> Budget<ROWS, COLUMNS> {
         if self.frames < WINDOW {
             return;
         }
-        // The dearest frame of a window took at least this for the model.
+        // The longest frame of a window took at least this for the model.
         self.without_model = if self.modelled { self.longest.saturating_sub(least) } else { self.longest };
         self.restart();
         self.wait = self.wait.saturating_sub(1);
-        // A rise needs a little more room than staying, so that what varies by a little does not undo it.
+        // A rise needs slightly more time than staying, so that a small variation does not undo it.
         let higher = self.fit_level.higher();
         let [most, _] = Self::model_cycles(higher);
         if self.wait == 0

@@ -1,23 +1,22 @@
 //! The last word on the duty: an envelope that holds whatever the loop, the fit or the host believe.
 //!
-//! The guard owes nothing to the loop. It counts the encoder by itself, keeps a model of the motor of its own, and
-//! takes of the array the larger of the plain sum and the force in use. `docs/safety.md` states its promises, by
-//! number:
+//! The guard is independent of the loop. It counts the encoder by itself, keeps its own model of the motor, and uses the
+//! larger of the plain sum of the array and the force in use. `docs/safety.md` states its promises, by number:
 //!
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
 //! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm
-//!    on, the motor stops. An object that pushes a tip which does not move forward takes that place, and the rear end,
-//!    along.
-//! 3. Where nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a
+//!    on, the motor stops. An object that pushes a tip which does not move forward moves this limit, and the rear end,
+//!    back.
+//! 3. While nothing is surely pressed for 20 ms, no duty speeds up a tip that is faster than 1.5 times the approach; a
 //!    tip that stays so fast for 20 ms stops.
-//! 4. A motor or an encoder that runs the wrong way, or stands still though driven, stops within 5 ms and 0.5 mm of
-//!    full drive.
-//! 5. A tip that moves steadily forward stops where the motor measures three eighths of the goal more than before, and
+//! 4. A motor or an encoder that runs in the wrong direction, or does not move though driven, stops within 5 ms and
+//!    0.5 mm of full drive.
+//! 5. A tip that moves steadily forward stops if the motor measures three eighths of the goal more than before, and
 //!    the array no contact.
 //!
-//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder tells,
+//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder measures,
 //! and the one that its model of the motor expects. Both pass the same two filters, so a sound finger shows the same
-//! sign whatever it is asked for:
+//! sign whatever is requested of it:
 //!
 //! ```text
 //! a = g V - c v - F / m       h' = a - h / tau       p' = 4 (h - p) / tau       tau = 5 ms
@@ -36,36 +35,37 @@ use crate::config::Config;
 use crate::state::{Fault, Limits};
 use crate::units::{Duty, Millimetres, Newtons};
 
-/// A change of speed that is less than this part of what is expected is none: 1/8.
+/// Part of the expected change below which a change of speed counts as none: 1/8.
 const NONE_BITS: u32 = 3;
-/// The two changes must tell another story for so long, ns.
+/// Time for which motor model and encoder must disagree before the motor is stopped, ns.
 const OTHER_NS: u32 = 500_000;
-/// How far an end may be overrun: 1 mm.
+/// Distance by which an end may be overrun: 1 mm.
 const BEYOND: i32 = 1 << 24;
 /// Time after a contact until the tip must be slow, and from then on until it is stopped, ns.
 const LOOSE_NS: u32 = 20_000_000;
-/// How much farther than some indentations a tip may have gone and still count as pressed: 0.5 mm, Q24.
+/// Distance beyond a number of indentations at which a tip still counts as pressed: 0.5 mm, Q24.
 const YIELDING: i32 = 1 << 23;
-/// So many on the way forward, and on the way back: what yields goes along with the tip.
+/// Number of indentations on the way forward: an object that yields moves with the tip.
 const DEEPER: i32 = 2;
+/// Number of indentations on the way back: a force that is too high must not wait.
 const DEEPER_BACK: i32 = 5;
-/// A touch moves back with the tip where the force falls over this travel, 0.5 mm, Q24,
+/// Travel over which the force must fall for the touch to move back with the tip: 0.5 mm, Q24.
 const RETREAT: i32 = 1 << 23;
-/// by 0.1 N, Q16, or by half of itself.
+/// Force by which it must fall, 0.1 N, Q16, or half of it if that is less.
 const FALLS: i32 = (1 << 16) / 10;
-/// The force's mean follows it by 1/16 in each frame.
+/// The mean force moves by 1/16 of the difference in each frame.
 const FORCE_BITS: u32 = 4;
 
-/// What the guard knows of a frame.
+/// Inputs of the guard in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
-    /// The encoder's count.
+    /// Count of the encoder.
     pub encoder: i32,
-    /// The force on the array: the larger of the sum and what the loop goes by.
+    /// Force on the array: the larger of the sum and the force that the loop uses.
     pub force: Newtons,
-    /// Whether the finger presses or seeks an object.
+    /// True if the finger presses or seeks an object.
     pub pressing: bool,
-    /// The force that the host asks for.
+    /// Force that the host requests.
     pub goal: Newtons,
     /// g V that the bridge was given in the last frame, Q8 mm/s^2.
     pub voltage: i32,
@@ -75,19 +75,20 @@ pub struct Seen {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Guard {
     origin: i32,
-    /// All lengths Q24 mm.
+    /// Travel. All lengths are in Q24 mm.
     travel: i32,
-    /// No farther back than here, for this touch and for any.
+    /// Rear end of the travel for this touch.
     floor: i32,
+    /// Rear end of the travel for any touch.
     rear: i32,
-    /// The tip touched when torque was enabled, and still does.
+    /// True if the tip touched when torque was enabled, and still does.
     inherited: bool,
     /// Travel and force at which the tip last began to go back.
     from: [i32; 2],
-    /// Where a touch began, less its indentation.
+    /// Travel at which a touch began, less its indentation.
     surface: Option<i32>,
     touching: bool,
-    /// Whether this touch has its surface.
+    /// True if this touch has its surface.
     placed: bool,
     presses: bool,
     /// Mean force, Q16 N, and the indentation that it means.
@@ -96,20 +97,20 @@ pub struct Guard {
     /// Speeds by the encoder, quick and slow, Q16 mm/s.
     speed: i32,
     slow_speed: i32,
-    /// What the model expects the speed to have changed by, and that as late as the encoder tells it.
+    /// Change of the speed that the model expects, and the same with the delay of the encoder's filter.
     change: i32,
     late_change: i32,
-    /// Since the tip was last surely pressed, for the way forward and for the way back.
+    /// Time since the tip was last surely pressed, for the way forward and for the way back, ns.
     loose_ns: [u32; 2],
-    /// For how long it has been too fast.
+    /// Time for which the tip has been too fast, ns.
     fast_ns: u32,
-    /// For how long the two ways have told another story.
+    /// Time for which model and encoder have disagreed, ns.
     other_ns: u32,
     unseen: Unseen,
     may: May,
 }
 
-/// Which duties are let through.
+/// Directions in which a duty is allowed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct May {
     forward: bool,
@@ -117,8 +118,8 @@ struct May {
 }
 
 impl Guard {
-    /// Torque is enabled with the encoder at this count; travel counts from `zero`. What is touched already is known, as
-    /// far as it was seen since the last tare.
+    /// Starts with torque enabled at this count of the encoder; travel counts from `zero`. A touch that was seen
+    /// since the last tare is kept.
     pub fn start(&mut self, encoder: i32, zero: i32, config: &Config) {
         let shift = config.travel(zero.wrapping_sub(self.origin)).to_bits();
         let travel = config.travel(encoder.wrapping_sub(zero)).to_bits();
@@ -141,7 +142,7 @@ impl Guard {
         };
     }
 
-    /// Takes a frame: what is to stop the motor, where it is driven.
+    /// Takes a frame. Returns the fault that stops the motor, if it is driven.
     #[inline(always)]
     pub fn check(&mut self, seen: &Seen, driven: bool, config: &Config) -> Option<Fault> {
         self.measure(seen, config);
@@ -151,7 +152,7 @@ impl Guard {
             return None;
         }
         let frame_ns = config.timing.frame_ns;
-        // What is pressed is where it touched, or deeper, and the deeper the more force.
+        // A pressed tip is where it touched, or deeper, and the deeper the more force.
         let pressed = [self.pressed(DEEPER), self.pressed(DEEPER_BACK)];
         self.presses = pressed[1];
         for (loose_ns, pressed) in self.loose_ns.iter_mut().zip(pressed) {
@@ -162,7 +163,7 @@ impl Guard {
         let [fast_forward, fast_back] = [self.speed > limit(self.loose_ns[0]), self.speed < -limit(self.loose_ns[1])];
         self.fast_ns = if fast_forward || fast_back { self.fast_ns.saturating_add(frame_ns) } else { 0 };
         let end = config.travel_max.to_bits();
-        // In 1/256 s: Q16 mm/s are as many Q24 mm.
+        // Travel in 1/256 s: Q16 mm/s become the same number of Q24 mm.
         let soon = self.travel.saturating_add(self.speed);
         self.may = May {
             forward: self.travel.max(soon) <= end && !fast_forward,
@@ -175,7 +176,7 @@ impl Guard {
         self.disagreement(seen, config).or_else(|| self.unseen(seen.goal, config))
     }
 
-    /// The duty that is let through; sets [`Limits::GUARD`] where that is not what was asked for.
+    /// Returns the duty if it is allowed, else zero with [`Limits::GUARD`] set.
     pub fn allow(&self, duty: Duty, limits: &mut Limits) -> Duty {
         let allowed = (duty.0 == 0) || if duty.0 > 0 { self.may.forward } else { self.may.back };
         if allowed {
@@ -185,7 +186,7 @@ impl Guard {
         Duty::ZERO
     }
 
-    /// Whether the tip presses on something, as far as array and travel tell.
+    /// Returns true if array and travel show that the tip presses on something.
     pub fn presses(&self) -> bool {
         self.presses
     }
@@ -203,13 +204,13 @@ impl Guard {
             })
     }
 
-    /// The same, and the tip is not behind where it touched: between there and the clearance the array may show the
-    /// same for ever.
+    /// Returns true if the tip presses and is not behind the surface: between the surface and the clearance the array
+    /// may show the same for ever.
     pub fn presses_in(&self) -> bool {
         self.presses && self.surface.is_some_and(|surface| self.travel >= surface)
     }
 
-    /// Travel, force, and the two changes of speed.
+    /// Updates travel, force, and the two changes of speed.
     #[inline(always)]
     fn measure(&mut self, seen: &Seen, config: &Config) {
         let before = self.travel;
@@ -223,7 +224,7 @@ impl Guard {
 
         let pushed =
             saturated((i64::from(seen.force.to_bits().max(0)) * i64::from(config.bounds.acceleration_per_n)) >> 16);
-        // By the way itself: what a filtered speed is late by would add up.
+        // Computed from the unfiltered speed: the delay of a filtered one would add up.
         let back_emf = saturated((i64::from(speed) * i64::from(config.damping_q17_per_s)) >> 25);
         let acceleration = seen.voltage.saturating_sub(back_emf).saturating_sub(pushed);
         let gained = saturated((i64::from(acceleration) * i64::from(config.frame_s_q37)) >> 29);
@@ -231,7 +232,7 @@ impl Guard {
         self.late_change = towards(self.late_change, self.change, 4 * config.bounds.leak);
     }
 
-    /// Where a touch begins and how far back it lets the tip go.
+    /// Updates the touch and the rear end that it allows.
     #[inline(always)]
     fn touch(&mut self, pressing: bool, config: &Config) {
         if self.force < config.contact_off.to_bits() {
@@ -247,13 +248,14 @@ impl Guard {
                 force.saturating_sub(self.force) > FALLS.min(force >> 1)
             };
             if falls {
-                // An object that springs back moves with the tip. What was pressed before torque was may be far away.
+                // An object that springs back moves with the tip. An object that was pressed before torque may be far
+                // away.
                 self.surface = self.surface.map(|before| before.min(surface));
                 self.rear = if self.inherited { self.rear.min(back) } else { self.rear };
             }
             let pushed = travel >= self.travel && self.force > force.saturating_add(config.contact_on.to_bits());
             if pushed {
-                // An object that comes to a tip which does not move forward takes the rear end along.
+                // An object that pushes a tip which does not move forward moves the rear end back.
                 self.from = [self.travel, self.force];
                 self.rear = self.rear.min(back);
             }
@@ -262,7 +264,7 @@ impl Guard {
                 self.surface = Some(surface);
                 self.floor = back.max(self.rear);
             } else if pressing || falls || pushed || begins {
-                // What is held may come along, towards the finger, and so may what comes to a released tip.
+                // A held object may move with the finger, and an object may come to a released tip.
                 self.floor = self.floor.min(back.max(self.rear));
             }
         }
@@ -272,27 +274,27 @@ impl Guard {
         self.placed &= self.touching;
     }
 
-    /// What the motor feels where the array shows nothing.
+    /// Looks for a force on the motor while the array shows none.
     #[inline(always)]
     fn unseen(&mut self, goal: Newtons, config: &Config) -> Option<Fault> {
         if self.force >= config.contact_off.to_bits() {
             self.unseen.seen();
             return None;
         }
-        let told = self.speed.saturating_sub(self.slow_speed);
-        self.unseen.check(&Going { speed: self.speed, told, expected: self.late_change }, goal, config)
+        let measured = self.speed.saturating_sub(self.slow_speed);
+        self.unseen.check(&Going { speed: self.speed, measured, expected: self.late_change }, goal, config)
     }
 
-    /// How deep the tip is by what the motor felt before the array saw a contact.
+    /// Indentation by the force that the motor measured before the array saw a contact.
     #[inline(never)]
     pub fn depth_felt(&self, config: &Config) -> Millimetres {
         self.unseen.depth(self.force, self.speed, config)
     }
 
-    /// What the encoder tells against what the model expects, where that has been another for a while.
+    /// Compares the encoder with the model, and returns a fault once they have disagreed for a while.
     #[inline(always)]
     fn disagreement(&mut self, seen: &Seen, config: &Config) -> Option<Fault> {
-        // A quarter of what the force makes is left to its errors.
+        // A quarter of the force's effect is left to its errors.
         let force = self.force.max(seen.force.to_bits());
         let expected = self.late_change.saturating_abs();
         if expected < config.bounds.change_least {
@@ -300,75 +302,77 @@ impl Guard {
             return None;
         }
         let by_force = saturated((i64::from(force) * i64::from(config.bounds.change_per_n)) >> 18);
-        let told = self.speed.saturating_sub(self.slow_speed);
-        let along = if self.late_change < 0 { told.saturating_neg() } else { told };
+        let measured = self.speed.saturating_sub(self.slow_speed);
+        let along = if self.late_change < 0 { measured.saturating_neg() } else { measured };
         if expected < config.bounds.change_least.saturating_add(by_force) || along >= expected >> NONE_BITS {
             self.other_ns = 0;
             return None;
         }
         self.other_ns = self.other_ns.saturating_add(config.timing.frame_ns);
-        // At an end stop the speed changes against the drive, too, but only to none.
+        // At an end stop the speed changes against the drive, too, but only to zero.
         let speed_along = if self.late_change < 0 { self.speed.saturating_neg() } else { self.speed };
         let wrong = along.max(speed_along) < -(expected >> NONE_BITS);
         (self.other_ns > OTHER_NS).then_some(if wrong { Fault::Reversed } else { Fault::EncoderFrozen })
     }
 }
 
-/// How far behind a surface the tip may go: the clearance and 1 mm.
+/// Returns the travel to which the tip may go behind a surface: the clearance and 1 mm.
 fn behind(surface: i32, config: &Config) -> i32 {
     surface.saturating_sub(config.clearance.to_bits()).saturating_sub(BEYOND)
 }
 
-/// `value` moved by a share (Q16, at most a half) of the way to `goal`.
+/// Moves `value` towards `goal` by a share of the difference (Q16, at most a half).
 #[inline(always)]
 fn towards(value: i32, goal: i32, share: i32) -> i32 {
-    // Half of 32 bits: it fits.
+    // At most half of 32 bits: it fits.
     value.saturating_add(((i64::from(goal.saturating_sub(value)) * i64::from(share)) >> 16) as i32)
 }
 
-/// The nearest number of 32 bits.
+/// Returns the nearest number of 32 bits.
 #[inline(always)]
 fn saturated(value: i64) -> i32 {
     let low = value as i32;
     if i64::from(low) == value { low } else { (value >> 63) as i32 ^ i32::MAX }
 }
 
-/// The mean follows a lesser force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for
+/// The mean follows a smaller force by 1/64 in each frame, a larger one by 1/8,192: a contact must not pass for
 /// friction.
 const FREE_BITS: [u32; 2] = [6, 13];
-/// The tip goes steadily for so long before what the motor feels counts, ns.
+/// Time of steady motion before the measured force counts, ns.
 const STEADY_NS: u32 = 20_000_000;
-/// It must feel more for so long, ns.
+/// Time for which the force must exceed the mean, ns.
 const FELT_NS: u32 = 500_000;
 
-/// A force that the motor feels is three eighths of the goal, but no less and no more than these, Q16 N: 0.2 and 1 N.
+/// Least force that counts as a contact, Q16 N: 0.2 N. The threshold is three eighths of the goal within these
+/// limits.
 const LEAST: i32 = (1 << 16) / 5;
+/// Largest force that the threshold takes, Q16 N: 1 N.
 const MOST: i32 = 1 << 16;
 
-/// Much more than the array sees: so many times as much.
+/// Ratio to the force of the array from which the force of the motor counts as hidden from the array.
 const HIDDEN: i32 = 4;
 
-/// How the tip goes through the air: forces as what they change the speed by over tau, Q16 mm/s.
+/// Motion of the tip through the air. Forces are given as the change of speed that they make over tau, Q16 mm/s.
 #[derive(Clone, Copy, Debug)]
 struct Going {
-    /// Its speed by the encoder, Q16 mm/s.
+    /// Speed by the encoder, Q16 mm/s.
     pub speed: i32,
-    /// What that changed by.
-    pub told: i32,
-    /// What the model expects it to have changed by.
+    /// Measured change of the speed.
+    pub measured: i32,
+    /// Change of the speed that the model expects.
     pub expected: i32,
 }
 
-/// What the motor feels while the tip goes steadily forward and the array shows no contact.
+/// Force on the motor while the tip moves steadily forward and the array shows no contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Unseen {
-    /// For how long the tip has gone so.
+    /// Time of steady motion, ns.
     steady_ns: u32,
-    /// The mean of what is felt.
+    /// Mean of the measured force.
     free: i32,
-    /// By how much the last frame felt more than that.
+    /// Force of the last frame less the mean.
     more: i32,
-    /// For how long it has felt a contact.
+    /// Time for which the force has been that of a contact, ns.
     felt_ns: u32,
 }
 
@@ -376,12 +380,12 @@ impl Unseen {
     /// Takes a frame without a contact.
     #[inline(always)]
     pub fn check(&mut self, going: &Going, goal: Newtons, config: &Config) -> Option<Fault> {
-        let Going { speed, told, expected } = *going;
+        let Going { speed, measured, expected } = *going;
         let (approach, frame_ns) = (config.approach.to_bits(), config.timing.frame_ns);
         let steady =
-            speed > approach / 2 && speed <= approach.saturating_mul(2) && told.saturating_abs() < approach / 4;
+            speed > approach / 2 && speed <= approach.saturating_mul(2) && measured.saturating_abs() < approach / 4;
         self.steady_ns = if steady { self.steady_ns.saturating_add(frame_ns) } else { 0 };
-        let felt = expected.saturating_sub(told);
+        let felt = expected.saturating_sub(measured);
         if self.steady_ns < STEADY_NS {
             (self.free, self.more, self.felt_ns) = (felt, 0, 0);
             return None;
@@ -389,7 +393,7 @@ impl Unseen {
         self.more = felt.saturating_sub(self.free);
         let [down, up] = FREE_BITS;
         self.free = self.free.saturating_add(self.more >> if self.more < 0 { down } else { up });
-        // Without a goal the finger measures.
+        // A finger without a goal measures.
         let contact = if goal > Newtons::ZERO { (goal.to_bits() / 8).saturating_mul(3) } else { MOST };
         let contact = i64::from(contact.max(LEAST).min(MOST)) * i64::from(config.bounds.change_per_n);
         let contact = saturated(contact >> 16).saturating_add(config.bounds.change_free);
@@ -397,22 +401,22 @@ impl Unseen {
         (self.felt_ns > FELT_NS).then_some(Fault::Unseen)
     }
 
-    /// A contact is seen, or nothing drives.
+    /// Takes note that the array sees a contact.
     #[inline(always)]
     pub fn seen(&mut self) {
         self.felt_ns = 0;
     }
 
-    /// How deep the tip is by what the motor felt when the array came to see the contact, where that is much more than
-    /// the array sees.
+    /// Returns the indentation by the force that the motor measured when the array came to see the contact, if that
+    /// force is much larger than the force of the array.
     pub fn depth(&self, seen: i32, speed: i32, config: &Config) -> Millimetres {
         let more = self.more.saturating_sub(config.bounds.change_unsure);
-        // Q16 mm/s by Q16 mm/s for each N.
+        // Q16 mm/s over Q16 mm/s per N.
         let felt = saturated((i64::from(more) << 16) / i64::from(config.bounds.change_per_n.max(1)));
         if self.steady_ns < STEADY_NS || felt <= seen.max(config.contact_on.to_bits()).saturating_mul(HIDDEN) {
             return Millimetres::ZERO;
         }
-        // It feels it 1/256 s late: Q16 mm/s to Q24 mm.
+        // The measurement is 1/256 s late: Q16 mm/s to Q24 mm.
         let depth = config.tip.indentation(Newtons::from_bits(felt.saturating_add(seen)));
         Millimetres::from_bits(depth.to_bits().saturating_add(speed.max(0)))
     }

@@ -1,4 +1,4 @@
-//! What must hold in every frame while the motor may move.
+//! Conditions that must hold in every frame while the motor may move.
 
 use crate::command::Command;
 use crate::config::Config;
@@ -38,23 +38,23 @@ const MORE: i32 = 4;
 /// A larger jump is a fault once it has lasted longer than a burst of interference, ns.
 const MORE_NS: u32 = 8_000_000;
 
-/// What a frame shows, for judgement.
+/// Inputs of the monitor in a frame.
 pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// The array.
+    /// Tactile image.
     pub picture: &'a Picture<ROWS, COLUMNS>,
-    /// The contact read off it.
+    /// Contact in the image.
     pub contact: &'a Contact,
-    /// Whether the tip surely presses into something, by the guard.
+    /// True if the tip surely presses into something, by the guard.
     pub pressed: bool,
     /// Encoder, supply and bridge.
     pub sense: &'a Sense,
-    /// The motion estimated.
+    /// Estimated motion.
     pub motion: &'a SpeedLoop,
-    /// What the host asks.
+    /// Requests of the host.
     pub command: &'a Command,
 }
 
-/// Where things stood when they last changed.
+/// Values at the last change of the image, and counters of conditions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Monitor {
     sums: [i32; 3],
@@ -71,8 +71,8 @@ pub struct Monitor {
 }
 
 impl Monitor {
-    /// Starts again from this frame. The supply is watched on: one that was out of its window before stops the motor in
-    /// the first frame.
+    /// Starts again from this frame. The count of the supply continues: a supply that was out of its window before
+    /// stops the motor in the first frame.
     pub fn restart<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         picture: &Picture<ROWS, COLUMNS>,
@@ -92,7 +92,7 @@ impl Monitor {
         };
     }
 
-    /// The first fault that the contact and the motion show, the most direct evidence first.
+    /// Returns the first fault that the contact and the motion show, the most direct evidence first.
     pub fn check<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -119,7 +119,8 @@ impl Monitor {
         (self.supply_frames >= SUPPLY_FRAMES).then_some(if low { Fault::SupplyLow } else { Fault::SupplyHigh })
     }
 
-    /// No contact lowers what the array reads without one: its supply, its gain or its connector changed.
+    /// Returns a fault if the array reads less than at its tare. No contact causes this: the array's supply, its gain
+    /// or its connector changed.
     fn less<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -130,7 +131,7 @@ impl Monitor {
         (self.less_frames >= LESS_FRAMES).then_some(Fault::ArrayBroken)
     }
 
-    /// A step up of the sum that no contact can cause: a row or a taxel is stuck at a high code.
+    /// Returns a fault for a step up of the sum that no contact can cause: a row or a taxel is stuck at a high code.
     fn more<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -150,8 +151,9 @@ impl Monitor {
         self.step_ns.is_some_and(|ns| ns > MORE_NS).then_some(Fault::ArrayBroken)
     }
 
-    /// The array must see what the encoder and the motor see: a tip that presses on is pressed more. An object that
-    /// leaves as fast as the tip follows shows the same for a while; the motor then has no more to push.
+    /// Returns a fault if the array does not see what encoder and motor see: a tip that presses on is pressed more.
+    /// An object that leaves as fast as the tip follows shows the same for a while, but then the motor does not push
+    /// more.
     fn array<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -163,7 +165,7 @@ impl Monitor {
         let way = disturbance.0.saturating_sub(self.mean.0);
         self.mean.0 = self.mean.0.saturating_add(way >> MEAN_BITS);
         let disturbance = self.mean;
-        // In the air the array may well show the same for ever, and so may an object that carries a tip at its goal.
+        // In the air the array may show the same for ever, and so may an object that moves with a tip at its goal.
         let (force, goal) = (view.contact.force, view.command.goal);
         let holds = force.0.saturating_sub(goal.0).saturating_abs() <= goal.0 >> HOLDS_BITS;
         let idle = !view.pressed || holds || force < config.contact_off || travel < self.travel;
@@ -171,7 +173,7 @@ impl Monitor {
             *self = Self { sums, travel, disturbance, ..*self };
         }
         let moved = travel.0.saturating_sub(self.travel.0);
-        // What the motor pushes counts from where it has overcome its friction forward.
+        // The load counts from where the motor has overcome its friction forward.
         if moved < BLIND_TRAVEL.0 >> FORWARD_BITS {
             self.disturbance = disturbance;
         }

@@ -1,6 +1,6 @@
 //! Parameters at and between the ends of their ranges, and the configurations they make.
 
-use fingertip::config::{ConfigError, gains::Gains};
+use fingertip::config::{ConfigError, Gains};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use proptest::prelude::*;

@@ -2,9 +2,8 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 use fingertip::link::Reply;
-use fingertip::link::packet::BROADCAST;
-use fingertip::link::packet::Sender;
 use fingertip::link::packet::instruction::REBOOT;
+use fingertip::link::packet::{self, BROADCAST};
 use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
@@ -351,7 +350,7 @@ impl Drop for Served {
 /// An instruction to all, which nobody answers, without parameters.
 fn instruction(number: u8) -> Vec<u8> {
     let mut packet = Reply::new();
-    Sender::new(&mut packet, BROADCAST, number).finish();
+    packet::Sender::new(&mut packet, BROADCAST, number).finish();
     packet.to_vec()
 }
 

@@ -1,10 +1,10 @@
-//! Captures: a burst of frames kept on the board, which replays to the bit on any machine.
+//! Captures: a burst of frames kept on the board, which can be replayed to the bit on any machine.
 //!
-//! A capture is armed, and begins at the next tare: the pipeline is then made anew
-//! ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that all that the loop knows is known outside as well.
-//! From then on each step's frame, sense, command, duty, mode and fault are kept, with a digest of everything else that
-//! the step reported, until the memory is full, the host stops it, or something acts on the loop that is no step.
-//! The host reads a capture and feeds its frames through the core again (`tool/replay`).
+//! A capture is armed, and begins at the next tare: the pipeline is then reset
+//! ([`Pipeline::renew`](crate::pipeline::Pipeline::renew)), so that the whole state of the loop is known outside as
+//! well. From then on each step's frame, sense, command, duty, mode and fault are kept, with a digest of everything
+//! else that the step reported, until the memory is full, the host stops it, or something other than a step acts on
+//! the loop. The host reads a capture and feeds its frames through the core again (`tool/replay`).
 //!
 //! The layout, little-endian; bits fill a byte from its lowest one on:
 //!
@@ -42,33 +42,33 @@ use write::{WIDTH_MAX, mix};
 /// The version of the layout.
 pub const VERSION: u8 = 3;
 
-/// What a capture is doing. The numbers are stable.
+/// State of a capture. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
-    /// None was asked for since reset, or it was called off.
+    /// No capture was requested since reset, or it was cancelled.
     #[default]
     None = 0,
-    /// It begins with the next tare.
+    /// The capture begins with the next tare.
     Armed = 1,
     /// Frames are being kept.
     Recording = 2,
-    /// It can be read.
+    /// The capture can be read.
     Done = 3,
 }
 
-/// Why a capture ended. The numbers are stable.
+/// Reason why a capture ended. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Ended {
-    /// It did not.
+    /// The capture did not end.
     #[default]
     No = 0,
     /// Its memory is full.
     Full = 1,
     /// The host stopped it.
     Asked = 2,
-    /// Parameters or gains became others.
+    /// Parameters or gains changed.
     Configured = 3,
     /// The firmware stopped the motor between two steps: frames were lost, or a step came too late.
     Stopped = 4,
@@ -77,7 +77,7 @@ pub enum Ended {
 }
 
 impl Ended {
-    /// The inverse of its number; none where there is no such end.
+    /// Returns the reason with this number; none for an unknown number.
     pub const fn of(number: u8) -> Option<Self> {
         Some(match number {
             0 => Self::No,
@@ -91,44 +91,44 @@ impl Ended {
     }
 }
 
-/// How a capture stands.
+/// Status of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Standing {
-    /// What it is doing.
+pub struct CaptureStatus {
+    /// State of the capture.
     pub state: State,
-    /// Why it ended.
+    /// Reason why the capture ended.
     pub ended: Ended,
-    /// Counts the captures begun since reset; wraps.
+    /// Number of captures begun since reset; wraps.
     pub count: u8,
-    /// Frames kept.
+    /// Number of frames kept.
     pub frames: u32,
-    /// Bytes of the whole capture, once it can be read.
+    /// Number of bytes of the whole capture, once it can be read.
     pub bytes: u32,
 }
 
-/// The step to which the next frame's differences are written.
+/// Step relative to which the next frame is written.
 #[derive(Clone, Copy, Debug)]
 pub struct Last<const ROWS: usize, const COLUMNS: usize> {
-    /// The step's frame.
+    /// Frame of the step.
     pub frame: Frame<ROWS, COLUMNS>,
-    /// What was sensed beside the frame.
+    /// Measurements beside the frame.
     pub sense: Sense,
-    /// What the host asked for.
+    /// Requests of the host.
     pub command: Command,
-    /// The duty that the step returned, Q15.
+    /// Duty that the step returned, Q15.
     pub duty: i16,
-    /// The mode's number after the step.
+    /// Number of the mode after the step.
     pub mode: u8,
-    /// The fault's number after the step; 0 without one.
+    /// Number of the fault after the step; 0 without one.
     pub fault: u8,
     /// Sum of the folded differences of the frame's codes: the width of the next frame's codes follows it.
     pub spread: u32,
-    /// The digest of all steps so far.
+    /// Digest of all steps so far.
     pub digest: u32,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
-    /// Before the first frame: all zeros.
+    /// State before the first frame: all zeros.
     pub const NONE: Self = Self {
         frame: Frame::EMPTY,
         sense: Sense {
@@ -156,7 +156,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
         digest: 0,
     };
 
-    /// Low bits that a code's folded difference is likely to need.
+    /// Number of low bits that a code's folded difference is likely to need.
     pub fn width(&self) -> u32 {
         let codes = (COLUMNS * (ROWS + 1)) as u32;
         let mut width = 0;
@@ -169,42 +169,42 @@ impl<const ROWS: usize, const COLUMNS: usize> Last<ROWS, COLUMNS> {
 
 /// Low bits of what is coded beside the codes: chosen by what each does from frame to frame.
 pub mod width {
-    /// Of the frame's number.
+    /// Width of the frame's number.
     pub const SEQUENCE: u32 = 0;
-    /// Of the encoder's count.
+    /// Width of the encoder's count.
     pub const ENCODER: u32 = 1;
-    /// Of the bridge's supply, mV.
+    /// Width of the bridge's supply, mV.
     pub const SUPPLY: u32 = 2;
-    /// Of the time since the bus's last packet, ms.
+    /// Width of the time since the bus's last packet, ms.
     pub const SILENT: u32 = 0;
-    /// Of the time from the frame's end to its duty, core cycles.
+    /// Width of the time from the frame's end to its duty, core cycles.
     pub const ANSWER: u32 = 6;
-    /// Of the microcontroller's temperature.
+    /// Width of the microcontroller's temperature.
     pub const CHIP: u32 = 0;
-    /// Of the duty, Q15.
+    /// Width of the duty, Q15.
     pub const DUTY: u32 = 6;
 }
 
-/// What a capture begins with.
+/// Head of a capture: the state of the loop before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     /// Why it ended.
     pub ended: Ended,
-    /// Frames in it.
+    /// Number of frames.
     pub frames: u32,
-    /// Bits of all its frames.
+    /// Number of bits of all frames.
     pub bits: u32,
-    /// The digest after the last one.
+    /// Digest after the last frame.
     pub digest: u32,
-    /// The check sum of its frames' bits.
+    /// Check sum of the frames' bits.
     pub check: u32,
-    /// Frames missed since reset, before the first one.
+    /// Number of frames missed since reset, before the first one.
     pub missed_frames: u32,
-    /// Requests taken up before.
+    /// Requests acknowledged before.
     pub taken: Taken,
     /// What is known of the motor's winding, as [`Winding`](crate::control::Winding) tells it.
     pub winding: [u32; WINDING_WORDS],
-    /// From frame to frame.
+    /// Time from frame to frame, ns.
     pub frame_ns: u32,
     /// The parameters in force.
     pub params: Params,
@@ -214,10 +214,10 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
 
 /// First bytes of a capture.
 pub const MAGIC: [u8; 4] = [b'F', b'T', b'C', VERSION];
-/// Bytes before the parameters.
+/// Number of bytes before the parameters.
 const FIXED: usize = 40 + 4 * WINDING_WORDS;
 
-/// A number for the names and the order of the parameters (FNV-1a of 32 bits).
+/// Number that identifies the names and the order of the parameters (FNV-1a of 32 bits).
 pub const LAYOUT: u32 = {
     let (mut hash, mut place) = (0x811C_9DC5_u32, 0);
     while place < Params::COUNT {
@@ -234,10 +234,10 @@ pub const LAYOUT: u32 = {
 };
 
 impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
-    /// Its bytes.
+    /// Number of bytes of the head.
     pub const BYTES: usize = FIXED + 4 * Params::COUNT + 4 * Gains::<ROWS, COLUMNS>::WORDS;
 
-    /// What the digest of the steps goes on from: all that is known before the first one.
+    /// Initial value of the digest of the steps: the digest of the state before the first one.
     pub fn seed(&self) -> u32 {
         let first = [self.missed_frames, self.taken.word(), self.frame_ns];
         let params = self.params.to_array().map(i32::cast_unsigned);
@@ -265,7 +265,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
         (0..Gains::<ROWS, COLUMNS>::WORDS).for_each(|word| put(self.gains.word(word).to_le_bytes()));
     }
 
-    /// Says in one that was written why the capture ended, and its frames, bits, digest and check sum.
+    /// Completes a written head with the reason of the end, frames, bits, digest and check sum.
     fn close(bytes: &mut [u8], ended: Ended, words: [u32; 4]) {
         if let Some(place) = bytes.get_mut(6) {
             *place = ended as u8;
@@ -276,19 +276,19 @@ impl<const ROWS: usize, const COLUMNS: usize> Head<ROWS, COLUMNS> {
     }
 }
 
-/// The digest after one more step. What differs once makes all that follow differ.
+/// Returns the digest after one more step. A difference in one step changes all later digests.
 pub fn digest_step(digest: u32, duty: Duty, status: &Status) -> u32 {
     let mut sum = digest;
     status.words(duty, |word| sum = mix(sum, word));
     sum
 }
 
-/// A digest of words, to begin with or to go on from.
+/// Returns the digest of more words.
 pub fn digest_words(digest: u32, words: impl Iterator<Item = u32>) -> u32 {
     words.fold(digest, mix)
 }
 
-/// What of a digest is kept with each frame: the upper bits, which all others reach.
+/// Returns the part of a digest that is kept with each frame: the upper bits, which depend on all others.
 pub const fn short_digest(digest: u32) -> u16 {
     (digest >> 16) as u16
 }

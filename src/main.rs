@@ -97,7 +97,7 @@ async fn main(spawner: Spawner) {
     CONTROL.start(interrupt::SPI3).spawn(unwrap!(control::run(control).ok()));
 }
 
-/// What the flash holds, and whether all of it could be taken. Then makes room for the next records.
+/// Loads the record from the flash, and returns if all of it could be taken. Then makes room for the next records.
 fn load(store: &mut Store) -> (Record, bool) {
     let mut unknown = 0;
     let Loaded { record, sound } = store.load(|remark| {
@@ -115,7 +115,7 @@ fn load(store: &mut Store) -> (Record, bool) {
     (record, sound)
 }
 
-/// Why this board must not drive a motor.
+/// Returns the reason why this board must not drive a motor, if any.
 fn unfit(clocked: bool) -> Option<Fault> {
     if !clocked {
         return Some(Fault::NoClock);

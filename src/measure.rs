@@ -6,9 +6,10 @@
 //! | strokes | the jog to both sides, then strokes at several speeds in the air | a [`Row::Sample`] every 8 frames |
 //! | press | into a flat plate and back at two speeds, and a hold | a [`Row::Step`] for every step of the travel |
 //!
-//! Nothing is fitted and nothing is judged here but whether to go on: each motion has limits of travel, force, speed and
-//! time, beside those of guard and monitor. [`crate::capture`] keeps the rows in the memory of a capture, and a host
-//! reads them the same way; [`series`] has the layout. `docs/solve.md` describes what a host computes from them.
+//! The chip fits nothing, and judges only if a motion may continue: each motion has limits of travel, force, speed
+//! and time, besides those of guard and monitor. [`crate::capture`] keeps the rows in the memory of a capture, and a
+//! host reads them in the same way; [`series`] has the layout. `docs/solve.md` describes what a host computes from
+//! them.
 
 pub mod press;
 pub mod series;
@@ -20,11 +21,11 @@ pub use strokes::Strokes;
 use crate::units::Newtons;
 use press::Step;
 
-/// What is asked for. The numbers are stable.
+/// Task of a measurement. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Task {
-    /// To stop what is under way.
+    /// Stop of the motion under way.
     #[default]
     Stop = 0,
     /// The jog, which proves the direction; torque must be off.
@@ -36,7 +37,7 @@ pub enum Task {
 }
 
 impl Task {
-    /// The task in the number of a request: its two lowest bits.
+    /// Returns the task in the number of a request: its two lowest bits.
     pub const fn of(request: u8) -> Self {
         match request & 3 {
             1 => Self::Jog,
@@ -46,22 +47,23 @@ impl Task {
         }
     }
 
-    /// The number that asks for this task after another request.
+    /// Returns the number that requests this task after another request.
     pub const fn after(self, request: u8) -> u8 {
         (request & !3).wrapping_add(4) | self as u8
     }
 }
 
-/// How a motion ended. The numbers are stable. What [`Standing::value`] means is in brackets.
+/// End of a motion. The numbers are stable. The meaning of [`MeasureStatus::value`] is in brackets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Ended {
-    /// It was completed, or has not ended.
+    /// The motion was completed, or has not ended.
     #[default]
     Complete = 0,
-    /// Stop, torque, a fault, a tare or new parameters ended it.
+    /// A stop, torque, a fault, a tare or new parameters ended the motion.
     Interrupted = 1,
-    /// A tare is missing, something touches the tip, torque is not as the task needs it, or a count is above 0.1 mm.
+    /// A tare is missing, something touches the tip, torque is not as the task needs it, or an encoder count is above
+    /// 0.1 mm.
     NotReady = 2,
     /// The direction is not confirmed.
     Unconfirmed = 3,
@@ -69,11 +71,11 @@ pub enum Ended {
     Still = 4,
     /// The encoder counts against the voltage (counts).
     Reversed = 5,
-    /// The tip left the way of the strokes (um).
+    /// The tip left the range of the strokes (um).
     Astray = 6,
     /// The array measured a touch, or in a press more than the largest goal (mN).
     Touched = 7,
-    /// The motor felt a force that the array did not (mN).
+    /// The motor measured a force that the array did not (mN).
     Pushed = 8,
     /// The tip did not come to rest (counts in the last half of the time).
     Restless = 10,
@@ -86,7 +88,7 @@ pub enum Ended {
 }
 
 impl Ended {
-    /// The end of this number.
+    /// Returns the end with this number.
     pub fn of(number: u8) -> Option<Self> {
         let all = [
             Self::Complete,
@@ -107,57 +109,57 @@ impl Ended {
     }
 }
 
-/// State of the motion that was last requested.
+/// Progress of the motion that was last requested.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Standing {
-    /// What it is doing.
+pub struct MeasureStatus {
+    /// State of the motion.
     pub state: State,
-    /// The task.
+    /// Task of the motion.
     pub task: Task,
-    /// How it ended.
+    /// End of the motion.
     pub ended: Ended,
-    /// The number behind that.
+    /// Number that explains the end.
     pub value: i32,
-    /// How much of it is done, percent.
+    /// Completed part of the motion, percent.
     pub progress: u8,
 }
 
-/// What a motion is doing. The numbers are stable.
+/// State of a motion. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum State {
-    /// None was asked for since reset.
+    /// No motion was requested since reset.
     #[default]
     None = 0,
-    /// It is under way.
+    /// The motion is under way.
     Running = 1,
-    /// It is complete.
+    /// The motion is complete.
     Done = 2,
-    /// It ended early.
+    /// The motion ended early.
     Ended = 3,
 }
 
-impl Standing {
-    /// A task under way.
+impl MeasureStatus {
+    /// Progress of a task that begins.
     pub const fn running(task: Task) -> Self {
         Self { state: State::Running, task, ended: Ended::Complete, value: 0, progress: 0 }
     }
 
-    /// Ends it, where it is under way.
+    /// Ends the motion if it is under way.
     pub fn end(&mut self, ended: Ended, value: i32) {
         if self.state == State::Running {
             *self = Self::over(self.task, ended, value);
         }
     }
 
-    /// A task that has ended, or could not begin.
+    /// Progress of a task that has ended, or could not begin.
     pub const fn over(task: Task, ended: Ended, value: i32) -> Self {
         let (state, progress) = if matches!(ended, Ended::Complete) { (State::Done, 100) } else { (State::Ended, 0) };
         Self { state, task, ended, value, progress }
     }
 }
 
-/// What a frame adds to the record of a motion.
+/// Row that a frame adds to the record of a motion.
 #[derive(Clone, Copy, Debug)]
 pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
     /// A part of a complete step of a press, of [`press::PARTS`].
@@ -166,20 +168,20 @@ pub enum Row<'a, const ROWS: usize, const COLUMNS: usize> {
     Stroke,
     /// A sample of a stroke.
     Sample {
-        /// The encoder's count, from where the strokes began.
+        /// Encoder count relative to the start of the strokes.
         count: i16,
         /// Mean voltage since the sample before, quarters of a mV.
         voltage: i16,
     },
 }
 
-/// A force in mN, as [`Standing::value`] has it.
+/// Converts a force to mN, for [`MeasureStatus::value`].
 fn millinewtons(force: Newtons) -> i32 {
     ((i64::from(force.to_bits()) * 1_000) >> 16) as i32
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Row<'_, ROWS, COLUMNS> {
-    /// Whether a row of the record begins with it, and whether one ends.
+    /// Returns if a row of the record begins with this part, and if one ends.
     pub const fn ends(&self) -> [bool; 2] {
         match self {
             Self::Step(_, part) => [*part == 0, *part + 1 >= press::PARTS],

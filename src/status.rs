@@ -1,7 +1,7 @@
 //! Report of a step beside the duty. Its digest fields make the digests of runs.
 
 use crate::contact::{Contact, FitLevel};
-use crate::measure::Standing;
+use crate::measure::MeasureStatus;
 use crate::state::{Fault, Limits, Mode};
 use crate::units::{Celsius, Duty, Millimetres, MillimetresPerSecond, Newtons};
 
@@ -66,7 +66,7 @@ pub struct Status {
     /// True in off and tare while the tip still moves: the motor is shorted.
     pub braking: bool,
     /// Progress of the motion that measures.
-    pub measure: Standing,
+    pub measure: MeasureStatus,
     /// State of the tare.
     pub tare: Taring,
     /// Acknowledged requests.
@@ -143,7 +143,7 @@ impl Status {
         } = *self;
         let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } =
             contact;
-        let Standing { state, task, ended, value, progress } = measure;
+        let MeasureStatus { state, task, ended, value, progress } = measure;
         let always = [
             sequence,
             missed_frames,

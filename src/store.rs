@@ -33,7 +33,7 @@ pub const BAUD_RATES: [u32; 6] = [9_600, 57_600, 115_200, 1_000_000, 2_000_000, 
 
 const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// What outlives a reset.
+/// Record of the values that outlive a reset.
 ///
 /// ```
 /// use fingertip::shipped::Record;
@@ -70,7 +70,7 @@ pub struct Record<const ROWS: usize, const COLUMNS: usize> {
     pub baud_code: u8,
     /// Pause before a reply, in units of 2 us.
     pub return_delay_2us: u8,
-    /// How much work the loop may put into a contact.
+    /// Largest amount of work per frame for the contact.
     pub fit_level: FitLevel,
     /// The parameters.
     pub params: Params,
@@ -79,7 +79,7 @@ pub struct Record<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
-    /// What a blank flash stands for: ID 1, 1 Mbaud, 500 us.
+    /// Default values: ID 1, 1 Mbaud, 500 us.
     pub const DEFAULT: Self = Self {
         id: 1,
         baud_code: 3,
@@ -96,12 +96,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Default for Record<ROWS, COLUMNS> 
     }
 }
 
-/// Values that stand before the parameters.
+/// Number of values before the parameters.
 const HEAD_COUNT: usize = 4;
-/// How many values this firmware has without the gains.
+/// Number of values of this firmware without the gains.
 const COUNT: usize = HEAD_COUNT + Params::COUNT;
 
-/// Name, least and largest value of those before the parameters. The names are stored: they stay.
+/// Name, least and largest value of the values before the parameters. The names are stored, so they must not change.
 const HEAD: [(&str, i32, i32); HEAD_COUNT] = [
     ("id", 0, ID_MAX as i32),
     ("baud_code", 0, BAUD_RATES.len() as i32 - 1),
@@ -109,7 +109,7 @@ const HEAD: [(&str, i32, i32); HEAD_COUNT] = [
     ("fit_level", 0, FitLevel::AllRows as i32),
 ];
 
-/// The number under which a value is stored: the CRC-32 (ISO-HDLC) of its name.
+/// Returns the number under which a value is stored: the CRC-32 (ISO-HDLC) of its name.
 pub const fn number(name: &str) -> u32 {
     CRC.checksum(name.as_bytes())
 }
@@ -128,8 +128,8 @@ const fn numbers() -> [u32; COUNT] {
     numbers
 }
 
-/// The number under which an array's first two gains are stored; the next two are stored under the next one. Of another
-/// array's it is another.
+/// Returns the number under which an array's first two gains are stored; the next two are stored under the next
+/// number. Arrays of other shapes have other numbers.
 pub const fn gains_number(rows: usize, columns: usize) -> u32 {
     let shape =
         [b'0' + rows as u8 / 10, b'0' + rows as u8 % 10, b'x', b'0' + columns as u8 / 10, b'0' + columns as u8 % 10];
@@ -139,7 +139,7 @@ pub const fn gains_number(rows: usize, columns: usize) -> u32 {
     digest.finalize()
 }
 
-/// Whether no other value is stored under the numbers of an array's gains.
+/// Returns true if no other value is stored under the numbers of an array's gains.
 const fn gains_stand_apart(rows: usize, columns: usize) -> bool {
     let numbers = numbers();
     let mut place = 0;
@@ -198,15 +198,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
     }
 }
 
-/// What is to be told of a start.
+/// Remark about the stored values at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Remark {
-    /// There is no whole record, but the flash is not blank: the defaults count. It is a fault.
+    /// There is no whole record, but the flash is not blank: the defaults are used. It is a fault.
     NoneWhole,
-    /// What was written after the newest whole record is damaged, most likely cut short: the values before it count. It
-    /// is a fault.
+    /// Bytes after the newest whole record are damaged, most likely cut short: the values before them are used. It is
+    /// a fault.
     Torn,
-    /// A value is out of its range: its default counts. It is a fault.
+    /// A value is out of its range: its default is used. It is a fault.
     Refused(ParamError),
     /// Another firmware had a value whose name this one does not know.
     Unknown {
@@ -215,13 +215,13 @@ pub enum Remark {
         /// The value.
         value: i32,
     },
-    /// The record has no such value: its default counts.
+    /// The record has no such value: its default is used.
     New(&'static str),
 }
 
-/// The values that this firmware knows, and whether all of those were taken.
+/// Returns the values that this firmware knows, and true if all of those were accepted.
 ///
-/// Gains are taken all or not at all.
+/// Gains are accepted all or not at all.
 #[inline(never)]
 fn take<const ROWS: usize, const COLUMNS: usize>(
     found: &Found<'_>,
@@ -263,15 +263,16 @@ fn take<const ROWS: usize, const COLUMNS: usize>(
     (record, sound)
 }
 
-/// Makes something of the parameters; those that contradict each other go back to their defaults, and `tell` hears why.
+/// Calls `make` with the parameters. Parameters that contradict each other are set back to their defaults, and `tell`
+/// is called with the reason.
 ///
-/// None where even the defaults make nothing.
+/// Returns none if `make` fails even with the defaults.
 pub fn settle<T>(
     params: &mut Params,
     mut make: impl FnMut(&Params) -> Result<T, ConfigError>,
     mut tell: impl FnMut(ConfigError),
 ) -> Option<T> {
-    // Each round but the last puts one back at the least.
+    // Each round but the last sets back at least one.
     for _ in 0..=Params::COUNT {
         match make(params) {
             Ok(made) => return Some(made),
@@ -284,7 +285,7 @@ pub fn settle<T>(
     None
 }
 
-/// Puts what the error names back to its default, and everything where that is no change.
+/// Sets the parameters that the error names back to their defaults, and all parameters if that is no change.
 #[inline(never)]
 fn give_up(params: &mut Params, error: ConfigError) {
     let names = match error {
@@ -307,23 +308,23 @@ fn give_up(params: &mut Params, error: ConfigError) {
 
 const MAGIC: [u8; 4] = *b"FTPR";
 const HEADER_BYTES: usize = 12;
-/// More values than this no firmware writes.
+/// Largest number of values that any firmware writes.
 const VALUES_MAX: usize = 512;
-/// What flash reads after an erase.
+/// Value of a byte of flash after an erase.
 const BLANK: u8 = 0xFF;
-/// Where records may begin: every so many bytes.
+/// Distance of the places where a record may begin, bytes.
 const GRID: usize = 16;
 
-/// From a record of this firmware whose gains are all 1 to the next one.
+/// Distance from a record of this firmware whose gains are all 1 to the next one, bytes.
 pub const SLOT_BYTES: usize = slot_bytes(COUNT);
 
-/// From a record of so many values to the next one.
+/// Distance from a record with `count` values to the next one, bytes.
 const fn slot_bytes(count: usize) -> usize {
     (HEADER_BYTES + 8 * count + 4).next_multiple_of(GRID)
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
-    /// From the longest record of this array to the next one.
+    /// Distance from the longest record of this array to the next one, bytes.
     pub const SLOT_MAX: usize = {
         assert!(gains_stand_apart(ROWS, COLUMNS), "the gains' numbers are those of other values: rename one");
         slot_bytes(COUNT + Gains::<ROWS, COLUMNS>::WORDS)
@@ -333,13 +334,13 @@ impl<const ROWS: usize, const COLUMNS: usize> Record<ROWS, COLUMNS> {
         if self.gains == Gains::ONE { 0 } else { Gains::<ROWS, COLUMNS>::WORDS }
     }
 
-    /// From this record to the next one.
+    /// Distance from this record to the next one, bytes.
     pub fn slot_bytes(&self) -> usize {
         slot_bytes(COUNT + self.stored_gains())
     }
 }
 
-/// A record as it is written to flash, word by word, up to where the next one may begin.
+/// Returns the words of a record as written to flash, up to where the next one may begin.
 pub fn words<const ROWS: usize, const COLUMNS: usize>(
     record: &Record<ROWS, COLUMNS>,
     sequence: u32,
@@ -360,7 +361,7 @@ pub fn words<const ROWS: usize, const COLUMNS: usize>(
 struct Found<'a> {
     /// Number of the record: each is one more than the one before.
     pub sequence: u32,
-    /// From its start to where the next may begin.
+    /// Distance from its start to where the next may begin, bytes.
     pub bytes: usize,
     values: &'a [[u8; 8]],
 }
@@ -374,7 +375,7 @@ impl Found<'_> {
     }
 }
 
-/// The record that begins here, if one does and is whole.
+/// Returns the record that begins here, if there is one and it is whole.
 fn read_record(bytes: &[u8]) -> Option<Found<'_>> {
     let (header, rest) = bytes.split_first_chunk::<HEADER_BYTES>()?;
     let [magic, sequence, count] = *header.as_chunks().0 else { return None };
@@ -389,7 +390,7 @@ fn read_record(bytes: &[u8]) -> Option<Found<'_>> {
     whole.then_some(Found { sequence: u32::from_le_bytes(sequence), bytes: slot_bytes(count), values })
 }
 
-/// Where the last thing in the sector ends: all behind it is blank.
+/// Returns the end of the used part of a sector: all behind it is blank.
 fn end_of_records(sector: &[u8]) -> usize {
     let used = sector.chunks_exact(GRID).rposition(|chunk| {
         let (words, _) = chunk.as_chunks::<4>();

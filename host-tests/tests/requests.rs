@@ -3,7 +3,7 @@
 
 use fingertip::config::newtons;
 use fingertip::contact::Contact;
-use fingertip::measure::{Ended, Standing, State, Task};
+use fingertip::measure::{Ended, MeasureStatus, State, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::{Bridge, Taring};
 use fingertip::pressure::TARE_BITS;
@@ -14,8 +14,8 @@ use images::record::Record;
 use sim::native::bench::Bench;
 use sim::plant::{Setup, Taxel};
 
-const NOT_READY: Standing = Standing::over(Task::Press, Ended::NotReady, 0);
-const RUNNING: Standing = Standing::running(Task::Press);
+const NOT_READY: MeasureStatus = MeasureStatus::over(Task::Press, Ended::NotReady, 0);
+const RUNNING: MeasureStatus = MeasureStatus::running(Task::Press);
 
 /// With the object so far away.
 fn at(distance_mm: f64) -> Bench {
@@ -191,7 +191,7 @@ fn a_press_in_the_frame_of_a_fault_leaves_no_old_outcome() {
         let mut board = ready();
         board.request(Task::Press);
         let status = board.step_with(spoil);
-        let interrupted = Standing::over(Task::Press, Ended::Interrupted, 0);
+        let interrupted = MeasureStatus::over(Task::Press, Ended::Interrupted, 0);
         assert_eq!((status.mode, status.fault, status.measure), (Mode::Fault, Some(fault), interrupted));
     }
 }
@@ -207,7 +207,7 @@ fn a_press_that_comes_with_torque_or_during_a_tare_waits_for_the_drive() {
     while board.step().mode != Mode::Press {
         frames += 1;
         assert!(frames < TARE_FRAMES + 5);
-        assert_eq!(board.status().measure, Standing::default());
+        assert_eq!(board.status().measure, MeasureStatus::default());
     }
     assert_eq!(board.step().measure, RUNNING);
 
@@ -226,7 +226,7 @@ fn a_press_that_waits_is_refused_once_torque_is_off() {
     board.command().torque = true;
     board.request(Task::Press);
     board.step();
-    assert_eq!(board.step().measure, Standing::default());
+    assert_eq!(board.step().measure, MeasureStatus::default());
     board.command().torque = false;
     let status = board.step();
     assert_eq!((status.mode, status.measure), (Mode::Tare, NOT_READY));

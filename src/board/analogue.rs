@@ -24,12 +24,12 @@ const SENSOR: u8 = 18;
 /// The factory's codes of the reference, and of the sensor at 30 and 110 degrees Celsius (DS10693).
 const FACTORY: [*const u16; 3] = [0x1FFF_7A2A as _, 0x1FFF_7A2C as _, 0x1FFF_7A2E as _];
 
-/// The converter, and what its codes tell of the microcontroller.
+/// The converter, and the microcontroller's state by its codes.
 pub struct Analogue {
     chip: Chip,
     /// The supply's last conversion.
     supply_mv: u16,
-    /// Whether the last frame found the converter still at work.
+    /// True if the converter was still busy in the last frame.
     waited: bool,
 }
 
@@ -91,7 +91,7 @@ impl Analogue {
     }
 }
 
-/// What is done counts no more.
+/// Clears the flags and starts the next conversions.
 fn start() {
     pac::ADC1.sr().write_value(pac::adc::regs::Sr(0));
     pac::ADC1.cr2().modify(|w| w.set_swstart(true));

@@ -32,7 +32,7 @@ pub fn make_safe() {
     pac::GPIOC.bsrr().write(|w| w.set_br(NSLEEP, true));
 }
 
-/// Whether the hardware says that the bridge is cut.
+/// Returns true if the hardware shows that the bridge is cut.
 pub fn is_safe() -> bool {
     !pac::TIM1.bdtr().read().moe() && pac::GPIOC.odr().read().odr(NSLEEP) == pac::gpio::vals::Odr::LOW
 }
@@ -89,7 +89,7 @@ impl Bridge {
         pac::TIM1.egr().write(|w| w.set_ug(true));
     }
 
-    /// Does what the pipeline says; a driver that sleeps is not woken to brake.
+    /// Sets the state that the pipeline requests. A sleeping driver is not woken to brake.
     pub fn apply(&mut self, wanted: Wanted) {
         match wanted {
             Wanted::Asleep => self.sleep(),
@@ -106,7 +106,7 @@ impl Bridge {
                 }
             }
         }
-        // The guard may have cut the bridge between these lines; what it cut stays cut.
+        // The guard may have cut the bridge meanwhile; then the bridge must remain cut.
         if guard::tripped() {
             self.sleep();
         }
@@ -118,7 +118,7 @@ impl Bridge {
         *self = Self { woken: None, ready: false, driving: false, period_ticks: self.period_ticks };
     }
 
-    /// Whether an awake driver reports a fault, or the hardware cut an output that should be on.
+    /// Returns true if an awake driver reports a fault, or the hardware cut an output that should be on.
     pub fn fault(&self) -> bool {
         let reported = pac::GPIOB.idr().read().idr(NFAULT) == pac::gpio::vals::Idr::LOW;
         (self.ready && reported) || (self.driving && !pac::TIM1.bdtr().read().moe())
@@ -166,7 +166,7 @@ impl Bridge {
     }
 }
 
-/// Whether a compare value waits for the next period. Not so only while the outputs are off, or where both become
+/// Sets if a compare value waits for the next period. It does not only while the outputs are off, or if both become
 /// constant: RM0390 (OC1PE) guarantees no PWM without preload.
 #[inline(never)]
 fn set_preload(on: bool) {

@@ -86,9 +86,9 @@ pub struct Parts {
     pub rx: Peri<'static, PA3>,
     /// High while sending.
     pub transmit_enable: Peri<'static, PC8>,
-    /// Carries what is sent.
+    /// Stream of the sent bytes.
     pub tx_dma: Peri<'static, DMA1_CH6>,
-    /// Carries what is received.
+    /// Stream of the received bytes.
     pub rx_dma: Peri<'static, DMA1_CH5>,
 }
 

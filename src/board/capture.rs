@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use fingertip::capture::{Ended, Standing, State};
+use fingertip::capture::{CaptureStatus, Ended, State};
 use fingertip::command::Command;
 use fingertip::frame::Sense;
 use fingertip::measure::{State as Motion, Task};
@@ -11,7 +11,7 @@ use fingertip::shipped::{Frame, Pipeline};
 
 use super::exchange::CAPTURE;
 
-/// What the host asked for last, and nobody took up.
+/// Last request of the host that was not acknowledged.
 static ASKED: AtomicU8 = AtomicU8::new(NOTHING);
 const NOTHING: u8 = 0;
 const ARM: u8 = 1;
@@ -22,21 +22,21 @@ pub fn ask(arm: bool) {
     ASKED.store(if arm { ARM } else { END }, Ordering::Relaxed);
 }
 
-/// What control knows of the capture without reaching for it.
+/// State of the capture that control knows without access to it.
 #[derive(Clone, Copy, Default)]
 pub struct Keeper {
-    standing: Standing,
+    standing: CaptureStatus,
     /// A motion that measures was under way in the step before.
     measures: bool,
 }
 
 impl Keeper {
-    /// How it stands.
-    pub fn standing(self) -> Standing {
+    /// Status of the capture.
+    pub fn standing(self) -> CaptureStatus {
         self.standing
     }
 
-    /// Takes up what the host asked for.
+    /// Acknowledges the request of the host.
     pub fn take_asked(&mut self) {
         match ASKED.load(Ordering::Relaxed) {
             NOTHING => return,
@@ -53,7 +53,7 @@ impl Keeper {
         ASKED.store(NOTHING, Ordering::Relaxed);
     }
 
-    /// Whether the next step is to be the first one kept.
+    /// Returns true if the next step is the first one to keep.
     pub fn is_due(&mut self, status: &Status, command: impl FnOnce() -> Command) -> bool {
         if self.standing.state != State::Armed {
             return false;
@@ -99,7 +99,7 @@ impl Keeper {
         }
     }
 
-    /// What is done goes to the link, which alone reaches it from then on.
+    /// A finished capture goes to the link, which alone accesses it from then on.
     #[inline(never)]
     fn work(&mut self, act: impl FnOnce(&mut fingertip::shipped::Capture)) {
         let standing = CAPTURE.work(|capture| {

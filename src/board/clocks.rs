@@ -12,7 +12,7 @@ use embassy_stm32::rcc::{
 use embassy_stm32::time::Hertz;
 use embassy_stm32::{Config, Peripherals};
 
-/// How often to look for the external clock: for some 0.4 s, at 16 MHz and about 6 cycles a look.
+/// Number of checks for the external clock: for about 0.4 s, at 16 MHz and about 6 cycles a check.
 const LOOKS: u32 = 1_000_000;
 
 /// Starts the external clock and its guard, and says whether it is there. Comes before [`init`], which would wait for
@@ -60,7 +60,8 @@ pub fn init(external: bool) -> Peripherals {
     })
 }
 
-/// Halting the core in a debugger stops the watchdogs and the bridge's timer; the latter lets go of the outputs.
+/// Stops the watchdogs and the bridge's timer while a debugger halts the core. The stopped timer releases the
+/// outputs.
 pub fn freeze_when_halted() {
     pac::DBGMCU.apb1fzr().modify(|w| {
         w.set_iwdg(true);

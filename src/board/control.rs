@@ -17,7 +17,7 @@ use super::analogue::Analogue;
 use super::bridge::{self, Bridge};
 use super::capture::Keeper;
 use super::encoder::Encoder;
-use super::exchange::{GAINS, HEARD, Heard, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED, STANDING, Standing};
+use super::exchange::{GAINS, HEARD, Heard, LOOP_STATE, LoopState, NotSaved, PARAMS, PICTURE, Report, SAVE, SAVED};
 use super::flash::Store;
 use super::guard::{self, Stopwatch};
 use super::scan::{Completed, Scan, WAKE};
@@ -43,7 +43,7 @@ pub struct Control {
     pub store: Store,
     /// The core.
     pub pipeline: &'static mut Pipeline,
-    /// Why this board must not drive a motor: a fault that cannot be cleared.
+    /// Reason why this board must not drive a motor: a fault that cannot be cleared.
     pub unfit: Option<Fault>,
 }
 
@@ -111,7 +111,7 @@ impl State {
         self.save();
     }
 
-    /// Starts the scan anew when its fault is to be cleared, with torque off. The next frame clears it.
+    /// Restarts the scan when its fault is to be cleared, with torque off. The next frame clears the fault.
     fn find_frames(&mut self) {
         let Command { torque, clear_request, .. } = HEARD.get().command;
         if self.lost && clear_request != self.clear_seen && !torque {
@@ -196,7 +196,7 @@ impl State {
         self.keeper.follow(self.parts.pipeline);
     }
 
-    /// The guard cut the bridge: latches the fault. The scan starts anew when that is cleared.
+    /// Latches the fault after the guard cut the bridge. The scan restarts when the fault is cleared.
     ///
     /// The watchdog guards against firmware that hangs. Here it does not: it has seen the fault, and it feeds the
     /// watchdog only after reading back that the bridge is cut, so that the fault can be read on the bus.
@@ -235,8 +235,8 @@ impl State {
         self.report.capture = self.keeper.standing();
         let (pipeline, frame, report) = (&self.parts.pipeline, &self.frame, &self.report);
         let status = pipeline.status();
-        STANDING.set(Standing { mode: status.mode, fault: status.fault, missed_frames: status.missed_frames });
-        // Where the link is just answering, it has the next one.
+        LOOP_STATE.set(LoopState { mode: status.mode, fault: status.fault, missed_frames: status.missed_frames });
+        // While the link answers from the snapshot, this one is skipped.
         PICTURE.visit(|picture| {
             picture.report = Some(Report { status: *status, ..*report });
             picture.frame = *frame;
@@ -277,7 +277,7 @@ impl FrameClock {
     }
 }
 
-/// How long the bus has been silent, measured where a hanging link cannot stop the clock.
+/// Time for which the bus has been silent, measured where a hanging link cannot stop the clock.
 pub struct BusClock {
     packets: u32,
     last: u32,
@@ -315,7 +315,7 @@ impl State {
         guard::rest();
     }
 
-    /// Begins a capture where it is due. The pipeline is made anew, which may take most of a frame: the scan starts anew.
+    /// Begins a capture when it is due. The reset of the pipeline may take most of a frame, so the scan restarts.
     fn capture(&mut self) {
         self.keeper.take_asked();
         if self.keeper.is_due(self.parts.pipeline.status(), || HEARD.get().command) {
@@ -327,7 +327,7 @@ impl State {
     }
 
     /// Makes a new configuration of new parameters. That takes longer than a frame: the bridge is off meanwhile, and
-    /// the scan starts anew.
+    /// the scan restarts.
     fn configure(&mut self) {
         let Some(params) = PARAMS.take(|params| *params) else { return };
         self.keeper.end(Ended::Configured);
@@ -340,7 +340,7 @@ impl State {
         self.restart_scan();
     }
 
-    /// Takes new gains, which need a new tare. That may take most of a frame: the scan starts anew.
+    /// Takes new gains, which need a new tare. That may take most of a frame, so the scan restarts.
     fn calibrate(&mut self) {
         if let Some(gains) = GAINS.take(|gains| *gains) {
             self.keeper.end(Ended::Configured);
@@ -351,8 +351,8 @@ impl State {
         }
     }
 
-    /// Saves a record, where the motor is off. The core stands while a word is written, for up to a frame's time: so
-    /// the scan is stopped and starts anew, and the bridge stays as it is.
+    /// Saves a record while the motor is off. The core halts while a word is written, for up to a frame's time: so
+    /// the scan is stopped and restarts, and the bridge stays as it is.
     #[inline(never)]
     fn save(&mut self) {
         let Some(record) = SAVE.take(|record| *record) else { return };

@@ -1,6 +1,6 @@
-//! What happens when the firmware fails: the bridge is cut, a record is left for after the reset, the reset follows.
+//! Failure of the firmware: the bridge is cut, a record is left for after the reset, the reset follows.
 //!
-//! The record lies in memory that start-up does not clear; a magic word and a check word tell it from noise.
+//! The record lies in memory that start-up does not clear; a magic word and a check word distinguish it from noise.
 
 use core::arch::naked_asm;
 use core::mem::MaybeUninit;
@@ -34,18 +34,18 @@ static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 unsafe extern "C" {
     /// The stack's lower end; from memory.x.
     static _stack_end: u32;
-    /// Where the stack starts, its upper end.
+    /// Upper end of the stack, where it starts.
     static _stack_start: u32;
 }
 
-/// Why this run began.
+/// Reason of this start.
 #[derive(Clone, Copy)]
 pub struct Boot {
-    /// What reset the microcontroller.
+    /// Cause of the reset.
     pub reset: ResetCause,
     /// The last crash since power-on.
     pub crash: Crash,
-    /// Whether that crash ended the last run.
+    /// True if that crash ended the last run.
     pub crashed: bool,
 }
 
@@ -172,7 +172,7 @@ unsafe extern "C" fn HardFault() -> ! {
 
 extern "C" fn hard_fault(frame: *const u32) -> ! {
     bridge::make_safe();
-    /// Where the exception's frame holds the program counter, words.
+    /// Index of the program counter in the exception's frame, words.
     const PC_PLACE: usize = 6;
     let stack = (&raw const _stack_end)..(&raw const _stack_start);
     let place = frame.wrapping_add(PC_PLACE);

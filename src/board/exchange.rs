@@ -1,4 +1,4 @@
-//! What control and the thread tasks hand each other. Only whole snapshots cross, so neither side can hold up the
+//! Data exchanged between control and the thread tasks. Only whole snapshots cross, so neither side can delay the
 //! other.
 
 use core::cell::{Cell, UnsafeCell};
@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
-use fingertip::capture::Standing as CaptureStanding;
+use fingertip::capture::CaptureStatus;
 use fingertip::command::Command;
 use fingertip::params::Params;
 use fingertip::pipeline::Status;
@@ -17,37 +17,37 @@ use fingertip::state::{Fault, Mode};
 use super::flash::SaveError;
 use super::guard::Stopwatch;
 
-/// What control reports after every step, and after every trip of the guard.
+/// Report of control after every step, and after every trip of the guard.
 #[derive(Clone, Copy, Default)]
 pub struct Report {
-    /// The pipeline's own report.
+    /// Report of the pipeline.
     pub status: Status,
-    /// When the frame ended, in microseconds since control started; wraps.
+    /// Time of the frame's end, us since control started; wraps.
     pub frame_time_us: u32,
-    /// From frame to frame; 0 before the first.
+    /// Time from frame to frame, ns; 0 before the first.
     pub frame_ns: u32,
-    /// The bridge's supply.
+    /// Supply of the bridge, mV.
     pub supply_mv: u16,
-    /// From the frame's end to the new duty.
+    /// Time from the frame's end to the new duty.
     pub loop_time: Stopwatch,
-    /// The longest of those.
+    /// Longest of these times.
     pub loop_time_max: Stopwatch,
     /// The capture.
-    pub capture: CaptureStanding,
+    pub capture: CaptureStatus,
 }
 
-/// What the LED and the log show.
+/// State of the loop for the LED and the log.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
-pub struct Standing {
-    /// The loop's mode.
+pub struct LoopState {
+    /// Mode of the loop.
     pub mode: Mode,
-    /// Why it stopped.
+    /// Reason why the motor was stopped.
     pub fault: Option<Fault>,
-    /// Frames that were not taken.
+    /// Number of missed frames.
     pub missed_frames: u32,
 }
 
-/// Why a record was not saved.
+/// Reason why a record was not saved.
 #[derive(Clone, Copy)]
 pub enum NotSaved {
     /// The motor is driven or a tare is under way.
@@ -56,10 +56,11 @@ pub enum NotSaved {
     Failed(SaveError),
 }
 
-/// What the link heard from the host: as a whole, so that a bus watchdog never comes without the packet that set it.
+/// Requests that the link received from the host: as a whole, so that a bus watchdog never arrives without the packet
+/// that set it.
 #[derive(Clone, Copy, Default)]
 pub struct Heard {
-    /// What the host asks of the loop.
+    /// Requests of the host to the loop.
     pub command: Command,
     /// Valid packets; only its changes count.
     pub packets: u32,
@@ -75,13 +76,14 @@ pub struct Picture {
     pub taxels: [[i32; COLUMNS]; ROWS],
     /// Pressure in Pa for such a sixteenth, Q32.
     pub pascals_per_sum_q32: i64,
-    /// What they read without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional bits.
+    /// Readings of the taxels without contact, corrected codes with [`fingertip::pressure::TARE_BITS`] fractional
+    /// bits.
     pub tare: [[i32; COLUMNS]; ROWS],
 }
 
-/// What the loop is doing.
-pub static STANDING: Shared<Standing> = Shared::new();
-/// What the host wants.
+/// State of the loop.
+pub static LOOP_STATE: Shared<LoopState> = Shared::new();
+/// Requests of the host.
 pub static HEARD: Shared<Heard> = Shared::new();
 /// New parameters for control.
 pub static PARAMS: Mailbox<Params> = Mailbox::new(Params::DEFAULT);
@@ -122,7 +124,7 @@ impl<T: Copy + Default> Shared<T> {
     }
 }
 
-/// Room for one large value that is filled and emptied in turns; whoever comes out of turn is told so and never waits.
+/// Mailbox for one large value that is filled and emptied in turns. A call out of turn fails and never waits.
 ///
 /// Interrupts stay on while the value is copied.
 pub struct Mailbox<T> {

@@ -10,7 +10,7 @@ use fingertip::store::{self, Journal, Remark, Sector};
 const FLASH_START: u32 = 0x0800_0000;
 const SECTOR_BYTES: u32 = 128 * 1024;
 
-/// From the start of the flash.
+/// Offset from the start of the flash.
 const fn offset(sector: Sector) -> u32 {
     match sector {
         // Sector 7, and sector 6 below it.
@@ -25,11 +25,11 @@ pub struct Store {
     journal: Journal,
 }
 
-/// Why a record was not saved, or no room made.
+/// Reason why a record was not saved, or no room made.
 pub type SaveError = store::SaveError<Error>;
 
 impl Store {
-    /// Takes the flash, and looks at what it holds.
+    /// Takes the flash, and reads the positions of its records.
     pub fn new(flash: Peri<'static, FLASH>) -> Self {
         let chip = Chip::new(flash);
         let journal = Journal::new(&chip);
@@ -100,7 +100,7 @@ fn set_width() {
     pac::FLASH.cr().modify(|w| w.set_psize(Psize::PSIZE32));
 }
 
-/// The data cache may still hold what the flash was before.
+/// Clears the data cache, which may still hold the old content of the flash.
 fn drop_cached_data() {
     let acr = pac::FLASH.acr();
     acr.modify(|w| w.set_dcen(false));
@@ -113,12 +113,12 @@ fn drop_cached_data() {
 /// states (docs/board.md, Option bytes).
 const LEVEL_3: u8 = 0b00;
 
-/// All of them.
+/// Returns all option bytes.
 pub fn option_bytes() -> u32 {
     pac::FLASH.optcr().read().0
 }
 
-/// Whether a supply that is too low for the core's speed resets it. From the factory it does not.
+/// Returns true if a supply that is too low for the core's speed resets it. The factory setting does not.
 pub fn brown_out_resets() -> bool {
     pac::FLASH.optcr().read().bor_lev() == LEVEL_3
 }

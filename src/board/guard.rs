@@ -69,7 +69,7 @@ pub fn now() -> u32 {
     pac::TIM5.cnt().read()
 }
 
-/// Lets so many frames and the time to answer them pass from the instant `from` before the guard trips.
+/// Starts the guard: it trips after `frames` frames and the time to answer them, from the instant `from`.
 pub fn restart(from: u32, frames: u32, timing: ScanTiming) {
     let period = frames * Stopwatch::to_next_answer(timing).0;
     PERIOD.store(period, Ordering::Relaxed);
@@ -90,12 +90,12 @@ pub fn rest() {
     pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, false));
 }
 
-/// Whether the guard has tripped since [`take_trip`].
+/// Returns true if the guard has tripped since [`take_trip`].
 pub fn tripped() -> bool {
     TRIPPED.load(Ordering::Acquire)
 }
 
-/// Whether the guard has tripped; forgets it.
+/// Returns true if the guard has tripped, and clears that.
 pub fn take_trip() -> bool {
     TRIPPED.swap(false, Ordering::AcqRel)
 }

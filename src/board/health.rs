@@ -1,4 +1,4 @@
-//! What tells of the board's health. Each count has one writer; the link reads them all for the bus.
+//! Health of the board. Each count has one writer; the link reads them all for the bus.
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
@@ -8,7 +8,7 @@ use fingertip::link::snapshot::Health;
 use super::flash;
 use super::guard::{self, Stopwatch};
 
-/// What was wrong with a frame that is not whole.
+/// Defect of a frame that is not whole.
 #[derive(Clone, Copy)]
 pub enum Broken {
     /// The first bank is missing.

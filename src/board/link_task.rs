@@ -1,6 +1,6 @@
-//! The link task: bytes from the bus to the server, its replies back, and what it asks of the firmware.
+//! The link task: bytes from the bus to the server, its replies back, and its requests to the firmware.
 //!
-//! What it heard crosses to control as one: the command, and the count of packets that a bus watchdog goes by.
+//! The command and the count of packets, which the bus watchdog uses, cross to control as one.
 
 use defmt::{error, info, warn};
 use embassy_time::{Duration, Instant, Timer};
@@ -71,7 +71,7 @@ impl LinkTask {
         }
     }
 
-    /// How many bytes the server took.
+    /// Number of bytes that the server took.
     fn feed(&mut self, bytes: &[u8], reply: &mut Reply) -> Option<usize> {
         PICTURE.visit(|picture| {
             let snapshot = snapshot(picture, self.boot);
@@ -135,7 +135,7 @@ async fn save(record: &Record) -> bool {
     saved.is_ok()
 }
 
-/// What the bus may read, of the newest picture.
+/// Snapshot for the bus, from the newest data.
 fn snapshot(picture: &Picture, boot: Boot) -> Snapshot<'_> {
     let Picture { report, frame, taxels, pascals_per_sum_q32, tare } = picture;
     let report = report.unwrap_or_default();

@@ -10,11 +10,11 @@ use fingertip::state::{Fault, Mode};
 use fingertip::store::Remark;
 
 use super::crash::Boot;
-use super::exchange::{HEARD, STANDING, Standing};
+use super::exchange::{HEARD, LOOP_STATE, LoopState};
 use super::flash::SaveError;
 use super::{health, stack};
 
-/// Why this run began.
+/// Logs the reason of this start.
 pub fn log_boot(boot: Boot) {
     info!("fingertip {=str}, reset cause {=u8}", env!("CARGO_PKG_VERSION"), boot.reset as u8);
     let crash = boot.crash;
@@ -23,7 +23,7 @@ pub fn log_boot(boot: Boot) {
     }
 }
 
-/// Why the board must not drive a motor.
+/// Logs why the board must not drive a motor.
 pub fn log_unfit(fault: Fault) {
     match fault {
         Fault::NoClock => error!("no 8 MHz clock at PH0: internal oscillator, no torque until the next start"),
@@ -32,7 +32,7 @@ pub fn log_unfit(fault: Fault) {
     }
 }
 
-/// What a start could not take of the stored parameters as it is.
+/// Logs a remark about the stored parameters.
 pub fn log_remark(remark: Remark) {
     match remark {
         Remark::NoneWhole => error!("stored parameters: no whole record, defaults"),
@@ -45,7 +45,7 @@ pub fn log_remark(remark: Remark) {
     }
 }
 
-/// Why parameters were not saved, or no room made for them.
+/// Logs why parameters were not saved, or no room made for them.
 pub fn log_save_error(error: SaveError) {
     match error {
         SaveError::Full => error!("parameter sectors full until the next start"),
@@ -54,7 +54,7 @@ pub fn log_save_error(error: SaveError) {
     }
 }
 
-/// Why parameters make no configuration.
+/// Logs why parameters make no configuration.
 pub fn log_refusal(error: ConfigError) {
     match error {
         ConfigError::Param(cause) => log_parameter(cause),
@@ -83,10 +83,10 @@ const BLINK_PERIODS: u32 = 5;
 /// On with torque, fast blink on fault, off otherwise.
 #[embassy_executor::task]
 pub async fn run(mut led: Output<'static>) {
-    let mut last = Standing::default();
+    let mut last = LoopState::default();
     let mut paint = stack::Paint::default();
     for period in 0u32.. {
-        let now = STANDING.get();
+        let now = LOOP_STATE.get();
         if (now.mode, now.fault) != (last.mode, last.fault) {
             match now.fault {
                 Some(fault) => warn!("fault {=u8}", fault as u8),

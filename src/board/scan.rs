@@ -57,7 +57,7 @@ pub fn newest() -> Completed {
     }
 }
 
-/// Whether half of the rows were driven since the last call.
+/// Returns true if half of the rows were driven since the last call.
 pub fn take_halfway() -> bool {
     HALFWAY.swap(false, Ordering::AcqRel)
 }
@@ -86,7 +86,7 @@ impl Scan {
         stop();
     }
 
-    /// Starts anew from the first row. The first frame is not to be used: the converters have just woken.
+    /// Restarts from the first row. The first frame must not be used: the converters have just woken.
     pub fn start(&mut self, timing: ScanTiming) {
         const { assert!(CLOCKS.frame_ns.is_none(), "this scan has no idle time") };
         stop();
@@ -127,7 +127,7 @@ impl Scan {
         whole
     }
 
-    /// Replaces the slots of `frame` that the scan has already read anew.
+    /// Replaces the slots of `frame` that the scan has already read again.
     pub fn copy_so_far(&mut self, frame: &mut Frame) {
         let [half_a, half_b] = [STREAM_A, STREAM_B].map(written_half);
         if half_a == half_b {
@@ -137,7 +137,7 @@ impl Scan {
     }
 }
 
-/// What is wrong with a frame that is not whole.
+/// Returns the defect of a frame that is not whole.
 #[cold]
 #[inline(never)]
 fn what_broke(half: usize) -> Broken {
@@ -153,7 +153,7 @@ fn what_broke(half: usize) -> Broken {
     }
 }
 
-/// Counts what went wrong with the transfers since the last time.
+/// Counts the errors of the transfers since the last call.
 pub fn note_transfers() {
     let (bus, stream) = take_errors();
     health::note_transfers(bus, stream);
@@ -219,8 +219,8 @@ const SCANNING: [Adc; 2] = [pac::ADC3, pac::ADC2];
 const HALF_LEN: u16 = (SLOTS * BANK_COLUMNS) as u16;
 const BUFFER_LEN: u16 = 2 * HALF_LEN;
 
-/// What each slot writes to the port's set/reset register: its row set, the others reset; in the last all rows reset,
-/// and the frame's trace pin set.
+/// Words that the slots write to the port's set/reset register: their row set, the others reset; in the last all rows
+/// reset, and the frame's trace pin set.
 ///
 /// Atomic so that it lies in RAM: a flash that is being programmed would make the DMA wait.
 static ROW_WORDS: [AtomicU32; SLOTS] = {
@@ -354,7 +354,7 @@ fn written_half(stream: usize) -> usize {
     usize::from((stored(stream) / HALF_LEN) & 1)
 }
 
-/// Whether the codes belong to the rows under which they are stored.
+/// Returns true if the codes belong to the rows under which they are stored.
 ///
 /// In the slot that the rows' stream has set last, each bank has completed as many slots of the frame as came before
 /// it, or one more. A trigger that was lost leaves the banks behind the rows for good; only a new start brings them
@@ -368,7 +368,7 @@ fn in_step() -> bool {
     })
 }
 
-/// Whether the first bank's stream, which does not interrupt, has completed this half too.
+/// Returns true if the first bank's stream, which does not interrupt, has completed this half too.
 fn bank_a_completed(half: usize) -> bool {
     let flags = pac::DMA2.isr(0).read();
     if half == 0 { flags.htif(STREAM_A) } else { flags.tcif(STREAM_A) }
@@ -379,7 +379,7 @@ fn overrun() -> bool {
     SCANNING.into_iter().any(|adc| adc.sr().read().ovr())
 }
 
-/// Whether a transfer failed on the memory's bus, and whether a stream failed, since the last time.
+/// Returns if a transfer failed on the memory's bus, and if a stream failed, since the last call.
 fn take_errors() -> (bool, bool) {
     let flags = pac::DMA2.isr(0).read();
     let streams = [STREAM_A, STREAM_ROWS, STREAM_B];

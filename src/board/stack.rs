@@ -1,4 +1,4 @@
-//! What lies below the stack is closed, so that an overflow faults wherever it lands.
+//! Protection of the memory below the stack: an overflow faults wherever it lands.
 //!
 //! RAM begins where the stack ends. Below it lie the option bytes and addresses that the manual calls reserved; what a
 //! store there does it does not say. A region of the memory protection unit refuses it: the access is a hard fault, as
@@ -14,13 +14,13 @@ const ATTRIBUTES: u32 = 13 << 1 | 1 | 1 << 28;
 /// On, with the usual map for all else. Off in the hard fault's handler.
 const CONTROL: u32 = 1 | 1 << 2;
 
-/// What the start-up code paints the stack with.
+/// Pattern with which the start-up code paints the stack.
 const PAINT: u32 = 0xCCCC_CCCC;
 
 unsafe extern "C" {
     /// The stack's lower end; from memory.x.
     static _stack_end: u32;
-    /// Where the stack starts, its upper end.
+    /// Upper end of the stack, where it starts.
     static _stack_start: u32;
 }
 

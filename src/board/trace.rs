@@ -1,4 +1,4 @@
-//! Pins that show an oscilloscope what runs when; see "Trace pins" in `docs/board.md`.
+//! Pins that show the timing of the firmware on an oscilloscope; see "Trace pins" in `docs/board.md`.
 //!
 //! The frame's and the trigger's are moved by the scan's own DMA and timer, at no cost. The two here cost a store each.
 

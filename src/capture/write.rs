@@ -1,4 +1,4 @@
-//! The board's side: frames in, bytes kept.
+//! The board's side of a capture: frames in, bytes kept.
 //!
 //! # Numbers that are mostly small
 //!
@@ -6,7 +6,7 @@
 //! many low bits as the width (a Rice code). A number that would take [`ESCAPE`] ones or more is written as these ones and
 //! all its bits.
 
-use super::{Ended, Head, Last, Standing, State, digest_step, digest_words, short_digest, width};
+use super::{CaptureStatus, Ended, Head, Last, State, digest_step, digest_words, short_digest, width};
 use crate::command::Command;
 use crate::frame::{Frame, Sense};
 use crate::measure::series::{CHECK, HEAD, Head as Series, Out};
@@ -16,18 +16,18 @@ use crate::pressure::Gains;
 use crate::state::Mode;
 use crate::units::Duty;
 
-/// A capture, and the memory that it takes: at least 1 KiB. Nothing here waits or fails; what is out of turn does nothing.
+/// A capture, and its memory of at least 1 KiB. Nothing here waits or fails; a call out of turn does nothing.
 #[derive(Clone, Debug)]
 pub struct Capture<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> {
-    standing: Standing,
+    standing: CaptureStatus,
     place: Place,
     last: Last<ROWS, COLUMNS>,
-    /// The head of a record of a motion, while one is kept, and its bytes so far.
+    /// Head of the record of a motion while one is kept, and its number of bytes so far.
     series: Series,
     length: usize,
     /// Bytes and check sum of the row under way.
     row: (usize, u32),
-    /// A motion was under way in the step before.
+    /// True if a motion was under way in the step before.
     ran: bool,
     bytes: [u8; BYTES],
 }
@@ -39,9 +39,9 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Default for Ca
 }
 
 impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, COLUMNS, BYTES> {
-    /// Nothing asked for. All its bytes are zero.
+    /// Capture before any request. All its bytes are zero.
     pub const NEW: Self = Self {
-        standing: Standing { state: State::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
+        standing: CaptureStatus { state: State::None, ended: Ended::No, count: 0, frames: 0, bytes: 0 },
         place: Place::START,
         last: Last::NONE,
         series: Series::NONE,
@@ -51,31 +51,33 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         bytes: [0; BYTES],
     };
 
-    /// How it stands.
-    pub fn standing(&self) -> Standing {
+    /// Progress of the capture.
+    pub fn standing(&self) -> CaptureStatus {
         self.standing
     }
 
-    /// The capture, once it is done; nothing before.
+    /// Bytes of the capture once it is done; none before.
     pub fn data(&self) -> &[u8] {
         let bytes = if self.standing.state == State::Done { self.standing.bytes as usize } else { 0 };
         self.bytes.get(..bytes).unwrap_or_default()
     }
 
-    /// Lets it begin at the next tare; what was kept before is forgotten. Not while frames are being kept.
+    /// Arms the capture: it begins at the next tare, and drops what was kept before. Has no effect while frames are
+    /// being kept.
     pub fn arm(&mut self) {
         if self.standing.state != State::Recording {
-            self.standing = Standing { state: State::Armed, count: self.standing.count, ..Standing::default() };
+            self.standing =
+                CaptureStatus { state: State::Armed, count: self.standing.count, ..CaptureStatus::default() };
         }
     }
 
-    /// Whether it should begin: it is armed, and the next step would take up a tare.
+    /// Returns true if the capture should begin: it is armed, and the next step would acknowledge a tare.
     pub fn is_due(&self, status: &Status, command: &Command) -> bool {
         self.standing.state == State::Armed && status.mode == Mode::Off && command.tare_request != status.taken.tare
     }
 
-    /// Begins, with a pipeline that is made anew; the next step is the first one kept. That takes as long as a frame.
-    /// Gains that cannot be stored are no board's: then it is called off.
+    /// Begins, and resets the pipeline; the next step is the first one kept. That takes as long as a frame. A board
+    /// has no gains that cannot be stored: with such gains the capture is cancelled.
     pub fn begin(&mut self, pipeline: &mut Pipeline<ROWS, COLUMNS>) {
         let mut gains = Gains::<ROWS, COLUMNS>::ONE;
         let mut places = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
@@ -106,16 +108,16 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         self.place = Place::START;
         self.last = Last { digest: head.seed(), ..Last::NONE };
         let count = self.standing.count.wrapping_add(1);
-        self.standing = Standing { state: State::Recording, count, ..Standing::default() };
+        self.standing = CaptureStatus { state: State::Recording, count, ..CaptureStatus::default() };
     }
 
-    /// Keeps what a step took and answered.
+    /// Keeps the inputs and the results of a step.
     pub fn record(&mut self, frame: &Frame<ROWS, COLUMNS>, sense: &Sense, command: &Command, status: &Status) {
         if self.standing.state != State::Recording || self.series.kind != 0 {
             return;
         }
         let body = self.bytes.get_mut(Head::<ROWS, COLUMNS>::BYTES..).unwrap_or_default();
-        // The last word is for what is less than one.
+        // The last word is for the rest of less than a word.
         let room = body.len().saturating_sub(4);
         let mut out = Writer::new(body.get_mut(..room).unwrap_or_default(), self.place);
         let last = &mut self.last;
@@ -144,8 +146,8 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         self.last = Last { frame: *frame, sense: *sense, command: *command, duty, mode, fault, spread, digest };
     }
 
-    /// Keeps what a step adds to the record of a motion that measures: it begins with the motion, over whatever was kept,
-    /// and ends with it. Not while frames are being kept.
+    /// Keeps the row that a step adds to the record of a motion that measures. The record replaces an earlier
+    /// capture, begins and ends with the motion, and has no effect while frames are being kept.
     pub fn follow(&mut self, pipeline: &Pipeline<ROWS, COLUMNS>) {
         let motion = pipeline.status().measure;
         let runs = motion.state == measure::State::Running;
@@ -166,7 +168,7 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
             };
             self.length = HEAD;
             let count = self.standing.count.wrapping_add(1);
-            self.standing = Standing { state: State::Recording, count, ..Standing::default() };
+            self.standing = CaptureStatus { state: State::Recording, count, ..CaptureStatus::default() };
         }
         let Self { series: head, length, bytes, row: begun, .. } = self;
         if head.kind == 0 {
@@ -197,14 +199,14 @@ impl<const ROWS: usize, const COLUMNS: usize, const BYTES: usize> Capture<ROWS, 
         let head = Series { ended, value, ..core::mem::replace(&mut self.series, Series::NONE) }.bytes();
         self.bytes.iter_mut().zip(head).for_each(|(to, byte)| *to = byte);
         let ended = if ended == measure::Ended::Full { Ended::Full } else { Ended::Asked };
-        self.standing = Standing { state: State::Done, ended, bytes: self.length as u32, ..self.standing };
+        self.standing = CaptureStatus { state: State::Done, ended, bytes: self.length as u32, ..self.standing };
     }
 
-    /// Ends it, or calls it off where it has not begun.
+    /// Ends the capture, or cancels it if it has not begun.
     pub fn end(&mut self, why: Ended) {
         match self.standing.state {
             State::Armed if why == Ended::Asked => self.standing.state = State::None,
-            // A motion goes on where the array was broken for a part of a frame.
+            // A motion continues if the array was broken for a part of a frame.
             State::Recording if self.series.kind != 0 && why == Ended::Cut => {}
             State::Recording if self.series.kind != 0 => self.end_series(measure::Ended::Interrupted, 0),
             State::Recording => {
@@ -253,28 +255,28 @@ fn put_command(out: &mut Writer<'_>, command: &Command, last: &Command) {
     }
 }
 
-/// Count of ones after which a number follows with all its bits.
+/// Number of ones after which a number follows with all its bits.
 pub const ESCAPE: u32 = 12;
-/// The largest width.
+/// Largest width.
 pub(super) const WIDTH_MAX: u32 = 16;
 
-/// Where the next bit goes.
+/// Position of the next bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     /// Bits that are not yet a word, from the lowest one on: fewer than 32.
     held: u32,
     count: u32,
-    /// Where their word will be.
+    /// Position of their word.
     at: usize,
-    /// Of the words before.
+    /// Check sum of the words before.
     check: u32,
 }
 
 impl Place {
-    /// At the beginning.
+    /// Position of the first bit.
     pub const START: Self = Self { held: 0, count: 0, at: 0, check: 0 };
 
-    /// Bits written.
+    /// Number of bits written.
     pub fn bits(&self) -> u32 {
         8 * self.at as u32 + self.count
     }
@@ -284,7 +286,7 @@ impl Place {
 pub(super) struct Writer<'a> {
     bytes: &'a mut [u8],
     pub place: Place,
-    /// There was no room for a word: what is behind it is lost.
+    /// True if there was no room for a word: it and all that follows is lost.
     pub full: bool,
 }
 
@@ -293,7 +295,7 @@ impl<'a> Writer<'a> {
         Self { bytes, place, full: false }
     }
 
-    /// The low bits of a number, at most 32; those above must be 0.
+    /// Writes the low bits of a number, at most 32; those above must be 0.
     #[inline(always)]
     pub fn put(&mut self, value: u32, count: u32) {
         self.place.held |= value << self.place.count;
@@ -301,12 +303,12 @@ impl<'a> Writer<'a> {
         if self.place.count >= 32 {
             self.word(self.place.held);
             self.place.count -= 32;
-            // What did not fit: none of 32 bits that fill a word.
+            // The part that did not fit: nothing if 32 bits fill a word.
             self.place.held = value.checked_shr(count - self.place.count).unwrap_or(0);
         }
     }
 
-    /// A whole word.
+    /// Writes a whole word.
     #[inline(always)]
     fn word(&mut self, word: u32) {
         let place = &mut self.place;
@@ -318,7 +320,8 @@ impl<'a> Writer<'a> {
         place.check = mix(place.check, word);
     }
 
-    /// Codes as their folded differences to those before, each of 16 bits at most; what these add up to.
+    /// Writes codes as their folded differences to those before, each of 16 bits at most. Returns the sum of the
+    /// differences.
     ///
     /// [`Writer::folded`] for each, with the word under way in registers: a frame has a hundred of them.
     #[inline(never)]
@@ -357,7 +360,7 @@ impl<'a> Writer<'a> {
         self.put(value, 16);
     }
 
-    /// Brings what is not yet a word to its place; the check sum of all.
+    /// Writes the last bits, and returns the check sum of all.
     pub fn finish(self) -> u32 {
         let place = self.place;
         if let Some(to) = self.bytes.get_mut(place.at..).and_then(|rest| rest.first_chunk_mut()) {
@@ -366,7 +369,7 @@ impl<'a> Writer<'a> {
         mix(place.check, place.held)
     }
 
-    /// A folded number of at most `all` bits.
+    /// Writes a folded number of at most `all` bits.
     #[inline(always)]
     fn folded(&mut self, value: u32, width: u32, all: u32) {
         let ones = value >> width;
@@ -379,19 +382,20 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// A difference of 32 bits.
+    /// Writes a difference of 32 bits.
     pub fn signed(&mut self, value: i32, width: u32) {
         self.folded((value << 1 ^ value >> 31).cast_unsigned(), width, 32);
     }
 }
 
-/// Turned, mixed, multiplied by an odd number (2^32 over the golden ratio): no word that differs is lost.
+/// Rotates, mixes and multiplies by an odd number (2^32 over the golden ratio), so that different words give
+/// different sums.
 #[inline(always)]
 pub(super) const fn mix(sum: u32, word: u32) -> u32 {
     (sum.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1)
 }
 
-/// A difference of 16 bits, folded.
+/// Returns a difference of 16 bits, folded.
 #[inline(always)]
 pub(super) fn fold(value: u16, last: u16) -> u32 {
     let difference = value.wrapping_sub(last).cast_signed();

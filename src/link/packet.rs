@@ -30,7 +30,7 @@ pub fn update_crc(crc: u16, bytes: &[u8]) -> u16 {
     digest.finalize()
 }
 
-/// What every packet begins with.
+/// First bytes of every packet.
 pub const HEADER: [u8; 4] = [0xFF, 0xFF, 0xFD, 0x00];
 /// The ID that addresses every device.
 pub const BROADCAST: u8 = 254;
@@ -73,7 +73,7 @@ pub mod instruction {
     pub const FAST_BULK_READ: u8 = 0x9A;
 }
 
-/// Why an instruction was refused, with the protocol's numbers.
+/// Reason to refuse an instruction, with the protocol's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum StatusError {
@@ -96,24 +96,24 @@ pub enum StatusError {
 /// A packet with its CRC checked and its stuffing removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Packet<'a> {
-    /// Whom it is for, or in a status packet from.
+    /// ID of the addressed device, or in a status packet of the sender.
     pub id: u8,
     /// One of [`instruction`], or a number that this device does not know.
     pub instruction: u8,
-    /// What follows the instruction; in a status packet the error comes first.
+    /// Bytes after the instruction; in a status packet the error comes first.
     pub params: &'a [u8],
     /// False where there were more parameters than the receiver holds, and only the first were kept.
     pub complete: bool,
 }
 
-/// Parameters that are kept of a packet: a Sync Read of every ID there is, or a Sync Write of 76 goal forces.
+/// Number of parameter bytes that are kept of a packet: a Sync Read of every ID, or a Sync Write of 76 goal forces.
 pub const PARAMS_MAX: usize = 384;
-/// A longer packet is taken for noise.
+/// Largest length of a packet: a longer one is taken for noise.
 pub const LENGTH_MAX: u16 = 2048;
-/// A length counts the instruction and the CRC at least.
+/// Least length: the instruction and the CRC.
 const LENGTH_MIN: u16 = 3;
 
-/// What a byte brought to an end.
+/// Event that a byte completes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A whole packet with a good CRC: [`Receiver::packet`].
@@ -142,13 +142,13 @@ pub struct Receiver {
     /// The last four bytes as they came.
     window: u32,
     expect: Expect,
-    /// Bytes since the last packet that belong to none.
+    /// Number of bytes since the last packet that belong to none.
     stray: u8,
-    /// Bytes that still belong to a packet of which this device has sent a part.
+    /// Number of bytes that still belong to a packet of which this device has sent a part.
     shared: u16,
     id: u8,
     instruction: u8,
-    /// Bytes to come before the CRC.
+    /// Number of bytes before the CRC.
     left: u16,
     crc: u16,
     crc_low: u8,
@@ -157,7 +157,7 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver that has heard nothing.
+    /// Creates a receiver.
     pub const fn new() -> Self {
         Self {
             window: 0,
@@ -174,7 +174,7 @@ impl Receiver {
         }
     }
 
-    /// The packet that the last event spoke of; valid until the next byte.
+    /// Packet of the last event; valid until the next byte.
     pub fn packet(&self) -> Packet<'_> {
         Packet { id: self.id, instruction: self.instruction, params: &self.params, complete: self.complete }
     }
@@ -232,7 +232,8 @@ impl Receiver {
         None
     }
 
-    /// This device sends a part of the packet that it hears, and does not hear that; so many bytes come behind it.
+    /// Takes note that this device sends a part of the packet, which it does not hear; `behind` bytes follow the
+    /// part.
     pub(super) fn take_part(&mut self, behind: u16) {
         self.window = 0;
         self.stray = 0;
@@ -253,7 +254,7 @@ impl Receiver {
         self.expect = if self.left == 0 { Expect::CrcLow } else { Expect::Params };
     }
 
-    /// What looked like a packet is none.
+    /// Drops a header that was no packet.
     fn lose(&mut self) {
         self.stray = u8::MAX;
         self.expect = Expect::Header;
@@ -286,9 +287,9 @@ pub const REPLY_MAX: usize = 384;
 /// Bytes to send.
 pub type Reply = Vec<u8, REPLY_MAX>;
 
-/// Where the length stands.
+/// Position of the length.
 const LENGTH_PLACE: usize = 5;
-/// Where stuffing begins: at the instruction.
+/// Position from which bytes are stuffed: the instruction.
 const STUFFED_FROM: usize = 7;
 
 /// Writes one packet into a cleared buffer; a packet that does not fit leaves it empty.
@@ -316,7 +317,7 @@ impl<'r> Sender<'r> {
         sender
     }
 
-    /// Adds a byte of the parameters, and stuffing where it is due.
+    /// Adds a byte of the parameters, and stuffing if it is needed.
     pub fn push(&mut self, byte: u8) {
         self.raw(byte);
         let stuffed = self.reply.get(STUFFED_FROM..).unwrap_or_default();

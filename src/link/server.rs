@@ -1,4 +1,4 @@
-//! The device on the bus: packets in, replies out, and what they ask of the loop and the firmware.
+//! The device on the bus: packets in, replies out, and their requests to the loop and the firmware.
 
 mod answer;
 mod execute;
@@ -20,7 +20,7 @@ use answer::Turn;
 /// The longest Reg Write: all gains of 10 x 10 taxels at once.
 pub const REG_WRITE_MAX: usize = 200;
 
-/// Counts of what went wrong on the bus since reset.
+/// Counts of errors on the bus since reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Good instruction packets for this device, broadcasts included; wraps.
@@ -31,7 +31,7 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// How often an instruction was refused for this reason; holds at its top.
+    /// Number of instructions refused for this reason; saturates.
     ///
     /// [`StatusError::Crc`] counts damaged packets for other devices too.
     pub fn refused(&self, error: StatusError) -> u16 {
@@ -52,7 +52,7 @@ struct Registered {
     data: Vec<u8, REG_WRITE_MAX>,
 }
 
-/// What the device knows.
+/// State of the device.
 #[derive(Clone, Debug)]
 pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
@@ -60,11 +60,11 @@ pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
     registered: Option<Registered>,
     actions: Actions,
     turn: Turn,
-    /// Once this device has sent its part of a shared packet: how much comes behind it.
+    /// Number of bytes behind this device's part of a shared packet, once it has sent the part.
     behind: Option<u16>,
-    /// When a byte was heard that its turn may go by.
+    /// Time of the last byte that its turn may depend on, ms.
     heard_ms: u32,
-    /// How the loop stood at the last snapshot.
+    /// State of the loop at the last snapshot.
     stand: Stand,
     reply_delay_us: u32,
     clocks: &'static Clocks,
@@ -100,7 +100,7 @@ pub struct Server<const ROWS: usize, const COLUMNS: usize> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
-    /// A device with these stored settings, torque off; it judges new ones by the board's clocks.
+    /// Creates a device with these stored settings and torque off, which checks new settings with the board's clocks.
     pub fn new(record: Record<ROWS, COLUMNS>, clocks: &'static Clocks) -> Self {
         let state = Device {
             settings: Settings::new(record),
@@ -142,42 +142,43 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
         bytes.len()
     }
 
-    /// How long to wait between the packet's last byte and the reply's first.
+    /// Time to wait between the packet's last byte and the reply's first, us.
     pub fn reply_delay_us(&self) -> u32 {
         self.state.reply_delay_us
     }
 
-    /// What the host asks of the loop.
+    /// Requests of the host to the loop.
     pub fn command(&self) -> Command {
         Command { fit_level: self.state.settings.record.fit_level, ..self.state.settings.command }
     }
 
-    /// All that the host may change.
+    /// Settings that the host may change.
     pub fn settings(&self) -> &Settings<ROWS, COLUMNS> {
         &self.state.settings
     }
 
-    /// What went wrong on the bus.
+    /// Counts of errors on the bus.
     pub fn counters(&self) -> &Counters {
         &self.state.counters
     }
 
-    /// Changes with every good instruction packet for this device: what the bus watchdog watches.
+    /// Number of good instruction packets for this device, for the bus watchdog.
     pub fn good_packets(&self) -> u32 {
         self.state.counters.good_packets
     }
 
-    /// What the firmware is asked to do, once.
+    /// Returns the actions requested of the firmware, once.
     pub fn take_actions(&mut self) -> Actions {
         core::mem::take(&mut self.state.actions)
     }
 
-    /// How a save went.
+    /// Takes the result of a save.
     pub fn note_saved(&mut self, succeeded: bool) {
         self.state.settings.saved = if succeeded { Saved::Same } else { Saved::Failed };
     }
 
-    /// A fault turns torque off and lets go; a silent bus also trips the watchdog's register.
+    /// Updates the state of the loop. A fault turns torque off and sets the goal to 0; a silent bus also trips the
+    /// watchdog's register.
     fn observe(&mut self, stand: Stand) {
         let settings = &mut self.state.settings;
         if stand.faulted {
@@ -193,12 +194,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Server<ROWS, COLUMNS> {
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
-    /// Whether a Reg Write waits.
+    /// Returns true while a Reg Write waits.
     pub fn registered(&self) -> bool {
         self.registered.is_some()
     }
 
-    /// What waits for the firmware.
+    /// Actions that wait for the firmware.
     pub fn actions(&self) -> Actions {
         self.actions
     }

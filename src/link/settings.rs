@@ -1,4 +1,4 @@
-//! What the host may change, and what it may ask the firmware to do.
+//! Settings that the host may change, and actions that it may request of the firmware.
 
 use crate::command::Command;
 use crate::config::{ConfigError, Shaped};
@@ -9,26 +9,26 @@ use crate::units::Newtons;
 use super::packet::StatusError;
 use super::table::indirect;
 
-/// Everything that a write can change.
+/// Settings that a write can change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings<const ROWS: usize, const COLUMNS: usize> {
-    /// What outlives a reset once it is saved.
+    /// Record that outlives a reset once it is saved.
     pub record: Record<ROWS, COLUMNS>,
-    /// What the loop is asked for.
+    /// Requests to the loop.
     pub command: Command,
     /// 0: only Ping is answered; 1: reads too; 2: everything.
     pub status_return_level: u8,
-    /// The bus watchdog has tripped and was not reset.
+    /// True if the bus watchdog has tripped and was not reset.
     pub watchdog_tripped: bool,
-    /// How the record stands to the flash.
+    /// State of the record compared with the flash.
     pub saved: Saved,
-    /// Where the bytes of the indirect data stand; 0 is nowhere.
+    /// Addresses of the bytes of the indirect data; 0 is nowhere.
     pub indirect: [u16; indirect::COUNT],
-    /// Which byte of the capture is read first.
+    /// Offset of the byte of the capture that is read first.
     pub capture_offset: u32,
 }
 
-/// How the stored registers stand to the flash. The numbers are stable.
+/// State of the stored registers compared with the flash. The numbers are stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Saved {
@@ -40,12 +40,12 @@ pub enum Saved {
     Failed = 2,
 }
 
-/// What a packet asks the firmware to do once the reply is sent.
+/// Actions that a packet requests of the firmware, after the reply is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Actions {
     /// Reset the microcontroller.
     pub reboot: bool,
-    /// Write [`Settings::record`] to flash, and say how it went with [`super::Server::note_saved`].
+    /// Write [`Settings::record`] to flash, and report the result with [`super::Server::note_saved`].
     pub save: bool,
     /// The parameters changed: make a new configuration.
     pub configure: bool,
@@ -81,7 +81,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
         u32::from(self.record.return_delay_2us) * 2
     }
 
-    /// Refuses what no register's own range can catch.
+    /// Refuses values that no register's own range can refuse.
     ///
     /// # Errors
     /// A parameter out of its range, parameters that contradict each other, or a goal beyond the largest force.
@@ -99,7 +99,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Settings<ROWS, COLUMNS> {
     }
 }
 
-/// A force in mN, rounded.
+/// Converts a force to mN, rounded.
 pub(super) fn goal_mn(force: Newtons) -> i32 {
     super::table::thousandths(force.to_bits(), 16)
 }

@@ -1,4 +1,4 @@
-//! What the bus may read of the running controller, gathered by the firmware.
+//! State of the running controller that the bus may read, gathered by the firmware.
 
 use crate::capture;
 use crate::frame::Frame;
@@ -6,36 +6,36 @@ use crate::pipeline::Status;
 use crate::pressure::TARE_BITS;
 use crate::state::Fault;
 
-/// A picture of the controller at one moment.
+/// Snapshot of the controller at one moment.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// What the last step reported.
+    /// Report of the last step.
     pub status: Status,
-    /// The bridge's supply.
+    /// Supply of the bridge, mV.
     pub supply_mv: u16,
-    /// Time since reset; wraps.
+    /// Time since reset, ms; wraps.
     pub tick_ms: u32,
-    /// When the frame's last conversion ended, in microseconds since the controller started; wraps.
+    /// Time of the frame's last conversion, us since the controller started; wraps.
     pub frame_time_us: u32,
-    /// From frame to frame.
+    /// Time from frame to frame, ns.
     pub frame_ns: u32,
-    /// From a frame's last conversion to the new duty, last time.
+    /// Time from the last frame's last conversion to the new duty, us.
     pub loop_time_us: u16,
-    /// The longest of those since reset.
+    /// Longest of these times since reset, us.
     pub loop_time_max_us: u16,
-    /// Why the microcontroller started.
+    /// Reason why the microcontroller started.
     pub reset_cause: ResetCause,
     /// The last crash on record.
     pub crash: Crash,
-    /// How the board is.
+    /// Health of the board.
     pub health: Health,
-    /// The frame that the status was made from.
+    /// Frame of the status.
     pub frame: &'a Frame<ROWS, COLUMNS>,
-    /// What its taxels read above tare, sixteenths of a corrected code.
+    /// Readings of its taxels above tare, sixteenths of a corrected code.
     pub taxels: &'a [[i32; COLUMNS]; ROWS],
-    /// Pressure in Pa for such a sixteenth, Q32.
+    /// Pressure of such a sixteenth, Pa in Q32.
     pub pascals_per_sum_q32: i64,
-    /// What they read without contact, corrected codes with [`TARE_BITS`] fractional bits.
+    /// Readings of the taxels without contact, corrected codes with [`TARE_BITS`] fractional bits.
     pub tare: &'a [[i32; COLUMNS]; ROWS],
     /// The capture.
     pub capture: Captured<'a>,
@@ -44,9 +44,9 @@ pub struct Snapshot<'a, const ROWS: usize, const COLUMNS: usize> {
 /// A capture as the bus may read it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Captured<'a> {
-    /// How it stands.
-    pub standing: capture::Standing,
-    /// Its bytes; none before it is done.
+    /// Progress of the capture.
+    pub standing: capture::CaptureStatus,
+    /// Bytes of the capture; none before it is done.
     pub data: &'a [u8],
 }
 
@@ -71,16 +71,17 @@ fn saturate(value: i32) -> u16 {
     value.max(0).min(i32::from(u16::MAX)) as u16
 }
 
-/// How the board is, since the last reset. Counts hold at their top.
+/// Health of the board since the last reset. Counts saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Health {
     /// The option bytes as the last reset loaded them, in the microcontroller's own order.
     pub option_bytes: u32,
-    /// The analogue supply; 0 where it is not known.
+    /// Analogue supply, mV; 0 if it is not known.
     pub analogue_mv: u16,
-    /// The deepest that the stack has been.
+    /// Largest use of the stack, bytes.
     pub stack_bytes: u16,
-    /// The longest that a frame's end came late to the processor: critical sections, and interrupts no less urgent.
+    /// Longest delay of a frame's end at the processor: critical sections, and interrupts of the same or a higher
+    /// priority.
     pub late_ns: u16,
     /// Frames that were there and not whole, by what was wrong first: a bank was missing, the banks were out of step
     /// with the rows, a converter had overrun, or the next frame came over it.
@@ -91,7 +92,7 @@ pub struct Health {
     pub line_errors: [u16; 3],
 }
 
-/// Why the microcontroller started. The numbers are stable.
+/// Reason why the microcontroller started. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum ResetCause {
@@ -112,7 +113,7 @@ pub enum ResetCause {
     Other = 6,
 }
 
-/// How the firmware ended. The numbers are stable.
+/// Cause of a crash. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum CrashCause {
@@ -132,13 +133,13 @@ pub enum CrashCause {
 /// The crash record, which survives a reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Crash {
-    /// How the last one happened.
+    /// Cause of the last crash.
     pub cause: CrashCause,
-    /// Line of the source where it panicked, 0 where that is not known.
+    /// Source line of the panic; 0 if it is not known.
     pub line: u16,
-    /// How many since power-on.
+    /// Number of crashes since power-on.
     pub count: u32,
-    /// Program counter at the fault or the panic, 0 where that is not known.
+    /// Program counter at the fault or the panic; 0 if it is not known.
     pub pc: u32,
 }
 

@@ -1,4 +1,4 @@
-//! How the loop stands to what the host asks, and what can therefore not be carried out.
+//! State of the loop at the last snapshot, and the requests that cannot be carried out in it.
 //!
 //! The link knows the loop by a snapshot that may be a frame old, and by what it has itself let through since. A
 //! request that is impossible by these is refused with the result error. What comes in between, as a fault in the next
@@ -16,12 +16,12 @@ use super::packet::StatusError;
 use super::settings::Actions;
 use super::snapshot::Snapshot;
 
-/// What the last snapshot told.
+/// State of the loop at the last snapshot.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stand {
-    /// A fault stands.
+    /// True in a fault.
     pub faulted: bool,
-    /// It is that of the bus watchdog.
+    /// True if it is the fault of the bus watchdog.
     pub bus_silent: bool,
     taken: Taken,
     mode: Mode,
@@ -29,11 +29,11 @@ pub(super) struct Stand {
     tared_touching: bool,
     supply_mv: u16,
     bad_taxels: u8,
-    /// Frames are being kept for a capture.
+    /// True while frames are being kept for a capture.
     pub captures: bool,
 }
 
-/// What stands in the way of recovering from a fault: it would be back at once. The numbers are stable.
+/// Obstacle to a recovery from a fault, which would return at once. The numbers are stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Hindrance {
@@ -45,7 +45,7 @@ pub(super) enum Hindrance {
 }
 
 impl Stand {
-    /// As a snapshot shows it.
+    /// Returns the state that a snapshot shows.
     pub fn of<const ROWS: usize, const COLUMNS: usize>(snapshot: &Snapshot<'_, ROWS, COLUMNS>) -> Self {
         let status = &snapshot.status;
         Self {
@@ -61,7 +61,7 @@ impl Stand {
         }
     }
 
-    /// What stands in the way of recovering from a fault.
+    /// Returns the obstacle to a recovery from a fault.
     pub fn hindrance(&self, params: &Params, actions: Actions) -> Hindrance {
         let supply_mv = i32::from(self.supply_mv);
         if supply_mv < params.supply_min_mv {
@@ -77,24 +77,24 @@ impl Stand {
         }
     }
 
-    /// Whether a tare is under way, or about to be.
+    /// Returns true if a tare is under way, or about to be.
     fn taring(&self, command: &Command) -> bool {
         self.mode == Mode::Tare || command.tare_request != self.taken.tare
     }
 
-    /// Whether torque may be enabled: a tare is under way, which torque waits for, or is done; and nothing touched the tip
-    /// in it, or that was forced.
+    /// Returns true if torque may be enabled: a tare is under way, for which torque waits, or is done; and nothing
+    /// touched the tip in it, or it was forced.
     pub fn zeroed(&self, command: &Command) -> bool {
         self.taring(command) || self.tared && (command.tare_forced || !self.tared_touching)
     }
 
-    /// Whether the motor jogs or makes strokes, or is about to.
+    /// Returns true if the motor jogs or makes strokes, or is about to.
     pub fn strokes(&self, command: &Command) -> bool {
         let waits = command.measure_request != self.taken.measure;
         self.mode == Mode::Strokes || waits && matches!(Task::of(command.measure_request), Task::Jog | Task::Strokes)
     }
 
-    /// Refuses what a write asks for and what cannot be done.
+    /// Refuses requests of a write that cannot be carried out.
     ///
     /// # Errors
     /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press without torque or tare;

@@ -5,11 +5,11 @@
 //! in and back at 10 mm/s - in at 2 mm/s - hold for 3 s - back at 2 mm/s
 //! ```
 //!
-//! Two speeds show the tip's relaxation, two directions its hysteresis, the hold its creep. The way in ends 0.3 a deep (the
-//! range of the paper's measurement), at 7/8 of the largest force, at the travel's end, or where one more taxel than in
-//! the air is dead or saturated.
+//! Two speeds show the tip's relaxation, two directions its hysteresis, the hold its creep. A way in ends at a depth
+//! of 0.3 a (the range of the paper's measurement), at 7/8 of the largest force, at the travel's end, or when one
+//! more taxel than in the air is dead or saturated.
 
-use super::{Ended, Standing};
+use super::{Ended, MeasureStatus};
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::{Reference, SpeedLoop};
@@ -20,57 +20,56 @@ use crate::units::{Celsius, Millimetres, MillimetresPerSecond};
 /// Speeds of the quick and of the slow way: 10 and 2 mm/s, at most that of an approach.
 const QUICK: MillimetresPerSecond = MillimetresPerSecond::from_bits(10 << 16);
 const SLOW: MillimetresPerSecond = MillimetresPerSecond::from_bits(2 << 16);
-/// A way begins and ends this far before the touch: 0.5 mm, Q24.
+/// Distance before the touch at which a way begins and ends: 0.5 mm, Q24.
 const BEFORE: i32 = 1 << 23;
-/// Steps of a way at most, and their least length: 0.1 mm, Q24.
+/// Largest number of steps of a way.
 pub const STEPS: usize = 28;
 const STEP: i32 = (1 << 24) / 10;
-/// When the steps of the hold end, ms.
+/// Times at which the steps of the hold end, ms.
 pub const HOLDS_MS: [u32; 9] = [20, 40, 80, 160, 320, 640, 1_300, 2_100, 3_000];
-/// Rows of a press at most: four ways, each with a step that is begun before it turns and one that turning makes, and
-/// the hold.
+/// Largest number of rows of a press: four ways, each with a step that is begun before it turns and one that turning
+/// makes, and the hold.
 pub const ROWS_MAX: usize = 4 * (STEPS + 2) + HOLDS_MS.len();
-/// How near to its end the travel counts as used up, Q24 mm.
+/// Distance to the travel's end below which the travel counts as used up, Q24 mm.
 const END: i32 = 1 << 20;
-/// A way that is longer than the brake needs at the speeds of a press.
+/// Distance that is longer than the brake needs at the speeds of a press.
 const FAR: Millimetres = Millimetres::from_bits(4 << 24);
-/// The tip must move on by 1/128 mm (Q24) within this time, ns.
+/// Travel by which the tip must move on within [`STALL_NS`], Q24: 1/128 mm.
 const MOVES: i32 = 1 << 17;
 const STALL_NS: u32 = 1_000_000_000;
-/// One more taxel than before must be bad in this number of frames in a row.
+/// Number of frames in a row in which one more taxel than before must be bad.
 const BAD_FRAMES: u8 = 4;
-/// A taxel's code is held to this, and what it differs by from the step's first frame: sixteenths and quarters.
+/// Limit of a taxel's code, sixteenths.
 const CODE_MAX: i32 = 1 << 17;
 const CHANGE_MAX: i32 = 1_023;
-/// A complete step is handed over in this number of parts, one a frame: writing all of it takes as long as the step of the
-/// loop.
+/// Number of parts of a complete step, one a frame: writing all of it takes as long as a step of the loop.
 pub const PARTS: u8 = 4;
-/// More frames than this are not taken into a step: the sums then have 31 bits.
+/// Largest number of frames of a step: the sums then have 31 bits.
 const FRAMES_MAX: u16 = 16_383;
 
-/// A press.
+/// State of a press.
 #[derive(Clone, Copy, Debug)]
 pub struct Press {
     phase: Phase,
-    /// Where the tip touched, by the force and the configured modulus.
+    /// Travel at which the tip touched, by the force and the configured modulus.
     touch: Millimetres,
-    /// How deep the quick way went.
+    /// Depth of the quick way.
     deepest: Millimetres,
-    /// Where the step under way began.
+    /// Travel at which the step under way began.
     step_from: Millimetres,
     /// Time of the hold, ns, and the steps of it that are over.
     held_ns: u32,
     holds: u8,
     moved_to: Millimetres,
     still_ns: u32,
-    /// The most taxels that were bad in the air, and frames in turn with more.
+    /// Largest number of bad taxels in the air, and number of frames in a row with more.
     bad_before: u16,
     bad_frames: u8,
-    /// The part of a complete step that is handed over with this frame.
+    /// Part of a complete step that this frame adds to the record.
     part: Option<u8>,
-    /// The next frame begins a step.
+    /// True if the next frame begins a step.
     fresh: bool,
-    /// Steps of this way that are complete.
+    /// Number of complete steps of this way.
     steps: u8,
 }
 
@@ -97,21 +96,21 @@ enum Pace {
     Slow,
 }
 
-/// What a frame says to a press.
+/// Inputs of a press in a frame.
 pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
-    /// The frame's number.
+    /// Number of the frame.
     pub sequence: u32,
-    /// The array.
+    /// Tactile image.
     pub picture: &'a Picture<ROWS, COLUMNS>,
-    /// The contact by the plain sum.
+    /// Contact by the plain sum.
     pub contact: &'a Contact,
-    /// The encoder's count.
+    /// Count of the encoder.
     pub encoder: i32,
-    /// The motion estimated.
+    /// Estimated motion.
     pub motion: &'a SpeedLoop,
-    /// What the bridge gave since the frame before, mV.
+    /// Voltage of the bridge since the frame before, mV.
     pub applied_mv: i32,
-    /// The microcontroller's temperature.
+    /// Temperature of the microcontroller.
     pub chip: Option<Celsius>,
 }
 
@@ -120,28 +119,28 @@ pub struct View<'a, const ROWS: usize, const COLUMNS: usize> {
 pub struct Step<const ROWS: usize, const COLUMNS: usize> {
     /// Numbers of its first and last frame.
     pub frames: [u32; 2],
-    /// The encoder's counts at these.
+    /// Encoder counts at these frames.
     pub counts: [i32; 2],
-    /// How many were taken.
+    /// Number of frames in the sums.
     pub taken: u16,
-    /// Whether it is one of a way back.
+    /// True for a step of a way back.
     pub back: bool,
     /// Sum of the bridge's voltage, mV.
     pub voltage_mv: i32,
-    /// The microcontroller's temperature at its end.
+    /// Temperature of the microcontroller at the end of the step.
     pub chip: Option<Celsius>,
-    /// What each taxel read in the first frame, sixteenths of a corrected code above tare.
+    /// Reading of each taxel in the first frame, sixteenths of a corrected code above tare.
     pub first: [[i32; COLUMNS]; ROWS],
-    /// Sum of what it read.
+    /// Sum of each taxel's readings.
     pub sums: [[i32; COLUMNS]; ROWS],
-    /// Sum of the squares of what it differed by from the first frame, quarters of a code.
+    /// Sum of the squared differences of each taxel to the first frame, quarters of a code.
     pub squares: [[u32; COLUMNS]; ROWS],
-    /// A bit for each column that was bad in any frame, for each row.
+    /// Bits of the columns that were bad in any frame, for each row.
     pub bad: [u32; ROWS],
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
-    /// Without a frame.
+    /// Step without a frame.
     pub const NONE: Self = Self {
         frames: [0; 2],
         counts: [0; 2],
@@ -185,7 +184,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
 }
 
 impl Press {
-    /// Begins; the tip may touch or not.
+    /// Begins a press. The tip may touch or not.
     pub fn begin(motion: &SpeedLoop) -> Self {
         Self {
             phase: Phase::Retreat,
@@ -204,7 +203,7 @@ impl Press {
         }
     }
 
-    /// Whether it still needs the motor.
+    /// Returns true while the press needs the motor.
     pub fn running(&self) -> bool {
         self.phase != Phase::Over
     }
@@ -220,10 +219,10 @@ impl Press {
         &mut self,
         view: &View<ROWS, COLUMNS>,
         step: &mut Step<ROWS, COLUMNS>,
-        standing: &mut Standing,
+        standing: &mut MeasureStatus,
         config: &Config,
     ) {
-        // Meanwhile the motion goes on as it was, and no frame is taken.
+        // Meanwhile the motion continues, and no frame is taken.
         self.part = self.part.and_then(|part| (part + 1 < PARTS).then_some(part + 1));
         if self.part.is_some() {
             return;
@@ -289,7 +288,7 @@ impl Press {
         }
     }
 
-    /// The speed to follow.
+    /// Returns the speed reference.
     pub fn reference(&self, motion: &mut SpeedLoop, config: &Config, limits: &mut Limits) -> Reference {
         let back = Millimetres(-FAR.0);
         let of = |pace| config.approach.min(if pace == Pace::Quick { QUICK } else { SLOW });
@@ -308,7 +307,7 @@ impl Press {
         motion.towards(way, Millimetres::ZERO, speed, config).0
     }
 
-    /// Adds a frame to the step of a way; the step is over after its length, or where the way turns.
+    /// Adds a frame to the step of a way. The step ends after its length, or when the way turns.
     fn sample<const ROWS: usize, const COLUMNS: usize>(
         &mut self,
         view: &View<ROWS, COLUMNS>,
@@ -329,8 +328,8 @@ impl Press {
         }
     }
 
-    /// The next part of the press; the place of the turn is where its first step begins, and where a hold holds.
-    fn next(&mut self, phase: Phase, at: Millimetres, standing: &mut Standing) {
+    /// Starts the next part of the press. Its first step begins, and a hold holds, at the travel of the turn.
+    fn next(&mut self, phase: Phase, at: Millimetres, standing: &mut MeasureStatus) {
         (self.phase, self.step_from, self.fresh, self.steps) = (phase, at, true, 0);
         standing.progress = match phase {
             Phase::In(Pace::Quick) => 10,
@@ -341,18 +340,18 @@ impl Press {
         };
     }
 
-    fn end(&mut self, standing: &mut Standing, ended: Ended, at: Millimetres) {
+    fn end(&mut self, standing: &mut MeasureStatus, ended: Ended, at: Millimetres) {
         self.phase = Phase::Over;
         standing.end(ended, ((i64::from(at.to_bits()) * 1_000) >> 24) as i32);
     }
 
-    /// Where the ways begin: before the touch, and within the guard's rear end.
+    /// Travel at which the ways begin: before the touch, and within the guard's rear end.
     fn start(&self, config: &Config) -> Millimetres {
         let rear = config.bounds.back.to_bits().saturating_neg().saturating_add(BEFORE / 2);
         Millimetres::from_bits(self.touch.to_bits().saturating_sub(BEFORE).max(rear))
     }
 
-    /// Whether one more taxel than in the air is bad.
+    /// Returns true if one more taxel than in the air is bad.
     fn one_more_bad(&mut self, bad: u16) -> bool {
         if !matches!(self.phase, Phase::In(_) | Phase::Hold | Phase::Back(_)) {
             self.bad_before = self.bad_before.max(bad);
@@ -371,7 +370,7 @@ impl Press {
     }
 }
 
-/// How deep a press goes: 0.3 a, the range of the paper's measurement.
+/// Depth of a press: 0.3 a, the range of the paper's measurement.
 fn depth_goal(config: &Config) -> Millimetres {
     Millimetres::from_bits((i64::from(config.tip.radius().to_bits()) * 3 / 10) as i32)
 }

@@ -1,4 +1,4 @@
-//! The record of a motion, as it lies in the memory of a capture and is read over the bus; little-endian.
+//! Record of a motion, as it is stored in the memory of a capture and read over the bus; little-endian.
 //!
 //! | byte | what |
 //! | --- | --- |
@@ -24,53 +24,53 @@
 use super::press::Step;
 use super::{Ended, Row};
 
-/// The version of the layout.
+/// Version of the layout.
 pub const VERSION: u8 = 1;
-/// Bytes of the head.
+/// Number of bytes of the head.
 pub const HEAD: usize = 32;
 /// First value of the check sum.
 pub const CHECK: u32 = 0x811C_9DC5;
 const PRIME: u32 = 0x0100_0193;
-/// Bytes of a step before its taxels.
+/// Number of bytes of a step before its taxels.
 const STEP: usize = 24;
-/// What is added to a mean, eighths of a code.
+/// Offset that is added to a mean, eighths of a code.
 const OFFSET: i32 = 1_024;
 
-/// The check sum of all rows.
+/// Computes the check sum of all rows.
 pub fn check(rows: &[u8]) -> u32 {
     rows.iter().fold(CHECK, |check, byte| (check ^ u32::from(*byte)).wrapping_mul(PRIME))
 }
 
-/// Bytes of a step.
+/// Number of bytes of a step.
 pub const fn step_bytes(taxels: usize) -> usize {
     (STEP + 3 * taxels + taxels.div_ceil(8)).next_multiple_of(4)
 }
 
-/// The bytes before the rows.
+/// Head of a record, before the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head {
     /// 0 none, 1 a press, 2 strokes.
     pub kind: u8,
     /// Rows and columns of the array.
     pub shape: [u8; 2],
-    /// How it ended.
+    /// End of the motion.
     pub ended: Ended,
-    /// Rows that follow.
+    /// Number of rows that follow.
     pub rows: u32,
-    /// Their check sum.
+    /// Check sum of the rows.
     pub check: u32,
-    /// From frame to frame.
+    /// Time from frame to frame, ns.
     pub frame_ns: u32,
-    /// Encoder count of travel 0, or where the strokes began.
+    /// Encoder count of travel 0, or of the start of the strokes.
     pub origin: i32,
-    /// From the count of a sample to the moment at which the voltage acts.
+    /// Time from the count of a sample to the moment at which the voltage acts, ns.
     pub delay_ns: u32,
-    /// The number behind the end.
+    /// Number that explains the end.
     pub value: i32,
 }
 
 impl Head {
-    /// Of no record: all zeros, so an image does not grow by it.
+    /// Head of no record: all zeros, so an image does not grow by it.
     pub const NONE: Self = Self {
         kind: 0,
         shape: [0; 2],
@@ -83,7 +83,7 @@ impl Head {
         value: 0,
     };
 
-    /// Its bytes.
+    /// Returns the bytes of the head.
     pub fn bytes(&self) -> [u8; HEAD] {
         let mut bytes = [0; HEAD];
         let [rows, columns] = self.shape;
@@ -105,16 +105,16 @@ impl Head {
 /// Bytes put one after the other, with their check sum; what does not fit shows in [`Out::full`].
 pub struct Out<'a> {
     room: &'a mut [u8],
-    /// The check sum so far.
+    /// Check sum so far.
     pub check: u32,
-    /// How many were put.
+    /// Number of bytes that were put.
     pub count: usize,
-    /// Whether some did not fit.
+    /// True if some bytes did not fit.
     pub full: bool,
 }
 
 impl<'a> Out<'a> {
-    /// Into this room, behind bytes of the same row; with the check sum of all before.
+    /// Creates an output into `room`, after `count` bytes of the same row, with the check sum of all before.
     pub fn new(room: &'a mut [u8], count: usize, check: u32) -> Self {
         let full = room.len() < count;
         Self { room: room.get_mut(count..).unwrap_or_default(), check, count, full }
@@ -134,7 +134,7 @@ impl<'a> Out<'a> {
         self.count += BYTES;
     }
 
-    /// A row.
+    /// Puts a row.
     pub fn row<const ROWS: usize, const COLUMNS: usize>(&mut self, row: &Row<'_, ROWS, COLUMNS>) {
         match row {
             Row::Stroke => self.put(0x8000_u32.to_le_bytes()),
@@ -146,7 +146,8 @@ impl<'a> Out<'a> {
         }
     }
 
-    /// A part: the numbers and half of the means, the other means, half of the variances, the others and the bits.
+    /// Puts a part: the numbers and half of the means, the other means, half of the variances, or the other variances
+    /// and the bits.
     fn step<const ROWS: usize, const COLUMNS: usize>(&mut self, step: &Step<ROWS, COLUMNS>, part: u8) {
         let taken = i32::from(step.taken.max(1));
         let (sums, first) = (step.sums.as_flattened(), step.first.as_flattened());
@@ -178,7 +179,7 @@ impl<'a> Out<'a> {
     }
 
     fn means(&mut self, sums: &[i32], taken: i32) {
-        // The offset makes all that counts positive: rounded to the nearest, without a remainder's sign.
+        // The offset makes every sum positive: rounded to the nearest, without a remainder's sign.
         let zero = taken / 2 + OFFSET * taken;
         for sum in sums {
             let eighths = (sum / 2 + zero) / taken;
@@ -189,7 +190,7 @@ impl<'a> Out<'a> {
     /// Of squares, sums and first readings.
     fn variances<'t>(&mut self, taxels: impl Iterator<Item = (&'t u32, (&'t i32, &'t i32))>, taken: i32) {
         for (square, (sum, first)) in taxels {
-            // Mean of what it differed by from the first frame, quarters.
+            // Mean difference to the first frame, quarters.
             let mean = (sum / taken).saturating_sub(*first) >> 2;
             let mean = mean.unsigned_abs().min(65_535);
             self.put([coded((square / taken.cast_unsigned()).saturating_sub(mean * mean))]);

@@ -1,4 +1,4 @@
-//! The motions in the air that show what the drive is like: pulses, and strokes under one voltage each.
+//! Motions in the air that measure the drive: pulses, and strokes under one voltage each.
 //!
 //! ```text
 //! pulse forward, pulse back      quick, so that nothing goes far without an encoder: motor and encoder go the same way
@@ -10,55 +10,55 @@
 //! go home                        as the slowest stroke
 //! ```
 //!
-//! Voltage is given, not closed over the encoder. A pulse presses with what its voltage has beyond that of the easiest
-//! pulse, and is shorted 40 um after it began to move: a force of 0.17 N stops it whatever the array sees. Strokes stay
-//! within the way that was felt. Whatever else happens shorts the motor at once and waits until it rests.
+//! The voltage is open loop. The force of a pulse is that of its voltage beyond the voltage of the easiest pulse, and
+//! the pulse is shorted 40 um after it began to move: a force of 0.17 N stops it whatever the array sees. Strokes
+//! stay within the range of the pulses. In any other case the motor is shorted at once until the tip rests.
 
-use super::{Ended, Standing, Task};
+use super::{Ended, MeasureStatus, Task};
 use crate::config::{Config, Motions, SPAN_PARTS};
 use crate::units::Newtons;
 
-/// From the end of a frame, when the encoder is read, to the moment at which the voltage of its step acts, ns, by the
-/// emulated board.
+/// Time from the end of a frame, when the encoder is read, to the moment at which the voltage of its step acts, ns,
+/// by the emulated board.
 pub const DELAY_NS: u32 = 33_000;
-/// Frames of a sample.
+/// Number of frames of a sample.
 pub const SAMPLE_FRAMES: u32 = 8;
-/// Speeds of the strokes, in quarters of the fastest. The first goes as slowly as it will start; fast ones are short, so
-/// there are more of them.
+/// Speeds of the strokes, in quarters of the fastest. The first one is the slowest with which the tip starts. Fast
+/// strokes are short, so there are more of them.
 const SPEEDS: [u8; 8] = [0, 1, 2, 3, 4, 4, 3, 2];
-/// Strokes: each speed twice, forward and back.
+/// Number of strokes: each speed twice, forward and back.
 const STROKES: u8 = 4 * SPEEDS.len() as u8;
-/// A pulse takes at most 2/25 of the supply, a stroke a third.
+/// Largest share of the supply for a pulse: 2/25.
 const PULSE_SUPPLY: [i32; 2] = [2, 25];
 const STROKE_SUPPLY: [i32; 2] = [1, 3];
-/// Counts that are motion.
+/// Number of counts that is motion.
 const MOVED: i32 = 2;
-/// Pulses that a way may take: five times what it needs.
+/// Largest number of pulses of a way: five times what it needs.
 const PULSES: u8 = 100;
 
-/// What a frame says.
+/// Inputs of the motion in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// The encoder's count.
+    /// Count of the encoder.
     pub encoder: i32,
-    /// The array's force.
+    /// Force of the array.
     pub force: Newtons,
-    /// The bridge's supply.
+    /// Supply of the bridge, mV.
     pub supply_mv: u16,
-    /// What the bridge gave since the frame before, quarters of a mV.
+    /// Voltage of the bridge since the frame before, quarters of a mV.
     pub applied: i32,
 }
 
-/// The parts of the motion, in their order.
+/// Parts of the motion, in their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     /// A pulse; quick ones prove the direction.
     Pulse { quick: bool },
     /// Pulses until the end of the way.
     Feel,
-    /// Under one voltage to a place.
+    /// Motion under one voltage to a place.
     Go,
-    /// The same, recorded, with the number of the stroke.
+    /// Recorded stroke with its number.
     Stroke(u8),
 }
 
@@ -70,28 +70,29 @@ enum Phase {
     Over,
 }
 
-/// A jog, or all strokes.
+/// State of a jog, or of all strokes.
 #[derive(Clone, Copy, Debug)]
 pub struct Strokes {
     task: Task,
     phase: Phase,
     part: Part,
-    /// Parts begun so far: the pulses of a way that is felt are one.
+    /// Number of parts begun so far: the pulses of a way count as one.
     done: u8,
-    /// Pulses of the way that is felt.
+    /// Number of pulses of the present way.
     pulses: u8,
-    /// Forward 1, back -1.
+    /// Direction: forward 1, back -1.
     sign: i32,
-    /// Counts where it all began, and where this motion did.
+    /// Encoder counts at the start of all, and of this motion.
     origin: i32,
     begun: i32,
-    /// Frames of this motion, and of motion within it, or of this rest.
+    /// Numbers of frames of this motion, and of motion within it, or of this rest.
     frames: u32,
     moving: u32,
-    /// What is asked for, uV, always as if forward; and by how much it was raised because nothing moved.
+    /// Requested voltage, uV, positive in the direction of motion; and by how much it was raised because nothing
+    /// moved.
     voltage_uv: i32,
     more_uv: i32,
-    /// The lowest voltages at which pulses moved, forward and back, and what friction takes at the slowest strokes.
+    /// Lowest voltages at which pulses moved, forward and back, and the voltage of friction at the slowest strokes.
     moved_uv: [i32; 2],
     friction_uv: [i32; 2],
     /// Counts at the ends of the last parts of a span; counts over the last span and the last quarter of one, as the
@@ -99,16 +100,16 @@ pub struct Strokes {
     history: [i32; SPAN_PARTS],
     over: [i32; 2],
     fastest: i32,
-    /// The count that stood last, since which frame, and where the second half of a rest began.
+    /// Count at the last motion, its frame, and the count at the second half of a rest.
     stood: (i32, u32),
     half_rest: i32,
-    /// Frames and voltage of the sample under way; what this frame gives the record.
+    /// Frames and voltage of the sample under way; and the part of the record in this frame.
     sampled: u32,
     sum: i32,
     row: Option<Kept>,
 }
 
-/// What a frame gives the record.
+/// Part of the record in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept {
     /// A stroke begins with the next frame.
@@ -149,17 +150,17 @@ impl Strokes {
         }
     }
 
-    /// Whether it still needs the motor.
+    /// Returns true while the motion needs the motor.
     pub fn running(&self) -> bool {
         self.phase != Phase::Over
     }
 
-    /// Where it began.
+    /// Count at which the motion began.
     pub fn origin(&self) -> i32 {
         self.origin
     }
 
-    /// What this frame gives the record.
+    /// Part of the record in this frame.
     pub fn row(&self) -> Option<Kept> {
         self.row
     }
@@ -171,7 +172,7 @@ impl Strokes {
         }
     }
 
-    /// What the motor is to get, mV.
+    /// Voltage for the motor, mV.
     pub fn voltage_mv(&self) -> i32 {
         match self.phase {
             Phase::Moving => self.sign * (self.voltage_uv.saturating_add(self.more_uv) / 1_000),
@@ -181,7 +182,7 @@ impl Strokes {
 
     /// Takes a frame.
     #[inline(never)]
-    pub fn observe(&mut self, view: &View, standing: &mut Standing, config: &Config) {
+    pub fn observe(&mut self, view: &View, standing: &mut MeasureStatus, config: &Config) {
         let plan = &config.motions;
         self.row = None;
         self.sample(view);
@@ -200,7 +201,7 @@ impl Strokes {
         }
     }
 
-    /// The record of a stroke: it goes on until the tip rests.
+    /// Records a stroke, until the tip rests.
     fn sample(&mut self, view: &View) {
         if !matches!(self.part, Part::Stroke(_)) {
             return;
@@ -229,7 +230,7 @@ impl Strokes {
         usize::from(self.sign < 0)
     }
 
-    /// What ends any motion.
+    /// Returns the reason that ends any motion.
     fn danger(&self, view: &View, plan: &Motions) -> Option<(Ended, i32)> {
         let place = self.place(view.encoder);
         if view.force >= plan.touch {
@@ -250,7 +251,7 @@ impl Strokes {
         (self.stood, self.half_rest) = ((encoder, 0), encoder);
     }
 
-    fn rest(&mut self, ended: Option<(Ended, i32)>, view: &View, standing: &mut Standing, plan: &Motions) {
+    fn rest(&mut self, ended: Option<(Ended, i32)>, view: &View, standing: &mut MeasureStatus, plan: &Motions) {
         self.frames = self.frames.saturating_add(1);
         let ended = match ended {
             None if view.force >= plan.touch => Some((Ended::Touched, super::millinewtons(view.force))),
@@ -277,13 +278,13 @@ impl Strokes {
         }
     }
 
-    fn end(&mut self, standing: &mut Standing, ended: Ended, value: i32) {
+    fn end(&mut self, standing: &mut MeasureStatus, ended: Ended, value: i32) {
         self.phase = Phase::Over;
         standing.end(ended, value);
     }
 
-    /// The next motion, or the end. It begins with the next frame.
-    fn next(&mut self, view: &View, standing: &mut Standing, plan: &Motions) {
+    /// Starts the next motion, or ends. The motion begins with the next frame.
+    fn next(&mut self, view: &View, standing: &mut MeasureStatus, plan: &Motions) {
         let felt = self.part != Part::Feel || self.place(view.encoder) >= plan.felt;
         self.done += u8::from(felt);
         self.pulses = if felt { 0 } else { self.pulses.saturating_add(1) };
@@ -344,12 +345,12 @@ impl Strokes {
         self.friction_uv.get(side).copied().unwrap_or(0)
     }
 
-    /// The voltage with which a stroke starts for certain.
+    /// Voltage with which a stroke surely starts.
     fn least(&self, plan: &Motions) -> i32 {
         self.easiest().saturating_add(plan.start_uv)
     }
 
-    /// The voltage rises until it moves; a little later the motor is shorted.
+    /// Raises the voltage until the tip moves; slightly later the motor is shorted.
     fn pulse(&mut self, view: &View, plan: &Motions) {
         let (gone, easiest) = (self.gone(view.encoder), self.easiest());
         let limit = easiest.saturating_add(plan.feel_uv).min(of_supply(view, PULSE_SUPPLY));
@@ -375,7 +376,7 @@ impl Strokes {
         }
     }
 
-    /// A stroke under one voltage that comes to rest at a place.
+    /// Runs a stroke under one voltage that comes to rest at a place.
     fn stroke(&mut self, view: &View, plan: &Motions) {
         let gone = self.gone(view.encoder);
         if self.frames.is_multiple_of(plan.span_part) {
@@ -404,7 +405,7 @@ impl Strokes {
             let force = plan.push_mn.saturating_mul(self.fastest - span).checked_div(plan.push.max(1)).unwrap_or(0);
             self.short(view.encoder, Some((Ended::Pushed, force)));
         } else if gone < MOVED && self.frames > 3 * plan.span() {
-            // With all of it no more than a stroke may take.
+            // In total no more than a stroke may take.
             let most = of_supply(view, STROKE_SUPPLY).saturating_sub(self.voltage_uv).max(0);
             self.more_uv = self.more_uv.saturating_add(plan.rise_uv);
             if self.more_uv > plan.feel_uv.min(most) {

@@ -16,7 +16,7 @@ use crate::command::Command;
 use crate::contact::Contact;
 use crate::frame::Sense;
 use crate::grip::Grip;
-use crate::measure::{Ended, Press, Standing, State, Strokes, Task};
+use crate::measure::{Ended, MeasureStatus, Press, State, Strokes, Task};
 use crate::safety::guard::Guard;
 use crate::state::Fault;
 use crate::status::{Taken, Taring};
@@ -160,7 +160,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
             (Task::Stop, _) => return,
             (Task::Press, Activity::Grip(_)) => {
-                self.status.measure = Standing::running(task);
+                self.status.measure = MeasureStatus::running(task);
                 self.activity = Activity::Press(Press::begin(&self.motion));
                 return;
             }
@@ -174,7 +174,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             {
                 if task == Task::Jog || self.config.params.direction_confirmed != 0 {
                     self.start(encoder);
-                    self.status.measure = Standing::running(task);
+                    self.status.measure = MeasureStatus::running(task);
                     self.activity = Activity::Strokes(Strokes::begin(task, encoder));
                     return;
                 }
@@ -182,7 +182,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             }
             _ => Ended::NotReady,
         };
-        self.status.measure = Standing::over(task, refusal, 0);
+        self.status.measure = MeasureStatus::over(task, refusal, 0);
     }
 
     /// Ends what drives the motor, for the reason that something else begins: off, where there is no fault.

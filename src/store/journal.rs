@@ -1,26 +1,28 @@
-//! Where records are written and what is erased when, so that at every instant one sector holds the newest whole
-//! record.
+//! Order of writing and erasing, so that at every instant one sector holds the newest whole record.
 //!
-//! - A save appends to the sector of the newest record; where that is full, to the other one, once that was erased.
-//! - A start whose sector is nearly full erases the other one where that has older records. Never the one with the
+//! - A save appends to the sector of the newest record; if that is full, to the other one, once that was erased.
+//! - A start whose sector is nearly full erases the other one if that has older records. The sector with the newest
+//!   whole record is never erased.
 //!   newest whole record.
-//! - What is damaged behind the newest whole record was written after it, and so was what is damaged in the other
+//! - Damaged bytes behind the newest whole record were written after it, and so were damaged bytes in the other
+//!   sector if the newest one's is full. Each start reports them until the next save, which is written behind them.
+//!   An erase that was cut short at such a time looks the same, and is reported too.
 //!   sector where the newest one's is full: each start says so until the next save, which goes behind that. An erase
 //!   that was cut short at such a time looks the same, and is told too.
 
 use super::{BLANK, Found, GRID, Record, Remark, end_of_records, read_record, take, words};
 
-/// One of the two.
+/// One of the two sectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sector {
-    /// The first that a new board uses.
+    /// Sector that a new board uses first.
     A,
-    /// The other.
+    /// The other sector.
     B,
 }
 
 impl Sector {
-    /// The other one.
+    /// Returns the other sector.
     pub const fn other(self) -> Self {
         match self {
             Self::A => Self::B,
@@ -31,7 +33,7 @@ impl Sector {
 
 /// Two sectors of flash: programming clears bits, erasing sets all bits of a sector.
 pub trait Flash {
-    /// Why it failed.
+    /// Reason of a failure.
     type Error;
 
     /// The bytes of a sector, a multiple of 16.
@@ -50,7 +52,7 @@ pub trait Flash {
     fn erase(&mut self, sector: Sector) -> Result<(), Self::Error>;
 }
 
-/// Why a record was not saved, or no room made.
+/// Reason why a record was not saved, or no room made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SaveError<E> {
     /// Both sectors are full; the next start erases one.
@@ -61,19 +63,19 @@ pub enum SaveError<E> {
     Verify,
 }
 
-/// What a start has.
+/// Result of loading the parameters at a start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Loaded<const ROWS: usize, const COLUMNS: usize> {
     /// The newest whole record, or the defaults.
     pub record: Record<ROWS, COLUMNS>,
-    /// Whether nothing was lost or refused.
+    /// True if nothing was lost or refused.
     pub sound: bool,
 }
 
-/// Where the records are.
+/// Positions of the records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Journal {
-    /// The sector that saves go to: that of the newest whole record.
+    /// Current sector for saves: that of the newest whole record.
     current: Sector,
     sequence: u32,
     /// The current sector, and the other.
@@ -81,7 +83,7 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Looks at what the flash holds.
+    /// Reads the positions from the flash.
     pub fn new(flash: &impl Flash) -> Self {
         let [a, b] = [Sector::A, Sector::B].map(|sector| Stand::of(flash.bytes(sector)));
         let b_is_newer = match (a.newest, b.newest) {
@@ -93,7 +95,7 @@ impl Journal {
         Self { current, sequence, stands }
     }
 
-    /// The newest whole record, as far as this firmware can take it. `tell` hears what it cannot.
+    /// Loads the newest whole record, as far as this firmware can take it. `tell` is called with every remark.
     #[inline(never)]
     pub fn load<const ROWS: usize, const COLUMNS: usize>(
         &self,
@@ -110,8 +112,8 @@ impl Journal {
             }
             return Loaded { record: Record::DEFAULT, sound: blank };
         };
-        // A save goes to the other sector only where there is no room behind the newest, and the other one was erased.
-        // What it was to save may have been longer or shorter than that.
+        // A save goes to the other sector only if there is no room behind the newest record, and the other one was
+        // erased. The record that was to be saved may have been longer or shorter than that.
         let room = bytes.len().saturating_sub(whole.end) >= Record::<ROWS, COLUMNS>::SLOT_MAX;
         let torn = own.end > whole.end || (!room && other.newest.is_none() && other.end > 0);
         if torn {
@@ -121,8 +123,8 @@ impl Journal {
         Loaded { record, sound: taken && !torn }
     }
 
-    /// Erases the sector without the newest whole record where both are nearly full, or have no room for a record of
-    /// `slot_max` bytes; says whether it did. For the start: the core may stand for seconds.
+    /// Erases the sector without the newest whole record if both are nearly full, or have no room for a record of
+    /// `slot_max` bytes. Returns true if it did. For the start: the core may halt for seconds.
     ///
     /// # Errors
     /// The flash refuses, or is not blank afterwards.
@@ -171,7 +173,7 @@ impl Journal {
             self.sequence = sequence;
             self.stands[0] = Stand { end, newest: Some(Whole { start, end, sequence }) };
         } else {
-            // Whatever became of it, the next goes behind it.
+            // Whatever the result, the next record goes behind it.
             *self = Self::new(flash);
         }
         written
@@ -196,7 +198,7 @@ fn write<F: Flash, W: Iterator<Item = u32>>(
     if words().all(|word| held.next() == Some(word)) { Ok(()) } else { Err(SaveError::Verify) }
 }
 
-/// How a sector stands.
+/// Content of a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stand {
     /// All behind this is blank.

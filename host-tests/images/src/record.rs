@@ -133,7 +133,7 @@ impl Default for Digest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fingertip::measure::{Standing, Task};
+    use fingertip::measure::{MeasureStatus, Task};
     use fingertip::pipeline::Taring;
     use fingertip::state::{Fault, Limits, Mode};
     use fingertip::units::{Millimetres, MillimetresPerSecond};
@@ -193,7 +193,7 @@ mod tests {
             with(|status| status.taken.tare = 1),
             with(|status| status.taken.clear = 1),
             with(|status| status.taken.measure = 1),
-            with(|status| status.measure = Standing::running(Task::Press)),
+            with(|status| status.measure = MeasureStatus::running(Task::Press)),
         ];
         let count = values.len();
         values.sort_unstable();

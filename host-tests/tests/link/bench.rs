@@ -1,6 +1,6 @@
 //! A server with a made-up loop behind it, and a host's side of the talk.
 
-use fingertip::capture::Standing;
+use fingertip::capture::CaptureStatus;
 use fingertip::command::Command;
 use fingertip::link::packet::{Event, Packet, Receiver, Sender, StatusError};
 use fingertip::link::{Captured, Crash, CrashCause, Health, Reply, ResetCause};
@@ -37,7 +37,7 @@ pub struct Bench {
     /// The time, which stands.
     pub tick_ms: u32,
     /// The made-up capture, and its bytes.
-    pub capture: Standing,
+    pub capture: CaptureStatus,
     pub captured: Vec<u8>,
 }
 
@@ -59,7 +59,7 @@ impl Bench {
             taxels: by_place(|place| 20_000 + place),
             tare: by_place(|place| (300 + place) << TARE_BITS),
             tick_ms: 0x1_8123,
-            capture: Standing::default(),
+            capture: CaptureStatus::default(),
             captured: Vec::new(),
         }
     }

@@ -3,7 +3,7 @@
 
 use fingertip::capture::State;
 use fingertip::command::Command;
-use fingertip::measure::{Ended, Standing, Task};
+use fingertip::measure::{Ended, MeasureStatus, Task};
 use fingertip::pipeline::Taring;
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Limits, Mode};
@@ -144,14 +144,14 @@ fn a_motion_is_refused_where_it_cannot_begin() {
 #[test]
 fn an_old_outcome_is_never_taken_for_that_of_a_new_motion() {
     let mut bench = Bench::new();
-    bench.status.measure = Standing::over(Task::Press, Ended::NoContact, -1_234);
+    bench.status.measure = MeasureStatus::over(Task::Press, Ended::NoContact, -1_234);
     let read = |bench: &mut Bench| {
         [address::MEASURE_STATE, address::MEASURE_ENDED, address::MEASURE_TASK].map(|place| bench.number(place, 1))
     };
     assert_eq!((read(&mut bench), bench.number(address::MEASURE_VALUE, 4)), ([3, 11, 3], -1_234_i32 as u32));
     bench.write(address::MEASURE, &[1]).expect("a jog");
     assert_eq!(bench.number(address::MEASURE_STATE, 1), 1, "before the loop has looked");
-    bench.status.measure = Standing::over(Task::Jog, Ended::Complete, 0);
+    bench.status.measure = MeasureStatus::over(Task::Jog, Ended::Complete, 0);
     bench.take_up();
     assert_eq!((read(&mut bench), bench.number(address::MEASURE_PROGRESS, 1)), ([2, 0, 1], 100));
 }

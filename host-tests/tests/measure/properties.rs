@@ -7,7 +7,7 @@ use fingertip::config::newtons;
 use fingertip::contact::Contact;
 use fingertip::control::SpeedLoop;
 use fingertip::measure::press::{Press, ROWS_MAX, Step, View};
-use fingertip::measure::{Standing, State, Task};
+use fingertip::measure::{MeasureStatus, State, Task};
 use fingertip::shipped::{COLUMNS, Picture, ROWS};
 use fingertip::units::Celsius;
 use host_tests::finger::config;
@@ -20,7 +20,7 @@ fn a_press_has_no_more_rows_than_stated() {
         let mut random = fastrand::Rng::with_seed(seed);
         let mut config = config();
         config.timing.frame_ns = random.u32(83_000..10_000_000);
-        let (mut motion, mut standing) = (SpeedLoop::new(), Standing::running(Task::Press));
+        let (mut motion, mut standing) = (SpeedLoop::new(), MeasureStatus::running(Task::Press));
         let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, Picture::EMPTY);
         let mut contact = Contact::default();
         motion.observe(0, &config);

@@ -9,8 +9,8 @@ use crate::link::packet::{
 use crate::link::snapshot::Snapshot;
 use crate::link::table::{self, READ_MAX, View};
 
-/// Who makes a pause as long as this in a packet that the devices share, at the slowest speed too, sends it no further:
-/// what comes then is another's.
+/// Longest pause in a packet that the devices share, ms, at the slowest speed too: after a longer one the bytes
+/// belong to another packet.
 const SILENCE_MS: u32 = 5;
 
 // The largest part of a shared packet, its beginning included, fits into a reply.
@@ -122,21 +122,21 @@ const FAST_HEAD: usize = 8;
 /// Bytes that each device adds to its data: error, ID and CRC.
 const FAST_EXTRA: u16 = 4;
 
-/// What was asked of this device.
+/// Request to this device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Request {
     pub address: u16,
     pub length: u16,
 }
 
-/// What this device waits for before it answers.
+/// Event that this device waits for before it answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// Nothing is asked.
+    /// No request.
     None,
     /// The status packet of this device.
     After(u8, Request),
-    /// This much more of the packet that the devices share.
+    /// The rest of the packet that the devices share.
     Shared(Shared, Request),
 }
 
@@ -146,14 +146,15 @@ pub struct Shared {
     /// The packet's length field.
     length: u16,
     heard: u16,
-    /// How much the devices before this one send, the packet's beginning included; nothing for the first.
+    /// Number of bytes that the devices before this one send, the packet's beginning included; 0 for the first.
     ahead: u16,
-    /// Of all that was heard.
+    /// Checksum of all that was heard.
     pub crc: u16,
 }
 
 impl Shared {
-    /// For the device at `place` of those that send so many bytes of data each; none where the packet were too long.
+    /// Creates the state for the device at `place` of devices that send `lengths` bytes of data; none if the packet
+    /// would be too long.
     pub fn new(place: usize, lengths: impl Iterator<Item = u16>) -> Option<Self> {
         let (mut whole, mut ahead) = (1_u16, 0);
         for (other, length) in lengths.enumerate() {
@@ -166,24 +167,24 @@ impl Shared {
         Some(Self { length: whole, heard: 0, ahead, crc: CRC_START })
     }
 
-    /// How the packet begins.
+    /// Returns the beginning of the packet.
     fn head(&self) -> [u8; FAST_HEAD] {
         let [low, high] = self.length.to_le_bytes();
         let [a, b, c, d] = HEADER;
         [a, b, c, d, BROADCAST, low, high, instruction::STATUS]
     }
 
-    /// Whether this device begins the packet.
+    /// Returns true if this device begins the packet.
     pub fn first(&self) -> bool {
         self.ahead == 0
     }
 
-    /// What this device sends before its part: the packet's beginning, where it is the first.
+    /// Returns the bytes that this device sends before its part: the packet's beginning, if it is the first.
     pub fn opening(&self) -> impl Iterator<Item = u8> {
         self.head().into_iter().take(if self.first() { FAST_HEAD } else { 0 })
     }
 
-    /// Takes a byte of the bus; false where it does not belong to the packet.
+    /// Takes a byte of the bus. Returns false if it does not belong to the packet.
     pub fn hear(&mut self, byte: u8) -> bool {
         let fits = self.head().get(usize::from(self.heard)).is_none_or(|&expected| expected == byte);
         self.heard = self.heard.saturating_add(1);
@@ -191,14 +192,14 @@ impl Shared {
         fits
     }
 
-    /// How much of the packet comes behind this device's part, which has so many bytes of data.
+    /// Returns the number of bytes of the packet behind this device's part with `length` bytes of data.
     pub fn behind(&self, length: u16) -> u16 {
         // The length leaves out the seven bytes before the instruction.
         let own = self.ahead.max(FAST_HEAD as u16).saturating_add(length).saturating_add(FAST_EXTRA);
         self.length.saturating_add(FAST_HEAD as u16 - 1).saturating_sub(own)
     }
 
-    /// Whether all that comes before this device's part was heard.
+    /// Returns true if all bytes before this device's part were heard.
     pub fn due(&self) -> bool {
         self.heard >= self.ahead
     }

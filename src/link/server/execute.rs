@@ -1,4 +1,4 @@
-//! What each instruction does.
+//! Execution of each instruction.
 
 use heapless::Vec;
 
@@ -13,7 +13,7 @@ use crate::store::Record;
 use super::answer::{Request, Shared, Turn};
 use super::{Device, Registered};
 
-/// Bytes of the longest status packet to a Ping, 10 bits each: what a device with a higher ID waits for.
+/// Bits of the longest status packet to a Ping, 10 per byte: a device with a higher ID waits for as long.
 const PING_SLOT_BITS: u32 = 14 * 10;
 /// Clear: the fault.
 const CLEAR_FAULT: [u8; 5] = [0x02, b'E', b'R', b'C', b'L'];
@@ -53,7 +53,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         }
     }
 
-    /// Counts what went wrong, and answers where only this device was addressed.
+    /// Counts an error, and answers if only this device was addressed.
     fn conclude(&mut self, packet: Packet<'_>, level: u8, result: Result<(), StatusError>, reply: &mut Reply) {
         let result = self.counted(result);
         if packet.id != BROADCAST {
@@ -137,8 +137,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
         Ok(())
     }
 
-    /// What has a register of its own, asked for by an option and a key against mistakes; other options are for what
-    /// there is not here.
+    /// Executes an instruction that has a register of its own, requested by an option and a key against mistakes.
+    /// Other options are for functions that do not exist here.
     fn on_key(&mut self, params: &[u8], key: [u8; 5], request: u16) -> Result<(), StatusError> {
         let params: [u8; 5] = params.try_into().map_err(|_| StatusError::Length)?;
         if params == key { self.write(request, &[1]) } else { Err(StatusError::Range) }
@@ -263,7 +263,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Device<ROWS, COLUMNS> {
     }
 }
 
-/// The entries of a bulk read: whom, and what of it.
+/// Entries of a bulk read: ID and request.
 fn bulk(params: &[u8]) -> Result<impl Iterator<Item = (u8, Request)> + Clone, StatusError> {
     let (entries, []) = params.as_chunks::<5>() else { return Err(StatusError::Length) };
     Ok(entries.iter().map(|&[id, a, b, c, d]| {
@@ -271,20 +271,20 @@ fn bulk(params: &[u8]) -> Result<impl Iterator<Item = (u8, Request)> + Clone, St
     }))
 }
 
-/// A 16-bit number, and what follows it.
+/// Splits off a 16-bit number.
 fn word(params: &[u8]) -> Option<(u16, &[u8])> {
     let (bytes, rest) = params.split_first_chunk()?;
     Some((u16::from_le_bytes(*bytes), rest))
 }
 
-/// An address and a length, and what follows them.
+/// Splits off an address and a length.
 fn request(params: &[u8]) -> Option<(Request, &[u8])> {
     let (address, rest) = word(params)?;
     let (length, rest) = word(rest)?;
     Some((Request { address, length }, rest))
 }
 
-/// An address and a length, and nothing else.
+/// Reads an address and a length, and nothing else.
 fn request_only(params: &[u8]) -> Result<Request, StatusError> {
     match request(params) {
         Some((request, [])) => Ok(request),

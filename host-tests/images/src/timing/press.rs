@@ -5,7 +5,7 @@ use fingertip::config::newtons;
 use fingertip::fixed::types::I8F24;
 use fingertip::measure::press::{PARTS, Press as Motion, Step, View};
 use fingertip::measure::series::{CHECK, Out, step_bytes};
-use fingertip::measure::{Row, Standing, Task};
+use fingertip::measure::{MeasureStatus, Row, Task};
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::Millimetres;
 
@@ -13,7 +13,7 @@ use fingertip::units::Millimetres;
 pub struct Press {
     motion: Option<Motion>,
     step: Step<ROWS, COLUMNS>,
-    standing: Standing,
+    standing: MeasureStatus,
     bytes: [u8; step_bytes(ROWS * COLUMNS)],
     part: u8,
     frames: u32,
@@ -22,7 +22,7 @@ pub struct Press {
 impl Press {
     /// Not begun.
     pub fn new() -> Self {
-        let standing = Standing::running(Task::Press);
+        let standing = MeasureStatus::running(Task::Press);
         Self { motion: None, step: Step::NONE, standing, bytes: [0; step_bytes(ROWS * COLUMNS)], part: 0, frames: 0 }
     }
 }

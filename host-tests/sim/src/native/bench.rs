@@ -14,7 +14,7 @@ use crate::setup::Setup;
 use crate::watch::Truth;
 use fingertip::command::Command;
 use fingertip::frame::Sense;
-use fingertip::measure::{Standing, State, Task};
+use fingertip::measure::{MeasureStatus, State, Task};
 use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
@@ -152,7 +152,7 @@ impl<E: Set> Bench<E> {
     ///
     /// # Panics
     /// The motion does not end within 30 s.
-    pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> Standing {
+    pub fn measure(&mut self, task: Task, mut each: impl FnMut(&mut Self)) -> MeasureStatus {
         self.request(task);
         let request = self.command().measure_request;
         for _ in 0..MEASURE_FRAMES {

@@ -2,7 +2,7 @@
 
 use crate::{drawn, fingers_or, population, print_worst, rows};
 use fingertip::measure::press::ROWS_MAX;
-use fingertip::measure::{Ended, Standing, State, Task};
+use fingertip::measure::{Ended, MeasureStatus, State, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Fault;
@@ -20,7 +20,7 @@ const FORCE_SHARE: f64 = 1.05;
 
 /// One press, and what was true meanwhile.
 struct Made {
-    standing: Standing,
+    standing: MeasureStatus,
     fault: Option<Fault>,
     rows: u32,
     record: Vec<u8>,
@@ -62,7 +62,7 @@ fn tips(count: usize, changes: &[(&str, &str)]) -> Vec<Finger> {
 }
 
 fn told(finger: &Finger, made: &Made) -> String {
-    let Standing { ended, value, .. } = made.standing;
+    let MeasureStatus { ended, value, .. } = made.standing;
     format!(
         "{ended:?} {value} {:?} after {:.2} s; {:.0} kPa, {:.2} N, {:.2} mm deep, {} rows",
         made.fault,

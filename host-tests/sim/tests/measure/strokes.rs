@@ -1,7 +1,7 @@
 //! Jog and strokes on drawn drives, in free air and with an object in their way.
 
 use crate::{drawn, fingers_or, population, print_worst, rows};
-use fingertip::measure::{Ended, Standing, State, Task};
+use fingertip::measure::{Ended, MeasureStatus, State, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use sim::cores;
@@ -19,7 +19,7 @@ const FORCE_N: f64 = 0.3;
 
 /// One motion, and the largest true distance and force.
 struct Made {
-    standing: Standing,
+    standing: MeasureStatus,
     rows: u32,
     travel_mm: f64,
     force_n: f64,
@@ -59,7 +59,7 @@ fn judge(name: &str, made: &[(Finger, Made)]) -> usize {
     let all = |of: fn(&Made) -> f64| made.iter().enumerate().map(|(number, (_, made))| (of(made), number)).collect();
     println!("{name}:");
     for (number, (finger, made)) in made.iter().enumerate() {
-        let Standing { ended, value, progress, .. } = made.standing;
+        let MeasureStatus { ended, value, progress, .. } = made.standing;
         if ended != Ended::Complete {
             println!(
                 "  drive {number}: {ended:?} {value} after {:.2} s, {progress} %; friction {:.2} %, {:.0} % more at rest, {:.0} counts",

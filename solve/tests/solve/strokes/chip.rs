@@ -3,7 +3,7 @@
 use super::drive::{DELAY_S, FRAME_S, Rig};
 use fingertip::measure::series::{CHECK, HEAD, Head, Out};
 use fingertip::measure::strokes::{Kept, Strokes, View};
-use fingertip::measure::{Ended, Row, Standing, State, Task};
+use fingertip::measure::{Ended, MeasureStatus, Row, State, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::units::Newtons;
@@ -34,7 +34,7 @@ pub fn measure(rig: &mut Rig, strokes: usize) -> Record {
     let config = Config::shipped(&params).expect("a sheet that is allowed");
     let first = rig.view();
     let mut run = Strokes::begin(Task::Strokes, first.count);
-    let mut standing = Standing::running(Task::Strokes);
+    let mut standing = MeasureStatus::running(Task::Strokes);
     let mut bytes = vec![0; 4 * ROWS];
     let (mut check, mut length, mut begun, mut applied, mut full) = (CHECK, 0, 0, 0.0, false);
     while run.running() {

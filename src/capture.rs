@@ -188,7 +188,7 @@ pub mod width {
 /// Head of a capture: the state of the loop before its first frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Head<const ROWS: usize, const COLUMNS: usize> {
-    /// Why it ended.
+    /// Reason why the capture ended.
     pub ended: Ended,
     /// Number of frames.
     pub frames: u32,
@@ -202,7 +202,7 @@ pub struct Head<const ROWS: usize, const COLUMNS: usize> {
     pub missed_frames: u32,
     /// Requests acknowledged before.
     pub taken: Taken,
-    /// What is known of the motor's winding, as [`Winding`](crate::control::Winding) tells it.
+    /// Thermal state of the motor's winding, see [`Winding`](crate::control::Winding).
     pub winding: [u32; WINDING_WORDS],
     /// Time from frame to frame, ns.
     pub frame_ns: u32,

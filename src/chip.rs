@@ -126,7 +126,7 @@ mod tests {
 
     const FACTORY: Factory = Factory { reference: 1_502, sensor: [954, 1_202] };
 
-    /// What is told of codes that stand still.
+    /// Results for constant codes.
     fn told(factory: Factory, reference: u16, sensor: u16) -> (u16, Option<f64>) {
         let mut chip = Chip::new(factory);
         for frame in 1..=FRAMES {

@@ -1,7 +1,7 @@
 //! Parameters, turned once into the numbers that the loop works with.
 //!
-//! This module is the only one with floating point: single precision, and only + - * /, so the host and the target agree
-//! to the bit. `docs/control.md` gives the formulas and their reasons.
+//! This module is the only one with floating point: single precision, and only + - * /, so the host and the target
+//! agree to the bit. `docs/control.md` gives the formulas and their reasons.
 
 pub(crate) mod array;
 mod bounds;

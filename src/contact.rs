@@ -1,8 +1,10 @@
-//! The picture to a contact: total force, centre, indentation and radius, and how far the picture is a contact at all.
+//! From the tactile image to a contact: total force, centre, indentation and radius, and the likeness of the image to
+//! a contact.
 //!
-//! Where the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. Where
-//! it does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to
-//! the taxels that do see it, by [`Fit`] from frame to frame. `docs/contact.md` gives the method and the measured errors.
+//! If the array sees the whole contact, the sum of the taxels is its force and their moments are its centre. If it
+//! does not, because the contact reaches over the array's edge or over a bad taxel, the paper's model is fitted to
+//! the taxels that do see it, by [`Fit`] from frame to frame. `docs/contact.md` gives the method and the measured
+//! errors.
 
 mod equations;
 mod fit;

@@ -24,8 +24,8 @@
 //!
 //! # Speed reference
 //!
-//! The time-optimal speed over the distance e with a deceleration a is sqrt(2 a |e|). Its slope is infinite at e = 0, so
-//! near the goal a line of slope k takes over where both agree in value and slope (a proximate time-optimal servo):
+//! The time-optimal speed over the distance e with a deceleration a is sqrt(2 a |e|). Its slope is infinite at e = 0,
+//! so near the goal a line of slope k takes over where both agree in value and slope (a proximate time-optimal servo):
 //!
 //! ```text
 //! |e| <= a / (2 k^2):  v_ref = k e                                 a_ref = -k v
@@ -38,9 +38,9 @@
 //!
 //! Rest and speed want different bandwidths. The calmest gain set is for distances within twice a band that encoder
 //! counts and noise explain, each quicker set for distances twice as long. When the mean distance is longer, the loop
-//! becomes quicker at once; when it was half as long for four of the loop's own time constants, the loop becomes calmer.
-//! So a loop that swings slows down, whatever made it swing. Only gains change, never the state of observer and drive,
-//! so a change of the gain set moves nothing.
+//! becomes quicker at once; when it was half as long for four of the loop's own time constants, the loop becomes
+//! calmer. So a loop that swings slows down, whatever made it swing. Only gains change, never the state of observer and
+//! drive, so a change of the gain set moves nothing.
 
 mod compensation;
 mod drive;
@@ -167,8 +167,8 @@ impl SpeedLoop {
         clamp_bits(high(speed << 3, config.damping_q17_per_s), 28) << 4
     }
 
-    /// Deceleration that the motor can surely give to a motion in the direction of `distance`, with the current that the
-    /// winding's temperature allows.
+    /// Deceleration that the motor can surely give to a motion in the direction of `distance`, with the current that
+    /// the winding's temperature allows.
     ///
     /// The contact force brakes a tip that presses in and accelerates one that releases: the disturbance contains it.
     #[inline(always)]
@@ -252,8 +252,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Returns the fastest reference over `distance` that ends at rest, at the present speed `speed`, with a deceleration
-    /// `brake` of up to 1000 m/s^2.
+    /// Returns the fastest reference over `distance` that ends at rest, at the present speed `speed`, with a
+    /// deceleration `brake` of up to 1000 m/s^2.
     #[inline(always)]
     pub fn towards(
         distance: Millimetres,

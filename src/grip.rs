@@ -70,8 +70,8 @@ struct Release {
 }
 
 impl Grip {
-    /// Takes a frame of a grip whose bus is `silent`, or was. Returns true once the tip rests clear of the object, at the
-    /// latest 0.5 s after the bus fell silent.
+    /// Takes a frame of a grip whose bus is `silent`, or was. Returns true once the tip rests clear of the object, at
+    /// the latest 0.5 s after the bus fell silent.
     pub fn ends(&mut self, silent: bool, touch: &Touch, motion: &SpeedLoop, config: &Config) -> bool {
         if !silent && self.silent_ns.is_none() {
             return false;

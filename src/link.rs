@@ -7,7 +7,7 @@
 //! The firmware feeds received bytes to a [`Server`] together with a [`Snapshot`] of the loop, sends the reply,
 //! passes [`Server::command`] on to the loop and carries out [`Server::take_actions`].
 //!
-//! What happens where, beyond the protocol's own rules:
+//! Rules beyond those of the protocol:
 //!
 //! | subject | rule |
 //! | --- | --- |

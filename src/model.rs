@@ -18,8 +18,8 @@
 //! assert_eq!(tip.contact_radius(Millimetres::from_bits(2 << 24)), Millimetres::from_bits(6 << 24));
 //! ```
 //!
-//! Functions of a point of the contact name it by its distance `r` from the contact's centre. Arithmetic is of 32 and 64
-//! bits only, except where a [`Gain`] is made.
+//! Functions of a point of the contact name it by its distance `r` from the contact's centre. Arithmetic is of 32 and
+//! 64 bits only, except where a [`Gain`] is made.
 
 mod pressure;
 
@@ -189,8 +189,8 @@ impl Tip {
 
     /// `pi Y` times a number with 48 bits after the point, rounded once, to nearest.
     ///
-    /// A squared length in mm^2 gives a force in N, a cubed length in mm^3 a moment in N mm. The result has `16 - drop` bits
-    /// after the point. The number counts as at most 2^15, `drop` as at most 16.
+    /// A squared length in mm^2 gives a force in N, a cubed length in mm^3 a moment in N mm. The result has `16 - drop`
+    /// bits after the point. The number counts as at most 2^15, `drop` as at most 16.
     pub fn pi_y_times(&self, number_q48: u64, drop: u32) -> u64 {
         self.force_gain.round_short(number_q48.min(1 << 63), drop.min(16))
     }
@@ -219,8 +219,8 @@ impl Tip {
         Millimetres::from_bits(root(square(self.radius_bits()) - square(self.distance(r))) as i32)
     }
 
-    /// How far the column at `r` is compressed: `dL = sqrt(a^2 - r^2) - (a - d)` inside the contact, 0 outside (eq. 16;
-    /// the length QC of eq. 4).
+    /// Compression of the column at `r`: `dL = sqrt(a^2 - r^2) - (a - d)` inside the contact, 0 outside (eq. 16; the
+    /// length QC of eq. 4).
     ///
     /// Correctly rounded: both terms are multiples of the unit, and the root is the nearest one.
     pub fn compression(&self, r: Millimetres, d: Millimetres) -> Millimetres {
@@ -233,7 +233,7 @@ impl Tip {
         self.radius().to_bits().unsigned_abs()
     }
 
-    /// What is left between plane and centre, `a - d`, in units of the last place.
+    /// Distance between plane and centre, `a - d`, in units of the last place.
     const fn rest(&self, depth: u32) -> u32 {
         self.radius_bits() - depth
     }

@@ -8,7 +8,7 @@
 pub struct ParamError {
     /// The field of [`Params`].
     pub name: &'static str,
-    /// What was asked for.
+    /// Requested value.
     pub value: i32,
     /// The least value allowed.
     pub min: i32,
@@ -41,7 +41,7 @@ macro_rules! params {
         pub struct Params { $($(#[doc = $doc])+ pub $name: i32,)* }
 
         impl Params {
-            /// How many there are.
+            /// Number of parameters.
             pub const COUNT: usize = [$(stringify!($name)),*].len();
 
             /// The parameters of the reference finger, described in `docs/board.md`.
@@ -71,7 +71,7 @@ macro_rules! params {
             pub const RANGES: [(&'static str, i32, i32, i32); Self::COUNT] =
                 [$((stringify!($name), $default, $min, $max)),*];
 
-            /// What each says in its documentation, in order.
+            /// Documentation of each parameter, in order.
             pub const DOCS: [&'static str; Self::COUNT] = [$(concat!($($doc),+)),*];
         }
     };
@@ -105,7 +105,7 @@ params! {
     contact_on_mn = 40 in 5..=2_000;
     /// Contact ends below this force. Must be below contact_on_mn.
     contact_off_mn = 15 in 1..=2_000;
-    /// Whether the baseline follows drift while there is no contact: 1 yes, 0 no.
+    /// Baseline follows drift while there is no contact: 1 yes, 0 no.
     baseline_follows = 1 in 0..=1;
     /// Torque constant of the motor, uN m/A.
     torque_constant_unm_per_a = 5_350 in 100..=200_000;
@@ -129,9 +129,9 @@ params! {
     speed_max_um_per_s = 250_000 in 1_000..=2_000_000;
     /// Speed of the approach and of the release. Must not be above speed_max_um_per_s.
     approach_um_per_s = 30_000 in 500..=200_000;
-    /// How far the tip may travel from where torque was first enabled.
+    /// Largest travel of the tip from where torque was first enabled.
     travel_max_um = 20_000 in 100..=100_000;
-    /// How far the tip backs off after contact is lost on release.
+    /// Distance that the tip backs off after contact is lost on release.
     clearance_um = 1_000 in 0..=20_000;
     /// Over-force: above this the motor is stopped. Must be above force_max_mn.
     force_fault_mn = 9_000 in 100..=200_000;
@@ -141,21 +141,21 @@ params! {
     supply_min_mv = 5_000 in 1_000..=48_000;
     /// Above this supply the motor is stopped. Must be above supply_min_mv.
     supply_max_mv = 8_500 in 2_000..=60_000;
-    /// How much more force a code means at the converter's full range than at none, permille: the array's
+    /// Increase of the force per code at the converter's full range, compared with small codes, permille: the array's
     /// characteristic. 0 is a line. With more, codes_per_kpa_milli is that of small pressures, and must leave 1,000 at
     /// the full range.
     curve_permille = 0 in 0..=8_000;
-    /// By how much the reading of a held force grows in the end, permille of it: the array's creep. 0 takes none off.
+    /// Final growth of the reading of a held force, permille of it: the array's creep. 0 turns the compensation off.
     creep_permille = 0 in 0..=300;
     /// Time constant of the creep.
     creep_time_ms = 10_000 in 50..=600_000;
-    /// Whether somebody saw that positive duty moves the tip towards the object, and the jog that the encoder then counts
-    /// up: 1 yes, 0 no. Without it torque is refused. See `docs/commissioning.md`.
+    /// Direction confirmed: positive duty moves the tip towards the object, and the jog showed that the encoder then
+    /// counts up: 1 yes, 0 no. Without it torque is refused. See `docs/commissioning.md`.
     direction_confirmed = 0 in 0..=1;
-    /// Largest temperature of the winding, degrees Celsius: below it the current is held back, see limit 13.
+    /// Largest temperature of the winding, degrees Celsius: the current is reduced below it, see limit 13.
     winding_max_c = 125 in 85..=250;
-    /// Thermal resistance from winding to housing. 0 leaves it out; with housing_k_per_w of 0 as well the winding is taken
-    /// for as warm as its surroundings.
+    /// Thermal resistance from winding to housing. 0 leaves it out; with housing_k_per_w of 0 as well the winding is
+    /// assumed to have the temperature of its surroundings.
     winding_k_per_w = 20 in 0..=500;
     /// Thermal time constant of the winding.
     winding_time_ms = 5_000 in 2_000..=600_000;
@@ -163,17 +163,17 @@ params! {
     housing_k_per_w = 26 in 0..=500;
     /// Thermal time constant of the housing.
     housing_time_ms = 400_000 in 2_000..=10_000_000;
-    /// The warmest that it gets around the motor, degrees Celsius.
+    /// Largest temperature around the motor, degrees Celsius.
     ambient_c = 40 in -40..=60;
-    /// Change of the array's gain for a K, by the microcontroller's temperature. 0 takes none off.
+    /// Change of the array's gain for a K, by the microcontroller's temperature. 0 turns the compensation off.
     array_gain_ppm_per_k = 0 in -10_000..=10_000;
     /// The microcontroller's temperature at which the array's gain is right, degrees Celsius.
     array_gain_at_c = 25 in -40..=125;
-    /// Change of every taxel's zero for a K, by the microcontroller's temperature since the zero was last learnt. 0 takes
-    /// none off.
+    /// Change of every taxel's zero for a K, by the microcontroller's temperature since the zero was last learnt. 0
+    /// turns the compensation off.
     array_zero_pa_per_k = 0 in -1_000..=1_000;
-    /// How far below the converter's largest code, 4,095, a column amplifier may clip. A taxel that reads this close to
-    /// it counts as saturated. 255 codes are 205 mV.
+    /// Distance below the converter's largest code, 4,095, within which a column amplifier may clip. A taxel that reads
+    /// this close to it counts as saturated. 255 codes are 205 mV.
     headroom_codes = 255 in 5..=2_000;
 }
 

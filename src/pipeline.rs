@@ -39,8 +39,8 @@ pub struct Pipeline<const ROWS: usize, const COLUMNS: usize> {
     repeated: Option<u32>,
     /// True once the travel has its zero: the place where torque was first enabled.
     zeroed: bool,
-    /// True once torque was off in a frame after which the array had a zero or was about to get one: torque may be taken
-    /// up. Torque that has been on for longer drives nothing until it was off.
+    /// True once torque was off in a frame after which the array had a zero or was about to get one: torque may be
+    /// enabled. Torque that has been on for longer drives nothing until it was off.
     armed: bool,
     /// Torque of the last command; on before the first one.
     torque: bool,

@@ -1,5 +1,5 @@
-//! What holds whatever the loop, the fit or the host believe: the guard, with the last word on the duty, and the
-//! monitor, which looks for what must hold in every frame. `docs/safety.md` states the promises by number.
+//! Protection that is independent of loop, fit and host: the guard, with the last word on the duty, and the monitor,
+//! which checks conditions of every frame. `docs/safety.md` states the promises by number.
 
 pub mod guard;
 pub mod monitor;

@@ -313,7 +313,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// What the shipped board makes of it: a PWM of 20 to 40 kHz in step with whatever scan is asked for.
+    /// Timing of the shipped board: a PWM of 20 to 40 kHz in step with the requested scan.
     #[test]
     fn a_frame_is_a_whole_number_of_its_parts() {
         let clocks = Clocks { slot_step: 12, ..CLOCKS };

@@ -1,4 +1,4 @@
-//! The array that this controller is built for, and everything that goes by its shape.
+//! The array that this controller is built for, and the types of its shape.
 //!
 //! The core takes any [`Shape`]; board and host code take it from here.
 
@@ -82,7 +82,7 @@ pub type Server = crate::link::Server<ROWS, COLUMNS>;
 pub const REGISTERS: &[table::Register] = &ALL;
 static ALL: [table::Register; table::COUNT] = table::registers::<ROWS, COLUMNS>();
 
-/// Where each register begins.
+/// Address of each register.
 pub mod address {
     use super::{COLUMNS, ROWS, table};
 

@@ -9,8 +9,8 @@
 //! | then 4 | CRC-32 (ISO-HDLC) of all before |
 //!
 //! All little-endian; FF up to the next multiple of 16. The number of a name is its CRC-32, so a firmware with other
-//! values takes those that it knows. Behind the parameters come the taxels' gains, two in a value, under the numbers from
-//! [`gains_number`] on; they are left out where all are 1.
+//! values takes those that it knows. Behind the parameters come the taxels' gains, two in a value, under the numbers
+//! from [`gains_number`] on; they are left out where all are 1.
 //!
 //! [`Journal`] has the order of writing and erasing: the sector that holds the newest whole record is never erased. So
 //! a loss of power leaves the old record or the new one. A record that was cut short fails the CRC: the one before it

@@ -10,9 +10,9 @@
 //! | doubtful | the force vanished in a frame: the object is gone, or the array's signal | a force returns: held; a release has backed off: clear |
 //! | clear | a release has backed off; what the array still reads is a residue of the contact | a larger reading: held; the next approach: none |
 //!
-//! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step is
-//! withheld: the loop continues with the force before it, and does not press harder. The guard keeps a record of its own,
-//! from raw readings, on purpose.
+//! A force cannot fall by a quarter within a frame: the object would have to leave at metres in a second. Such a step
+//! is withheld: the loop continues with the force before it, and does not press harder. The guard keeps a record of its
+//! own, from raw readings, on purpose.
 
 use crate::config::Config;
 use crate::contact::Contact;
@@ -80,7 +80,7 @@ pub struct Touch {
     felt: Millimetres,
     /// Largest force of this touch.
     peak: Newtons,
-    /// Least force of a touch without a place, or since the tip stands clear.
+    /// Least force of a touch without a place, or since the tip is clear.
     least: Newtons,
     /// Force that the array lost in a step, added to what it reads.
     withheld: Newtons,
@@ -88,10 +88,10 @@ pub struct Touch {
     /// too much is no reference.
     before: (Newtons, Newtons, u8),
     lesser: (Newtons, Newtons),
-    /// Lower estimate of the force: the plain sum where much of the contact may be hidden, else the force of the fit. The
-    /// fit takes a faulty taxel at the array's edge for a contact many times larger.
+    /// Lower estimate of the force: the plain sum where much of the contact may be hidden, else the force of the fit.
+    /// The fit takes a faulty taxel at the array's edge for a contact many times larger.
     shown: Newtons,
-    /// Frames since the force began, or since the tip stands clear.
+    /// Number of frames since the force began, or since the tip is clear.
     frames: u32,
     /// Frames for which the force has been above its least by `contact_on_mn`, where the touch has no place yet.
     risen: u32,
@@ -144,7 +144,8 @@ impl Touch {
         self.before = (force, felt.summed, felt.contact.bad_taxels);
     }
 
-    /// Starts a touch. A force that returns keeps the surface and the largest force of the contact before, until it rises.
+    /// Starts a touch. A force that returns keeps the surface and the largest force of the contact before, until it
+    /// rises.
     fn begin(&mut self, felt: &Felt, by_motor: Millimetres) {
         let force = felt.contact.force;
         let kept = self.stage != Stage::None && self.place != Place::Here;
@@ -201,7 +202,7 @@ impl Touch {
         let here = place(felt, self.felt);
         let sure = felt.contact.doubt == 0;
         match self.place {
-            // Where a part of the contact is hidden, an indentation that is too small must not move the surface.
+            // If a part of the contact is hidden, an indentation that is too small must not move the surface.
             Place::Here if sure => self.surface = self.surface.max(here),
             Place::Before if rises => {
                 // A contact that was lost to the array alone is where it was.
@@ -326,8 +327,8 @@ impl Touch {
     }
 }
 
-/// Travel at which the tip touches, from the present frame. Where a part of the contact is hidden, the indentation that the
-/// motor measured counts if it is larger.
+/// Travel at which the tip touches, from the present frame. Where a part of the contact is hidden, the indentation that
+/// the motor measured counts if it is larger.
 fn place(felt: &Felt, by_motor: Millimetres) -> Millimetres {
     let Contact { indentation, doubt, .. } = *felt.contact;
     let deep = if doubt > 0 { indentation.max(by_motor) } else { indentation };

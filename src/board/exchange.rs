@@ -93,7 +93,7 @@ pub static GAINS: Mailbox<Gains> = Mailbox::new(Gains::ONE);
 pub static SAVE: Mailbox<Record> = Mailbox::new(Record::DEFAULT);
 /// See [`SAVE`].
 pub static SAVED: Signal<CriticalSectionRawMutex, Result<(), NotSaved>> = Signal::new();
-/// The newest picture; control leaves it as it is while the link answers from it.
+/// Newest snapshot; control does not change it while the link answers from it.
 pub static PICTURE: Mailbox<Picture> = Mailbox::full(Picture {
     report: None,
     frame: Frame::EMPTY,

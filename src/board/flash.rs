@@ -41,14 +41,14 @@ impl Store {
         self.journal.load(&self.chip, tell)
     }
 
-    /// See [`Journal::make_room`]. Takes up to 2 s in which the core stands, so call it before the watchdog and the
+    /// See [`Journal::make_room`]. Takes up to 2 s in which the core halts, so call it before the watchdog and the
     /// scan start.
     pub fn make_room(&mut self) -> Result<bool, SaveError> {
         self.journal.make_room(&mut self.chip, Record::SLOT_MAX)
     }
 
-    /// Appends a record. The core stands while each of its words (`Record::slot_bytes`) is programmed, 16 us and at
-    /// most 100 us: the motor must be off, the scan stopped, and `between` them the watchdog fed.
+    /// Appends a record. The core halts while each of its words (`Record::slot_bytes`) is programmed, 16 us and at
+    /// most 100 us: the motor must be off and the scan stopped, and `between` must feed the watchdog.
     ///
     /// # Errors
     /// There is no room, or the flash does not hold the record afterwards.
@@ -109,8 +109,8 @@ fn drop_cached_data() {
     acr.modify(|w| w.set_dcen(true));
 }
 
-/// The code of level 3 in the register: it resets before the supply is below 2.7 V, the least for 168 MHz with five wait
-/// states (docs/board.md, Option bytes).
+/// The code of level 3 in the register: it resets before the supply is below 2.7 V, the least for 168 MHz with five
+/// wait states (docs/board.md, Option bytes).
 const LEVEL_3: u8 = 0b00;
 
 /// Returns all option bytes.

@@ -75,7 +75,7 @@ pub fn restart(from: u32, frames: u32, timing: ScanTiming) {
     PERIOD.store(period, Ordering::Relaxed);
     pac::TIM5.ccr(COMPARE_1).write_value(from.wrapping_add(period));
     if !pac::TIM5.dier().read().ccie(COMPARE_1) {
-        // What matched while the guard rested is void.
+        // A match while the guard rested is void.
         clear_flag();
     }
     pac::TIM5.dier().write(|w| w.set_ccie(COMPARE_1, true));

@@ -34,7 +34,7 @@ impl LinkTask {
     async fn run(&mut self) {
         let mut received = [0; 256];
         let mut reply = Reply::new();
-        // What is stored of it counts before anybody asks.
+        // Stored requests apply before the host sends any.
         self.pass_on();
         loop {
             match self.bus.receive(&mut received).await {
@@ -56,7 +56,7 @@ impl LinkTask {
     async fn answer(&mut self, mut bytes: &[u8], reply: &mut Reply) {
         let received = Instant::now();
         while !bytes.is_empty() {
-            // Control, which fills the picture, interrupts this task: here it is never under way.
+            // Control, which fills the snapshot, interrupts this task: it never runs at this point.
             let Some(taken) = self.feed(bytes, reply) else { return };
             bytes = bytes.get(taken..).unwrap_or_default();
             self.pass_on();
@@ -121,7 +121,7 @@ impl LinkTask {
 
 /// Has control write to flash, which makes the core wait: never while the motor is driven.
 async fn save(record: &Record) -> bool {
-    // What an earlier save left is void.
+    // The result of an earlier save is void.
     SAVE.take(|_| ());
     SAVED.reset();
     SAVE.fill(|place| *place = *record);

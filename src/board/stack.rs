@@ -35,8 +35,8 @@ pub struct Paint {
 }
 
 impl Paint {
-    /// Looks at the next piece. Where it comes to the end of the paint: the bytes that the stack has taken at most since
-    /// the reset.
+    /// Looks at the next piece. Where it comes to the end of the paint: the bytes that the stack has taken at most
+    /// since the reset.
     pub fn look(&mut self) -> Option<u16> {
         let (end, top) = (&raw const _stack_end, &raw const _stack_start);
         for _ in 0..PIECE {

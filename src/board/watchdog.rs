@@ -62,7 +62,8 @@ impl Watchdogs {
         self.set(Wdgtb::from_bits(divider), (ticks >> divider) as u8 + u8::from(divider > 0));
     }
 
-    /// Lets the window watchdog wait for as long as it can, 49 ms. The independent one bites after 8 ms at the earliest.
+    /// Lets the window watchdog wait for as long as it can, 49 ms. The independent one bites after 8 ms at the
+    /// earliest.
     pub fn allow_long(&mut self) {
         self.set(Wdgtb::DIV8, LARGEST as u8);
     }

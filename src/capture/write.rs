@@ -3,8 +3,8 @@
 //! # Numbers that are mostly small
 //!
 //! A number is folded (0, -1, 1, -2 .. are 0, 1, 2, 3 ..) and written as its part above a width in ones, a zero, and as
-//! many low bits as the width (a Rice code). A number that would take [`ESCAPE`] ones or more is written as these ones and
-//! all its bits.
+//! many low bits as the width (a Rice code). A number that would take [`ESCAPE`] ones or more is written as these ones
+//! and all its bits.
 
 use super::{CaptureStatus, Ended, Head, Last, State, digest_step, digest_words, short_digest, width};
 use crate::command::Command;

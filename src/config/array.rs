@@ -3,9 +3,9 @@
 //! # Geometry
 //!
 //! The fit has a table of the model over the squared distance. Lengths are in tip radii. A taxel at the distance r from
-//! the contact's centre, with sides h, sees squared distances spread around `r^2 + h^2/6` with the variance `(h r)^2 / 3`
-//! whatever its direction. So its mean is taken over squared distances spread evenly over `r^2 + h^2/6 +- h r`, and both
-//! parts of the model have closed forms there:
+//! the contact's centre, with sides h, sees squared distances spread around `r^2 + h^2/6` with the variance `(h r)^2 /
+//! 3` whatever its direction. So its mean is taken over squared distances spread evenly over `r^2 + h^2/6 +- h r`, and
+//! both parts of the model have closed forms there:
 //!
 //! - inside the contact, `p/Y = 1 - s G` with `G = (L1 - L2) / (h r)`, the mean of 1/L,
 //! - under the rim, `p/Y = (L1 - s)^2 / (2 h r)`,

@@ -135,7 +135,8 @@ const COUNTS_MAX: f32 = 1_048_576.0;
 /// Largest voltage in the motions' arithmetic, uV.
 const UV_MAX: f32 = 50_000_000.0;
 
-/// Bounds of the motions that measure the drive; see [`crate::measure::strokes`]. Lengths in encoder counts, times in frames, voltages in uV.
+/// Bounds of the motions that measure the drive; see [`crate::measure::strokes`]. Lengths in encoder counts, times in
+/// frames, voltages in uV.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motions {
     /// Distance to each side within which pulses feel the friction.

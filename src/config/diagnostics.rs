@@ -4,15 +4,16 @@ use super::{Config, SEEN_LEAST, newtons};
 use crate::params::ParamError;
 use crate::scan::ScanError;
 
-/// Why parameters were refused.
+/// Reason to refuse parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// One is out of its range.
+    /// A parameter is out of its range.
     Param(ParamError),
-    /// The scan cannot be timed so.
+    /// The scan cannot be timed with these parameters.
     Scan(ScanError),
-    /// Two contradict each other, by name and value: the first must be below the second; the speeds may be equal.
+    /// Two parameters contradict each other, by name and value: the first must be below the second; the speeds may be
+    /// equal.
     Order([(&'static str, i32); 2]),
     /// The largest voltage at the motor, mV, is more than four times the least supply.
     Supply(i32, i32),
@@ -53,8 +54,8 @@ impl core::error::Error for ConfigError {}
 
 /// Contacts from this part of `force_max_mn` on should be seen as hemispheres: 1/8.
 const PART: i32 = 8;
-/// Radius of such a contact over the pitch, in pitches. Where taxels read their mean pressure, a dead one costs 2 % of the force at
-/// most from 1.65 on, and up to 30 % below 1.5. The rest is for taxels that are smaller than the pitch.
+/// Radius of such a contact over the pitch, in pitches. Where taxels read their mean pressure, a dead one costs 2 % of
+/// the force at most from 1.65 on, and up to 30 % below 1.5. The rest is for taxels that are smaller than the pitch.
 const PITCHES: i64 = 2;
 /// The slowest frames for which the gains follow the frame time, ns: 5 frames of them take 1/60 s.
 const FRAME_NS: u32 = 3_333_333;
@@ -98,7 +99,8 @@ impl core::fmt::Display for Warning {
         match self {
             Self::CoarsePitch { pitch_um, force_mn, radius_um } => write!(
                 f,
-                "pitch_um of {pitch_um}: a contact of {force_mn} mN has a radius of {radius_um} um, less than {PITCHES} taxels; \
+                "pitch_um of {pitch_um}: a contact of {force_mn} mN has a radius of {radius_um} um, less than \
+                 {PITCHES} taxels; \
                  its confidence is low, and one dead taxel falsifies the force"
             ),
             Self::ForceUnseen { force_max_mn, seen_mn } => write!(
@@ -107,18 +109,20 @@ impl core::fmt::Display for Warning {
             ),
             Self::SlowFrames { frame_ns } => write!(
                 f,
-                "frames of {frame_ns} ns: the gains follow the frame time up to {FRAME_NS} ns; the guard and the motions that measure are made for quicker ones"
+                "frames of {frame_ns} ns: the gains follow the frame time up to {FRAME_NS} ns; the guard and \
+                 the motions that measure are made for quicker ones"
             ),
             Self::CoarseEncoder { count_um } => write!(
                 f,
-                "encoder_counts_per_turn: a count is {count_um} um of travel; jog and strokes are refused above {COUNT_UM}"
+                "encoder_counts_per_turn: a count is {count_um} um of travel; jog and strokes are refused above \
+                 {COUNT_UM}"
             ),
         }
     }
 }
 
 impl Config {
-    /// Returns what is doubtful about this configuration, for a host to show.
+    /// Returns the warnings about this configuration, for a host to show.
     pub fn warnings(&self) -> impl Iterator<Item = Warning> {
         let p = &self.params;
         let force_mn = p.force_max_mn / PART;

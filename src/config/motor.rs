@@ -2,17 +2,17 @@
 //!
 //! # Gain sets
 //!
-//! A quick loop answers each encoder count with a kick of the voltage. An observer with its poles at w_o takes a step of
-//! one count q for a speed of about w_o q and a disturbance of w_o^2 q, and the law with w_o = 2.5 k_v answers with
+//! A quick loop answers each encoder count with a kick of the voltage. An observer with its poles at w_o takes a step
+//! of one count q for a speed of about w_o q and a disturbance of w_o^2 q, and the law with w_o = 2.5 k_v answers with
 //!
 //! ```text
 //! g dV = (k_v w_o 0.8 + w_o^2) q 0.7 = 5.8 k_v^2 q
 //! ```
 //!
-//! The quickest gain set is the slowest of three: the one that the dead time allows, `1 / (5 T)`, the one at which a count
-//! moves the voltage by three quarters of the largest, and the one at which a count is taken for 60 mm/s. So a coarse
-//! encoder makes a slower loop, never a swinging one. Each further gain set is half as quick and answers a count with a
-//! quarter of the voltage. At rest the answer to a count is 1/64 of that of the quickest set.
+//! The quickest gain set is the slowest of three: the one that the dead time allows, `1 / (5 T)`, the one at which a
+//! count moves the voltage by three quarters of the largest, and the one at which a count is taken for 60 mm/s. So a
+//! coarse encoder makes a slower loop, never a swinging one. Each further gain set is half as quick and answers a count
+//! with a quarter of the voltage. At rest the answer to a count is 1/64 of that of the quickest set.
 
 use super::{exp2, narrow, wide};
 use crate::arith::floor_sqrt;

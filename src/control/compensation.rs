@@ -6,8 +6,9 @@
 //! # Creep
 //!
 //! Under a constant force F the reading grows to F (1 + k) with the time constant tau. So a part c of a reading S is
-//! creep, c' = (k (S - c) - c) / tau: a lag towards S k / (1 + k) with tau / (1 + k). The lag has one state of first order
-//! and moves at most half of the difference in a frame, so it stays between 0 and the largest target, and cannot ring.
+//! creep, c' = (k (S - c) - c) / tau: a lag towards S k / (1 + k) with tau / (1 + k). The lag has one state of first
+//! order and moves at most half of the difference in a frame, so it stays between 0 and the largest target, and cannot
+//! ring.
 //!
 //! # Temperature
 //!
@@ -17,10 +18,10 @@
 //! S = F (1 + a (T - T_gain)) + b A (T - T_zero)
 //! ```
 //!
-//! with a and b the array's coefficients, A its area, T_gain the temperature at its calibration and T_zero the temperature
-//! at which the taxels' zero was last learnt. T is the temperature of the microcontroller: a proxy, which does not show a
-//! heat source that warms only one of the two, or one of them sooner. The compensation moves a goal by half of it at most,
-//! whatever the temperature.
+//! with a and b the array's coefficients, A its area, T_gain the temperature at its calibration and T_zero the
+//! temperature at which the taxels' zero was last learnt. T is the temperature of the microcontroller: a proxy, which
+//! does not show a heat source that warms only one of the two, or one of them sooner. The compensation moves a goal by
+//! half of it at most, whatever the temperature.
 
 use crate::config::Config;
 use crate::units::{Celsius, Newtons};
@@ -69,8 +70,8 @@ const SLOW: u32 = 10;
 /// Temperatures from which the array's drift is computed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TemperatureDrift {
-    /// Filtered temperature of the microcontroller, degrees Celsius in Q32; none before the first reading, and while the
-    /// compensation is off.
+    /// Filtered temperature of the microcontroller, degrees Celsius in Q32; none before the first reading, and while
+    /// the compensation is off.
     chip: Option<i64>,
     /// Temperature when the zero was last learnt, degrees Celsius in Q16.
     zero: i32,

@@ -2,20 +2,20 @@
 //!
 //! # Winding
 //!
-//! The winding's temperature is estimated from the current of the motor's model. Heat P = i^2 R flows from the winding to
-//! the housing and from there to the air. Data sheets give a thermal resistance and a time constant for each; the
+//! The winding's temperature is estimated from the current of the motor's model. Heat P = i^2 R flows from the winding
+//! to the housing and from there to the air. Data sheets give a thermal resistance and a time constant for each; the
 //! temperature is the sum of two lags (a Foster network):
 //!
 //! ```text
 //! T = ambient + T_w + T_h,   tau_w T_w' = R_w P - T_w,   tau_h T_h' = R_h P - T_h
 //! ```
 //!
-//! The estimate errs upwards: heat counts a quarter more than the parameters say, a rise is a quarter quicker and a fall a
-//! quarter slower. R is that of the cold winding with the bridge; at a given voltage a warm winding takes less current.
-//! `docs/control.md` lists what the estimate covers and what it does not.
+//! The estimate errs upwards: heat counts a quarter more than the parameters say, a rise is a quarter quicker and a
+//! fall a quarter slower. R is that of the cold winding with the bridge; at a given voltage a warm winding takes less
+//! current. `docs/control.md` lists what the estimate covers and what it does not.
 //!
-//! The squares of 256 frames, or of fewer slow ones, make one step of the lags. A step is at most half of the difference,
-//! so no lag leaves the range from 0 to its largest target.
+//! The squares of 256 frames, or of fewer slow ones, make one step of the lags. A step is at most half of the
+//! difference, so no lag leaves the range from 0 to its largest target.
 
 use crate::arith::nearest_share;
 use crate::config::{ALLOWANCE_BITS, Config, Heat};

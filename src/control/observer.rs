@@ -9,8 +9,8 @@
 //! l1 = 1 - beta^3,   l2 = 1.5 (1 - beta)^2 (1 + beta) / T,   l3 = (1 - beta)^3 / T^2
 //! ```
 //!
-//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts again at the new place,
-//! at rest. A limited correction would not work: three integrators behind a limited error swing for ever.
+//! An error beyond what motion can make in a frame is a jump of the encoder: the observer starts again at the new
+//! place, at rest. A limited correction would not work: three integrators behind a limited error swing for ever.
 
 use crate::arith::{nearest_product, nearest_share};
 use crate::config::{Config, Gains};

@@ -8,10 +8,10 @@
 //! The length counts from the instruction to the CRC. From the instruction to the last parameter, FF FF FD is sent
 //! as FF FF FD FD, so a header never appears inside a packet.
 //!
-//! [`Receiver`] takes bytes in any slicing, with any garbage in between. Stuffing keeps the header out of every packet's
-//! inside, so a header always starts a packet, also after a packet that was cut short. A lost or damaged byte therefore
-//! costs the packet that it belongs to and no other. [`Sender`] puts header, stuffing, length and CRC around bytes that
-//! are pushed one by one.
+//! [`Receiver`] takes bytes in any slicing, with any garbage in between. Stuffing keeps the header out of every
+//! packet's inside, so a header always starts a packet, also after a packet that was cut short. A lost or damaged byte
+//! therefore costs the packet that it belongs to and no other. [`Sender`] puts header, stuffing, length and CRC around
+//! bytes that are pushed one by one.
 
 use crate::store::ID_MAX;
 use crc::{CRC_16_UMTS, Crc, Table};
@@ -23,7 +23,8 @@ static TABLE: Crc<u16, Table<1>> = Crc::<u16, Table<1>>::new(&CRC_16_UMTS);
 /// Checksum of no bytes.
 pub const CRC_START: u16 = 0;
 
-/// Continues a checksum over more bytes: `update_crc(update_crc(CRC_START, a), b)` is the checksum of `a` followed by `b`.
+/// Continues a checksum over more bytes: `update_crc(update_crc(CRC_START, a), b)` is the checksum of `a` followed by
+/// `b`.
 pub fn update_crc(crc: u16, bytes: &[u8]) -> u16 {
     let mut digest = TABLE.digest_with_initial(crc);
     digest.update(bytes);

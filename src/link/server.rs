@@ -77,7 +77,8 @@ pub(super) struct Device<const ROWS: usize, const COLUMNS: usize> {
 /// let mut server = Server::new(Record::DEFAULT, &CLOCKS);
 /// let zeros = [[0; COLUMNS]; ROWS];
 /// let snapshot = Snapshot {
-///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0, loop_time_us: 0, loop_time_max_us: 0,
+///     status: Status::default(), supply_mv: 6000, tick_ms: 0, frame_time_us: 0, frame_ns: 0,
+///     loop_time_us: 0, loop_time_max_us: 0,
 ///     reset_cause: Default::default(), crash: Default::default(), health: Default::default(),
 ///     frame: &Frame::EMPTY, taxels: &zeros, pascals_per_sum_q32: 0, tare: &zeros, capture: Default::default(),
 /// };

@@ -97,9 +97,9 @@ impl Stand {
     /// Refuses requests of a write that cannot be carried out.
     ///
     /// # Errors
-    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press without torque or tare;
-    /// a jog or strokes with torque, in a fault or without a tare; a save while the loop drives, is about to or tares,
-    /// when it must not wait for the flash.
+    /// A goal above 0 in a fault, which lets go; a tare in one that is not to be cleared; a press without torque or
+    /// tare; a jog or strokes with torque, in a fault or without a tare; a save while the loop drives, is about to or
+    /// tares, when it must not wait for the flash.
     pub fn check(&self, before: &Command, after: &Command, actions: Actions) -> Result<(), StatusError> {
         let goal = after.goal == Newtons::ZERO || !self.faulted;
         let stopped = self.faulted && after.clear_request == self.taken.clear;

@@ -27,21 +27,21 @@ use crate::state::Limits;
 use crate::{capture, measure};
 use indirect::Part;
 
-/// Where each register begins.
+/// Address of each register.
 pub mod address {
     pub use super::indirect::address::*;
     pub use super::mirrors::address::*;
     pub use super::registers::address::*;
 }
 
-/// The longest read.
+/// Largest number of bytes of a read.
 pub const READ_MAX: u16 = 256;
 
 /// The part of a [`Register`] that the device needs.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     address: u16,
-    /// Where its value belongs: elsewhere for a mirror.
+    /// Address of its value: a different one for a mirror.
     of: u16,
     count: u16,
     kind: Kind,
@@ -58,7 +58,7 @@ impl Cell {
         self.address + self.bytes()
     }
 
-    /// The cell that a byte belongs to; none in a gap.
+    /// Returns the cell that a byte belongs to; none in a gap.
     fn at<const ROWS: usize, const COLUMNS: usize>(address: u16) -> Option<Self> {
         if let Some(param) = param_place(address) {
             let address = address::PARAMS + 4 * param as u16;
@@ -68,25 +68,25 @@ impl Cell {
         Self::all::<ROWS, COLUMNS>().find(holds).copied()
     }
 
-    /// Where the gap ends that a byte lies in.
+    /// Returns the end of the gap that contains a byte.
     fn next<const ROWS: usize, const COLUMNS: usize>(gap: u16) -> u16 {
         let after = Self::all::<ROWS, COLUMNS>().map(|cell| cell.address).chain([address::PARAMS]);
         after.filter(|&address| address > gap).min().unwrap_or(u16::MAX)
     }
 
-    /// All but the parameters.
+    /// Returns all cells but those of the parameters.
     fn all<const ROWS: usize, const COLUMNS: usize>() -> impl Iterator<Item = &'static Self> {
         let pictures = const { &pictures::cells::<ROWS, COLUMNS>() };
         pictures.iter().chain(&registers::CELLS).chain(&indirect::CELLS).chain(&mirrors::CELLS)
     }
 
-    /// That of a register by itself, where it begins.
+    /// Returns the cell of a register from its address.
     const fn of(address: u16) -> Self {
         let Register { kind, count, access, .. } = registers::fixed(address);
         Self { address, of: address, count, kind, access }
     }
 
-    /// The element that a byte belongs to, and how many bytes of it come before.
+    /// Returns the element that a byte belongs to, and the number of bytes of it before that byte.
     fn element(&self, address: u16) -> (u16, u16) {
         let offset = address.saturating_sub(self.address);
         match self.kind.width() {
@@ -97,11 +97,11 @@ impl Cell {
     }
 }
 
-/// What a write works on: a copy, which replaces the original once the whole write is found good.
+/// Copy that a write changes. It replaces the original once the whole write is valid.
 pub(super) struct Staged<const ROWS: usize, const COLUMNS: usize> {
     pub settings: Settings<ROWS, COLUMNS>,
     pub actions: Actions,
-    /// How the loop stands.
+    /// State of the loop at the last snapshot.
     pub stand: Stand,
     /// The board's.
     pub clocks: &'static Clocks,
@@ -158,7 +158,7 @@ pub(super) fn read<const ROWS: usize, const COLUMNS: usize>(
 /// Writes whole registers side by side into the staged copy.
 ///
 /// # Errors
-/// What is wrong with the first register that is refused; the copy is then of no use.
+/// Reason to refuse the first register that is invalid; the copy must then be dropped.
 pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     address: u16,
@@ -190,7 +190,7 @@ pub(super) fn write<const ROWS: usize, const COLUMNS: usize>(
     staged.stand.check(&before, &staged.settings.command, staged.actions)
 }
 
-/// Writes the element that begins at `at`, and tells how many bytes it took.
+/// Writes the element that begins at `at`, and returns its number of bytes.
 fn write_element<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     cell: &Cell,
@@ -219,7 +219,7 @@ fn write_element<const ROWS: usize, const COLUMNS: usize>(
     Ok(cell.kind.width())
 }
 
-/// Writes the register that the first of these addresses leads to: the others must lead to the rest of it.
+/// Writes the register that the first of these addresses leads to: the other addresses must lead to the rest of it.
 fn write_through<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     targets: &[u16],
@@ -235,7 +235,7 @@ fn write_through<const ROWS: usize, const COLUMNS: usize>(
     write_element::<ROWS, COLUMNS>(staged, &cell, target, data, moves)
 }
 
-/// Which parameter a byte belongs to.
+/// Returns the index of the parameter that a byte belongs to.
 fn param_place(at: u16) -> Option<usize> {
     let place = usize::from(at.checked_sub(address::PARAMS)?) / 4;
     (place < Params::COUNT).then_some(place)
@@ -249,13 +249,13 @@ fn write_param(params: &mut Params, place: usize, value: i64) {
     *params = Params::from_array(&values);
 }
 
-/// A fixed-point number in thousandths, rounded.
+/// Converts a fixed-point number to thousandths, rounded.
 pub(super) const fn thousandths(value: i32, fraction_bits: u32) -> i32 {
     let scaled = value as i64 * 1000;
     ((scaled + (1 << (fraction_bits - 1))) >> fraction_bits) as i32
 }
 
-/// What a read sees.
+/// Data of a read: the device's own state, and the snapshot of the loop.
 #[derive(Clone, Copy)]
 pub(in crate::link) struct View<'a, const ROWS: usize, const COLUMNS: usize> {
     pub state: &'a Device<ROWS, COLUMNS>,
@@ -303,7 +303,8 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         byte.unwrap_or(0)
     }
 
-    /// A request that the loop has not yet taken up counts as running: what its status tells of is the one before.
+    /// Returns the state of the tare. A request that the loop has not acknowledged counts as running: the status
+    /// still describes the tare before.
     fn tare_state(&self) -> u32 {
         let status = &self.snapshot.status;
         if self.settings().command.tare_request != status.taken.tare {
@@ -312,7 +313,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         status.tare as u32
     }
 
-    /// As the tare's.
+    /// Returns the state of the measurement, with the same rule as the tare's.
     fn measure_state(&self) -> u32 {
         let status = &self.snapshot.status;
         if self.settings().command.measure_request != status.taken.measure {
@@ -321,7 +322,7 @@ impl<'a, const ROWS: usize, const COLUMNS: usize> View<'a, ROWS, COLUMNS> {
         status.measure.state as u32
     }
 
-    /// As the tare's: what was asked for counts already.
+    /// Returns the state of the capture, where a new request counts already.
     fn capture_state(&self) -> u32 {
         let state = self.snapshot.capture.standing.state;
         if self.state.actions().capture == Some(true) { capture::State::Armed as u32 } else { state as u32 }

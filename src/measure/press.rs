@@ -17,13 +17,15 @@ use crate::pressure::Picture;
 use crate::state::Limits;
 use crate::units::{Celsius, Millimetres, MillimetresPerSecond};
 
-/// Speeds of the quick and of the slow way: 10 and 2 mm/s, at most that of an approach.
+/// Speed of the quick way: 10 mm/s, at most that of an approach.
 const QUICK: MillimetresPerSecond = MillimetresPerSecond::from_bits(10 << 16);
+/// Speed of the slow way: 2 mm/s, at most that of an approach.
 const SLOW: MillimetresPerSecond = MillimetresPerSecond::from_bits(2 << 16);
 /// Distance before the touch at which a way begins and ends: 0.5 mm, Q24.
 const BEFORE: i32 = 1 << 23;
 /// Largest number of steps of a way.
 pub const STEPS: usize = 28;
+/// Least length of a step: 0.1 mm, Q24.
 const STEP: i32 = (1 << 24) / 10;
 /// Times at which the steps of the hold end, ms.
 pub const HOLDS_MS: [u32; 9] = [20, 40, 80, 160, 320, 640, 1_300, 2_100, 3_000];
@@ -36,11 +38,13 @@ const END: i32 = 1 << 20;
 const FAR: Millimetres = Millimetres::from_bits(4 << 24);
 /// Travel by which the tip must move on within [`STALL_NS`], Q24: 1/128 mm.
 const MOVES: i32 = 1 << 17;
+/// Time within which the tip must move on by [`MOVES`], ns.
 const STALL_NS: u32 = 1_000_000_000;
 /// Number of frames in a row in which one more taxel than before must be bad.
 const BAD_FRAMES: u8 = 4;
 /// Limit of a taxel's code, sixteenths.
 const CODE_MAX: i32 = 1 << 17;
+/// Limit of the difference of a code to the step's first frame, quarters.
 const CHANGE_MAX: i32 = 1_023;
 /// Number of parts of a complete step, one a frame: writing all of it takes as long as a step of the loop.
 pub const PARTS: u8 = 4;
@@ -208,7 +212,7 @@ impl Press {
         self.phase != Phase::Over
     }
 
-    /// The part of a complete step that is handed over with this frame.
+    /// Part of a complete step that this frame adds to the record.
     pub fn part(&self) -> Option<u8> {
         self.part
     }

@@ -14,9 +14,9 @@
 //! A row of a press is a step: numbers of its first and last frame, the encoder's counts at these, frames taken (2
 //! bytes), whether it is one of the way back, 0, mean voltage of the bridge in mV (2), temperature of the
 //! microcontroller in 0.1 K (2, 0 unknown). Then of every taxel, row by row: the mean above tare in eighths of a
-//! corrected code, plus 1,024 (2 bytes each); the variance of a frame in quarters of a code, squared, as
-//! `(8 + (byte & 7)) << (byte >> 3) >> 3`, 0 below 1 (a byte each); a bit that is 1 where it was bad or saturated in any
-//! frame, lowest bit first. Zeros fill it up to a multiple of 4 bytes.
+//! corrected code, plus 1,024 (2 bytes each); the variance of a frame in quarters of a code, squared, as `(8 + (byte &
+//! 7)) << (byte >> 3) >> 3`, 0 below 1 (a byte each); a bit that is 1 where it was bad or saturated in any frame,
+//! lowest bit first. Zeros fill it up to a multiple of 4 bytes.
 //!
 //! A row of strokes is a sample: count from the origin, mean voltage since the sample before in quarters of a mV (2
 //! bytes each). A count of -32,768 begins a stroke.
@@ -243,7 +243,7 @@ mod tests {
             let variance = u64::from(variance);
             assert!(told <= variance && variance - told <= variance / 8, "{variance}: {told}");
         }
-        // Small ones are told by the shift as they are; 0 and 1 share a byte with nothing else.
+        // Small variances are exact; 0 and 1 share a byte with nothing else.
         assert_eq!((coded(0), coded(1)), (0, 0));
     }
 }

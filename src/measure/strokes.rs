@@ -30,6 +30,7 @@ const SPEEDS: [u8; 8] = [0, 1, 2, 3, 4, 4, 3, 2];
 const STROKES: u8 = 4 * SPEEDS.len() as u8;
 /// Largest share of the supply for a pulse: 2/25.
 const PULSE_SUPPLY: [i32; 2] = [2, 25];
+/// Largest share of the supply for a stroke: 1/3.
 const STROKE_SUPPLY: [i32; 2] = [1, 3];
 /// Number of counts that is motion.
 const MOVED: i32 = 2;

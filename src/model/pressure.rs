@@ -62,8 +62,8 @@ impl Tip {
         Kilopascals::from_bits(bits as i32)
     }
 
-    /// Whether the pressure comes within half a unit of `bits` from below: `Y (1 - (a - d)/L) >= bits - 1/2`, cleared
-    /// of fraction and root.
+    /// Returns true if the pressure comes within half a unit of `bits` from below: `Y (1 - (a - d)/L) >= bits - 1/2`,
+    /// cleared of fraction and root.
     fn pressure_reaches(&self, bits: u64, distance_square: u64, depth: u32) -> bool {
         let lost = u128::from(2 * self.modulus_bits() * u64::from(self.rest(depth)));
         let left = u128::from(2 * (self.modulus_bits() - bits) + 1);

@@ -24,11 +24,11 @@ use crate::touch::{Stage, Touch};
 use crate::units::Millimetres;
 use fixed::types::I8F24;
 
-/// The coarsest encoder whose counts a jog can go by: 0.1 mm.
+/// Coarsest encoder for a jog: 0.1 mm a count.
 const COARSEST: Millimetres = Millimetres::from_bits((1 << 24) / 10);
 
 impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
-    /// Whether a command asks for something new, or for something that waits.
+    /// Returns true if a command has a new request, or one that waits.
     #[inline(always)]
     pub(super) fn asked(&self, command: &Command) -> bool {
         let waits = match self.activity {
@@ -44,7 +44,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             || command.measure_request != taken.measure
     }
 
-    /// Serves what a command newly asks for.
+    /// Serves the new requests of a command.
     #[inline(never)]
     pub(super) fn serve(&mut self, command: &Command, sense: &Sense, contact: &Contact) {
         let before = self.status.taken;
@@ -91,7 +91,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
             _ => Halt::BRAKES,
         };
         let free = self.touch.stage() == Stage::Clear;
-        // Whoever tares a finger outside its travel moved it there: a millimetre outside, where the guard stops it.
+        // A finger that is tared outside its travel was moved there: a millimetre outside, where the guard stops it.
         let (travel, one) = (self.motion.observer.travel.0, I8F24::ONE);
         let [end, back] = [self.config.travel_max, self.config.bounds.back].map(|length| length.0.saturating_add(one));
         self.zeroed &= travel <= end && travel.saturating_neg() <= back;
@@ -102,12 +102,12 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.activity = Activity::Tare { halt, free };
     }
 
-    /// Whether torque may be taken up: it is a new request, and somebody confirmed which way the motor goes.
+    /// Returns true if torque may be enabled: it is a new request, and the motor's direction is confirmed.
     fn takes_torque(&self, tare_forced: bool) -> bool {
         self.may_drive(tare_forced) && self.armed && self.config.params.direction_confirmed != 0
     }
 
-    /// Whether the motor may be driven: the readings are those of a free tip.
+    /// Returns true if the motor may be driven: the readings are those of a free tip.
     fn may_drive(&self, tare_forced: bool) -> bool {
         self.tared && (tare_forced || !self.array.tared_touching())
     }
@@ -120,7 +120,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
     }
 
-    /// The motor is driven from here on: guard and monitor start.
+    /// Starts guard and monitor: the motor is driven from here on.
     #[inline(never)]
     fn start(&mut self, encoder: i32) {
         if !self.zeroed {
@@ -132,8 +132,8 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.monitor.restart(self.array.picture(), &self.motion);
     }
 
-    /// A motion that measures, or its end. A press waits for torque that is being taken up, the others until the tip is
-    /// at rest.
+    /// Serves a request for a motion that measures, or for its end. A press waits for torque that is being enabled,
+    /// the others until the tip is at rest.
     #[inline(never)]
     fn serve_measure(&mut self, command: &Command, encoder: i32, contact: &Contact) {
         let task = Task::of(command.measure_request);
@@ -164,7 +164,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 self.activity = Activity::Press(Press::begin(&self.motion));
                 return;
             }
-            // The one under way answers for both.
+            // The motion under way answers both requests.
             _ if runs => return,
             (Task::Jog | Task::Strokes, Activity::Off(_))
                 if !command.torque
@@ -185,7 +185,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         self.status.measure = MeasureStatus::over(task, refusal, 0);
     }
 
-    /// Ends what drives the motor, for the reason that something else begins: off, where there is no fault.
+    /// Ends the activity, because something else begins: the new one is off, unless there is a fault.
     #[inline(never)]
     pub(super) fn leave(&mut self, halt: Halt) {
         match &mut self.activity {

@@ -3,10 +3,10 @@
 //! # Characteristic
 //!
 //! The force per conductance of an array may grow with conductance. A taxel that shows u codes behind its gain carries
-//! f(u) = u (1 + p u / 4096) / (1 + p), in the codes of the full range: f(4096) = 4096. Above its tare B it reads T, so it
-//! carries f(T + B) - f(B) = T (q + q p (T + 2 B) / 4096) with q = 1 / (1 + p). In the factor T + B and B count as 0 where
-//! they are below: a taxel cannot show that, and the parabola would turn. So a reading keeps its sign, and a larger one is
-//! never a smaller force.
+//! f(u) = u (1 + p u / 4096) / (1 + p), in the codes of the full range: f(4096) = 4096. Above its tare B it reads T, so
+//! it carries f(T + B) - f(B) = T (q + q p (T + 2 B) / 4096) with q = 1 / (1 + p). In the factor T + B and B count as 0
+//! where they are below: a taxel cannot show that, and the parabola would turn. So a reading keeps its sign, and a
+//! larger one is never a smaller force.
 
 use super::{CODE_BITS, TARE_BITS, weight};
 use crate::config::{Config, Curve};

@@ -2,12 +2,12 @@
 //!
 //! # Touch during a tare
 //!
-//! A contact is a patch: some rows carry more than the rest. Gains, preload and amplifiers differ from taxel to taxel, so
-//! their differences average out over a row, where a contact adds up. The row that carries most is compared with the row
-//! that carries least.
+//! A contact is a patch: some rows carry more than the rest. Gains, preload and amplifiers differ from taxel to taxel,
+//! so their differences average out over a row, where a contact adds up. The row that carries most is compared with the
+//! row that carries least.
 //!
-//! Compared with a clean tare before, it must carry more by half of what begins a contact. Without a clean tare only the
-//! shape is known, and preload may be uneven: then it must also carry half as much again as the other row.
+//! Compared with a clean tare before, it must carry more by half of what begins a contact. Without a clean tare only
+//! the shape is known, and preload may be uneven: then it must also carry half as much again as the other row.
 
 use super::{Array, CODE_BITS, Picture, TARE_BITS};
 use crate::config::Config;

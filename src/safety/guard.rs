@@ -1,7 +1,7 @@
 //! The last word on the duty: an envelope that holds whatever the loop, the fit or the host believe.
 //!
-//! The guard is independent of the loop. It counts the encoder by itself, keeps its own model of the motor, and uses the
-//! larger of the plain sum of the array and the force in use. `docs/safety.md` states its promises, by number:
+//! The guard is independent of the loop. It counts the encoder by itself, keeps its own model of the motor, and uses
+//! the larger of the plain sum of the array and the force in use. `docs/safety.md` states its promises, by number:
 //!
 //! 1. Beyond an end of the travel no duty drives the tip farther out; 1 mm beyond, the motor stops.
 //! 2. Behind a touch by more than the indentation, the clearance and 1 mm, no duty drives the tip farther back; 1 mm
@@ -14,9 +14,9 @@
 //! 5. A tip that moves steadily forward stops if the motor measures three eighths of the goal more than before, and
 //!    the array no contact.
 //!
-//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder measures,
-//! and the one that its model of the motor expects. Both pass the same two filters, so a sound finger shows the same
-//! sign whatever is requested of it:
+//! For the fourth the guard compares two changes of speed over the last milliseconds: the one that the encoder
+//! measures, and the one that its model of the motor expects. Both pass the same two filters, so a sound finger shows
+//! the same sign whatever is requested of it:
 //!
 //! ```text
 //! a = g V - c v - F / m       h' = a - h / tau       p' = 4 (h - p) / tau       tau = 5 ms
@@ -26,8 +26,8 @@
 //!
 //! # A contact that the array does not see
 //!
-//! An object may lie off the array, or under an array that sees nothing. In steady motion through the air the motor works
-//! against friction alone. The force that the motor works against follows from the change of speed that the model
+//! An object may lie off the array, or under an array that sees nothing. In steady motion through the air the motor
+//! works against friction alone. The force that the motor works against follows from the change of speed that the model
 //! expected and the encoder did not show. A mean of this force is kept; more than the mean by 1 N and the friction is a
 //! contact.
 

@@ -10,32 +10,32 @@ use crate::state::Fault;
 use crate::touch::FRAME_NS_MAX;
 use crate::units::{Millimetres, MillimetresPerSecond2};
 
-/// Travel forward that must not leave the picture of a contact unchanged to the last bit, where the motor pushes more
-/// than before (0.2 mm), and in any case (4 mm: what holds an object may move that far).
+/// Travel forward after which the image of a contact must have changed, if the motor pushes more than before: 0.2 mm.
 const BLIND_TRAVEL: Millimetres = Millimetres::from_bits((1 << 24) / 5);
+/// Travel forward after which the image must have changed in any case: 4 mm, as an object may yield by that.
 const BLIND_TRAVEL_MAX: Millimetres = Millimetres::from_bits(4 << 24);
 /// The part of that travel after which the motor has overcome its friction forward: 1/2.
 const FORWARD_BITS: u32 = 1;
-/// Growth of the load that means "pushes more", as a part of what 1 N does to the tip: 1/4,
+/// Growth of the load that means "pushes more", as a part of the acceleration of the tip by 1 N: 1/4.
 const LOAD_BITS: u32 = 2;
-/// plus this part of the contact force, which a gear may lose: 1/2.
+/// Part of the contact force that is added to this growth, because a gear may lose it: 1/2.
 const LOST_BITS: u32 = 1;
-/// Share by which the mean of the disturbance follows it in each frame: 1/64.
+/// Share of the difference by which the mean of the disturbance moves in each frame: 1/64.
 const MEAN_BITS: u32 = 6;
-/// A force this near to the goal is held: 1/8.
+/// Part of the goal within which a force is held: 1/8.
 const HOLDS_BITS: u32 = 3;
 /// The supply must be out of its window for this many frames: a braking motor lifts it for an instant.
 const SUPPLY_FRAMES: u8 = 5;
 
-/// Fault where all taxels together read less than at the tare by three times the least contact (in halves of it)
+/// Limit below the tare at which the array is broken, in halves of the least contact: three contacts.
 const LESS: i32 = 6;
-/// for this many frames: interference changes one.
+/// Number of frames below that limit until it is a fault: interference changes one.
 const LESS_FRAMES: u8 = 3;
-/// A contact raises the sum of all taxels in one frame by no more than this part of the sum, 1/4, and
+/// Part of the sum by which a contact can raise it in one frame: 1/4.
 const MORE_BITS: u32 = 2;
-/// twice the least contact (this number counts halves of it).
+/// Growth that is added to this part, in halves of the least contact: two contacts.
 const MORE: i32 = 4;
-/// A larger jump is a fault once it has lasted longer than a burst of interference, ns.
+/// Time after which a larger jump is a fault: longer than a burst of interference, ns.
 const MORE_NS: u32 = 8_000_000;
 
 /// Inputs of the monitor in a frame.
@@ -185,8 +185,8 @@ impl Monitor {
     }
 }
 
-/// A broken array. The same taxels must be bad in two frames running, or half of them in one: what a burst of
-/// interference makes of a frame is no fault.
+/// Returns a fault for a broken array. The same taxels must be bad in two frames in a row, or half of them in one: a
+/// burst of interference in a frame is no fault.
 pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     picture: &Picture<ROWS, COLUMNS>,
     config: &Config,
@@ -203,7 +203,7 @@ pub fn array_broken<const ROWS: usize, const COLUMNS: usize>(
     }
 }
 
-/// Whether anything is to be read off a frame's array: not where more taxels are bad than allowed, be it for this frame
+/// Returns true if a frame's array can be read. It cannot if more taxels are bad than allowed, even in this frame
 /// only.
 pub fn array_sound<const ROWS: usize, const COLUMNS: usize>(picture: &Picture<ROWS, COLUMNS>, config: &Config) -> bool {
     let p = &config.params;

@@ -1,4 +1,5 @@
-//! Replies: whether, when and with what; and whose turn it is after a Sync Read, a Bulk Read, and the fast kinds of both.
+//! Replies: whether, when and with what; and whose turn it is after a Sync Read, a Bulk Read, and the fast kinds of
+//! both.
 //!
 //! The devices answer in the order of the list. Each waits for the one before it by listening to the bus.
 

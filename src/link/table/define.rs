@@ -28,7 +28,7 @@ macro_rules! control_table {
     ($($(#[doc = $doc:literal])+ $address:literal $name:ident: $kind:ident $([$count:expr])? $access:ident,
        $unit:literal * $scale:literal, $min:literal to $max:literal $(= $default:expr)?,
        $get:expr $(, $set:expr)?;)*) => {
-        /// Where each register begins.
+        /// Address of each register.
         pub mod address {
             $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
             /// The parameters, in the order of [`crate::params::Params`], 4 bytes each.
@@ -50,10 +50,16 @@ macro_rules! control_table {
         }),*];
 
         pub(super) static CELLS: [Cell; FIXED.len()] = [
-            $(Cell { address: $address, of: $address, kind: Kind::$kind, count: count!($($count)?), access: Access::$access }),*
+            $(Cell {
+                address: $address,
+                of: $address,
+                kind: Kind::$kind,
+                count: count!($($count)?),
+                access: Access::$access,
+            }),*
         ];
 
-        /// Where they end.
+        /// End of the registers.
         pub(super) const END: u16 = {
             let last = &FIXED[FIXED.len() - 1];
             last.address + last.kind.width() * last.count
@@ -118,7 +124,7 @@ pub enum Access {
     StoredLive,
 }
 
-/// How a register's bytes make a number, little-endian.
+/// Format of a register's number, little-endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// 8 bits.
@@ -165,15 +171,15 @@ pub struct Register {
     pub name: &'static str,
     /// Of its first byte.
     pub address: u16,
-    /// How its bytes make a number.
+    /// Format of its numbers.
     pub kind: Kind,
-    /// How many numbers stand side by side: 1, but for the pictures of the array.
+    /// Number of elements: 1, but for the tactile images of the array.
     pub count: u16,
     /// Who may write it.
     pub access: Access,
     /// Physical unit; empty where it is a plain number.
     pub unit: &'static str,
-    /// What a step of the number means, in that unit: the resolution.
+    /// Resolution: a step of the number in that unit.
     pub scale: u16,
     /// The least value.
     pub min: i64,
@@ -181,7 +187,7 @@ pub struct Register {
     pub max: i64,
     /// After a factory reset where it is stored, after a reset where it can be written.
     pub default: Option<i64>,
-    /// What it means.
+    /// Meaning of the register.
     pub doc: &'static str,
 }
 
@@ -192,7 +198,7 @@ impl Register {
     }
 }
 
-/// How many registers there are.
+/// Number of registers.
 pub const COUNT: usize =
     FIXED.len() + mirrors::REGISTERS.len() + indirect::REGISTERS.len() + Params::COUNT + pictures::COUNT;
 
@@ -208,7 +214,7 @@ pub const fn registers<const ROWS: usize, const COLUMNS: usize>() -> [Register; 
     all
 }
 
-/// Puts more registers, themselves in order, among those that are there.
+/// Merges more registers, which are in order, into those that are there.
 const fn add(all: &mut [Register], count: usize, more: &[Register]) -> usize {
     let (mut from, mut with, mut to) = (count, more.len(), count + more.len());
     while with > 0 {

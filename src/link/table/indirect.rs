@@ -1,6 +1,6 @@
 //! Indirect registers: bytes of the table gathered where a driver wants them side by side.
 //!
-//! Each byte of `INDIRECT_DATA` is the byte whose address stands in the `INDIRECT_ADDRESS` of the same number. There are
+//! Each byte of `INDIRECT_DATA` is the byte at the address in the `INDIRECT_ADDRESS` of the same number. There are
 //! two blocks of 28, at the addresses of the X-series servos' first one and at addresses of our own: one for what a
 //! driver writes, and one for what it reads. They live in RAM, and none of them leads to another.
 
@@ -8,14 +8,14 @@ use crate::link::packet::StatusError;
 
 use super::{Access, Cell, Kind, Register};
 
-/// How many bytes a block has.
+/// Number of bytes of a block.
 pub const BLOCK: usize = 28;
-/// How many there are in both blocks.
+/// Number of bytes of both blocks.
 pub const COUNT: usize = 2 * BLOCK;
 /// The least address that they lead to: what lies below is stored, and identifies the device.
 const TARGET_MIN: u16 = 64;
 
-/// Where the blocks begin.
+/// Addresses of the blocks.
 pub(super) mod address {
     /// Addresses of the first block.
     pub const INDIRECT_ADDRESS_1: u16 = 168;
@@ -29,12 +29,12 @@ pub(super) mod address {
 
 use address::{INDIRECT_ADDRESS_1, INDIRECT_ADDRESS_29, INDIRECT_DATA_1, INDIRECT_DATA_29};
 
-const ADDRESS_DOC: &str = " Where the byte of the same number in the indirect data stands: 64 or above, in any register but the \
-    indirect ones; a range error otherwise. 0 is nowhere. Kept until a reset.";
-const DATA_DOC: &str = " The bytes that the indirect addresses lead to; 0 for those that lead nowhere. A write obeys the rules \
-    of the registers that it reaches, and covers whole ones.";
+const ADDRESS_DOC: &str = " Address of the byte of the same number in the indirect data: 64 or above, in any register \
+    but the indirect ones; a range error otherwise. 0 is nowhere. Kept until a reset.";
+const DATA_DOC: &str = " The bytes that the indirect addresses lead to; 0 for those that lead nowhere. A write obeys \
+    the rules of the registers that it reaches, and covers whole ones.";
 
-/// What a cell of these is.
+/// Kind of an indirect cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// The address in this place.
@@ -43,7 +43,7 @@ pub(super) enum Part {
     Data(usize),
 }
 
-/// Which of them begins here.
+/// Returns the kind of the block that begins here.
 pub(super) const fn part(cell: u16) -> Option<Part> {
     match cell {
         INDIRECT_ADDRESS_1 => Some(Part::Address(0)),
@@ -54,7 +54,7 @@ pub(super) const fn part(cell: u16) -> Option<Part> {
     }
 }
 
-/// Whether a block of them begins here.
+/// Returns true if a block begins here.
 pub const fn begins(address: u16) -> bool {
     part(address).is_some()
 }

@@ -10,7 +10,7 @@ use super::{Cell, Register, registers};
 
 macro_rules! mirrors {
     ($($(#[doc = $doc:literal])+ $address:literal $name:ident = $of:ident;)*) => {
-        /// Where each mirror begins.
+        /// Address of each mirror.
         pub(super) mod address {
             $($(#[doc = $doc])+ pub const $name: u16 = $address;)*
         }
@@ -18,7 +18,8 @@ macro_rules! mirrors {
         /// The address of each, and that of the register that it is another name of.
         pub const PLACES: [(u16, u16); REGISTERS.len()] = [$(($address, registers::address::$of)),*];
 
-        pub(super) static CELLS: [Cell; PLACES.len()] = [$(Cell { address: $address, ..Cell::of(registers::address::$of) }),*];
+        pub(super) static CELLS: [Cell; PLACES.len()] =
+            [$(Cell { address: $address, ..Cell::of(registers::address::$of) }),*];
 
         /// As their documentation has them.
         pub(super) const REGISTERS: &[Register] = &[$(Register {

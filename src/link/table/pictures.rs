@@ -1,6 +1,6 @@
-//! The pictures of the array: registers whose number of values, and so their place, goes by its shape.
+//! The tactile images of the array: registers whose number of values, and so their address, depends on its shape.
 //!
-//! The first one begins at [`FIRST`], or at [`FIRST_OF_MANY`], and each of the others at the next multiple of 256.
+//! The first image begins at [`FIRST`], or at [`FIRST_OF_MANY`], and each of the others at the next multiple of 256.
 
 use crate::frame::Shape;
 
@@ -10,11 +10,11 @@ use crate::pressure::{GAIN_MAX, GAIN_ONE};
 use super::registers::FIXED;
 use super::{Access, Cell, Kind, Register, Staged, View, address};
 
-/// Where the first picture begins.
+/// Address of the first image.
 pub(super) const FIRST: u16 = 768;
-/// Where it begins of an array whose pictures would reach from there into other registers: beyond all of these.
+/// Address of the first image of an array whose images would reach into other registers: beyond all of these.
 const FIRST_OF_MANY: u16 = 8_192;
-/// How many there are.
+/// Number of images.
 pub const COUNT: usize = 4;
 /// Name, largest value, unit and resolution of each, and what it means.
 const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
@@ -36,7 +36,7 @@ const PICTURES: [(&str, i64, &str, u16, &str); COUNT] = [
     ),
 ];
 
-/// Where they are in an array's table.
+/// Cells of the images in an array's table.
 pub(super) const fn cells<const ROWS: usize, const COLUMNS: usize>() -> [Cell; COUNT] {
     const { Shape::<ROWS, COLUMNS>::CHECKED };
     let few = cells_from::<ROWS, COLUMNS>(FIRST);
@@ -58,7 +58,7 @@ const fn cell(address: u16, count: u16) -> Cell {
     Cell { address, of: address, count, kind: Kind::U16, access: Access::ReadOnly }
 }
 
-/// Where each of them begins, in an array's table.
+/// Addresses of the images in an array's table.
 pub const fn at<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
     let cells = cells::<ROWS, COLUMNS>();
     let mut addresses = [0; COUNT];
@@ -70,7 +70,7 @@ pub const fn at<const ROWS: usize, const COLUMNS: usize>() -> [u16; COUNT] {
     addresses
 }
 
-/// Where the table ends.
+/// End of the table.
 pub(super) const fn end<const ROWS: usize, const COLUMNS: usize>() -> u16 {
     let [.., last] = cells::<ROWS, COLUMNS>();
     let mut end = last.end();
@@ -104,7 +104,7 @@ const fn register(picture: usize, cells: &[Cell; COUNT]) -> Register {
     Register { name, address, kind, count, access, unit, scale, min, max, default, doc }
 }
 
-/// The value of an element; 0 where there is no such picture.
+/// Returns the value of an element; 0 if there is no such image.
 pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     view: View<'_, ROWS, COLUMNS>,
     address: u16,
@@ -126,7 +126,7 @@ pub(super) fn get<const ROWS: usize, const COLUMNS: usize>(
     value.into()
 }
 
-/// Sets an element of a picture that can be written; false where the address is not one's.
+/// Sets an element of an image that can be written. Returns false if the address is not that of an image.
 pub(super) fn set<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     address: u16,

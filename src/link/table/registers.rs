@@ -19,7 +19,7 @@ use super::values::{
     bump, permille, set_capture, set_goal, set_measure, set_recover, set_tare, set_torque, set_watchdog, short,
     watchdog,
 };
-/// The defaults go by no shape.
+/// The defaults do not depend on the shape.
 type Record = store::Record<3, 3>;
 
 use super::{Access, Cell, Kind, Register, Staged, View, thousandths};
@@ -64,14 +64,14 @@ control_table! {
     64 TORQUE_ENABLE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |view, _| u32::from(view.settings().command.torque),
         set_torque;
-    /// What is answered: 0 only Ping, 1 also reads, 2 everything.
+    /// Instructions that are answered: 0 only Ping, 1 also reads, 2 everything.
     68 STATUS_RETURN_LEVEL: U8 ReadWrite, "" * 1, 0 to 2 = 2,
         |view, _| u32::from(view.settings().status_return_level),
         |staged, value| { staged.settings.status_return_level = value as u8; Ok(()) };
     /// 1 while a Reg Write waits for its Action.
     69 REGISTERED_INSTRUCTION: U8 ReadOnly, "" * 1, 0 to 1,
         |view, _| u32::from(view.state.registered());
-    /// Why the motor was stopped, by bit: 0 supply, 3 encoder, 4 bridge, 5 over-force, 6 array, 7 controller or
+    /// Reason of a stop of the motor, by bit: 0 supply, 3 encoder, 4 bridge, 5 over-force, 6 array, 7 controller or
     /// bus; the number is in fault.
     70 HARDWARE_ERROR_STATUS: U8 ReadOnly, "" * 1, 0 to 255,
         |view, _| u32::from(hardware_error(view.snapshot.status.fault));
@@ -97,9 +97,9 @@ control_table! {
         |view, _| u32::from(view.snapshot.supply_mv.saturating_add(50) / 100);
 
     // The force loop: requests, state, and the state of the board.
-    /// The force to hold; 0 lets go. Beyond the parameter force_max_mn it is refused with a limit error; one
+    /// Force to hold; 0 releases. Beyond the parameter force_max_mn it is refused with a limit error; one
     /// below contact_on_mn is held as contact_on_mn, with limit 3. Goes to 0 on a fault and with torque_enable;
-    /// while a fault stands, other goals are refused with a result error.
+    /// in a fault, other goals are refused with a result error.
     256 GOAL_FORCE_MN: I32 ReadWrite, "mN" * 1, 0 to 150_000 = 0,
         |view, _| goal_mn(view.settings().command.goal) as u32,
         set_goal;
@@ -118,19 +118,19 @@ control_table! {
     262 SAVE_PARAMETERS: U8 TorqueOff, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         |staged, value| { staged.actions.save |= value != 0; Ok(()) };
-    /// How the stored registers stand to the flash: 0 the same, 1 changed since, 2 the last save failed.
+    /// Stored registers compared with the flash: 0 the same, 1 changed since, 2 the last save failed.
     263 SAVED_STATE: U8 ReadOnly, "" * 1, 0 to 2,
         |view, _| view.settings().saved as u32;
     /// Mode: 0 off, 1 tare, 2 approach, 3 force, 4 release, 5 fault, 6 press, 7 strokes.
     264 PRESENT_MODE: U8 ReadOnly, "" * 1, 0 to 7,
         |view, _| view.snapshot.status.mode as u32;
-    /// Why the motor was stopped; 0 it was not. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
+    /// Reason of a stop of the motor; 0 none. 1 lost frames, 2 array broken, 3 row stuck, 4 array frozen, 5
     /// encoder frozen, 6 over-force, 7 bus silent, 8 broken parameters, 9 supply low, 10 supply high, 11
     /// bridge, 12 missed deadline, 13 crash, 14 runaway, 15 reversed, 16 unseen contact, 17 no clock, 18
     /// brown-out level.
     265 FAULT: U8 ReadOnly, "" * 1, 0 to 18,
         |view, _| view.snapshot.status.fault.map_or(0, |fault| fault as u32);
-    /// What holds the loop back, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not
+    /// Present restrictions, by bit: 0 voltage, 1 current, 2 speed, 3 goal, 4 travel, 5 taxels, 6 not
     /// tared, 7 frame missed, 8 slew, 9 fit level held back by time, 10 something touched during the last tare,
     /// 11 force known only from below, 12 guard, 13 winding warm, 14 direction not confirmed, 15 torque on since
     /// before the tare or the configuration: it drives nothing until it was off.
@@ -155,7 +155,7 @@ control_table! {
     /// Highest taxel pressure.
     288 PEAK_PRESSURE_PA: U32 ReadOnly, "Pa" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.snapshot.status.contact.peak_pa;
-    /// How far the picture is a hemisphere on a plane: 0 not at all, 255 fully.
+    /// Likeness of the image to a hemisphere on a plane: 0 none, 255 full.
     292 CONFIDENCE: U8 ReadOnly, "1/255" * 1, 0 to 255,
         |view, _| u32::from(view.snapshot.status.contact.confidence);
     /// Taxels left out because they are dead or saturated.
@@ -219,28 +219,28 @@ control_table! {
     /// Good instruction packets for this device, broadcasts included; wraps.
     346 GOOD_PACKETS: U32 ReadOnly, "" * 1, 0 to 0xFFFF_FFFF,
         |view, _| view.counters().good_packets;
-    /// How much work the loop puts into the contact of a frame: 0 force by the sum, 1 centre by the moments, 2
+    /// Amount of work per frame for the contact: 0 force by the sum, 1 centre by the moments, 2
     /// the model with a row a frame, 3 with two rows, 4 with five, 5 with all rows and a solution in every
     /// frame.
     367 FIT_LEVEL: U8 StoredLive, "" * 1, 0 to 5 = Record::DEFAULT.fit_level as i64,
         |view, _| view.settings().record.fit_level as u32,
         |staged, value| { staged.settings.record.fit_level = FitLevel::from_number(value as u8); Ok(()) };
-    /// The fit level in use: less than asked for where the deadline leaves no time for that.
+    /// Fit level in use: less than requested if the deadline leaves no time for that.
     368 FIT_LEVEL_IN_USE: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.status.fit_level as u32;
-    /// The tare that was last asked for: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault:
+    /// State of the last requested tare: 0 none since reset, 1 running, 2 done, 3 refused or ended by a fault:
     /// ask again once that is cleared.
     369 TARE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.tare_state();
-    /// What of present_force_mn is taken for the array's creep: the force that is held is less by this. 0 where
+    /// Part of present_force_mn that is taken for the array's creep: the force that is held is less by this. 0 where
     /// the parameter creep_permille is.
     372 PRESENT_CREEP_MN: I32 ReadOnly, "mN" * 1, 0 to 32_768_000,
         |view, _| thousandths(view.snapshot.status.creep.to_bits(), 16) as u32;
-    /// Why the microcontroller started: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5
+    /// Reason of the last start: 0 unknown, 1 power-on, 2 brown-out, 3 reset pin, 4 software, 5
     /// watchdog, 6 other.
     384 RESET_CAUSE: U8 ReadOnly, "" * 1, 0 to 6,
         |view, _| view.snapshot.reset_cause as u32;
-    /// How the last crash happened: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
+    /// Cause of the last crash: 0 none, 1 panic, 2 hard fault, 3 hang, 4 clock failure.
     385 CRASH_CAUSE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.snapshot.crash.cause as u32;
     /// Crashes since power-on.
@@ -258,7 +258,7 @@ control_table! {
     396 RECOVER: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
         set_recover;
-    /// What stands in the way of recover: 0 nothing, 1 the supply is below supply_min_mv, 2 it is above
+    /// Obstacle to recover: 0 none, 1 the supply is below supply_min_mv, 2 it is above
     /// supply_max_mv, 3 more taxels are bad than bad_taxels_max, 4 a save waits.
     397 RECOVER_HINDRANCE: U8 ReadOnly, "" * 1, 0 to 4,
         |view, _| view.hindrance();
@@ -313,26 +313,26 @@ control_table! {
     4224 MEASURE: U8 ReadWrite, "" * 1, 0 to 3 = 0,
         |_, _| 0,
         set_measure;
-    /// The motion that was last asked for: 0 none since reset, 1 running, 2 complete, 3 ended early.
+    /// State of the last requested motion: 0 none since reset, 1 running, 2 complete, 3 ended early.
     4225 MEASURE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.measure_state();
-    /// How much of it is done.
+    /// Completed part of the motion.
     4226 MEASURE_PROGRESS: U8 ReadOnly, "%" * 1, 0 to 100,
         |view, _| u32::from(view.snapshot.status.measure.progress);
-    /// Why it ended early, with the number behind it in measure_value; 0 it did not. 1 interrupted, 2 not ready:
-    /// not tared, touching, or torque not as it must be, 3 the direction is not confirmed, 4 the encoder stood
-    /// (mV), 5 it counts against the motor (counts), 6 the tip left its way (um), 7 touched (mN), 8 the motor felt
-    /// a force (mN), 10 never at rest (counts), 11 no contact (um), 12 stalled (um), 13 memory full.
+    /// Reason of an early end, with its number in measure_value; 0 none. 1 interrupted, 2 not ready: not tared,
+    /// touching, or torque not as it must be, 3 the direction is not confirmed, 4 the encoder did not move (mV), 5 it
+    /// counts against the motor (counts), 6 the tip left its range (um), 7 touched (mN), 8 the motor measured a force
+    /// (mN), 10 never at rest (counts), 11 no contact (um), 12 stalled (um), 13 memory full.
     4227 MEASURE_ENDED: U8 ReadOnly, "" * 1, 0 to 13,
         |view, _| view.snapshot.status.measure.ended as u32;
-    /// The number behind measure_ended.
+    /// Number that explains measure_ended.
     4228 MEASURE_VALUE: I32 ReadOnly, "" * 1, -0x7FFF_FFFF to 0x7FFF_FFFF,
         |view, _| view.snapshot.status.measure.value as u32;
-    /// Which motion it was: 1 a jog, 2 strokes, 3 a press.
+    /// Kind of the motion: 1 a jog, 2 strokes, 3 a press.
     4232 MEASURE_TASK: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.snapshot.status.measure.task as u32;
     /// 1 arms a capture: it begins with the next tare and keeps every frame until its memory is full. 0 ends
-    /// it, or calls it off. 1 is refused with an access error with torque on, with a result error while frames
+    /// it, or cancels it. 1 is refused with an access error with torque on, with a result error while frames
     /// are being kept. Reads 0.
     4260 CAPTURE: U8 ReadWrite, "" * 1, 0 to 1 = 0,
         |_, _| 0,
@@ -340,8 +340,8 @@ control_table! {
     /// The capture: 0 none since reset, 1 armed, 2 frames are being kept, 3 done.
     4261 CAPTURE_STATE: U8 ReadOnly, "" * 1, 0 to 3,
         |view, _| view.capture_state();
-    /// Why it ended; 0 it did not. 1 its memory is full, 2 asked to, 3 new parameters or gains, 4 the firmware
-    /// stopped the motor, 5 the firmware shorted the motor at a broken array.
+    /// Reason of the capture's end; 0 none. 1 its memory is full, 2 the host ended it, 3 new parameters or gains, 4 the
+    /// firmware stopped the motor, 5 the firmware shorted the motor at a broken array.
     4262 CAPTURE_ENDED: U8 ReadOnly, "" * 1, 0 to 5,
         |view, _| view.snapshot.capture.standing.ended as u32;
     /// Counts the captures begun since reset; wraps.
@@ -364,7 +364,7 @@ control_table! {
     /// The microcontroller's temperature, by which the array's is guessed; -273,150 where it was not measured.
     4404 CHIP_MC: I32 ReadOnly, "mdegC" * 1, -273_150 to 1_000_000,
         |view, _| view.snapshot.status.chip.map_or(-273_150, |chip| thousandths(chip.to_bits(), 16)) as u32;
-    /// What a force of the goal's size reads more than it is, by the array's temperature coefficients; 0 where
+    /// Amount by which a force of the goal's size reads too high, by the array's temperature coefficients; 0 where
     /// they are.
     4408 PRESENT_DRIFT_MN: I32 ReadOnly, "mN" * 1, -150_000 to 150_000,
         |view, _| thousandths(view.snapshot.status.drift.to_bits(), 16) as u32;

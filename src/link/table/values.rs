@@ -59,7 +59,7 @@ pub(super) fn set_measure<const ROWS: usize, const COLUMNS: usize>(
     if kept { Err(StatusError::Result) } else { Ok(()) }
 }
 
-/// Goal force: refused while a tripped watchdog stands.
+/// Goal force: refused until a tripped watchdog is reset.
 pub(super) fn set_goal<const ROWS: usize, const COLUMNS: usize>(
     staged: &mut Staged<ROWS, COLUMNS>,
     value: i64,

@@ -3,7 +3,7 @@
 use std::{env, error::Error, fs, path::PathBuf};
 
 /// The beginning of a target's name, then start and KB of its board's flash and RAM. The RISC-V board has RAM only; the
-/// first half stands in for its flash.
+/// first half serves as its flash.
 const BOARDS: [(&str, [u32; 4]); 6] = [
     ("thumbv6m", [0, 256, 0x2000_0000, 16]),                          // microbit
     ("thumbv7m", [0, 4096, 0x2000_0000, 4096]),                       // mps2-an385
@@ -12,7 +12,7 @@ const BOARDS: [(&str, [u32; 4]); 6] = [
     ("thumbv8m.main", [0x1000_0000, 4096, 0x3800_0000, 4096]),        // mps2-an505, its secure addresses
     ("riscv32", [0x8000_0000, 1024, 0x8010_0000, 1024]),              // virt
 ];
-/// Where the linker script of `riscv-rt` places what it links.
+/// Memory in which the linker script of `riscv-rt` places the program.
 const RISCV_REGIONS: [(&str, &str); 6] =
     [("TEXT", "FLASH"), ("RODATA", "FLASH"), ("DATA", "RAM"), ("BSS", "RAM"), ("HEAP", "RAM"), ("STACK", "RAM")];
 

@@ -3,7 +3,7 @@
 //!
 //! Fails if the digest of an emulated core differs from this machine's.
 
-use host_tests::{emulator, page::Page};
+use host_tests::{page::Page, program};
 use images::closed_loop;
 use std::{collections::BTreeMap, env, error::Error, fmt::Write as _, fs, path::Path};
 
@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let [name, target, flags, bytes, emulator, image] = line.split('\t').collect::<Vec<_>>()[..] else {
             return Err(format!("not a line of six columns: {line}").into());
         };
-        let text = emulator::run_on(emulator, Path::new(image), Path::new("."), &[])
+        let text = program::run_on(emulator, Path::new(image), Path::new("."), &[])
             .map_err(|error| format!("{name}, {target}: {error}"))?;
         let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
         let figure = |name| report.get(name).copied().ok_or_else(|| format!("{target} reported no {name}:\n{text}"));

@@ -6,7 +6,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, TAXELS, address};
 use output::units;
 
-/// How this page is made anew.
+/// Command that renews this page.
 pub const COMMAND: &str = "cargo xtask docs";
 
 /// The page.
@@ -105,7 +105,7 @@ fn access(access: Access) -> &'static str {
     }
 }
 
-/// What a step of the number means: as the definition has it, for a parameter as its name says.
+/// Unit of a step of the number: from the definition, for a parameter from its name.
 pub fn step(register: &Register) -> String {
     if param(register).is_some() {
         return units::of(register.name).map_or("1".into(), |unit| units::step(&unit));

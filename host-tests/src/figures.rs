@@ -62,7 +62,7 @@ fn figure_7(tip: &Tip) -> Result<String, PlotError> {
     curves(&panels, (300, 260))
 }
 
-/// What the array sees, with the contact's circle dotted.
+/// Tactile image, with the contact's circle dotted.
 fn figure_10(tip: &Tip) -> Result<String, PlotError> {
     let pictures = DEPTHS_MM.map(|d_mm| {
         let d = Millimetres::from_bits(d_mm << 24);

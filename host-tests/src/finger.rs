@@ -5,7 +5,7 @@ use fingertip::shipped::{Array, Calibration, Config, Frame, TARE_FRAMES};
 /// The configuration that the default parameters make, with the motor's direction confirmed.
 ///
 /// # Panics
-/// Where the core does not allow them: a mistake in the core.
+/// If the core refuses its defaults: a mistake in the core.
 pub fn config() -> Config {
     Config::shipped(&images::CONFIRMED).expect("the defaults are allowed")
 }

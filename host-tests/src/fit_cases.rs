@@ -25,7 +25,7 @@ const SAMPLES: usize = 12;
 /// Mean pressures on the taxels, kPa, row by row.
 pub type Pressures = [[f64; COLUMNS]; ROWS];
 
-/// What the tip is pressed against.
+/// Object that the tip presses against.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Object {
     /// A plane: the paper's case.
@@ -66,7 +66,7 @@ pub struct Scene {
     pub x_mm: f64,
     /// Centre from the array's middle, along the rows.
     pub y_mm: f64,
-    /// What the tip is pressed against.
+    /// Object that the tip presses against.
     pub object: Object,
 }
 
@@ -216,7 +216,7 @@ fn normal(rng: &mut Rng) -> f64 {
     (-2.0 * (1.0 - rng.f64()).ln()).sqrt() * (TAU * rng.f64()).cos()
 }
 
-/// How readings are rounded.
+/// Rounding of the readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Steps {
     /// Codes rounded to 1/16, the resolution of the pipeline.
@@ -225,7 +225,7 @@ pub enum Steps {
     Codes,
 }
 
-/// What readings suffer.
+/// Disturbances of the readings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Noise {
     /// Nothing.
@@ -236,7 +236,7 @@ pub enum Noise {
     OfPeak(f64),
 }
 
-/// How pressures become a picture.
+/// Steps from pressures to a tactile image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Rounding.

@@ -16,10 +16,10 @@ use fingertip::frame::Sense;
 use fingertip::pipeline::Status;
 use fingertip::shipped::{Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
 
-/// Inputs that a run stands for.
+/// Inputs that a run represents.
 pub const STEPS: u64 = 1_000_000_000;
 
-/// How a machine ends.
+/// End state of a machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cycle {
     /// Steps before it repeats itself, at most.
@@ -47,12 +47,12 @@ pub fn cycle<S: Clone + PartialEq>(start: &S, most: u64, mut step: impl FnMut(&m
     None
 }
 
-/// What a run of a machine showed.
+/// Result of a run of a machine.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The machine and its input.
     pub name: String,
-    /// Where it ends.
+    /// End state.
     pub cycle: Cycle,
     /// Inputs that were taken one by one.
     pub taken: u64,
@@ -62,7 +62,7 @@ pub struct Outcome {
 }
 
 impl Outcome {
-    /// Whether every output swings no more than documented.
+    /// True if every output swings no more than documented.
     pub fn passes(&self) -> bool {
         self.swings.iter().all(|(_, swing, allowed)| swing <= allowed)
     }
@@ -82,11 +82,11 @@ impl std::fmt::Display for Outcome {
 
 /// A machine under an input that repeats; a step is one period of the input.
 pub struct Machine<S> {
-    /// What it is, and under which input.
+    /// Name of the machine and its input.
     pub name: String,
-    /// Where it begins.
+    /// Start state.
     pub start: S,
-    /// How many inputs a period has.
+    /// Number of inputs in a period.
     pub inputs: u64,
     /// One period of the input.
     pub step: Box<dyn Fn(&mut S) + Send>,
@@ -129,7 +129,7 @@ impl<S: Clone + PartialEq + 'static> Machine<S> {
         let mut state = self.start.clone();
         let steps = STEPS / self.inputs;
         (0..steps).for_each(|_| (self.step)(&mut state));
-        // `begin` stands a whole number of cycles after the lead.
+        // `begin` lies a whole number of cycles after the lead.
         let mut expected = begin.clone();
         (0..(steps - cycle.lead) % cycle.length).for_each(|_| (self.step)(&mut expected));
         assert!(state == expected, "{}: {steps} periods do not end in the cycle", self.name);
@@ -151,8 +151,8 @@ fn frame(codes: u16) -> Frame {
     frame
 }
 
-/// Holds a goal against frames that show so many codes on 16 taxels, with an encoder that stands, until nothing in the
-/// pipeline changes from period to period but the frames' number.
+/// Holds a goal against frames with the given codes on 16 taxels, with an encoder that does not move, until nothing in
+/// the pipeline changes from period to period but the frames' number.
 ///
 /// # Panics
 /// Something still changes after `most` steps.

@@ -9,7 +9,7 @@ use fingertip::link::table::indirect;
 use fingertip::link::table::{Kind, Register};
 use fingertip::shipped::{COLUMNS, REGISTERS, address};
 
-/// What X-series servos call what stands at these addresses: drivers ask for it by these names.
+/// Names that X-series servos have for these addresses: drivers use these names.
 const SERVO_NAMES: [(u16, &str); 6] = [
     (address::SHORT_GOAL_MN, "Goal Current"),
     (address::MIRROR_DUTY_PERMILLE, "Present PWM"),
@@ -45,13 +45,13 @@ const UNITS: [(&str, f64, &str); 9] = [
 pub struct Item {
     /// Of its first byte.
     pub address: u16,
-    /// How many there are: 1, 2 or 4.
+    /// Number of bytes: 1, 2 or 4.
     pub bytes: u16,
     /// As a driver asks for it.
     pub name: String,
-    /// What one step comes to, and in which unit; none for a plain number.
+    /// Value and unit of one step; `None` for a plain number.
     pub unit: Option<(f64, &'static str)>,
-    /// Whether it may be below 0.
+    /// True if it may be below 0.
     pub signed: bool,
 }
 
@@ -111,7 +111,7 @@ fn item(register: &Register) -> Item {
     }
 }
 
-/// `PRESENT_FORCE_MN` as `Present Force`: the unit stands in the unit info. A parameter keeps it, for it is not there.
+/// `PRESENT_FORCE_MN` as `Present Force`: the unit is in the unit info. A parameter keeps it, for it is not there.
 fn titled(register: &Register) -> String {
     let name = register.name.to_lowercase();
     let unit = UNITS.iter().find(|(unit, ..)| *unit == register.unit).map(|(unit, ..)| *unit);
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use std::collections::HashSet;
 
-    /// What the programs of ROBOTIS that were read ask for by name.
+    /// Names that the examined programs of ROBOTIS request.
     #[test]
     fn what_drivers_ask_for_by_name_is_there() {
         let text = text(false);

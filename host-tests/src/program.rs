@@ -1,12 +1,15 @@
-//! How the programs of this package end, and how they tell how far they are.
+//! Exit codes, progress lines and the emulator of the programs of this package.
 
+use std::error::Error;
 use std::fmt::Display;
-use std::io::{self, IsTerminal, Write};
-use std::process::ExitCode;
-use std::sync::Mutex;
+use std::io::{self, IsTerminal, Read, Write};
+use std::path::Path;
+use std::process::{Command, ExitCode, Stdio};
+use std::sync::{Mutex, mpsc};
 use std::time::{Duration, Instant};
+use std::{fs, thread};
 
-/// The exit code; says what went wrong.
+/// Prints the error, and returns the exit code.
 pub fn ended(result: Result<(), String>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -17,7 +20,7 @@ pub fn ended(result: Result<(), String>) -> ExitCode {
     }
 }
 
-/// A line that tells how far a program is: on a terminal only, a log wants the results.
+/// Progress line of a program: on a terminal only, a log wants the results.
 pub struct Progress(Option<Mutex<Instant>>);
 
 impl Progress {
@@ -44,5 +47,65 @@ impl Progress {
         if self.0.is_some() {
             eprint!("{text}");
         }
+    }
+}
+
+// QEMU with an emulated core, for images that report by semihosting.
+
+/// The firmware's core: an STM32F405, a board that QEMU 7 knows as well. An instruction takes 8 ns of virtual time: more
+/// than a tick of SysTick, so every one of them counts.
+const CORTEX_M4F: &str = "qemu-system-arm -M netduinoplus2 -icount shift=3,align=off,sleep=off";
+/// The image's own watchdog ends a hang in virtual time. This one, by the clock on the wall, is for an image that
+/// cannot even do that: the slowest machine takes a small part of it.
+const HUNG: Duration = Duration::from_secs(7200);
+
+/// Runs an image for the firmware's core in a folder with the words of its command line to its end, and returns what it wrote.
+///
+/// # Errors
+/// The emulator does not start, the image reports a failure, or hangs.
+pub fn run(image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
+    run_on(CORTEX_M4F, image, folder, words)
+}
+
+/// Runs an image on an emulator: its program and its options for the board, separated by spaces.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(emulator: &str, image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
+    let mut options = emulator.split(' ');
+    let program = options.next().unwrap_or_default();
+    let image = fs::canonicalize(image).map_err(|error| format!("the image {}: {error}", image.display()))?;
+    // A comma within a word is written twice.
+    let words: Vec<_> = words.iter().map(|word| format!(",arg={}", word.replace(',', ",,"))).collect();
+    let mut child = Command::new(program)
+        .current_dir(folder)
+        .args(options)
+        .args(["-display", "none", "-monitor", "none", "-serial", "none", "-semihosting-config"])
+        .arg(format!("enable=on,target=native{}", words.concat()))
+        .arg("-kernel")
+        .arg(image)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .map_err(|error| format!("cannot start {program}: {error}; looked in PATH"))?;
+    let (sender, receiver) = mpsc::channel();
+    if let Some(mut stdout) = child.stdout.take() {
+        thread::spawn(move || {
+            let mut text = Vec::new();
+            // The pipe breaks when the emulator is killed; what came before still counts.
+            let _ = stdout.read_to_end(&mut text);
+            let _ = sender.send(String::from_utf8_lossy(&text).into_owned());
+        });
+    }
+    let Ok(text) = receiver.recv_timeout(HUNG) else {
+        child.kill()?;
+        child.wait()?;
+        return Err(format!("FAILED: hang: the image did not end within {} s", HUNG.as_secs()).into());
+    };
+    let status = child.wait()?;
+    match text.lines().find(|line| line.starts_with("FAILED:")) {
+        Some(line) => Err(line.into()),
+        None if !status.success() => Err(format!("FAILED: the emulator ended with {status}:\n{text}").into()),
+        None => Ok(text),
     }
 }

@@ -1,7 +1,7 @@
 //! A recording of 10,000 frames for the core on another processor: the closed loop first, then everything that can
 //! break.
 //!
-//! Made anew where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
+//! Computed where it is needed: the plant gives the same bits on every machine, and what breaks is drawn with a fixed
 //! seed.
 
 use crate::finger::config;
@@ -67,7 +67,7 @@ pub fn records() -> Vec<Record> {
     records
 }
 
-/// What a recording's file holds.
+/// Content of a recording's file.
 pub fn to_bytes(records: &[Record]) -> Vec<u8> {
     let count = u32::try_from(records.len()).unwrap_or(u32::MAX);
     let header = MAGIC.into_iter().chain(count.to_le_bytes());
@@ -89,7 +89,7 @@ pub fn digest(records: &[Record]) -> u64 {
     digest.value()
 }
 
-/// Breaks a record of a burst in one of many ways; `held` is what was sensed at the burst's start.
+/// Spoils a record of a burst at random; `held` is what was sensed at the burst's start.
 fn spoil(record: &mut Record, way: usize, held: &Sense, random: &mut Rng) {
     let Record { frame, sense, command } = record;
     match way % 16 {
@@ -100,7 +100,7 @@ fn spoil(record: &mut Record, way: usize, held: &Sense, random: &mut Rng) {
         4 => fill(frame, |_, _, _| random.u16(..)),
         5 => fill(frame, |_, _, code| if random.u8(..10) == 0 { random.u16(..) } else { code }),
         6 => sense.encoder = random.i32(..),
-        // The encoder stands while the goal changes.
+        // The encoder does not move while the goal changes.
         7 => sense.encoder = held.encoder,
         8 => sense.supply_mv = random.u16(..5_000),
         9 => sense.supply_mv = random.u16(9_000..),

@@ -1,4 +1,4 @@
-//! What constructors refuse: each error names the parameter, its value and its range.
+//! Arguments that constructors refuse: each error names the parameter, its value and its range.
 
 use fingertip::config::ConfigError;
 use fingertip::model::Tip;

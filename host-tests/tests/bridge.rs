@@ -1,4 +1,4 @@
-//! What the bridge is told by each mode, and by a look at a frame that is still being scanned.
+//! Commands to the bridge in each mode, and in the middle of the scan of a frame.
 
 use fingertip::config::newtons;
 use fingertip::pipeline::{Bridge, Status};
@@ -7,7 +7,7 @@ use fingertip::state::{Fault, Mode};
 use fingertip::units::Duty;
 use sim::native::bench::Bench;
 
-/// What ends a grip.
+/// Ends of a grip.
 type End = fn(&mut Bench);
 
 /// Holds 1 N, with the duty that this takes.
@@ -23,7 +23,7 @@ fn holding() -> Bench {
     board
 }
 
-/// With so many dead taxels.
+/// Configuration with the given number of dead taxels.
 fn dead(frame: &Frame, count: usize) -> Frame {
     let mut frame = *frame;
     (0..count).for_each(|place| frame.set_code(place, place, 0));
@@ -128,7 +128,7 @@ fn a_motor_that_was_driven_brakes_until_the_tip_rests() {
     }
 }
 
-/// What acts between two steps shorts the motor before the next one.
+/// A stop between two steps shorts the motor before the next step.
 #[test]
 fn a_stop_and_new_parameters_brake_at_once() {
     let mut board = holding();

@@ -1,4 +1,4 @@
-//! How far a force is known only from below: by the sums, by a fit, and from frame to frame.
+//! Uncertainty of a force of which only a lower bound is known: by the sums, by a fit, and from frame to frame.
 
 use core::f64::consts::PI;
 use fastrand::Rng;

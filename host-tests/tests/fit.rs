@@ -14,7 +14,7 @@ use proptest::test_runner::RngSeed;
 /// A converter that gives its smallest and its largest code, in sixteenths.
 const FULL: i32 = 4095 * 16;
 const NONE: [u32; ROWS] = [0; ROWS];
-/// Places of the ways in a verdict.
+/// Indices of the reading methods in a verdict.
 const MOMENTS: usize = 0;
 const TWO: usize = 2;
 const FIT: usize = WAYS - 1;
@@ -31,7 +31,7 @@ fn all_ways(picture: &Picture, config: &Config) -> Vec<Contact> {
     FitLevel::ALL.map(followed).into_iter().chain(looks).collect()
 }
 
-/// The ways that use the model, of [`all_ways`].
+/// Methods of [`all_ways`] that use the model.
 const BY_MODEL: usize = FitLevel::OneRow as usize;
 
 fn newtons(force: Newtons) -> f64 {
@@ -42,7 +42,7 @@ fn mm(length: Millimetres) -> f64 {
     length.0.to_num()
 }
 
-/// A scene's picture without noise.
+/// Tactile image of a scene without noise.
 fn still(scene: &Scene, bad: [u32; ROWS]) -> (Picture, usize) {
     let reading = Reading { steps: Steps::Sixteenths, noise: Noise::None, dead: 0 };
     reading.picture(&scene.pressures(), bad, &mut fastrand::Rng::with_seed(0))
@@ -351,7 +351,7 @@ proptest! {
             for refined in Refined::ALL {
                 in_range(&read(picture, refined, &config), &config);
             }
-            // Not a whole number of refinements, so that a picture meets a guess made from another.
+            // Not a whole number of refinements, so that an image meets a guess from another image.
             for _ in 0..19 {
                 for fit in &mut fits {
                     in_range(&fit.read(picture, &config), &config);

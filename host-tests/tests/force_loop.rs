@@ -121,7 +121,7 @@ fn the_end_of_the_travel_stops_an_approach() {
     assert!(board.truth().speed_mm_per_s.abs() < 1.0);
 }
 
-/// The reading vanishes within a frame while the tip stands still: it is the array's, so the finger does not press
+/// The reading vanishes within a frame while the tip rests: it is the array's, so the finger does not press
 /// harder. After 3 ms without a force the finger releases the object, and seeks it then.
 #[test]
 fn a_reading_that_vanishes_at_once_does_not_make_it_press_harder() {
@@ -205,7 +205,7 @@ fn a_goal_below_the_least_contact_is_held_as_that() {
     }
     let mut board = board();
     let (_, status) = run(&mut board, 40, 0.5);
-    assert!(!status.limits.has(Limits::GOAL), "the least is none that is moved");
+    assert!(!status.limits.has(Limits::GOAL), "the smallest force needs no motion");
 }
 
 /// An object that yields at 100 mm/s: the force falls by more than a quarter within a frame of a slow scan.

@@ -31,7 +31,7 @@ impl Codes {
     }
 }
 
-/// Sound taxels, and up to so many codes that are anything up to `code_max`.
+/// Sound taxels, of which up to the given number have any code up to `code_max`.
 fn codes(wild: usize, code_max: u16) -> impl Strategy<Value = Codes> {
     let places = (0..=ROWS, 0..COLUMNS, 0..=code_max);
     let above = proptest::array::uniform10(proptest::array::uniform10(12_u16..3_200));
@@ -161,7 +161,7 @@ proptest! {
     }
 }
 
-/// Exactly at the limits, in each column, with one that stands higher than the others.
+/// Codes exactly at the limits, in each column, with one column higher than the others.
 #[test]
 fn a_taxel_is_bad_from_the_very_limit_on() {
     let config = config(1_667, 12);

@@ -195,8 +195,8 @@ impl Adversary {
     }
 }
 
-/// Where nothing is pressed, a tip that is fast 20 ms after the last contact is stopped within 30 ms more, whatever
-/// duty is asked for, and whatever the array reads in the air: noise, a wrong baseline, anything.
+/// Without contact, a tip that is fast 20 ms after the last contact is stopped within 30 ms more, whatever
+/// duty is requested, and whatever the array reads in the air: noise, a wrong baseline, anything.
 #[test]
 fn no_duty_makes_it_fast_in_the_air() {
     let mut rng = Rng::with_seed(2);

@@ -1,4 +1,4 @@
-//! Where the guard begins to hold back, and where it does not yet: each of its limits from both sides.
+//! Limits at which the guard begins to hold back, each from both sides.
 
 use fingertip::config::newtons;
 use fingertip::params::Params;
@@ -151,7 +151,7 @@ fn in_the_air_one_and_a_half_times_the_approach_is_allowed_and_no_more() {
 fn after_a_contact_it_may_be_fast_for_a_while() {
     for (speed_mm_per_s, cut) in [(-370.0, false), (-380.0, true)] {
         let mut finger = Finger::new();
-        // 1 N at 15 mm, touched there: a touch is where the force says.
+        // 1 N at 15 mm, touched there: the force gives the place of the touch.
         assert_eq!(finger.placed(15.0), None);
         finger.force = newtons(1_000);
         for _ in 0..2_000 {
@@ -217,7 +217,7 @@ fn a_touch_begins_and_ends_with_the_mean_force() {
     }
 }
 
-/// A driven tip that stands is no fault until so much is expected of it, and a quarter of what the force does.
+/// A driven tip that does not move is a fault only after the expected motion is large enough: a quarter of the force's.
 #[test]
 fn a_tip_that_stands_is_stopped_from_what_must_be_expected_on() {
     for force_n in [0.0, 4.0] {

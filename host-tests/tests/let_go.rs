@@ -50,7 +50,7 @@ fn carry<E: Set>(board: &mut Bench<E>, from: f64, to: f64) {
     }
 }
 
-/// Asks to let go, and says what is still held so many seconds later.
+/// Requests a release, and returns the force that is still held after the given time, s.
 fn kept<E: Set>(board: &mut Bench<E>, seconds: f64) -> Option<String> {
     board.command().goal = newtons(0);
     board.run(seconds);
@@ -94,7 +94,7 @@ fn goal_0_during_a_press<E: Set>(board: &mut Bench<E>) -> Option<String> {
     kept(board, 16.0)
 }
 
-/// A press asked for during the first approach; the host takes the goal back while it presses.
+/// A press requested during the first approach; the host takes the goal back while it presses.
 #[test]
 fn a_press_that_measures_is_let_go() {
     let mut failed = Vec::new();
@@ -163,7 +163,7 @@ fn a_residue_from_before_torque_does_not_make_the_tip_go_back() {
     assert!(failed.is_empty(), "{failed:#?}");
 }
 
-/// The object comes to a released tip, is held, and is let go again.
+/// The object comes to a released tip, is held, and is released again.
 #[test]
 fn what_came_to_a_released_tip_is_held_and_let_go() {
     let mut failed = Vec::new();

@@ -33,8 +33,8 @@ fn the_pipeline_comes_to_rest_under_what_does_not_change() {
     }
 }
 
-/// Whatever the encoder did, the observer comes to rest once it stands: also after jumps, and from speeds that no tip
-/// has.
+/// Whatever the encoder did, the observer comes to rest once the encoder does: also after jumps, and from speeds that
+/// no tip has.
 #[test]
 fn the_observer_recovers_from_anything() {
     for (settle_ns, sample_cycles, speed_max_um_per_s) in

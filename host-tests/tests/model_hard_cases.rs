@@ -3,8 +3,8 @@
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip, TipError};
 use fingertip::units::{Kilopascals, Millimetres};
 use host_tests::finger::config;
-use host_tests::prove::domain::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
 use host_tests::prove::exact;
+use host_tests::prove::random::{boundary_distances, boundary_tips, mm, newtons, reference_tip, tip};
 use host_tests::prove::reference::{Reference, error_ulp, real};
 use paper::units::{Radians, Ratio};
 use paper::{Displacement, Load};

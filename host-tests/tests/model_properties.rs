@@ -1,14 +1,17 @@
-//! What must hold for any tip and any input: order, ways back, energy, quadrature, totality.
+//! Properties of any tip and any input: order, inverses, energy, quadrature, totality.
 
 use core::num::NonZeroU16;
-
 use fingertip::model::{MODULUS_MAX, MODULUS_MIN, RADIUS_MAX, RADIUS_MIN, Tip};
 use fingertip::units::{Kilopascals, Millimetres, Newtons};
-use host_tests::prove::domain::{mm, newtons, reference_tip};
+use host_tests::prove::random::{mm, newtons, reference_tip};
+use host_tests::prove::tally::Tally;
+use host_tests::prove::{beyond, exhaustive, random, reference};
 use paper::units::{NewtonMillimetres, Radians, Ratio, SquareMillimetres};
 use paper::{Displacement, Relaxation, RelaxationState, RelaxationTerm, force_on, pressure_of, strain_of};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
+use std::io::Write;
+use std::process::{Command, Output, Stdio};
 
 fn config() -> ProptestConfig {
     ProptestConfig {
@@ -175,7 +178,7 @@ proptest! {
     ) {
         let d = (number(tip.depth_max().to_bits(), 0) * depth) as i32;
         let limit = paper::limit_surface(&tip, mm(d), Ratio::from_bits((mu * 65_536.0) as i32));
-        // So that a share of the limit can be told to a part in a thousand.
+        // So that a share of the limit is resolved to a part in a thousand.
         prop_assume!(limit.force.to_bits() > 1 << 10 && limit.moment.to_bits() > 1 << 10);
         for share in [0.0, 0.3, 0.9, 1.0, 2.0, 5.0] {
             let force = number(limit.force.to_bits(), 0) * angle.cos() * share;
@@ -275,4 +278,192 @@ fn a_held_tip_relaxes_by_its_terms_and_recovers() {
         relaxed = filter.step(&mut state, newtons(0));
     }
     assert!(number(relaxed.to_bits(), 16).abs() < 1e-4);
+}
+
+// The model command: rows in, rows out, as a script would use it.
+
+/// Folder of this package. Its use rebuilds the paths below after the checkout was moved.
+const _: &str = env!("FINGERTIP_ROOT");
+
+const HEADER: &str = "a_mm,Y_kPa,d_mm,r_mm,rc_mm,theta_max_rad,p_kPa,F_N,k_N_per_mm,d_from_F_mm\n";
+
+fn run(input: &str) -> Output {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_model"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+    child.wait_with_output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+#[test]
+fn columns_come_in_any_order_and_others_are_ignored() {
+    let output = run("note,r_mm,d_mm,Y_kPa,a_mm\nfirst,0,2,250,10\nsecond,6.0,2.0,250.0,10.0\n");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let expected = format!(
+        "{HEADER}{}{}",
+        "10,250,2,0,6,0.6435011,50,3.14159,3.14159,1.999998\n",
+        "10.0,250.0,2.0,6.0,6,0.6435011,0,3.14159,3.14159,1.999998\n"
+    );
+    assert_eq!(text(&output.stdout), expected);
+    assert_eq!(text(&output.stderr), "");
+}
+
+#[test]
+fn rows_outside_the_domain_are_named_and_left_empty() {
+    let output = run(concat!(
+        "a_mm,Y_kPa,d_mm,r_mm\n",
+        "10,250,2,6\n",
+        "3.99999999999,250,1,0\n",
+        "16.00000001,250,1,0\n",
+        "10,19.9,1,0\n",
+        "10,2000.1,1,0\n",
+        "10,250,0,0\n",
+        "10,250,9.5000000001,0\n",
+        "10,250,1,-0.1\n",
+        "10,250,1,128\n",
+        "10,250,one,0\n",
+        "10,250,1e999999999,0\n",
+        "10,250\n",
+        "10,250,nan,0\n",
+        "10,250,1,0\n",
+    ));
+    assert_eq!(output.status.code(), Some(1));
+    let rows: Vec<&str> = text(&output.stdout).lines().skip(1).collect();
+    assert_eq!(rows.len(), 14);
+    let reasons: Vec<&str> = text(&output.stderr).lines().collect();
+    let columns = ["a_mm", "a_mm", "Y_kPa", "Y_kPa", "d_mm", "d_mm", "r_mm", "r_mm", "d_mm", "d_mm", "d_mm", "d_mm"];
+    assert_eq!(reasons.len(), columns.len(), "{reasons:?}");
+    for (place, (reason, column)) in reasons.iter().zip(columns).enumerate() {
+        assert!(reason.starts_with(&format!("row {}: {column} is ", place + 2)), "{reason}");
+        assert!(rows[place + 1].ends_with(",,,,,,"), "{}", rows[place + 1]);
+    }
+    assert!(!rows[0].ends_with(',') && !rows[13].ends_with(','));
+}
+
+#[test]
+fn the_domains_ends_are_inside() {
+    let input = "a_mm,Y_kPa,d_mm,r_mm\n4,20,3.8,0\n16,2000,15.2,16\n7.3,20,6.935,127.9\n4,20,5.9604644775390625e-8,0\n";
+    let output = run(input);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stdout).lines().count(), 5);
+}
+
+#[test]
+fn a_missing_column_is_said() {
+    let output = run("a_mm,d_mm,r_mm\n10,2,0\n");
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("no column Y_kPa"), "{}", text(&output.stderr));
+    assert_eq!(text(&output.stdout), "");
+}
+
+#[test]
+fn the_oracle_passes_through_within_the_bounds() {
+    let oracle = std::fs::read_to_string(host_tests::prove::reference::path()).unwrap();
+    let output = run(&oracle);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut ours = csv::Reader::from_reader(output.stdout.as_slice());
+    let mut theirs = csv::Reader::from_reader(oracle.as_bytes());
+    let mut rows = 0;
+    for (ours, theirs) in ours.records().zip(theirs.records()) {
+        let (ours, theirs) = (ours.unwrap(), theirs.unwrap());
+        let number = |record: &csv::StringRecord, place: usize| record[place].parse::<f64>().unwrap();
+        // Units of the last place, and half a unit more for the decimals printed.
+        for (place, (ulp, bound)) in [(24, 1.0), (24, 4.0), (16, 2.0), (16, 1.0), (16, 1.0)]
+            .into_iter()
+            .map(|(bits, b)| (0.5_f64.powi(bits), b))
+            .enumerate()
+        {
+            let error = (number(&ours, 4 + place) - number(&theirs, 4 + place)) / ulp;
+            assert!(error.abs() <= bound + 0.5, "row {rows}, column {}: {error} ulp", 4 + place);
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, 400);
+}
+
+// A quick part of the proof: thousands of inputs where `cargo xtask prove` takes them all.
+
+fn quiet(_: u64, _: u64) {}
+
+fn hold(tallies: &[Tally]) {
+    for tally in tallies {
+        assert!(tally.holds(), "{tally}");
+    }
+}
+
+#[test]
+fn the_reference_tip_is_correctly_rounded_at_both_ends_and_in_the_middle() {
+    let tip = reference_tip();
+    let parts = |top: i32| {
+        let top = top as u64 + 1;
+        [0..20_000, top / 2..top / 2 + 20_000, top - 20_000..top]
+    };
+    for part in parts(tip.depth_max().to_bits()) {
+        hold(&exhaustive::depths(&tip, part.start.max(1)..part.end, &quiet));
+    }
+    for part in parts(tip.force_max().to_bits()) {
+        hold(&exhaustive::forces(&tip, part, &quiet));
+    }
+    for part in parts(tip.contact_radius(tip.depth_max()).to_bits()) {
+        hold(&exhaustive::radii(&tip, part, &quiet));
+    }
+    for part in parts(tip.peak_pressure(tip.depth_max()).to_bits()) {
+        hold(&exhaustive::peaks(&tip, part, &quiet));
+    }
+}
+
+#[test]
+fn the_pressure_is_correctly_rounded_and_falls_with_the_distance_on_a_grid() {
+    hold(&exhaustive::pressures(&reference_tip(), 100, 1_000, &quiet));
+}
+
+#[test]
+fn the_boundaries_of_the_domain_hold() {
+    hold(&random::boundaries(&quiet));
+}
+
+#[test]
+fn random_points_of_the_domain_hold() {
+    hold(&random::points(0..5_000, &quiet));
+}
+
+#[test]
+fn the_touching_angle_holds_over_the_reference_tip() {
+    hold(&random::touching_angles(&reference_tip(), 5_000, &quiet));
+}
+
+#[test]
+fn the_rest_of_the_model_holds() {
+    hold(&beyond::geometry(0..2_000, &quiet));
+    hold(&beyond::tilt(0..2_000, &quiet));
+    hold(&beyond::friction(0..2_000, &quiet));
+    hold(&beyond::relaxation(0..6, &quiet));
+}
+
+#[test]
+fn the_oracle_holds() {
+    let tallies = reference::check().unwrap();
+    hold(&tallies);
+    for tally in tallies {
+        assert_eq!(tally.inputs, 400);
+        // An error of nothing at all would mean that the comparison is not one.
+        assert!(tally.worst_ulp.abs() > 0.4, "{tally}");
+    }
+}
+
+#[test]
+fn a_pattern_fed_for_ever_ends_in_a_cycle_no_wider_than_the_pattern_makes_it() {
+    let settled = beyond::long_run(&[i32::MAX, i32::MAX], 1 << 10);
+    assert_eq!((settled.low, settled.high), (0.5, 0.5));
+    let swinging = beyond::long_run(&[i32::MAX, 0], 1 << 10);
+    // The mean of the pattern relaxes to 1/65536 of it; the swing about it is symmetric.
+    assert!((swinging.low + swinging.high - 0.5).abs() <= 2.0 / 65_536.0, "{swinging:?}");
+    assert!(swinging.high < 16_384.0 && swinging.high > 15_000.0, "{swinging:?}");
 }

@@ -13,7 +13,7 @@ use fingertip::units::{Millimetres, MillimetresPerSecond2, Newtons};
 use host_tests::finger::{config, tared};
 use sim::plant::{Plant, Setup};
 
-/// What a sound finger shows that presses with 1 N.
+/// Readings of a sound finger that presses with 1 N.
 #[derive(Clone, Copy)]
 struct Shown {
     picture: Picture,

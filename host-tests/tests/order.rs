@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 struct Stage {
     /// Its name.
     name: String,
-    /// What it uses, and a file that does.
+    /// Stages that it uses, each with a file that uses it.
     uses: Vec<(String, PathBuf)>,
 }
 
@@ -21,14 +21,14 @@ fn stages(core: &Path) -> io::Result<Vec<Stage>> {
     names.iter().map(|name| Ok(Stage { name: (*name).into(), uses: uses(core, name, "crate::")? })).collect()
 }
 
-/// What the board's side of the image uses of the core.
+/// Stages of the core that the board's side of the image uses.
 fn board(core: &Path) -> io::Result<Stage> {
     let mut uses = uses(core, "main", "fingertip::")?;
     uses.extend(self::uses(core, "board", "fingertip::")?);
     Ok(Stage { name: "board".into(), uses })
 }
 
-/// What the files of a stage name behind a prefix, itself aside.
+/// Names that the files of a stage have behind a prefix, except its own.
 fn uses(core: &Path, stage: &str, prefix: &str) -> io::Result<Vec<(String, PathBuf)>> {
     let mut found = Vec::new();
     for file in files(core, stage)? {

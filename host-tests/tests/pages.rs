@@ -1,5 +1,7 @@
-//! What the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
+//! All that the pages tell a reader to run or to open exists: commands with their flags, files, links and anchors.
 
+use fingertip::units::Millimetres;
+use host_tests::figures::{Modulus, PITCH_MM, all, fit, readings, seen, tip};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -114,7 +116,7 @@ impl Programs {
         let below: Vec<&str> = path.iter().skip(1).map(String::as_str).collect();
         let mut text = match (path[0].as_str(), below.first()) {
             ("xtask", Some(name)) if BEHIND.contains(name) => {
-                // What the command says itself is beside what the program behind it says.
+                // The command's own help and the help of the program behind it both count.
                 run("xtask", &["help", name]) + &run(name, &[&below[1..], &["--help"]].concat())
             }
             (program, _) => run(program, &[&below[..], &["--help"]].concat()),
@@ -124,7 +126,7 @@ impl Programs {
         text
     }
 
-    /// What is wrong with a command; nothing where all of it exists.
+    /// Returns what is wrong with a command; `None` if all of it exists.
     fn wrong(&mut self, words: &[String]) -> Option<String> {
         let (mut path, mut rest) = match words {
             [cargo, xtask, rest @ ..] if cargo == "cargo" && xtask == "xtask" => (vec!["xtask".to_owned()], rest),
@@ -176,19 +178,19 @@ impl Programs {
     }
 }
 
-/// Whether a letter goes on with the name of a flag.
+/// True if a letter goes on with the name of a flag.
 fn in_a_word(letter: char) -> bool {
     letter.is_alphanumeric() || letter == '-'
 }
 
-/// Whether a help text lists a command.
+/// True if a help text lists a command.
 fn lists(help: &str, name: &str) -> bool {
     let commands =
         help.split("\nCommands:\n").skip(1).flat_map(|section| section.lines().take_while(|line| !line.is_empty()));
     commands.into_iter().any(|line| line.starts_with("  ") && line.split_whitespace().next() == Some(name))
 }
 
-/// Whether a word stands for others: `FILE`, `[SCENE]`, `...`.
+/// True for a placeholder: `FILE`, `[SCENE]`, `...`.
 fn placeholder(word: &str) -> bool {
     !word.starts_with(|c: char| c.is_ascii_lowercase() || c == '-') || word.contains("...")
 }
@@ -273,4 +275,54 @@ fn every_page_that_a_source_names_exists() {
             }
         }
     }
+}
+
+// The paper's figures: well-formed, the same bytes every time, and of the model.
+
+#[test]
+fn the_pictures_are_well_formed_and_the_same_every_time() {
+    let pictures = all().unwrap();
+    assert_eq!(pictures, all().unwrap());
+    for (name, svg) in &pictures {
+        assert!(svg.starts_with("<svg") && svg.trim_end().ends_with("</svg>"), "{name}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{name}");
+        assert!(svg.contains("prefers-color-scheme:dark"), "{name}");
+    }
+    let [(_, profile), (_, maps), (_, force)] = pictures;
+    assert_eq!(profile.matches("pressure p, kPa").count(), 3);
+    assert_eq!(profile.matches("distance from the centre, mm").count(), 3);
+    assert_eq!(maps.matches("columns, mm").count(), 3);
+    assert!(maps.contains("kPa"));
+    // The dots of the contact's circle: 60 a map, as far as they are on the array.
+    assert_eq!(maps.matches("<circle").count(), 180);
+    assert!(force.contains("indentation d, mm") && force.contains("force F, N"));
+    assert_eq!(force.matches("<circle").count(), 24);
+}
+
+#[test]
+fn what_the_array_sees_sums_to_the_force() {
+    let tip = tip();
+    for d_mm in [1, 2, 3] {
+        let d = Millimetres::from_bits(d_mm << 24);
+        let seen = seen(&tip, d);
+        let sum: f64 = seen.iter().flatten().sum::<f64>() * PITCH_MM * PITCH_MM * 1e-3;
+        let force: f64 = tip.force(d).0.to_num();
+        assert!((sum / force - 1.0).abs() < 2e-3, "{d_mm} mm: {sum} N of {force} N");
+        // The middle taxels see less than the peak, by the fall over half a taxel.
+        let peak: f64 = tip.peak_pressure(d).0.to_num();
+        assert!((0.93..0.99).contains(&(seen[5][5] / peak)), "{d_mm} mm: {} kPa", seen[5][5]);
+    }
+}
+
+#[test]
+fn the_readings_scatter_and_give_the_modulus_back() {
+    let tip = tip();
+    let readings = readings(&tip);
+    let off = |(d, force): &(Millimetres, fingertip::units::Newtons)| {
+        force.0.to_num::<f64>() / tip.force(*d).0.to_num::<f64>() - 1.0
+    };
+    let worst = readings.iter().map(|reading| off(reading).abs()).fold(0.0, f64::max);
+    assert!((0.01..0.2).contains(&worst), "{worst}");
+    let Modulus { kpa, sigma_kpa } = fit(&tip, &readings);
+    assert!((kpa - 250.0).abs() < 3.0 * sigma_kpa && (0.2..5.0).contains(&sigma_kpa), "{kpa} +- {sigma_kpa}");
 }

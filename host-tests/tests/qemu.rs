@@ -3,7 +3,7 @@
 use std::env;
 use std::process::{Command, Output};
 
-/// Paths below are compiled in: by this they are compiled anew where the checkout was moved.
+/// Folder of this package. Its use rebuilds the paths below after the checkout was moved.
 const _: &str = env!("FINGERTIP_ROOT");
 
 /// 60 us at one instruction a cycle of 168 MHz.

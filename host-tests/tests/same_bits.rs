@@ -1,11 +1,11 @@
-//! What is compared between processors: every public function of the model, over its whole domain, and more than
-//! refusals.
+//! Functions that are compared between processors: every public function of the model, over its whole domain, and more
+//! than refusals.
 
 use fingertip::pipeline::Status;
 use fingertip::shipped::Pipeline;
 use fingertip::state::{Fault, Mode};
 use host_tests::finger::config;
-use host_tests::prove::domain::reference_tip;
+use host_tests::prove::random::reference_tip;
 use host_tests::stimulus;
 use host_tests::study::inputs::Inputs;
 use images::same_bits::model::Sample;
@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// Tells what is there already, without computing anything.
+/// Lists what is there already, without computing anything.
 const ACCESSORS: [&str; 6] = ["radius", "modulus", "depth_max", "force_max", "settled", "fmt"];
 
 /// The public functions of a file.

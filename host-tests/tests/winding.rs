@@ -32,7 +32,7 @@ fn degrees(winding: &Winding, config: &Config) -> f64 {
     winding.temperature(config).0.to_num()
 }
 
-/// What a motor is, where its controller has the parameters.
+/// True properties of a motor, as opposed to its controller's parameters.
 #[derive(Clone, Copy, Debug)]
 struct Truth {
     ohm: f64,
@@ -58,7 +58,7 @@ impl Truth {
         self.ambient_c + self.above_k[0] + self.above_k[1]
     }
 
-    /// Under a voltage at a motor that stands: the warm winding takes less.
+    /// Current under a voltage at a motor at rest: the warm winding takes less.
     fn pass(&mut self, volts: f64, seconds: f64) {
         let warm_ohm = self.ohm * (1.0 + 0.0039 * (self.degrees() - 25.0));
         let watts = volts * volts / warm_ohm;

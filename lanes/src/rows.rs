@@ -13,7 +13,7 @@ pub const GAIN_BITS: u32 = 14;
 pub const TARE_BITS: u32 = 16;
 /// Fractional bits of a boost.
 pub const BOOST_BITS: u32 = 28;
-/// By so many bits the boost is shortened for single taxels, whose product is then an upper half.
+/// Bits by which the boost is shortened for single taxels, whose product is then an upper half.
 const BOOST_DROP: u32 = GAIN_BITS + BOOST_BITS - CODE_BITS - 32;
 /// Pairs whose products with gains add up to 32 bits: 16 x 4095 x 32767 is just below 2^31.
 const BLOCK: usize = 8;
@@ -51,7 +51,7 @@ pub const fn pairs(columns: usize) -> usize {
     columns.div_ceil(2)
 }
 
-/// Where a column stands in a row of codes, gains or moments; beyond the row where there is no such column.
+/// Index of a column in a row of codes, gains or moments; beyond the row if there is no such column.
 ///
 /// ```
 /// let places = |columns| (0..columns).map(move |column| lanes::place(column, columns));
@@ -70,14 +70,14 @@ pub const fn place(column: usize, columns: usize) -> usize {
     }
 }
 
-/// A pair of a row of codes; 0 where there is none.
+/// Pair of a row of codes; 0 beyond the row.
 #[inline(always)]
 pub fn codes_at<const COLUMNS: usize>(row: &[u16; COLUMNS], at: usize) -> u32 {
     let code = |place: usize| row.get(place).copied().unwrap_or(0);
     u32::from(code(2 * at)) | u32::from(code(2 * at + 1)) << 16
 }
 
-/// A pair of a row of gains or moments; 0 where there is none.
+/// Pair of a row of gains or moments; 0 beyond the row.
 #[inline(always)]
 fn weights_at<const COLUMNS: usize>(row: &[i16; COLUMNS], at: usize) -> u32 {
     let weight = |place: usize| row.get(place).copied().unwrap_or(0);
@@ -95,7 +95,7 @@ pub fn each_pair<const COLUMNS: usize>(mut act: impl FnMut(usize)) {
     each!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15);
 }
 
-/// What stands in for the lane that the last pair of an odd row lacks: the other lane.
+/// Replacement of the lane that the last pair of an odd row lacks: the other lane.
 #[inline(always)]
 pub const fn filled<const COLUMNS: usize>(of: u32, at: usize) -> u32 {
     if 2 * at + 1 < COLUMNS { of } else { of & 0xffff | of << 16 }
@@ -122,7 +122,7 @@ pub const fn sum_drop(rows: usize, columns: usize) -> u32 {
     drop
 }
 
-/// What is known of a row before the pass, and what the pass finds.
+/// Data of a row before the pass, and results of the pass.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row<const COLUMNS: usize> {
@@ -130,7 +130,7 @@ pub struct Row<const COLUMNS: usize> {
     pub gains: [i16; COLUMNS],
     /// The weight of each column in the row's moment, its gain in it, in the order of the codes.
     pub moments: [i16; COLUMNS],
-    /// What each column reads without contact, in the columns' order.
+    /// Codes of each column without contact, in the columns' order.
     pub tare: [i32; COLUMNS],
     /// Found: 1 / (1 - x) in Q28, where x is the row's sag.
     pub boost: i32,
@@ -138,11 +138,11 @@ pub struct Row<const COLUMNS: usize> {
     pub largest: u32,
 }
 
-/// What is common to the rows of a pass.
+/// Data common to the rows of a pass.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct Common<const COLUMNS: usize> {
-    /// What each column's codes are taken above, in the order of the codes.
+    /// Offset of each column's codes, in the order of the codes.
     pub undriven: [u16; COLUMNS],
     /// A column that shows less is dead; in both lanes.
     pub dead: u32,
@@ -150,7 +150,7 @@ pub struct Common<const COLUMNS: usize> {
     pub sag: u32,
 }
 
-/// What the rows add up to.
+/// Sums over the rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Total {
     /// Sum of the rows' sums, each less [`sum_drop`] bits times its boost; upper half of the product.

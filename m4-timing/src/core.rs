@@ -74,7 +74,7 @@ impl Executed {
     }
 }
 
-/// Where execution went on.
+/// Address at which execution continued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Next {
     /// The next instruction's address.
@@ -96,7 +96,7 @@ const FLOAT_DIVIDE: u64 = 14;
 /// 32-bit instructions that straddle words, in a row, after which the fetch can fall behind.
 const STRADDLING: u32 = 3;
 
-/// What the core remembers from one instruction to the next.
+/// State of the core between two instructions.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Core {
     /// Registers that a load just before wrote, with its base where that was written back.
@@ -114,7 +114,7 @@ pub struct Core {
 }
 
 impl Core {
-    /// What an executed instruction cost, now that it is known what came next.
+    /// Cycles of an executed instruction, once its successor is known.
     #[inline(always)]
     pub fn retire(&mut self, executed: &Executed, next: Next) -> Cycles {
         let instruction = &executed.instruction;
@@ -129,7 +129,7 @@ impl Core {
         cost
     }
 
-    /// What is still to wait for at the end of the measured code: a division whose result nobody has asked for yet.
+    /// Cycles to wait for at the end of the measured code: a division whose result was not used yet.
     pub fn finish(&self) -> Cycles {
         // The most already counts a division as if nothing overlapped with it.
         Cycles::new(self.dividing, self.dividing, 0)

@@ -15,7 +15,7 @@ const LEAD: u64 = 2;
 /// Lines of the largest flash, 2 MiB; its aliases are the same lines.
 const FLASH_LINES: usize = 1 << 17;
 
-/// What a part's flash is like.
+/// Properties of a part's flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Wait states of an access.
@@ -140,7 +140,7 @@ impl Cache {
         self.used[line as usize % FLASH_LINES] != 0
     }
 
-    /// Whether a line is there; it then counts as just used.
+    /// True if a line is there; it then counts as just used.
     fn touch(&mut self, line: u32) -> bool {
         let there = self.contains(line);
         if there {

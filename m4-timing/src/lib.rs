@@ -3,15 +3,14 @@
 //!
 //! Everything but the plugin is safe, pure and independent of QEMU. `docs/timing.md` gives the rules, where they
 //! come from, and how far they agree with published measurements.
+
 #![deny(unsafe_code)]
 
-pub mod condition;
 pub mod core;
 pub mod decode;
 pub mod flash;
 pub mod instruction;
 pub mod meter;
-pub mod region;
 pub mod report;
 
 #[cfg(feature = "plugin")]

@@ -18,7 +18,7 @@ type Id = u64;
 type Block = c_void;
 type Insn = c_void;
 
-/// What QEMU says of itself; only the beginning matters.
+/// QEMU's version information; only the beginning matters.
 #[repr(C)]
 pub struct Info {
     target_name: *const c_char,
@@ -91,7 +91,7 @@ const CORE_REGISTERS: [&CStr; 15] =
     [c"r0", c"r1", c"r2", c"r3", c"r4", c"r5", c"r6", c"r7", c"r8", c"r9", c"r10", c"r11", c"r12", c"sp", c"lr"];
 
 static PLUGIN: OnceLock<Mutex<Plugin>> = OnceLock::new();
-/// Whether a region is being measured: the callbacks outside of one end here.
+/// True if a region is being measured: the callbacks outside of one end here.
 static RUNNING: AtomicBool = AtomicBool::new(false);
 
 struct Plugin {

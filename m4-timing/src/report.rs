@@ -1,6 +1,6 @@
 //! The measurements as text to read and as JSON lines.
 
-use crate::region::{Figures, Region, Summary};
+use crate::meter::{Figures, Region, Summary};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

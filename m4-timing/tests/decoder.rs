@@ -36,7 +36,7 @@ fn core_register(text: &str) -> Option<CoreSet> {
     Some(bit(number))
 }
 
-/// How many words a list in braces names.
+/// Number of words that a list in braces names.
 fn words(operands: &str) -> u8 {
     let list = operands.split_once('{').expect("a list").1;
     let words = list.split(',').map(|name| if name.trim().starts_with('d') { 2 } else { 1 });

@@ -4,8 +4,8 @@
 use m4_timing::core::Touched;
 use m4_timing::decode::{decode, is_wide};
 use m4_timing::flash::{Flash, Settings};
+use m4_timing::meter::Summary;
 use m4_timing::meter::{Meter, Refusal, Registers, Site};
-use m4_timing::region::Summary;
 
 const BEGIN: [u16; 2] = [0xf3af, 0x8040];
 const END: [u16; 2] = [0xf3af, 0x8041];
@@ -34,7 +34,7 @@ fn site(address: u32, halfwords: &[u16]) -> Site {
     Site { address, code: decode(&bytes) }
 }
 
-/// What a step of a test executes: an instruction where the last one ended, or elsewhere; or an access of the last.
+/// Step of a test: an instruction behind the last one, or elsewhere; or a memory access of the last one.
 #[derive(Clone, Copy)]
 enum Step<'a> {
     Do(&'a [u16]),

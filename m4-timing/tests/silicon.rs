@@ -1,13 +1,13 @@
 //! The model against cycles that others measured on STM32F4 boards and published. Needs QEMU and the image:
 //! `cargo xtask timing --check` runs these tests.
 //!
-//! The kernels are assembly, so no compiler stands between their source and these figures; `m4-timing/tests/kernels`
+//! The kernels are assembly, so no compiler changes these figures; `m4-timing/tests/kernels`
 //! has them with their licences. What was measured there is the call with its arguments in place: so it is here.
 
 use m4_timing::report::{Measured, parse};
 use std::{env, fs, path::PathBuf, process::Command};
 
-/// Paths below are compiled in: by this they are compiled anew where the checkout was moved.
+/// Folder of this package. Its use rebuilds the paths below after the checkout was moved.
 const _: &str = env!("FINGERTIP_ROOT");
 
 /// A kernel: its name, the cycles published without wait states, blocks a call, the cycles published at 5 wait states.

@@ -298,7 +298,7 @@ class Bus:
                     continue
                 missed[device_id] = 0
                 if isinstance(state, FingertipError):
-                    del missed[device_id]  # it started anew: torque is off
+                    del missed[device_id]  # it restarted: torque is off
                 elif state.mode == Mode.PRESS:
                     measuring.append(device_id)  # the end of a press that measures releases, with the goal 0
                     begun_s[device_id] = state.time_s

@@ -55,7 +55,7 @@ class Finger(Device):
     def state(self, pressures: bool = True) -> State:
         """Reads state and time in one packet, with the pressures or without: that is five times as short.
 
-        Raises `Restarted` once where the controller started anew since the last one.
+        Raises `Restarted` once where the controller restarted since the last one.
         """
         # Threads must count the time in the order of their reads.
         with self.line.lock:
@@ -155,7 +155,7 @@ class Finger(Device):
             raise FingertipError(f"{fault.name} cannot be cleared: {words.get(hindrance, why)}") from why
         self.bus.unwatch([self.device_id])
         if self.wait(reg.FAULT, int(fault)) if fault else 0:
-            raise FingertipError(f"{Fault(self.read(reg.FAULT)).name} stands again: what causes it is still there")
+            raise FingertipError(f"{Fault(self.read(reg.FAULT)).name} is back: what causes it is still there")
         return fault
 
     def parameters(self) -> Dict[str, int]:
@@ -189,7 +189,7 @@ class Finger(Device):
         if self.wait(reg.SAVED_STATE, _CHANGED) != _SAME:
             raise FingertipError("the save failed: the flash holds what it did")
         if self.parameters() != meant:
-            raise Restarted("the controller started anew before it saved: the flash holds what it did")
+            raise Restarted("the controller restarted before it saved: the flash holds what it did")
 
     def wait(self, register: reg.Register, *while_it_is: int) -> int:
         """Reads a register until it is something else, or the time is over."""
@@ -206,6 +206,6 @@ class Finger(Device):
         self._last = (time_us, frame)
         if (frame - last_frame) & 0x80000000:
             self._last, self._time_us = None, 0
-            raise Restarted("the controller started anew: torque is off, and it is not tared")
+            raise Restarted("the controller restarted: torque is off, and it is not tared")
         self._time_us += (time_us - last_us) & 0xFFFFFFFF
         return self._time_us / 1e6

@@ -69,7 +69,7 @@ class Limits(IntFlag):
 
 
 class Restarted(FingertipError):
-    """The controller started anew in between: torque is off, it is not tared, and its time begins again."""
+    """The controller restarted in between: torque is off, it is not tared, and its time begins again."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-//! What a reading does by itself: creep under a held force, and its change with temperature.
+//! Drift of a reading: creep under a held force, and its change with temperature.
 
 use crate::Value;
 use crate::modulus::{NoModulus, modulus};
@@ -16,7 +16,7 @@ pub struct HeldSeries {
 /// Creep of an array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Creep {
-    /// How much a held reading has grown in the end, as a share (`creep_permille`).
+    /// Final growth of a held reading, as a share (`creep_permille`).
     pub share: Value,
     /// Time constant, s (`creep_time_ms`).
     pub time_s: Value,

@@ -38,7 +38,7 @@ pub enum Condition {
 /// Gain of a taxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
-    /// What the taxel reads too much, as a factor; see [`Gain::factor`].
+    /// Factor by which the taxel reads too much; see [`Gain::factor`].
     pub reads: f64,
     /// Standard uncertainty of `reads`, apart from the factor that all have in common.
     pub sigma: f64,
@@ -49,7 +49,7 @@ pub struct Gain {
 }
 
 impl Gain {
-    /// What the gain in force is to be multiplied by, with the array's characteristic (`curve_permille` of the parameters).
+    /// Factor for the gain in force, with the array's characteristic (`curve_permille` of the parameters).
     ///
     /// The gain acts on codes before the characteristic makes u (1 + p u / 4096) / (1 + p) of them. So it is the ratio of
     /// two codes: at three quarters of the highest reading, where most of the weight is.

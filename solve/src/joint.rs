@@ -30,7 +30,7 @@ const DEAD: f64 = 0.25;
 /// A taxel is odd where its residuals are this many of their standard deviations and this share of its highest reading.
 const ODD_SIGMAS: f64 = 4.0;
 const ODD_PART: f64 = 0.02;
-/// What a gain keeps in uncertainty however well it repeats.
+/// Least uncertainty of a gain, however well it repeats.
 const FLOOR: f64 = 0.003;
 /// Usual yield of a plate and its table, mm/N, where they may yield.
 pub const YIELD_USUAL: f64 = 0.02;
@@ -249,7 +249,7 @@ impl<'a> Joint<'a> {
         (normal, right)
     }
 
-    /// What is usual of tilt, roundness and gains.
+    /// Usual values of tilt, roundness and gains.
     fn priors(&self, normal: &mut DMatrix<f64>, right: &mut DVector<f64>) {
         let mut usual = |at: usize, value: f64, sigma: f64| {
             normal[(at, at)] += 1.0 / (sigma * sigma);

@@ -23,7 +23,7 @@ pub struct Shift {
     pub force_n: f64,
     /// Force that the stiffest step leads one to expect, N.
     pub expected_n: f64,
-    /// How much shallower than the travel says the contact is, mm.
+    /// Travel minus depth of the contact, mm.
     pub shift_mm: f64,
     /// Its standard deviation, mm.
     pub sigma_mm: f64,
@@ -52,7 +52,7 @@ pub enum Verdict {
     /// Speed of the plate away from the tip, mm/s.
     #[error("the plate moves by {0:.3} mm/s; 0.01 is allowed: hold plate and finger fast")]
     Moving(f64),
-    /// Least force, as a share of what the depth says.
+    /// Least force, as a share of the force by the depth.
     #[error("the force fell to {0:.2} of what the depth says: the contact was lost")]
     Lost(f64),
     /// Indentation, mm.

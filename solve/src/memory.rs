@@ -18,10 +18,10 @@ use std::f64::consts::PI;
 const CREEP_S: [f64; 7] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3];
 /// Rings of equal area, counted over the largest contact: the play acts on each.
 const RINGS: usize = 16;
-/// How far in front of the contact a press is taken to begin, mm.
+/// Distance before the contact at which a press begins, mm.
 const AIR_MM: f64 = 0.2;
 
-/// What the tip and the ink remember.
+/// Memory of the tip and the ink.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Memory {
     /// Width h of the hysteresis, as a share of the pressure.
@@ -152,7 +152,7 @@ struct LowPass {
     input: f64,
 }
 
-/// What a low-pass does in a step, whatever its input.
+/// Coefficients of a low-pass for a step, independent of its input.
 #[derive(Clone, Copy, Debug)]
 struct Coefficients {
     /// Share of the way to a constant input.

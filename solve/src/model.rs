@@ -19,7 +19,7 @@ const SIDE: usize = 5;
 /// The shortest column of the tip that is computed, in radii.
 const SHORTEST: f64 = 0.2;
 
-/// Where and how a press touches the plate.
+/// Pose of a press against the plate.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Travel at which the tip's apex touches a plate that is not tilted, mm.
@@ -28,9 +28,9 @@ pub struct Pose {
     pub axis_mm: [f64; 2],
     /// Tangent of the plate's tilt along them; where positive, taxels beyond the axis are pressed more.
     pub tilt: [f64; 2],
-    /// How much rounder the gap between tip and plate is than the radius says, as a share.
+    /// Excess curvature of the gap between tip and plate over that of the radius, as a share.
     pub roundness: f64,
-    /// How far the plate yields, mm/N.
+    /// Compliance of the plate, mm/N.
     pub yields_mm_per_n: f64,
 }
 
@@ -62,7 +62,7 @@ pub struct Share {
     pub slopes: [f64; UNKNOWNS],
 }
 
-/// Where a press is in a step.
+/// Phase of a press in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct At {
     /// Mean travel, mm.

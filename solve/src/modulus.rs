@@ -37,7 +37,7 @@ pub struct OfPress {
     pub sigma_kpa: f64,
     /// Travel at which the tip touches, mm.
     pub touch_mm: f64,
-    /// What tip and ink remember.
+    /// Memory of tip and ink.
     pub memory: Memory,
     /// Standard uncertainties of hysteresis, creep and relaxation.
     pub memory_sigma: [f64; 3],
@@ -69,7 +69,7 @@ pub struct Parts {
     pub presses: f64,
     /// Factor that all gains have in common.
     pub gains: f64,
-    /// What is corrected for creep, relaxation and hysteresis, times what such a model is off by.
+    /// Correction for creep, relaxation and hysteresis, times the relative error of such a model.
     pub memory: f64,
 }
 

@@ -45,9 +45,9 @@ impl Array {
 /// Half of a press in which a step was recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Branch {
-    /// On the way in, or held at the deepest place.
+    /// Forward stroke, or held at the deepest place.
     Loading,
-    /// On the way back.
+    /// Return stroke.
     Unloading,
 }
 
@@ -71,7 +71,7 @@ pub struct Step {
     pub travel_mm: [f64; 2],
     /// Number of frames.
     pub frames: u32,
-    /// Way in or way back.
+    /// Forward or return stroke.
     pub branch: Branch,
     /// Readings of all taxels, row by row.
     pub taxels: Vec<Reading>,
@@ -92,7 +92,7 @@ impl Step {
         0.5 * (self.time_s[0] + self.time_s[1])
     }
 
-    /// Where the press is.
+    /// Position of the press.
     pub fn at(&self, array: &Array) -> At {
         let half_mm = 0.5 * (self.travel_mm[1] - self.travel_mm[0]).abs();
         At { travel_mm: self.middle_mm(), half_mm, force_n: self.force_n(array) }

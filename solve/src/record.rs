@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 pub const MAGIC: [u8; 3] = *b"FTS";
 /// Count that marks the start of a stroke.
 pub const START: i16 = i16::MIN;
-/// What the chip clips counts and voltages at.
+/// Limit to which the chip clips counts and voltages.
 const CLIPPED: u16 = 32_767;
 
 /// Codes of a mean: an eighth of a code, from -128 codes.
@@ -206,7 +206,7 @@ fn deviation(byte: u8) -> f64 {
     DEVIATION_CODES * (variance as f64).sqrt()
 }
 
-/// What the head says.
+/// Content of the head.
 struct Head {
     shape: [usize; 2],
     ended: Option<Ended>,

@@ -48,7 +48,7 @@ pub enum NoScale {
 
 /// Half a step of a kitchen scale with its repeatability, N.
 const SHOWN_N: f64 = 0.005;
-/// What creep and hysteresis change from hold to hold, as a share.
+/// Change by creep and hysteresis from hold to hold, as a share.
 const HELD_PART: f64 = 0.01;
 const LEAST_N: f64 = 0.1;
 

@@ -51,7 +51,7 @@ pub const TIMING_S: f64 = 20e-6;
 pub const UNSEEN: f64 = 0.1;
 /// Speed beyond which friction of brushes and bearings hardly falls, rad/s.
 pub const SETTLED: f64 = 30.0;
-/// Strokes each way without which nothing is fitted.
+/// Least number of strokes in each direction for a fit.
 const STROKES_MIN: usize = 3;
 /// Counts of the longest stroke below which the motor counts as still.
 const STILL_COUNTS: i32 = 12;
@@ -103,7 +103,7 @@ impl Stroke {
     }
 }
 
-/// What the controller delivers.
+/// Record that the controller delivers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Record {
     /// Time between samples, s.

@@ -28,7 +28,7 @@ const ABOUT: &str = "fingertip.capture";
 /// Entry of the metadata: host's time of the last frame, ns since 1970.
 pub const ENDED: &str = "ended_unix_ns";
 
-/// What is known of a capture beside its bytes, by name.
+/// Metadata of a capture, by name.
 pub type About = std::collections::BTreeMap<String, String>;
 
 /// Feeds a capture through the core on this machine.
@@ -39,12 +39,12 @@ pub fn through_the_core(
     replay(bytes, &CLOCKS, each)
 }
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Kept {
     /// The capture, as the board kept it.
     pub bytes: Vec<u8>,
-    /// What is known of it.
+    /// Metadata.
     pub about: About,
 }
 
@@ -98,9 +98,7 @@ pub fn of_bytes(mut rest: &[u8]) -> Result<Kept, String> {
     match ends[..] {
         [data, summary] if data != 0 && summary != 0 => {}
         [_, _] => {
-            return Err(
-                "the file has no check sums: another program wrote it anew. Take the one that it was made from".into(),
-            );
+            return Err("the file has no checksums: another program rewrote it. Use the original file".into());
         }
         _ => return Err(damaged(&"it has no end of its messages, or no footer")),
     }
@@ -134,7 +132,7 @@ pub fn write(to: impl Write + Seek, bytes: &[u8], about: &About) -> Result<(), S
     put(out, bytes, about, &replayed.head, &shown).map_err(|why| in_words(&why))
 }
 
-/// The system's reason where it has one: a full disk is told as such.
+/// The system's reason if there is one, for example a full disk.
 fn in_words(why: &McapError) -> String {
     if let McapError::Io(why) = why { why.to_string() } else { why.to_string() }
 }

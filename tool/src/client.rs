@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 /// The alert's bit of a status packet's error.
 const ALERT: u8 = 0x80;
-/// How long to wait for a device that is not expected to be there.
+/// Wait for a device that is not expected to be there.
 const PROBE: Duration = Duration::from_secs(1);
-/// How often what may be asked twice is asked on a noisy line.
+/// Attempts on a noisy line for requests that may be repeated.
 const TRIES: usize = 3;
 /// A status packet to a broadcast Ping, and bits of a byte: what each ID waits for those below.
 const PING_BITS: u32 = 14 * 10;
@@ -20,7 +20,7 @@ const PING_BITS: u32 = 14 * 10;
 pub const BAUD_MIN: i64 = 1_200;
 const ID_MAX: u8 = 252;
 
-/// How to reach a controller.
+/// Port, speed and ID of a controller.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Reach {
     /// Serial port, pseudo-terminal, or tcp:ADDRESS:PORT of a served finger
@@ -34,7 +34,7 @@ pub struct Reach {
     #[arg(long = "id", short, global = true, value_name = "ID", value_delimiter = ',', default_value = "1")]
     #[arg(value_parser = id)]
     pub ids: Vec<u8>,
-    /// How long to wait for an answer
+    /// Longest wait for an answer
     #[arg(long, global = true, default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..))]
     pub timeout_ms: u64,
 }
@@ -58,7 +58,7 @@ pub struct Client {
     owed: bool,
 }
 
-/// What a Ping tells.
+/// Answer to a Ping.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pong {
     /// Who answered.
@@ -126,7 +126,7 @@ impl Client {
         Ok(())
     }
 
-    /// How long it waits.
+    /// Longest wait.
     pub fn timeout(&self) -> Duration {
         self.timeout
     }
@@ -142,7 +142,7 @@ impl Client {
         Ok(Pong { id: self.id, model: u16::from_le_bytes([data[0], data[1]]), firmware: data[2] })
     }
 
-    /// Whether another device answers to an address; two at once do so with a damaged packet.
+    /// True if another device answers to an address; two at once do so with a damaged packet.
     pub fn is_taken(&mut self, id: u8) -> Result<bool, Error> {
         let (own, timeout) = (self.id, self.timeout);
         (self.id, self.timeout) = (id, timeout.min(PROBE));

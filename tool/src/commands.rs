@@ -29,26 +29,26 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Something of the output was lost, and nobody wanted that.
+/// True once output was lost against the user's will.
 static LOST: AtomicBool = AtomicBool::new(false);
 
-/// What a tare came to that was no tare.
+/// Advice after a tare during which something touched.
 const TOUCHED: &str = "something seemed to touch the tip while it was tared: forces read too low by that. \
                        Free the tip and tare again";
 
-/// Says a line. What becomes of it [`said`] tells.
+/// Prints a line; [`said`] reports whether that worked.
 pub fn say(text: impl std::fmt::Display) {
     note(writeln!(io::stdout(), "{text}"));
 }
 
-/// Who closed the output wanted no more of it; what else is in its way, as a full disk, is told in the end.
+/// A closed pipe is not an error: the reader has seen enough. Any other failure (a full disk, say) is reported at exit.
 fn note(written: io::Result<()>) {
     if written.is_err_and(|why| why.kind() != io::ErrorKind::BrokenPipe) {
         LOST.store(true, Ordering::Relaxed);
     }
 }
 
-/// Whether all that was said is written.
+/// True if all that was said is written.
 pub fn said() -> Result<(), Error> {
     note(io::stdout().flush());
     if LOST.load(Ordering::Relaxed) { Err("the output cannot be written: is the disk full?".into()) } else { Ok(()) }
@@ -64,10 +64,10 @@ fn say_json(value: &Value) {
     say(serde_json::to_string_pretty(value).unwrap_or_default());
 }
 
-/// Runs a command for each ID that `--id` names. An error of one does not keep it from the others.
+/// Runs a command for each ID of `--id`, also after an error of one.
 ///
 /// # Errors
-/// The port cannot be opened, nobody answers to `all`, or what the command came to.
+/// The port cannot be opened, no device answers to `all`, or the command failed.
 pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result<(), Error>) -> Result<(), Error> {
     let mut client = Client::open(reach)?;
     let mut ids = reach.ids.clone();
@@ -95,7 +95,7 @@ pub fn each(reach: &Reach, titled: bool, command: impl Fn(&mut Client) -> Result
     if failed.is_empty() { Ok(()) } else { Err(failed.join("; ").into()) }
 }
 
-/// How long Ctrl-C may go unseen in a pause.
+/// Longest time for which a pause does not check for Ctrl-C.
 const INTERRUPT_EVERY: Duration = Duration::from_millis(50);
 
 /// Set by Ctrl-C, SIGTERM and SIGHUP (the end of a terminal).
@@ -112,7 +112,7 @@ impl Interrupt {
         Ok(Self(flag))
     }
 
-    /// Whether it is time to end.
+    /// True if it is time to end.
     pub fn came(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -144,7 +144,7 @@ fn wait_for(client: &mut Client, address: u16, within: Duration, wanted: impl Fn
     }
 }
 
-/// Fails where a fault stands, and says how to go on.
+/// Fails if there is a fault, with the next step in the text.
 fn no_fault(client: &mut Client) -> Result<(), Error> {
     let fault = client.number(fingertip::shipped::address::FAULT)?;
     if fault == 0 { Ok(()) } else { Err(stopped(fault)) }

@@ -1,4 +1,4 @@
-//! What can go wrong: what it was, where, and what to do about it.
+//! Errors: what failed, where, and what to do about it.
 
 use crate::table::meaning_of_error;
 
@@ -11,7 +11,7 @@ pub enum Error {
     /// The port cannot be opened.
     #[error("cannot open {port}: {why}{}", ports_there())]
     Open {
-        /// As it was asked for.
+        /// Name as requested.
         port: String,
         /// The system's reason.
         why: std::io::Error,
@@ -33,7 +33,7 @@ pub enum Error {
          --timeout-ms waits longer"
     )]
     Silent {
-        /// What was asked.
+        /// Request.
         doing: String,
         /// Of whom.
         id: u8,
@@ -47,17 +47,17 @@ pub enum Error {
     /// The answer was no good.
     #[error("{doing}: a damaged answer of ID {id} ({what}); is the line noisy, or are there two devices with this ID?")]
     Damaged {
-        /// What was asked.
+        /// Request.
         doing: String,
         /// Of whom.
         id: u8,
-        /// What is wrong with it.
+        /// Fault of the packet.
         what: &'static str,
     },
     /// The controller refused.
     #[error("{doing}: refused by ID {id} with error {number}: {}", meaning_of_error(*number))]
     Refused {
-        /// What was asked.
+        /// Request.
         doing: String,
         /// Of whom.
         id: u8,
@@ -73,7 +73,7 @@ pub enum Error {
     /// A signal ended a command that moves the finger.
     #[error("interrupted before its end; torque is off")]
     Interrupted,
-    /// Something else; the text says it all.
+    /// Another error, with its whole text.
     #[error("{0}")]
     Other(String),
 }
@@ -90,12 +90,12 @@ impl Error {
         }
     }
 
-    /// Whether the controller refused with this number.
+    /// True if the controller refused with this number.
     pub fn refused_with(&self, wanted: u8) -> bool {
         matches!(self, Self::Refused { number, .. } if *number == wanted)
     }
 
-    /// Whether the line may be what was wrong, so that it may go well the next time.
+    /// True if the line may be what was wrong, so that it may go well the next time.
     pub fn is_noise(&self) -> bool {
         matches!(self, Self::Silent { .. } | Self::Damaged { .. }) || self.refused_with(DAMAGED)
     }

@@ -1,4 +1,4 @@
-//! What bytes go through: a serial port, a pseudo-terminal, or TCP to a served finger.
+//! Connections: a serial port, a pseudo-terminal, or TCP to a served finger.
 
 use rustix::fs::{FlockOperation, flock};
 use serial2::SerialPort;
@@ -6,15 +6,15 @@ use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::net::TcpStream;
 use std::time::Duration;
 
-/// What a TCP port's name begins with: `tcp:127.0.0.1:7000`.
+/// Prefix of a TCP port's name: `tcp:127.0.0.1:7000`.
 const TCP: &str = "tcp:";
 const BUFFER: usize = 1024;
-/// What the system says of a file that is no terminal.
+/// Error of the system for a file that is not a terminal.
 const NO_TERMINAL: i32 = rustix::io::Errno::NOTTY.raw_os_error();
-/// What a served finger says to a second client begins with this.
+/// Beginning of a served finger's message to a second client.
 const BUSY: &[u8] = b"busy: ";
 
-/// A way to the bus.
+/// Connection to the bus.
 #[derive(Debug)]
 pub enum Line {
     /// A serial port or a pseudo-terminal.
@@ -35,7 +35,7 @@ impl Line {
     /// Opens it.
     ///
     /// # Errors
-    /// There is none, it is another's, or it does not go at this speed.
+    /// There is no such port, another program has it, or it does not support this speed.
     pub fn open(port: &str, baud: u32) -> io::Result<Self> {
         if let Some(address) = port.strip_prefix(TCP) {
             let stream = TcpStream::connect(address)?;
@@ -68,7 +68,7 @@ impl Line {
         }
     }
 
-    /// What comes in within this time; nothing where that is over.
+    /// Reads within this time; empty after it.
     pub fn read(&mut self, within: Duration) -> io::Result<Vec<u8>> {
         let mut buffer = [0; BUFFER];
         // A time of 0 means for ever, to some.
@@ -107,7 +107,7 @@ impl Line {
     }
 }
 
-/// Fails where a served finger says in words that another client is there.
+/// Fails if a served finger reports that another client is connected.
 fn not_busy(bytes: &[u8]) -> io::Result<()> {
     if !bytes.starts_with(BUSY) {
         return Ok(());

@@ -45,7 +45,7 @@ struct Cli {
 enum Command {
     /// Look for controllers: on all ports or the one named, at all speeds
     Scan(scan::Args),
-    /// Tell what the controller is and how it stands
+    /// Show identity and status of the controller
     #[command(after_help = "Examples:\n  fingertip info\n  fingertip info --json")]
     Info,
     /// Own the bus for any number of clients: one commands, all watch, anyone stops
@@ -70,13 +70,13 @@ enum Command {
     Commission(commission::Args),
     /// Measure Young's modulus of the tip, by presses onto a hard plate
     Identify(identify::Args),
-    /// Touch, hold a force for a while, let go
+    /// Touch, hold a force for a time, release
     Press(press::Args),
     /// Stop the finger in any mode: release, torque off, measurements aborted, bus watchdog off
     Stop(stop::Args),
     /// Measure gains and modulus by presses onto a hard flat plate, and the scale of forces by a kitchen scale
     Calibrate(calibrate::Args),
-    /// Clear what stopped the motor, and say what stands in the way
+    /// Clear what stopped the motor, or report what prevents it
     #[command(after_help = "Examples:\n  fingertip recover")]
     Recover,
     /// Measure how long answers take: reads without a pause

@@ -1,5 +1,5 @@
 //! A state as messages for what shows recordings: the topics and the names of the scenes', so that what shows those
-//! shows these (`tests/messages.rs`). The numbers are `fingertip.Scalars`, the pressures a picture in grey.
+//! shows these (`tests/messages.rs`). The numbers are `fingertip.Scalars`, the pressures a grey image.
 
 use crate::state::{SHAPE, Stamp, State};
 use crate::{Client, Error};

@@ -38,7 +38,7 @@ pub struct State {
     pub duty_permille: i64,
     /// A mode's number.
     pub mode: i64,
-    /// A fault's number; 0 is none.
+    /// Number of the fault; 0 without one.
     pub fault: i64,
     /// A limit each bit.
     pub limits: i64,
@@ -108,7 +108,7 @@ impl State {
         table::meaning(address::PRESENT_MODE, self.mode)
     }
 
-    /// The fault in words; none where there is none.
+    /// The fault in words; `None` without one.
     pub fn fault_name(&self) -> Option<String> {
         (self.fault != 0).then(|| table::meaning(address::FAULT, self.fault))
     }
@@ -157,12 +157,12 @@ pub struct Clock {
     total_us: u64,
 }
 
-/// Why a [`Clock`] tells no time.
-pub const ANEW: &str = "the controller started anew: torque is off, and it is not tared";
+/// Reason for which a [`Clock`] has no time.
+pub const ANEW: &str = "the controller restarted: torque is off, and it is not tared";
 
 impl Clock {
     /// Seconds since the first state; states come in order, an hour apart at most. None where frames count back: the
-    /// controller started anew, and how long that took nobody knows.
+    /// controller restarted, which takes an unknown time.
     pub fn time_s(&mut self, state: &State) -> Option<f64> {
         let now = (state.time_us, state.frame as u32);
         let (last_us, last_frame) = self.last.replace(now).unwrap_or(now);
@@ -195,7 +195,7 @@ pub struct Stamps {
 }
 
 impl Stamps {
-    /// Stamps a state that was just read. None where the controller started anew, as of [`Clock::time_s`].
+    /// Stamps a state that was just read. None where the controller restarted, as of [`Clock::time_s`].
     pub fn stamp(&mut self, state: &State) -> Option<Stamp> {
         let Some(time_s) = self.clock.time_s(state) else {
             self.begun = None;

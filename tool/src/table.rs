@@ -7,7 +7,7 @@ use std::fmt;
 /// Registers side by side, as they were read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Where it begins.
+    /// First address.
     pub first: u16,
     /// As they came.
     pub bytes: Vec<u8>,
@@ -21,7 +21,7 @@ impl Block {
         register.and_then(|register| decode(register.kind, self.bytes.get(offset..)?)).unwrap_or(0)
     }
 
-    /// The numbers of a picture.
+    /// Numbers of a tactile image.
     pub fn numbers(&self, address: u16) -> Vec<i64> {
         let Some(register) = register_at(address) else { return Vec::new() };
         let width = register.kind.width();
@@ -36,7 +36,7 @@ impl Block {
 pub struct Value<'a> {
     /// Whose.
     pub register: &'a Register,
-    /// As it stands on the bus.
+    /// Bytes as on the bus.
     pub value: i64,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Display for Value<'_> {
     }
 }
 
-/// The name as it is asked for: small letters, the unit at its end.
+/// Name on the command line: lower case, the unit at its end.
 pub fn name(register: &Register) -> String {
     register.name.to_lowercase()
 }
@@ -93,7 +93,7 @@ fn begins_alike(a: &str, b: &str) -> bool {
     same >= 4
 }
 
-/// Whether it outlives a reset once it is saved.
+/// True if it outlives a reset once it is saved.
 pub fn is_stored(register: &Register) -> bool {
     register.count == 1 && matches!(register.access, Access::Stored | Access::StoredLive)
 }
@@ -124,7 +124,7 @@ pub fn model() -> i64 {
     register_at(address::MODEL_NUMBER).map_or(0, |register| register.min)
 }
 
-/// What a number of a register means, by the register's own documentation: `2 approach` there is "approach" here.
+/// Meaning of a register's number, from the register's own documentation: `2 approach` there is "approach" here.
 pub fn meaning(address: u16, number: i64) -> String {
     let doc = register_at(address).map_or("", |register| register.doc);
     let numbered = doc.split([',', '.', ':', ';']).map(str::trim);
@@ -132,15 +132,15 @@ pub fn meaning(address: u16, number: i64) -> String {
     found.map_or_else(|| format!("number {number}"), |(_, words)| words.trim().into())
 }
 
-/// What the bits of a register mean that are set.
+/// Meanings of the set bits of a register.
 pub fn bits(address: u16, number: i64) -> Vec<String> {
     (0..32).filter(|bit| number >> bit & 1 == 1).map(|bit| meaning(address, bit)).collect()
 }
 
-/// What an error of a status packet means.
+/// Meaning of an error of a status packet.
 pub fn meaning_of_error(number: u8) -> &'static str {
     match number {
-        1 => "it was understood, but cannot be carried out as the loop stands now",
+        1 => "it was understood, but cannot be carried out in the present state of the loop",
         2 => "it knows no such instruction",
         3 => "the packet arrived damaged: is the line noisy?",
         4 => "a value outside of its register's range",

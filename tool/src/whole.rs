@@ -4,7 +4,7 @@
 use crate::Error;
 use rustix::fs::{FlockOperation, flock};
 use std::fs::{self, File, Metadata, OpenOptions};
-use std::io;
+use std::io::{self, Write as _};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ fn is_same(there: &Metadata, file: &File) -> bool {
     file.metadata().is_ok_and(|own| (own.dev(), own.ino()) == (there.dev(), there.ino()))
 }
 
-/// A file on its way.
+/// A file that is being written.
 #[derive(Debug)]
 pub struct Part {
     file: File,
@@ -56,7 +56,7 @@ impl Part {
         Ok(begun)
     }
 
-    /// What is written to.
+    /// File to write to.
     pub fn file(&self) -> io::Result<File> {
         self.file.try_clone()
     }
@@ -84,7 +84,17 @@ impl Drop for Part {
     }
 }
 
-/// Fails where a file is there.
+/// Writes a whole file at once.
+///
+/// # Errors
+/// As [`Part::begin`] and [`Part::place`].
+pub fn write(place: &Path, force: bool, bytes: &[u8]) -> Result<(), Error> {
+    let mut part = Part::begin(place, force)?;
+    part.file.write_all(bytes).map_err(|why| Error::file("write", place, why))?;
+    part.place()
+}
+
+/// Fails if a file is there.
 fn free(place: &Path) -> Result<(), Error> {
     if fs::symlink_metadata(place).is_err() {
         return Ok(());

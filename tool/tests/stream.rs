@@ -9,7 +9,7 @@ use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::Child;
 
-/// The lengths that a frame's second byte stands for.
+/// Lengths that a frame's second byte encodes.
 const SHORT: u8 = 126;
 const TEXT: u8 = 1;
 const BINARY: u8 = 2;
@@ -79,14 +79,14 @@ impl Listener {
     }
 }
 
-/// Where it says that it streams.
+/// Beginning of the line that names the stream's address.
 fn address(child: &mut Child) -> String {
     let mut line = String::new();
     let mut reader = BufReader::new(child.stderr.take().expect("a pipe"));
     reader.read_line(&mut line).expect("it says where");
     let address = line.split("ws://").nth(1).and_then(|rest| rest.split(';').next());
     let address = address.unwrap_or_else(|| panic!("{line}")).to_owned();
-    // What it says later is for nobody, and must not stop it.
+    // Later output has no reader, and must not stop it.
     std::thread::spawn(move || std::io::copy(&mut reader, &mut std::io::sink()));
     address
 }

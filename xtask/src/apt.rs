@@ -2,22 +2,21 @@
 //!
 //! Package lists and downloads are kept in the build folder, so apt's own lists, caches and sources stay as they are.
 
-use crate::{console::Console, paths};
+use crate::console::Console;
+use crate::paths;
 use anyhow::{Context, Result, bail};
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
-/// Where backports come from where apt does not say, and the key that signs them.
+/// Default source of backports, and the key that signs them.
 const MIRROR: &str = "http://deb.debian.org/debian/";
 const KEYRING: &str = "/usr/share/keyrings/debian-archive-keyring.gpg";
 
 /// Makes sure of Debian packages.
 ///
 /// # Errors
-/// No Debian, no root, or apt-get cannot get them: says what to install by hand.
+/// No Debian, no root, or apt-get cannot get them; the text says what to install by hand.
 pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
     let missing: Vec<&str> = packages.iter().copied().filter(|package| !installed(package)).collect();
     if missing.is_empty() {
@@ -38,7 +37,7 @@ pub fn ensure(packages: &[&str], why: &str, console: &mut Console) -> Result<()>
         .with_context(|| format!("apt-get cannot install `{list}`, which {why} needs: is a package mirror in reach?"))
 }
 
-/// Whether nothing of these packages is missing.
+/// True if nothing of these packages is missing.
 pub fn all_installed(packages: &[&str]) -> bool {
     packages.iter().all(|package| installed(package))
 }
@@ -47,7 +46,7 @@ pub fn all_installed(packages: &[&str]) -> bool {
 /// source of this call alone: apt does not know of them afterwards.
 ///
 /// # Errors
-/// No Debian, no root, or apt-get cannot get them: says what to install by hand.
+/// No Debian, no root, or apt-get cannot get them; the text says what to install by hand.
 pub fn newest(packages: &[&str], why: &str, console: &mut Console) -> Result<()> {
     let list = packages.join(" ");
     let release = fs::read_to_string("/etc/os-release").unwrap_or_default();
@@ -85,7 +84,7 @@ impl Apt {
         }
         let sources = suite.map(|suite| {
             let file = folder.join(format!("{suite}.list"));
-            // It stands in for the system's own list, which it repeats.
+            // It replaces the system's own list, which it repeats.
             let own = fs::read_to_string("/etc/apt/sources.list").unwrap_or_default();
             let line = format!("deb [signed-by={KEYRING}] {} {suite} main\n", mirror());
             fs::write(&file, own + "\n" + &line).with_context(|| format!("cannot write {}", paths::shown(&file)))?;
@@ -125,7 +124,7 @@ fn mirror() -> String {
     found.map_or_else(|| MIRROR.into(), |(_, uri)| uri.into())
 }
 
-/// Whether this is the archive itself: not its security updates, nor somebody else's.
+/// True if this is the archive itself: not its security updates, nor somebody else's.
 fn is_main(release: &str, uri: &str) -> bool {
     uri.trim_end_matches('/').ends_with("/debian") && !release.contains("security")
 }
@@ -137,6 +136,24 @@ fn installed(package: &str) -> bool {
 
 fn is_root() -> bool {
     Command::new("id").arg("-u").output().is_ok_and(|output| output.stdout.trim_ascii() == b"0")
+}
+
+// A Chromium for the test that opens reports.
+
+/// Names of the program on various systems.
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// Finds a Chromium, or installs Debian's; with fonts, without which a page has no letters.
+///
+/// # Errors
+/// It is missing and cannot be installed; the text says what to install by hand.
+pub fn browser(console: &mut Console) -> Result<PathBuf> {
+    let find = || BROWSERS.into_iter().find_map(paths::find_program);
+    if let Some(program) = find() {
+        return Ok(program);
+    }
+    ensure(&["chromium", "fonts-dejavu-core"], "the test that opens reports in a browser", console)?;
+    find().context("Debian's package `chromium` is installed, but no `chromium` is in PATH")
 }
 
 #[cfg(test)]

@@ -1,23 +1,18 @@
 //! The first hour with a board: an image that checks a bare NUCLEO-F446RE, or the emulated one, and its judge.
 
-use crate::{
-    console::Console,
-    flash,
-    host::{self, Program},
-    image::{self, Image},
-    paths, sim, timing,
-    toolchain::{self, Choice, Toolchain},
-};
+use crate::console::Console;
+use crate::host::{self, Program};
+use crate::image::{self, Image};
+use crate::toolchain::{self, Choice, Toolchain};
+use crate::{flash, paths, sim, timing};
 use anyhow::{Context, Result, bail};
 use clap::ValueEnum;
-use std::{
-    fmt::Write as _,
-    fs,
-    path::{Path, PathBuf},
-};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 const NAME: &str = "bringup";
-/// Where Linux names the ST-LINK's port.
+/// Folder in which Linux names the ST-LINK's port.
 const BY_ID: &str = "/dev/serial/by-id";
 const ST_LINK: &str = "STLINK";
 
@@ -29,7 +24,7 @@ pub struct Args {
     /// A NUCLEO-F446RE with nothing attached, or the emulated board
     #[arg(long, value_enum, default_value_t = Board::Nucleo)]
     board: Board,
-    /// How many frames the rows are read back for; a million on a NUCLEO, which takes 100 s, a thousand emulated
+    /// Number of frames for which the rows are read back; a million on a NUCLEO, which takes 100 s, a thousand emulated
     #[arg(long)]
     frames: Option<u32>,
     /// Write the figures to this file, as JSON
@@ -49,7 +44,7 @@ pub struct Args {
     without_estimates: bool,
 }
 
-/// What the image runs on.
+/// Board that runs the image.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Board {
     /// On the desk
@@ -60,7 +55,7 @@ enum Board {
 
 /// Builds the image, runs it and judges what it reports. This process ends as the judge does.
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
-    // First, as it takes no time: where there is no board nobody waits for a build.
+    // First, as it takes no time: without a board there is no wait for a build.
     let port = (args.board == Board::Nucleo).then(|| args.port.clone().map_or_else(find_port, Ok)).transpose()?;
     if port.is_some() && !args.flashed {
         flash::need_probe_rs()?;

@@ -1,21 +1,16 @@
 //! The examples for clusters, tried on this machine: Slurm with one node, GNU parallel, the shell of the Kubernetes job.
 
-mod slurm;
-
-use crate::{
-    apt,
-    console::{self, Console},
-    host::Program,
-    paths,
-    python::{self, Environment},
-};
-use anyhow::{Context, Result};
-use slurm::Slurm;
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use crate::console::{self, Console};
+use crate::host::Program;
+use crate::python::{self, Environment};
+use crate::{apt, paths};
+use anyhow::{Context, Result, bail};
+use std::net::TcpListener;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+use std::{fs, thread};
 
 /// Shares and runs of the sweep, and its scene: one that draws, and breaks bounds in none of these.
 const SHARES: &str = "3";
@@ -23,7 +18,7 @@ const SEEDS: &str = "12";
 const SCENE: &str = "host-tests/sim/scenes/raspberry.toml";
 /// Which Debian packages have what the examples need.
 const PACKAGES: [&str; 5] = ["munge", "parallel", "slurm-client", "slurmctld", "slurmd"];
-/// What summarises the runs, and reads the Kubernetes job.
+/// Script that summarises the runs, and reads the Kubernetes job.
 const CLIENTS: Environment = Environment {
     folder: "venv-cluster",
     packages: &["duckdb==2.0.0", "pyyaml==6.0.3"],
@@ -117,11 +112,130 @@ fn same(sweep: &Path, whole: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
+// Slurm with one node, as long as a value of this lives.
+
+/// Number of attempts to reach the controller, and the time between two of them.
+const TRIES: u32 = 600;
+const BETWEEN: Duration = Duration::from_millis(100);
+
+/// The daemons, and the folder with all that is theirs. It is not in the build folder: the path of a socket is short.
+pub struct Slurm {
+    folder: PathBuf,
+    daemons: Vec<Child>,
+}
+
+impl Slurm {
+    /// Starts the daemons, and waits until the controller answers.
+    pub fn start(console: &mut Console) -> Result<Self> {
+        let folder = std::env::temp_dir().join(format!("fingertip-slurm-{}", std::process::id()));
+        let mut slurm = Self { folder, daemons: Vec::new() };
+        slurm.lay_out().context("cannot lay out a folder for Slurm")?;
+        let folder = slurm.folder.clone();
+        let mut munged = Command::new("munged");
+        for (option, file) in
+            [("key-file", "key"), ("socket", "socket"), ("pid-file", "pid"), ("log-file", "log"), ("seed-file", "seed")]
+        {
+            munged.arg(format!("--{option}={}", folder.join(format!("munge.{file}")).display()));
+        }
+        slurm.spawn(munged.args(["--foreground", "--force"]))?;
+        slurm.spawn(Command::new("slurmctld").arg("-D").env("SLURM_CONF", folder.join("slurm.conf")))?;
+        slurm.spawn(Command::new("slurmd").arg("-D").env("SLURM_CONF", folder.join("slurm.conf")))?;
+        console.say("Started Slurm with one node.");
+        for _ in 0..TRIES {
+            let answer = slurm.command("sinfo").args(["--noheader", "--states=idle", "--format=%n"]).output();
+            if answer.is_ok_and(|answer| answer.status.success() && !answer.stdout.is_empty()) {
+                return Ok(slurm);
+            }
+            thread::sleep(BETWEEN);
+        }
+        let log = |name: &str| fs::read_to_string(slurm.folder.join(name)).unwrap_or_default();
+        bail!("Slurm does not answer:\n{}\n{}", log("slurmctld.log"), log("slurmd.log"))
+    }
+
+    /// One of Slurm's programs.
+    pub fn command(&self, program: &str) -> Command {
+        let mut command = Command::new(program);
+        command.env("SLURM_CONF", self.folder.join("slurm.conf"));
+        command
+    }
+
+    fn spawn(&mut self, daemon: &mut Command) -> Result<()> {
+        let started = daemon.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        self.daemons.push(started.with_context(|| format!("cannot start {}", daemon.get_program().display()))?);
+        Ok(())
+    }
+
+    fn lay_out(&self) -> Result<()> {
+        let folder = &self.folder;
+        for name in ["state", "spool"] {
+            fs::create_dir_all(folder.join(name))?;
+        }
+        // Whoever reads it may give this machine's Slurm jobs; it dies with it.
+        let key = folder.join("munge.key");
+        fs::write(&key, random(128)?)?;
+        fs::set_permissions(&key, fs::Permissions::from_mode(0o400))?;
+        fs::write(folder.join("slurm.conf"), self.conf()?)?;
+        Ok(())
+    }
+
+    fn conf(&self) -> Result<String> {
+        let folder = self.folder.display();
+        let name = fs::read_to_string("/proc/sys/kernel/hostname")?;
+        let host = name.trim().split('.').next().unwrap_or("localhost");
+        // Both at once, so that they differ.
+        let free = [TcpListener::bind("127.0.0.1:0")?, TcpListener::bind("127.0.0.1:0")?];
+        let [controller, node] = [free[0].local_addr()?.port(), free[1].local_addr()?.port()];
+        Ok(format!(
+            "ClusterName=one
+SlurmctldHost={host}(127.0.0.1)
+SlurmctldPort={controller}
+SlurmdPort={node}
+SlurmUser=root
+AuthInfo=socket={folder}/munge.socket
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+SlurmctldLogFile={folder}/slurmctld.log
+SlurmdLogFile={folder}/slurmd.log
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_CPU
+MpiDefault=none
+ReturnToService=2
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cpus} State=UNKNOWN
+PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
+",
+            cpus = thread::available_parallelism().map_or(1, usize::from)
+        ))
+    }
+}
+
+/// Returns random bytes.
+fn random(count: u64) -> Result<Vec<u8>> {
+    use std::io::Read;
+    let mut bytes = Vec::new();
+    fs::File::open(Path::new("/dev/urandom"))?.take(count).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+impl Drop for Slurm {
+    fn drop(&mut self) {
+        for daemon in self.daemons.iter_mut().rev() {
+            // Whoever has ended is no loss.
+            let _ = daemon.kill();
+            let _ = daemon.wait();
+        }
+        let _ = fs::remove_dir_all(&self.folder);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// What a task of an array would run; none where it refuses.
+    /// Command that a task of an array would run; `None` if it refuses.
     fn task([id, min, max, count]: [u32; 4], shares: Option<&str>) -> Option<String> {
         let mut command = Command::new("sh");
         command.arg(paths::root().join("examples/cluster/slurm.sh")).arg("scene").env("SWEEP", "echo");

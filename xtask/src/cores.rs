@@ -1,15 +1,14 @@
 //! The closed loop of the crate's example on every core that QEMU emulates: each gives the same bits as this machine.
 
-use crate::{
-    apt,
-    console::{self, Console},
-    docs, host,
-    image::{self, Image},
-    paths, qemu,
-    toolchain::{self, Choice, TARGET},
-};
+use crate::console::{self, Console};
+use crate::host::{self, Program};
+use crate::image::{self, Image};
+use crate::toolchain::{self, Choice, TARGET};
+use crate::{apt, docs, paths};
 use anyhow::{Context, Result, ensure};
-use std::{fmt::Write as _, fs};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::PathBuf;
 
 /// The page with the table of cores, and the example that runs the images and prints it.
 pub const PAGE: (&str, &str) = ("docs/porting.md", "porting-page");
@@ -64,7 +63,7 @@ impl Core {
 ///
 /// # Errors
 /// As [`page`], or the page cannot be written.
-pub fn run(choice: Choice, console: &mut Console) -> Result<()> {
+pub fn run_all(choice: Choice, console: &mut Console) -> Result<()> {
     let page = page(choice, console)?;
     console.print(&table(&page));
     docs::renew(PAGE.0, &page, false, &mut Vec::new(), console)
@@ -84,7 +83,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
     let mut list = String::new();
     for (number, core) in CORES.iter().enumerate() {
         let mut command = image::apart(toolchain, "build", LOOP, core.target, core.flags);
-        console.build(command.arg("--release"), &format!("the loop for {}", core.target), crate::progress::IMAGE)?;
+        console.build(command.arg("--release"), &format!("the loop for {}", core.target), crate::console::IMAGE)?;
         // Two boards have the same target and name.
         let elf = folder.join(format!("{number}.elf"));
         fs::copy(toolchain.images_for(core.target, core.flags).join("cores"), &elf)
@@ -116,7 +115,7 @@ pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
     let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
-    console.build(command.arg("--release"), EXAMPLE, crate::progress::IMAGE)?;
+    console.build(command.arg("--release"), EXAMPLE, crate::console::IMAGE)?;
     let bytes = Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len();
     // Without the loop a few kilobytes would be left: its configuration would always be refused.
     ensure!(bytes > 40_000, "{EXAMPLE} has {bytes} bytes: the loop is not in it");
@@ -135,10 +134,65 @@ pub fn table(page: &str) -> String {
 /// # Errors
 /// One is missing and cannot be installed.
 pub fn ensure(console: &mut Console) -> Result<()> {
-    qemu::ensure(console)?;
+    ensure_m4(console)?;
     match paths::find_program(RISCV_PROGRAM) {
         Some(_) => Ok(()),
         // Of the same version as the emulator for Arm: both share files.
         None => apt::newest(&["qemu-system-riscv"], WHY, console),
     }
+}
+
+// The core on an emulated Cortex-M4F.
+
+const M4_EMULATOR: &str = "qemu-system-arm";
+
+/// Flags of `cargo xtask qemu`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask qemu\n  cargo xtask qemu --inject hang    (fails, as it must)")]
+pub struct QemuArgs {
+    /// Make the image fail, to see it reported
+    #[arg(long, value_name = "FAILURE", value_parser = ["panic", "hardfault", "hang"])]
+    inject: Option<String>,
+}
+
+/// Runs the recorded stimulus and random inputs for every function on the emulator and on the host, and compares.
+///
+/// # Errors
+/// The image does not build, fails, hangs, or differs from the host.
+pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<()> {
+    let image = prepare(choice, console)?;
+    let [mut replay, mut same_bits] =
+        [Program::tool("qemu-host").build(console)?, Program::tool("same-bits").build(console)?];
+    console.run(replay.arg(&image).arg(paths::target().join("stimulus")).args(&args.inject))?;
+    console.run(same_bits.arg(&image))
+}
+
+/// Runs the tests that need the emulator.
+///
+/// # Errors
+/// The image does not build, or a test fails.
+pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
+    let image = prepare(choice, console)?;
+    // Of all packages, like `cargo test`: so nothing is compiled again with other features.
+    let mut command = console::cargo("test");
+    command.args(["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
+    host::test(&mut command, console)
+}
+
+/// Makes sure of the emulator.
+///
+/// # Errors
+/// It is missing and cannot be installed.
+pub fn ensure_m4(console: &mut Console) -> Result<()> {
+    match paths::find_program(M4_EMULATOR) {
+        Some(_) => Ok(()),
+        // At once the version that the estimates of cycles need: none is installed to be replaced.
+        None => apt::newest(&[M4_EMULATOR], "running the core on an emulated Cortex-M4F", console),
+    }
+}
+
+fn prepare(choice: Choice, console: &mut Console) -> Result<PathBuf> {
+    ensure_m4(console)?;
+    let toolchain = toolchain::ensure(choice, console)?;
+    image::build(toolchain, "qemu", "qemu", console)
 }

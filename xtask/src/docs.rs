@@ -1,27 +1,24 @@
-//! Generated files: written anew, or checked for being fresh.
+//! Generated files: renewed, or checked for being fresh.
 
-use crate::{
-    console::{self, Console},
-    cores, figures, host, image,
-    package::PACKAGES,
-    paths,
-    toolchain::Choice,
-    tools,
-};
+use crate::console::{self, Console};
+use crate::toolchain::Choice;
+use crate::{cores, host, image, model, paths};
 use anyhow::{Context, Result, bail};
-use std::{fs, path::Path};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
-/// Files that programs write: path, and the example that prints their text.
+/// Generated files: path, and the example that prints the text for that path.
 const GENERATED: &[(&str, &str)] = &[
-    ("docs/control-table.md", "control-table"),
-    ("docs/firmware.md", "firmware-page"),
+    ("docs/control-table.md", "generated"),
+    ("docs/firmware.md", "generated"),
     ("docs/scenes.md", "scenes-page"),
     ("docs/budget.md", "budget-page"),
-    ("docs/board.md", "analogue"),
+    ("docs/board.md", "generated"),
     ("docs/pictures/schematic.svg", "schematic"),
-    ("examples/dynamixel/fingertip.model", "model-file"),
-    ("examples/dynamixel/fingertip_direct.model", "model-file-direct"),
-    ("python/fingertip/registers.py", "python-package"),
+    ("examples/dynamixel/fingertip.model", "generated"),
+    ("examples/dynamixel/fingertip_direct.model", "generated"),
+    ("python/fingertip/registers.py", "generated"),
 ];
 /// The demonstration's figures, as the README shows them.
 const FIGURES: &str = "docs/demo.json";
@@ -44,15 +41,15 @@ pub struct Args {
 pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     let mut stale = Vec::new();
     for (path, example) in GENERATED {
-        renew(path, &print(example, None)?, args.check, &mut stale, console)?;
+        renew(path, &print(example, Some(Path::new(path)))?, args.check, &mut stale, console)?;
     }
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
     for package in PACKAGES {
-        let items = tools::public_items(package, console)?;
+        let items = public_items(package, console)?;
         renew(&format!("docs/api/{package}.txt"), &items, args.check, &mut stale, console)?;
     }
     let drawn = paths::target().join("docs").join("figures");
-    figures::draw(&drawn, console)?;
+    model::draw(&drawn, console)?;
     for path in PAPER {
         let file = drawn.join(Path::new(path).file_name().unwrap_or_default());
         let text = fs::read_to_string(&file).with_context(|| format!("cannot read {}", paths::shown(&file)))?;
@@ -73,7 +70,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     renew(README.0, &print(README.1, Some(&json))?, args.check, &mut stale, console)?;
 
     if !stale.is_empty() {
-        bail!("stale: {}; write them anew with `cargo xtask docs`", stale.join(", "));
+        bail!("stale: {}; renew them with `cargo xtask docs`", stale.join(", "));
     }
     Ok(())
 }
@@ -98,4 +95,97 @@ pub fn renew(path: &str, text: &str, check: bool, stale: &mut Vec<String>, conso
         console.print(&format!("written  {path}"));
     }
     Ok(())
+}
+
+// The published packages: built, and tested from a project outside of this workspace.
+
+/// Published packages; each depends on those before it.
+pub const PACKAGES: [&str; 2] = ["fingertip-lanes", "fingertip"];
+/// Its version, as in the workspace's manifest.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Makes the packages and runs the tests of `host-tests/outside`, which depends on them.
+pub fn package(console: &mut Console) -> Result<()> {
+    let mut package = console::cargo("package");
+    // The project outside compiles them.
+    package.args(["--allow-dirty", "--no-verify"]).args(PACKAGES.iter().flat_map(|name| ["--package", name]));
+    console.run(&mut package)?;
+    let made = paths::target().join("package");
+    let unpacked = paths::target().join("outside").join("packages");
+    if unpacked.is_dir() {
+        fs::remove_dir_all(&unpacked).with_context(|| format!("cannot empty {}", paths::shown(&unpacked)))?;
+    }
+    fs::create_dir_all(&unpacked).with_context(|| format!("cannot make {}", paths::shown(&unpacked)))?;
+    let mut test = console::cargo("test");
+    for name in PACKAGES {
+        let folder = format!("{name}-{VERSION}");
+        let mut unpack = std::process::Command::new("tar");
+        // `-m` gives the files the present time, by which cargo decides what to rebuild.
+        unpack.args(["-x", "-z", "-m", "-f"]).arg(made.join(format!("{folder}.crate"))).arg("-C").arg(&unpacked);
+        console.run(&mut unpack)?;
+        test.arg("--config").arg(format!("patch.crates-io.{name}.path={:?}", unpacked.join(folder)));
+    }
+    let outside = paths::root().join("host-tests").join("outside");
+    // The same versions of all else, so that it works offline.
+    let lock = outside.join("Cargo.lock");
+    fs::copy(paths::root().join("Cargo.lock"), &lock)
+        .with_context(|| format!("cannot write {}", paths::shown(&lock)))?;
+    test.arg("--manifest-path")
+        .arg(outside.join("Cargo.toml"))
+        .arg("--target-dir")
+        .arg(paths::target().join("outside"));
+    console.run(&mut test)
+}
+
+// Cargo's tools for the checks, installed in the build folder.
+
+/// A tool of cargo's; the version is part of the promise that a passing check passes tomorrow.
+pub struct Tool {
+    /// Its name and that of its program.
+    name: &'static str,
+    version: &'static str,
+    /// Purpose here.
+    does: &'static str,
+}
+
+/// Checks licences and sources.
+pub const DENY: Tool = Tool { name: "cargo-deny", version: "0.20.2", does: "checks the licences" };
+/// Lists public items. This version reads what rustdoc of Rust 1.95 writes; another Rust may need another one.
+const PUBLIC_API: Tool = Tool { name: "cargo-public-api", version: "0.52.0", does: "lists what the packages offer" };
+
+impl Tool {
+    /// Finds or installs it.
+    pub fn ensure(&self, console: &mut Console) -> Result<PathBuf> {
+        let Self { name, version, does } = self;
+        let folder = paths::target().join("tools");
+        let program = folder.join("bin").join(name);
+        if !program.is_file() {
+            console.say(&format!("Installing {name} {version} to {}: it {does}.", paths::shown(&folder)));
+            // Unoptimised: it compiles in a third of the time, and runs for seconds.
+            let mut install = console::cargo("install");
+            install.arg(format!("{name}@{version}")).args(["--locked", "--debug", "--no-default-features", "--root"]);
+            let installed = console.prepare(install.arg(&folder));
+            installed.with_context(|| format!("cannot install {name}: is crates.io in reach?"))?;
+        }
+        Ok(program)
+    }
+}
+
+/// Installs all of them.
+pub fn ensure_all(console: &mut Console) -> Result<()> {
+    [DENY, PUBLIC_API].iter().try_for_each(|tool| tool.ensure(console).map(drop))
+}
+
+/// The public items of a package, a line each.
+pub fn public_items(package: &str, console: &mut Console) -> Result<String> {
+    let mut command = Command::new(PUBLIC_API.ensure(console)?);
+    command.args(["public-api", "-sss", "--package", package, "--target-dir"]).arg(paths::target().join("api"));
+    // What rustdoc writes for programs is not stable: this lets a stable compiler write it.
+    command.env("RUSTC_BOOTSTRAP", "1").current_dir(paths::root());
+    let output = command.output().with_context(|| console::show(&command))?;
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        bail!("{said}{} {} cannot list {package}", PUBLIC_API.name, PUBLIC_API.version);
+    }
+    Ok(String::from_utf8(output.stdout)?)
 }

@@ -1,14 +1,11 @@
 //! Programs of the workspace that run on this machine: built with a line of progress, then started.
 
-use crate::{
-    console::{self, Console},
-    paths,
-    progress::{EMULATOR, HOST, Slow},
-};
+use crate::console::{self, Console, EMULATOR, HOST, Slow};
+use crate::paths;
 use anyhow::Result;
 use std::process::Command;
 
-/// What is quick here is what runs: see the profile in `Cargo.toml`.
+/// Profile of all programs that run here; see `Cargo.toml`.
 pub const PROFILE: &str = "host";
 
 /// A program of the workspace.
@@ -17,7 +14,7 @@ pub struct Program {
     pub package: &'static str,
     /// Its name.
     pub name: &'static str,
-    /// Whether it is built with its package's default features.
+    /// True if it is built with its package's default features.
     pub whole: bool,
 }
 

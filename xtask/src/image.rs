@@ -1,25 +1,18 @@
 //! Images for the microcontroller: built, and laid out as the bytes that the flash gets.
 
-use crate::{
-    console::Console,
-    paths,
-    progress::IMAGE,
-    toolchain::{self, Choice, Toolchain},
-};
+use crate::console::{Console, IMAGE};
+use crate::paths;
+use crate::toolchain::{self, Choice, Toolchain};
 use anyhow::{Context, Result, bail};
-use object::{
-    LittleEndian,
-    elf::{FileHeader32, PT_LOAD},
-    read::elf::{ElfFile, ProgramHeader},
-};
+use object::LittleEndian;
+use object::elf::{FileHeader32, PT_LOAD};
+use object::read::elf::{ElfFile, ProgramHeader};
 use sha2::{Digest, Sha256};
-use std::{
-    fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
-/// What an erased byte of flash reads.
+/// Value of an erased byte of flash.
 const ERASED: u8 = 0xff;
 /// More than the largest part has: a larger span is a mistake in the linker script.
 const SPAN_MAX: usize = 2 << 20;

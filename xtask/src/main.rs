@@ -2,38 +2,22 @@
 
 mod apt;
 mod bringup;
-mod browser;
 mod cluster;
 mod console;
 mod cores;
-mod debugger;
-mod demo;
 mod docs;
-mod figures;
-mod fit;
 mod flash;
 mod host;
 mod image;
-mod lint;
 mod model;
 mod option_bytes;
-mod package;
 mod paths;
-mod progress;
-mod proof;
 mod python;
-mod qemu;
-mod replay;
-mod sensor;
-mod serve;
 mod sim;
 mod size;
-mod stages;
-mod study;
 mod test;
 mod timing;
 mod toolchain;
-mod tools;
 
 use clap::{Parser, Subcommand};
 use console::Console;
@@ -43,11 +27,11 @@ use toolchain::Choice;
 
 /// The fingertip's commands: watch it, test it, build it, flash it.
 ///
-/// What a command needs it installs itself, saying what and why; once set up, everything works offline.
+/// Each command installs what it needs, and reports what and why; once set up, everything works offline.
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask", version, arg_required_else_help = true)]
 struct Cli {
-    /// Where the firmware's compiler comes from: rustup's target, Debian's packages, or whichever works
+    /// Source of the firmware's compiler: rustup's target, Debian's packages, or whichever works
     #[arg(long, global = true, value_enum, default_value_t = Choice::Auto, env = "FINGERTIP_TOOLCHAIN")]
     toolchain: Choice,
 
@@ -57,8 +41,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Watch the flash image touch an object, hold the force and let go, on the virtual board
-    Demo(demo::Args),
+    /// Watch the flash image touch an object, hold the force and release, on the virtual board
+    Demo(sim::DemoArgs),
     /// Run a scene: a text file that names what is simulated around the fingertip
     #[command(
         disable_help_flag = true,
@@ -89,9 +73,9 @@ enum Command {
     )]
     Sensor(sim::Args),
     /// Serve a simulated finger in real time for any DYNAMIXEL client, behind a pseudo-terminal or a TCP port
-    Serve(serve::Args),
+    Serve(sim::ServeArgs),
     /// Feed captures of boards through the core on this machine: it must answer as they did, to the bit
-    Replay(replay::Args),
+    Replay(sim::ReplayArgs),
     /// Run every test: core, host, panic-free proof, QEMU, virtual board, reports in a browser
     Test(test::Args),
     /// Build the flash image and print its path, size and SHA-256
@@ -102,14 +86,14 @@ enum Command {
     /// Check a bare NUCLEO-F446RE, or the emulated board: clocks, watchdogs, flash, converters, scan, the loop, cycles
     Bringup(bringup::Args),
     /// Run the core on an emulated Cortex-M4F and compare it bit for bit with the host
-    Qemu(qemu::Args),
+    Qemu(cores::QemuArgs),
     /// Run the loop on every core that QEMU emulates, compare with the host, and renew the table of docs/porting.md
     #[command(after_help = "Examples:\n  cargo xtask cores")]
     Cores,
     /// Estimate the cycles of the loop's kernels on a Cortex-M4F, with and without the flash's wait states
     Timing(timing::Args),
-    /// Measure what accuracy costs in time: every way to work out every kernel, with tables and pictures
-    Study(study::Args),
+    /// Measure what accuracy costs in time: every variant of every kernel, with tables and plots
+    Study(timing::StudyArgs),
     /// Measure the flash image against its limits: flash, static RAM, share of each crate
     #[command(after_help = "Examples:\n  cargo xtask size")]
     Size,
@@ -117,18 +101,18 @@ enum Command {
     #[command(after_help = "Examples:\n  printf 'a_mm,Y_kPa,d_mm,r_mm\\n10,250,1,0\\n' | cargo xtask model")]
     Model,
     /// Prove the contact model's error bounds over whole input ranges
-    Prove(model::Args),
+    Prove(model::ProveArgs),
     /// Judge the contact's fit on thousands of pictures, and renew the tables of docs/contact.md
-    Fit(fit::Args),
+    Fit(model::FitArgs),
     /// Draw the paper's figures 7, 10 and 11 from the contact model, in the core's fixed point
-    Figures(figures::Args),
+    Figures(model::FiguresArgs),
     /// Prove the control step free of panics and of floating-point calls
     #[command(after_help = "Examples:\n  cargo xtask panic-free")]
     PanicFree,
     /// Check format, lints, documentation and licences
     #[command(after_help = "Examples:\n  cargo xtask lint")]
     Lint,
-    /// Write the generated files anew, or check that they are fresh
+    /// Renew the generated files, or check that they are fresh
     Docs(docs::Args),
     /// Make the packages that others take, and test them from a project outside of this workspace
     #[command(after_help = "Examples:\n  cargo xtask package")]
@@ -155,31 +139,31 @@ fn run(cli: &Cli) -> anyhow::Result<()> {
     let console = &mut Console::terminal();
     let toolchain = cli.toolchain;
     match &cli.command {
-        Command::Demo(args) => demo::run(args, toolchain, console),
+        Command::Demo(args) => sim::demo(args, toolchain, console),
         Command::Sim(args) => sim::sim(args, toolchain, console),
         Command::Sweep(args) => sim::sweep(args, console),
         Command::Population(args) => sim::population(args, toolchain, console),
         Command::Budget(args) => sim::budget(args, console),
-        Command::Sensor(args) => sensor::run(args, console),
-        Command::Serve(args) => serve::run(args, toolchain, console),
-        Command::Replay(args) => replay::run(args, console),
+        Command::Sensor(args) => python::sensor(args, console),
+        Command::Serve(args) => sim::serve(args, toolchain, console),
+        Command::Replay(args) => sim::replay(args, console),
         Command::Test(args) => test::run(args, toolchain),
         Command::Build => image::firmware(toolchain, console).map(|image| console.print(&image.summary())),
         Command::Flash(args) => flash::run(args, toolchain, console),
         Command::Bringup(args) => bringup::run(args, toolchain, console),
-        Command::Qemu(args) => qemu::run(args, toolchain, console),
-        Command::Cores => cores::run(toolchain, console),
+        Command::Qemu(args) => cores::run_m4(args, toolchain, console),
+        Command::Cores => cores::run_all(toolchain, console),
         Command::Timing(args) => timing::run(args, toolchain, console),
-        Command::Study(args) => study::run(args, toolchain, console),
+        Command::Study(args) => timing::study(args, toolchain, console),
         Command::Size => size::run(toolchain, console),
         Command::Model => model::answer(console),
         Command::Prove(args) => model::prove(args, console),
-        Command::Fit(args) => fit::run(args, console),
-        Command::Figures(args) => figures::run(args, console),
-        Command::PanicFree => proof::run(toolchain, console),
-        Command::Lint => lint::run(toolchain),
+        Command::Fit(args) => model::fit(args, console),
+        Command::Figures(args) => model::figures(args, console),
+        Command::PanicFree => size::prove_panic_free(toolchain, console),
+        Command::Lint => test::lint(toolchain),
         Command::Docs(args) => docs::run(args, toolchain, console),
-        Command::Package => package::run(console),
+        Command::Package => docs::package(console),
         Command::Cluster => cluster::run(console),
         Command::Setup => setup(toolchain, console),
     }
@@ -191,10 +175,10 @@ fn setup(choice: Choice, console: &mut Console) -> anyhow::Result<()> {
     timing::ensure(console)?;
     cores::ensure(console)?;
     python::ensure(console)?;
-    sensor::script("fit.py", console)?;
+    python::script("fit.py", console)?;
     cluster::ensure(console)?;
-    browser::ensure(console)?;
-    tools::ensure_all(console)?;
+    apt::browser(console)?;
+    docs::ensure_all(console)?;
     console.run(console::cargo("fetch").arg("--locked"))?;
     console.say(
         "All set up: demo, sim, sweep, population, cluster, sensor, test, build, qemu, timing, size, lint and docs work offline now.",

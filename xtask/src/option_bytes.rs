@@ -1,4 +1,4 @@
-//! The option bytes: brown-out level 3, written in a way that nothing can interrupt.
+//! The option bytes: brown-out level 3, written so that nothing can interrupt.
 //!
 //! A write erases and programs a sector of its own. If a reset or a power loss cuts it short, the device can come up
 //! with read protection level 1, and leaving level 1 erases the whole flash (sources: docs/board.md, Option bytes). The
@@ -51,7 +51,7 @@ pub trait Probe {
 #[derive(Clone, Copy)]
 enum Step {
     ResetAndHalt,
-    /// What is expected; address, mask, and value of the masked word within 2 s.
+    /// Expected condition: address, mask, and value of the masked word within 2 s.
     Expect(&'static str, u32, u32, u32),
     /// Address and value.
     Write(u32, u32),
@@ -109,7 +109,7 @@ const UNCHANGED: &str = "No option byte was changed. Check cable, probe and supp
 /// The option bytes, where [`program`] has to change them. Refuses another device, and leaves the core halted.
 ///
 /// # Errors
-/// A step fails: the message names it and says what to do.
+/// A step fails; the message names it and the next action.
 pub fn check(probe: &mut impl Probe) -> Result<Option<u32>> {
     run(probe, &PREPARE, UNCHANGED)?;
     let options = probe.read(OPTCR).map_err(|error| anyhow!("option bytes: {error:#}\n{UNCHANGED}"))?;
@@ -134,7 +134,7 @@ pub fn program(probe: &mut impl Probe, options: u32) -> Result<()> {
     )
 }
 
-/// Takes the steps until one fails; `next` says what to do then.
+/// Takes the steps until one fails; `next` is the advice for that case.
 fn run(probe: &mut impl Probe, steps: &[Step], next: &str) -> Result<()> {
     for step in steps {
         let taken = match *step {

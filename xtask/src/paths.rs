@@ -1,11 +1,9 @@
-//! Where things are.
+//! Paths.
 
 use anyhow::{Context, Result};
-use std::{
-    env, fs,
-    path::{Path, PathBuf},
-    sync::OnceLock,
-};
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::{env, fs};
 
 /// The repository's root, wherever it lies now: as cargo says, or else around the folder that the user is in.
 pub fn root() -> &'static Path {

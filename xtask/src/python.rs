@@ -1,21 +1,20 @@
-//! Pythons with packages of others: clients of the bus that nobody here wrote, and what reads a sweep's files.
+//! Python environments: independent clients of the bus, readers of a sweep's files, and the fit of a real sensor.
 
-use crate::{apt, console::Console, paths};
+use crate::console::Console;
+use crate::{apt, paths, sim};
 use anyhow::{Context, Result, ensure};
-use std::{
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// A virtual environment in the build folder.
 pub struct Environment {
     /// Its folder.
     pub folder: &'static str,
-    /// What is installed in it, with its version.
+    /// Installed packages, with their versions.
     pub packages: &'static [&'static str],
     /// The names by which a program imports that, with commas between.
     pub imports: &'static str,
-    /// What it is for.
+    /// Purpose.
     pub does: &'static str,
 }
 
@@ -34,7 +33,7 @@ pub fn ensure(console: &mut Console) -> Result<PathBuf> {
 /// Finds or makes a virtual environment, and returns its interpreter.
 ///
 /// # Errors
-/// No Python, no `venv`, or no package: says what to install.
+/// No Python, no `venv`, or no package; the text says what to install.
 pub fn environment(environment: &Environment, console: &mut Console) -> Result<PathBuf> {
     let Environment { folder, packages, imports, does } = environment;
     let folder = paths::target().join(folder);
@@ -62,4 +61,26 @@ pub fn environment(environment: &Environment, console: &mut Console) -> Result<P
 
 fn has(python: &Path, imports: &str) -> bool {
     Command::new(python).args(["-c", &format!("import {imports}")]).output().is_ok_and(|output| output.status.success())
+}
+
+// The fit of a real sensor to recordings: a script on NumPy and SciPy.
+
+const LEAST_SQUARES: Environment = Environment {
+    folder: "venv-sensor",
+    packages: &["numpy==2.4.6", "scipy==1.17.1"],
+    imports: "numpy, scipy.optimize",
+    does: "`cargo xtask sensor` solves its least squares with them",
+};
+
+/// Returns the command that starts a script of the fit, in an environment with what it imports.
+pub fn script(name: &str, console: &mut Console) -> Result<Command> {
+    let mut command = Command::new(environment(&LEAST_SQUARES, console)?);
+    // -B leaves no compiled files among the sources.
+    command.arg("-B").arg(paths::root().join("host-tests/sensor").join(name));
+    Ok(command)
+}
+
+/// Fits a sensor to recordings.
+pub fn sensor(args: &sim::Args, console: &mut Console) -> Result<()> {
+    sim::start(script("fit.py", console)?.args(&args.arguments))
 }

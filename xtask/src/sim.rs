@@ -1,14 +1,13 @@
-//! Scenes: one run, or many.
+//! Simulated fingers: scenes, the demonstration, the bus server and replays.
 
-use crate::{
-    console::{self, Console},
-    host, image,
-    toolchain::Choice,
-};
-use anyhow::{Context, Result};
+use crate::console::{self, Console};
+use crate::toolchain::Choice;
+use crate::{host, image, paths};
+use anyhow::{Context, Result, ensure};
+use std::path::PathBuf;
 use std::process::{Command, exit};
 
-/// What the program behind the command is told; `--help` too.
+/// Arguments of the program behind the command; `--help` too.
 #[derive(clap::Args)]
 pub struct Args {
     /// See `--help`
@@ -16,7 +15,7 @@ pub struct Args {
     pub arguments: Vec<String>,
 }
 
-/// Runs a scene, on the board that is asked for.
+/// Runs a scene on the requested board.
 pub fn sim(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     on_board("sim", args, choice, console)
 }
@@ -26,7 +25,7 @@ pub fn sweep(args: &Args, console: &mut Console) -> Result<()> {
     start(host::Program::sim("sweep").build(console)?.args(&args.arguments))
 }
 
-/// Runs a population of drawn fingers, on the board that is asked for.
+/// Runs a population of drawn fingers on the requested board.
 pub fn population(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
     on_board("population", args, choice, console)
 }
@@ -46,7 +45,7 @@ fn on_board(program: &'static str, args: &Args, choice: Choice, console: &mut Co
     start(command.arg(program).arg("--image").arg(std::path::absolute(&image.elf)?).args(&args.arguments))
 }
 
-/// Whether a board is asked for that runs the flash image.
+/// True if the requested board runs the flash image.
 fn wants_image(arguments: &[String]) -> bool {
     let boards = ["virtual", "both"];
     let pair = arguments.windows(2).any(|pair| pair[0] == "--board" && boards.contains(&pair[1].as_str()));
@@ -61,4 +60,130 @@ pub fn start(command: &mut Command) -> Result<()> {
         exit(status.code().unwrap_or(2));
     }
     Ok(())
+}
+
+/// Flags of `cargo xtask demo`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    cargo xtask demo\n  \
+    cargo xtask demo --json target/demo.json --out target/pictures")]
+pub struct DemoArgs {
+    /// Write the figures to this file, as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write the pictures to this folder
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Hold each force for a shorter time, and leave out the second run
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Shows the demonstration on the native core, which is built soon, then on the flash image.
+pub fn demo(args: &DemoArgs, choice: Choice, console: &mut Console) -> Result<()> {
+    native(args, console)?;
+    let image = image::firmware(choice, console)?;
+    console.say(&image.summary());
+    let mut command = host::BOARD.build(console)?;
+    command.args(["demo", "--image"]).arg(&image.elf);
+    for (flag, value) in [("--json", &args.json), ("--out", &args.out)] {
+        if let Some(path) = value {
+            command.arg(flag).arg(std::path::absolute(path)?);
+        }
+    }
+    command.args(args.quick.then_some("--quick"));
+    console.run(&mut command)
+}
+
+/// The same script on the core compiled for this machine: something to look at while the emulator compiles.
+fn native(args: &DemoArgs, console: &mut Console) -> Result<()> {
+    let mut command = host::NATIVE_DEMO.build(console)?;
+    console.say("First on the native core: the same script and plant, no microcontroller in between.");
+    // As it is to be read: programs are started in the root.
+    let out = paths::shown(&paths::target().join("demo").join("native"));
+    console.run(command.arg("--out").arg(out).args(args.quick.then_some("--quick")))?;
+    console.say("Now on the flash image: the emulator is compiled for some minutes, the first time.");
+    Ok(())
+}
+
+/// Flags of `cargo xtask serve`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  cargo xtask serve --pty /tmp/finger\n  cargo xtask serve raspberry --tcp 7000\n  \
+    cargo xtask serve my-scene.toml --set effects.noise.rms_codes=3\n  \
+    cargo xtask serve --board virtual --pty /tmp/finger\n\n\
+    Commands on standard input move the object or break something: type `help` there."
+)]
+pub struct ServeArgs {
+    /// Scene file, or the name of one that `cargo xtask sim --list` shows; `wall` by default
+    scene: Option<String>,
+    /// Controller to serve
+    #[arg(long, value_enum, default_value_t = Board::Native)]
+    board: Board,
+    /// Symbolic link to the pseudo-terminal
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
+    pty: Option<PathBuf>,
+    /// TCP port of this machine instead of a pseudo-terminal; 0 takes a free one
+    #[arg(long, value_name = "PORT")]
+    tcp: Option<u16>,
+    /// Seed that replaces the scene's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Key of the scene to replace; may be given many times
+    #[arg(long, value_name = "TABLE.KEY=VALUE")]
+    set: Vec<String>,
+}
+
+/// Board that is served.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Board {
+    /// The core on this machine, with a scene around it
+    Native,
+    /// The flash image on the emulated board, in front of a wall
+    Virtual,
+}
+
+/// Serves a scene's finger on the native core, or the flash image on the emulated board.
+pub fn serve(args: &ServeArgs, choice: Choice, console: &mut Console) -> Result<()> {
+    let mut command = match args.board {
+        Board::Native => {
+            let mut command = host::SERVE.build(console)?;
+            let seed = args.seed.iter().flat_map(|seed| ["--seed".to_owned(), seed.to_string()]);
+            let set = args.set.iter().flat_map(|key| ["--set".to_owned(), key.clone()]);
+            command.args(&args.scene).args(seed.chain(set));
+            command
+        }
+        Board::Virtual => {
+            let scene = args.scene.is_some() || args.seed.is_some() || !args.set.is_empty();
+            ensure!(!scene, "--board virtual takes no scene, no --seed and no --set: its object is a wall");
+            let image = image::firmware(choice, console)?;
+            console.say(&image.summary());
+            let mut command = host::BOARD.build(console)?;
+            command.args(["serve", "--image"]).arg(std::path::absolute(&image.elf)?);
+            command
+        }
+    };
+    if let Some(link) = &args.pty {
+        command.arg("--pty").arg(link);
+    }
+    if let Some(port) = args.tcp {
+        command.args(["--tcp", &port.to_string()]);
+    }
+    start(&mut command)
+}
+
+/// Flags of `cargo xtask replay`.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  cargo xtask replay\n  cargo xtask replay my/captures\n  cargo xtask replay press.mcap"
+)]
+pub struct ReplayArgs {
+    /// A folder with captures, or one of them; without it `captures/`
+    place: Option<PathBuf>,
+}
+
+/// Replays all captures in a folder: a line for each.
+pub fn replay(args: &ReplayArgs, console: &mut Console) -> Result<()> {
+    let place = args.place.clone().unwrap_or_else(|| paths::root().join("captures"));
+    start(host::TOOL.build(console)?.arg("replay").arg(place))
 }

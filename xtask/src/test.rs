@@ -1,14 +1,12 @@
-//! Every test, a stage each.
+//! Tests and checks, one stage each.
 
-use crate::{
-    bringup, browser, console, cores, host, image, proof, python, qemu, sensor,
-    size::Sizes,
-    stages::Stages,
-    timing,
-    toolchain::{self, Choice},
-};
-use anyhow::{Context, Result};
+use crate::console::{self, Console, clear_line, cpu_s};
+use crate::size::{self, Sizes};
+use crate::toolchain::{self, Choice, TARGET, Toolchain};
+use crate::{apt, bringup, cores, docs, host, image, python, timing};
+use anyhow::{Context, Result, bail, ensure};
 use std::process::Command;
+use std::time::Instant;
 
 /// Flags of `cargo xtask test`.
 #[derive(clap::Args)]
@@ -23,7 +21,7 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
     stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     stages.stage("fit of a sensor to recordings", |console| {
-        let mut command = sensor::script("test_fit.py", console)?;
+        let mut command = python::script("test_fit.py", console)?;
         console.run(&mut command)
     });
     let image = stages.stage("flash image", |console| {
@@ -37,8 +35,8 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
         console.print(&sizes.verdict());
         sizes.check()
     });
-    stages.stage("panic-free proof", |console| proof::run(choice, console));
-    stages.stage("emulated Cortex-M4F against this machine", |console| qemu::test(choice, console));
+    stages.stage("panic-free proof", |console| size::prove_panic_free(choice, console));
+    stages.stage("emulated Cortex-M4F against this machine", |console| cores::test_m4(choice, console));
     stages.stage("emulated cores of other boards against this machine", |console| {
         cores::page(choice, console).map(|page| console.print(&cores::table(&page)))
     });
@@ -62,7 +60,7 @@ pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     });
     stages.stage("stream to Foxglove", |console| host::test(&mut on_a_board(&["--test", "stream"]), console));
     stages.stage("reports in a browser", |console| {
-        let program = browser::ensure(console)?;
+        let program = apt::browser(console)?;
         host::test(on_a_board(&["--test", "report"]).env("FINGERTIP_CHROMIUM", &program), console)
     });
     stages.finish("test")
@@ -75,4 +73,156 @@ fn on_a_board(targets: &[&str]) -> Command {
     command.args(["--package", "serve", "--package", "browser", "--package", "fingertip-cli"]);
     command.args(["--features", "fingertip-cli/foxglove"]).args(targets);
     command
+}
+
+// Format, lints, documentation and licences.
+
+/// Every image that is emulated or linked as a proof, and its feature.
+const IMAGES: [(&str, &str); 5] =
+    [("qemu", "qemu"), ("panic-free", "proof"), ("timing", "timing"), ("timing-check", "timing"), ("study", "study")];
+
+/// Programs of other boards, each a workspace of its own.
+const APART: [&str; 2] = [cores::EXAMPLE, cores::LOOP];
+
+/// Runs all checks that are no tests.
+pub fn lint(choice: Choice) -> Result<()> {
+    let mut stages = Stages::default();
+    stages.stage("format", |console| {
+        console.run(console::cargo("fmt").args(["--all", "--check"]))?;
+        for folder in APART {
+            let manifest = format!("{folder}/Cargo.toml");
+            console.run(console::cargo("fmt").args(["--manifest-path", &manifest, "--check"]))?;
+        }
+        Ok(())
+    });
+    stages.stage("lints, host", |console| console.run(&mut clippy(&["--workspace", "--all-targets"])));
+    stages.stage("lints, what the demonstration is built of", |console| {
+        for package in ["sim", "virtual-board"] {
+            console.run(&mut clippy(&["--package", package, "--no-default-features", "--lib", "--bins"]))?;
+        }
+        Ok(())
+    });
+    stages.stage("lints, what is built where it is asked for", |console| {
+        console.run(&mut clippy(&["--package", "m4-timing", "--features", "plugin", "--all-targets"]))?;
+        console.run(&mut clippy(&["--package", "fingertip-cli", "--features", "foxglove", "--all-targets"]))
+    });
+    stages.stage("lints, microcontroller", |console| {
+        let toolchain = toolchain::ensure(choice, console)?;
+        ensure!(toolchain == Toolchain::Native, "Debian's Rust has no clippy for {TARGET}: rustup's target is needed");
+        console.run(&mut denying_warnings(image::flashed(toolchain, "clippy")))?;
+        for (name, feature) in IMAGES {
+            console.run(&mut denying_warnings(image::emulated(toolchain, "clippy", name, feature)))?;
+        }
+        console.run(&mut denying_warnings(image::checked(toolchain, "clippy", "bringup")))?;
+        let target = cores::TARGET_OF_EXAMPLE;
+        let toolchain =
+            toolchain::ensure_for(choice, &[target], "programs of other boards are checked for it", console)?;
+        for folder in APART {
+            console.run(&mut denying_warnings(image::apart(toolchain, "clippy", folder, target, &[])))?;
+        }
+        Ok(())
+    });
+    stages.stage("documentation", |console| {
+        let mut command = console::cargo("doc");
+        command.args(["--workspace", "--no-deps", "--document-private-items", "--ignore-rust-version"]);
+        console.run(command.env("RUSTDOCFLAGS", "-D warnings"))
+    });
+    stages.stage("licences and sources of the dependencies", |console| {
+        let program = docs::DENY.ensure(console)?;
+        console.run(Command::new(program).args(["check", "bans", "licenses", "sources"]))
+    });
+    stages.finish("lint")
+}
+
+fn denying_warnings(mut clippy: Command) -> Command {
+    clippy.args(["--ignore-rust-version", "--", "-D", "warnings"]);
+    clippy
+}
+
+fn clippy(arguments: &[&str]) -> Command {
+    let mut command = console::cargo("clippy");
+    command.args(arguments);
+    denying_warnings(command)
+}
+
+/// A sequence of checks, each a line with its cost; what failed is shown in full.
+#[derive(Default)]
+pub struct Stages {
+    done: Vec<Stage>,
+    failed: Vec<String>,
+}
+
+/// Cost of a stage.
+struct Stage {
+    name: String,
+    /// CPU time of compiling, s.
+    built_s: f64,
+    /// CPU time of all else, s.
+    ran_s: f64,
+    /// By the clock, s.
+    clock_s: f64,
+}
+
+impl Stages {
+    /// Runs a stage; `None` where it failed.
+    ///
+    /// Stages do not depend on each other's order: a stage that lacks what an earlier one failed to make fails too.
+    pub fn stage<T>(&mut self, name: &str, work: impl FnOnce(&mut Console) -> Result<T>) -> Option<T> {
+        println!("{name} ...");
+        let mut console = Console::captured();
+        let (start, before_s) = (Instant::now(), cpu_s());
+        let result = work(&mut console);
+        let (clock_s, built_s) = (start.elapsed().as_secs_f64(), console.built_s());
+        let ran_s = cpu_s() - before_s - built_s;
+        self.done.push(Stage { name: name.into(), built_s, ran_s, clock_s });
+        clear_line();
+        match result {
+            Ok(value) => {
+                for line in closing_lines(console.text()) {
+                    println!("    {line}");
+                }
+                println!("ok     {clock_s:7.1} s  {name}");
+                Some(value)
+            }
+            Err(error) => {
+                println!("{}", console.text());
+                // Again at the end, where one looks first.
+                for line in console.text().lines().filter(|line| is_failed_test(line)) {
+                    println!("    {line}");
+                }
+                println!("{error:#}");
+                println!("FAILED {clock_s:7.1} s  {name}");
+                self.failed.push(name.into());
+                None
+            }
+        }
+    }
+
+    /// The verdict.
+    pub fn finish(self, what: &str) -> Result<()> {
+        println!("\n{:>10} {:>8} {:>8}  seconds of CPU time", "compiling", "running", "clock");
+        let line = |built_s: f64, ran_s: f64, clock_s: f64, name: &str| {
+            println!("{built_s:10.1} {ran_s:8.1} {clock_s:8.1}  {name}");
+        };
+        for Stage { name, built_s, ran_s, clock_s } in &self.done {
+            line(*built_s, *ran_s, *clock_s, name);
+        }
+        let sum = |of: fn(&Stage) -> f64| self.done.iter().map(of).sum::<f64>();
+        line(sum(|stage| stage.built_s), sum(|stage| stage.ran_s), sum(|stage| stage.clock_s), "all\n");
+        if !self.failed.is_empty() {
+            bail!("{} failed: {}", what, self.failed.join("; "));
+        }
+        println!("{what}: all passed");
+        Ok(())
+    }
+}
+
+/// Cargo's line of a test that failed.
+fn is_failed_test(line: &str) -> bool {
+    line.starts_with("test ") && line.ends_with(" ... FAILED")
+}
+
+/// Cargo's closing line of each test binary that ran a test.
+fn closing_lines(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter(|line| line.starts_with("test result:") && !line.contains(" 0 passed; 0 failed; 0 ignored"))
 }

@@ -1,21 +1,17 @@
 //! Estimated cycles on a Cortex-M4F: an image under QEMU with the timing plugin. `docs/timing.md` says what they are
 //! worth.
 
-use crate::{
-    apt,
-    console::{self, Console},
-    host, image, paths, progress,
-    toolchain::{self, Choice},
-};
+use crate::console::{self, Console, IMAGE};
+use crate::host::{self, Program};
+use crate::toolchain::{self, Choice, Toolchain};
+use crate::{apt, image, paths};
 use anyhow::{Context, Result, bail};
 use m4_timing::report::{Measured, parse};
-use std::{
-    env::consts::{DLL_PREFIX, DLL_SUFFIX},
-    fmt::Write as _,
-    fs,
-    path::{Path, PathBuf},
-    process::{Command, Stdio},
-};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 const PROGRAM: &str = "qemu-system-arm";
 /// The first version with the plugin interface that the plugin speaks.
@@ -38,9 +34,9 @@ pub struct Args {
     check: bool,
 }
 
-/// What an image's run under the plugin gave.
+/// Result of an image's run under the plugin.
 pub struct Run {
-    /// What the image wrote to its standard output.
+    /// Standard output of the image.
     pub output: String,
     /// The regions, in order of their numbers.
     pub regions: Vec<Measured>,
@@ -116,7 +112,7 @@ pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     measure(&image, Some(&recording), console)
 }
 
-/// Runs an image to its end under the plugin; `argument` is what its command line says.
+/// Runs an image to its end under the plugin; `argument` is its command line.
 ///
 /// # Errors
 /// QEMU or the plugin is missing, the image fails, or a region cannot be measured.
@@ -174,7 +170,7 @@ fn version() -> Option<u32> {
 
 fn plugin(console: &mut Console) -> Result<PathBuf> {
     let mut command = host::cargo("build", "m4-timing");
-    console.build(command.args(["--features", "plugin"]), "the timing plugin", progress::HOST)?;
+    console.build(command.args(["--features", "plugin"]), "the timing plugin", console::HOST)?;
     let file = paths::target().join(host::PROFILE).join(format!("{DLL_PREFIX}m4_timing{DLL_SUFFIX}"));
     fs::canonicalize(&file).with_context(|| paths::shown(&file))
 }
@@ -201,4 +197,76 @@ fn table(run: &Run) -> String {
         );
     }
     text
+}
+
+// Cost of accuracy in time: every variant of every kernel on the emulated Cortex-M4F, judged on this machine.
+
+/// The image and its feature.
+const STUDY: &str = "study";
+/// The profile of everything but the firmware's own code.
+const STUDY_PROFILE: &str = "study";
+
+/// Flags of `cargo xtask study`.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  cargo xtask study\n  cargo xtask study --check\n  \
+    cargo xtask study --json study.json --out /tmp/study")]
+pub struct StudyArgs {
+    /// Change nothing; fail where a figure of docs/study.md, the README or a picture is stale
+    #[arg(long, conflicts_with = "out")]
+    check: bool,
+    /// Write the figures to a file, an object a line
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write pages and pictures to a folder instead of the documentation
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+/// Runs the study and renews or checks its page, its table in the README and its pictures.
+pub fn study(args: &StudyArgs, choice: Choice, console: &mut Console) -> Result<()> {
+    let toolchain = toolchain::ensure(choice, console)?;
+    let folder = paths::made("study")?;
+    let inputs = folder.join("inputs.bin");
+    let judge = Program::tool("study");
+    let mut command = judge.build(console)?;
+    console.run(command.arg("inputs").arg(&inputs))?;
+    let shipped = image::build(toolchain, STUDY, STUDY, console)?;
+    let shipped = measured(&shipped, &inputs, &folder.join("shipped.txt"), console)?;
+    let quick = measured(&build_quick(toolchain, console)?, &inputs, &folder.join("quick.txt"), console)?;
+    let mut command = judge.build(console)?;
+    command.arg("report").arg(&shipped).arg(&quick).args(args.check.then_some("--check"));
+    for (flag, path) in [("--json", &args.json), ("--out", &args.out)] {
+        if let Some(path) = path {
+            command.arg(flag).arg(std::path::absolute(path).with_context(|| paths::shown(path))?);
+        }
+    }
+    console.run(&mut command)
+}
+
+/// The image as quick as the compiler makes it, without what keeps the firmware's small.
+fn build_quick(toolchain: Toolchain, console: &mut Console) -> Result<PathBuf> {
+    let mut command = image::emulated(toolchain, "build", STUDY, STUDY);
+    command.args(["--profile", STUDY_PROFILE]);
+    // Instead of the flags that `.cargo/config.toml` has for the target.
+    let flags = ["-C", "opt-level=3"].map(String::from).into_iter().chain(toolchain::short_paths());
+    // Flags may hold blanks: a separator that no path has.
+    command.env("CARGO_ENCODED_RUSTFLAGS", flags.collect::<Vec<_>>().join("\u{1f}"));
+    console.build(&mut command, "the study, as quick as can be", IMAGE)?;
+    Ok(toolchain.images().with_file_name(STUDY_PROFILE).join(STUDY))
+}
+
+/// Runs an image; what it said and what it cost, in a file.
+fn measured(image: &Path, inputs: &Path, file: &Path, console: &mut Console) -> Result<PathBuf> {
+    let run = measure(image, Some(inputs), console)?;
+    let mut text = run.output;
+    for measured in &run.regions {
+        // A string takes every write.
+        let _ = write!(text, "cost {}", measured.region);
+        for figure in [&measured.instructions, &measured.low, &measured.estimate, &measured.high, &measured.flash] {
+            let _ = write!(text, " {} {}", figure.median, figure.max);
+        }
+        text.push('\n');
+    }
+    fs::write(file, text).with_context(|| format!("cannot write {}", paths::shown(file)))?;
+    Ok(file.into())
 }

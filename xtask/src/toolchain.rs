@@ -1,15 +1,18 @@
 //! The compiler for the firmware: rustup's bare-metal target, or Debian's Rust where rustup's server is out of reach.
 
-use crate::{apt, console, console::Console, paths};
+use crate::console::{self, Console};
+use crate::{apt, paths};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::ValueEnum;
-use std::{env, iter, path::PathBuf, process::Command};
+use std::path::PathBuf;
+use std::process::Command;
+use std::{env, iter};
 
 /// The microcontroller, in the compiler's words.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "lld"];
 
-/// What the user asks for.
+/// Source of the compiler that the user requests.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Choice {
     /// The installed target, rustup's, or Debian's: the first that works
@@ -89,7 +92,7 @@ pub fn short_paths() -> impl Iterator<Item = String> {
     iter::once(checkout).chain(sources().map(|crates| format!("--remap-path-prefix={}=crates", crates.display())))
 }
 
-/// Where cargo keeps the sources of other crates.
+/// Folder in which cargo keeps the sources of other crates.
 pub fn sources() -> Option<PathBuf> {
     let home = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(|| Some(env::home_dir()?.join(".cargo")))?;
     Some(home.join("registry").join("src"))
@@ -98,7 +101,7 @@ pub fn sources() -> Option<PathBuf> {
 /// Finds or installs a compiler for the firmware.
 ///
 /// # Errors
-/// Neither rustup nor Debian could provide one: says what was tried and what to do.
+/// Neither rustup nor Debian could provide one; the text says what was tried and what to do.
 pub fn ensure(choice: Choice, console: &mut Console) -> Result<Toolchain> {
     ensure_for(choice, &[TARGET], "the firmware is compiled for it", console)
 }

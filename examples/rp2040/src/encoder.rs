@@ -10,7 +10,7 @@ use rp_pac::{IO_BANK0, Interrupt, interrupt};
 /// The count, and both channels when it was taken.
 static COUNT: Mutex<Cell<(i32, usize)>> = Mutex::new(Cell::new((0, 0)));
 
-/// What the count changes by from two channels to two channels; both at once is a lost edge.
+/// Change of the count for a change of the two channels; a change of both at once is a lost edge.
 const STEPS: [[i32; 4]; 4] = [[0, 1, -1, 0], [-1, 0, 0, 1], [1, 0, 0, -1], [0, -1, 1, 0]];
 
 /// Counts from now on.

@@ -1,4 +1,4 @@
-//! What each pin is.
+//! Pins.
 
 use rp_pac::{IO_BANK0, PADS_BANK0, SIO};
 
@@ -59,7 +59,7 @@ pub fn low(pin: usize) {
     SIO.gpio_out(0).value_clr().write_value(1 << pin);
 }
 
-/// Whether an input is high.
+/// True if an input is high.
 pub fn is_high(pin: usize) -> bool {
     SIO.gpio_in(0).read() & 1 << pin != 0
 }

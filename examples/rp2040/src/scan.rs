@@ -29,7 +29,7 @@ struct Scan {
     scanned: Scanned,
     /// The slot that is being scanned: a row, none, or the supply's.
     slot: usize,
-    /// A whole frame that nobody has taken yet.
+    /// Whole frame that was not taken yet.
     whole: Option<Scanned>,
     next_us: u32,
     frame_us: u32,

@@ -1,7 +1,7 @@
 //! The reference finger against a wall, in single precision: array, motor and wall of `docs/runs.md`, quick enough to
 //! run beside the loop on the microcontroller.
 //!
-//! Simpler than the plant that the demonstration stands in: explicit steps of a sixth of a frame, all rows of a frame
+//! Simpler than the demonstration's plant: explicit steps of a sixth of a frame, all rows of a frame
 //! read at its middle, the pressures interpolated from a table over the indentation. `tests/finger.rs` holds the force
 //! steps against those of the demonstration.
 
@@ -27,7 +27,7 @@ const TORQUE_NM_PER_A: f32 = 5.35e-3;
 const MOTOR_AND_BRIDGE_OHM: f32 = 2.83 + 0.7;
 const INERTIA_KG_M2: f32 = 0.71e-7;
 const FRICTION_NM: f32 = 0.12e-3;
-/// What a gear of 70 % adds to the friction, as a share of the load.
+/// Friction that a gear of 70 % adds, as a share of the load.
 const FRICTION_SHARE: f32 = 1.0 / 0.7 - 1.0;
 pub(crate) const MM_PER_RAD: f32 = 12.0 / 43.0;
 const NM_PER_N: f32 = MM_PER_RAD * 1e-3;
@@ -106,7 +106,7 @@ impl Finger {
         FORCE_PER_MM2 * depth_mm * depth_mm
     }
 
-    /// How far the tip has come.
+    /// Travel of the tip.
     pub fn travel_mm(&self) -> f32 {
         self.angle_rad * MM_PER_RAD
     }
@@ -160,7 +160,7 @@ impl Finger {
         self.angle_rad += 0.5 * step_s * (before + self.speed_rad_per_s);
     }
 
-    /// What the step learns beside the frame.
+    /// Inputs of the step other than the frame.
     pub fn sense(&self, answer: CoreCycles) -> Sense {
         let counts = self.angle_rad * COUNTS_PER_RAD;
         // Rounded down, which the cast does for positive numbers only.
@@ -208,7 +208,7 @@ impl Finger {
     }
 }
 
-/// The share of the supply at the motor; none where it coasts.
+/// The share of the supply at the motor; `None` while it coasts.
 fn duty(bridge: Bridge) -> Option<f32> {
     match bridge {
         Bridge::Asleep | Bridge::Open => None,

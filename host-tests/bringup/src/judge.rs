@@ -11,10 +11,11 @@ use std::path::Path;
 
 /// Of the JSON file's fields.
 const SCHEMA_VERSION: u32 = 1;
-/// A kernel's cycles may differ by this share of the estimate, or by so many: what the model does not know of flash.
+/// Allowed difference between measured and estimated cycles: a share, or a number. The model does not know the flash
+/// fully.
 const SHARE: f64 = 0.1;
 const CYCLES: f64 = 10.0;
-/// What the kernels' calls themselves take.
+/// Cycles of an empty call of a kernel.
 const NOTHING: &str = "nothing: an empty call";
 
 /// Which board it was.
@@ -27,7 +28,7 @@ pub enum Board {
     Emulated,
 }
 
-/// What is said of a figure.
+/// Verdict on a figure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -52,13 +53,13 @@ pub struct Judged {
     pub figure: Option<f64>,
     /// The least that is expected.
     pub at_least: f64,
-    /// The most; none where there is no limit.
+    /// The most; `None` without a limit.
     pub at_most: Option<f64>,
-    /// Where that comes from.
+    /// Source.
     pub source: &'static str,
-    /// What is said of it.
+    /// Verdict.
     pub verdict: Verdict,
-    /// What to do, or why it is not shown.
+    /// Advice, or the reason for which it is not shown.
     pub advice: Option<&'static str>,
 }
 
@@ -71,9 +72,9 @@ pub struct Kernel {
     pub median_cycles: f64,
     /// The same.
     pub most_cycles: f64,
-    /// With the flash's wait states, of the same inputs; none where no estimate was made.
+    /// With the flash's wait states, of the same inputs; `None` without an estimate.
     pub estimated_cycles: Option<f64>,
-    /// What is said of it.
+    /// Verdict.
     pub verdict: Verdict,
 }
 
@@ -88,11 +89,11 @@ pub struct Judgement {
     pub board_uid: String,
     /// Which board it was.
     pub board: Board,
-    /// How many checks pass.
+    /// Number of checks that pass.
     pub passed: usize,
-    /// How many do not.
+    /// Number of checks that fail.
     pub failed: usize,
-    /// How many the emulated board cannot show.
+    /// Number of checks that the emulated board cannot show.
     pub not_shown: usize,
     /// All checks.
     pub checks: Vec<Judged>,

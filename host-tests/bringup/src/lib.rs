@@ -14,5 +14,3 @@ pub mod checks;
 pub mod judge;
 #[cfg(feature = "host")]
 pub mod listen;
-#[cfg(feature = "host")]
-pub mod steps;

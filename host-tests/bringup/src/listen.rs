@@ -1,9 +1,9 @@
-//! The host's side of the report: says `go`, and takes the lines in.
+//! The host's side of the report: sends `go`, and reads the lines.
 
 use crate::text::{CHECK, READY, VERSION, checked};
 use std::io::{Error, ErrorKind, Read, Write};
 
-/// What a board reported.
+/// Report of a board.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
     /// The part's unique number.
@@ -32,7 +32,7 @@ pub fn listen(port: &mut (impl Read + Write), frames: u32, progress: &mut dyn Fn
             if let Some(said) = taken.strip_prefix("# ") {
                 match (said, &report) {
                     (READY, None) => writeln!(port, "go {frames}")?,
-                    (READY, Some(_)) => return Err(Error::other("the image began anew within its report")),
+                    (READY, Some(_)) => return Err(Error::other("the image restarted within its report")),
                     _ if said.starts_with("crashed") || said.starts_with("FAILED") => return Err(Error::other(said)),
                     _ => progress(said),
                 }
@@ -70,13 +70,13 @@ fn uid(begins: &str) -> Result<String, Error> {
         Some((version, uid)) if version == VERSION.to_string() => Ok(uid.into()),
         _ => Err(Error::new(
             ErrorKind::InvalidData,
-            format!("the image reports by version {begins}, this host by {VERSION}: build both anew"),
+            format!("the image reports by version {begins}, this host by {VERSION}: rebuild both"),
         )),
     }
 }
 
 impl Report {
-    /// Takes a line in; false where it is none of the report's.
+    /// Takes a line in; false if the line does not belong to the report.
     fn take(&mut self, line: &str) -> bool {
         let parsed = |word: Option<&str>| word.and_then(|word| word.parse::<f64>().ok());
         if let Some(rest) = line.strip_prefix("figure ") {

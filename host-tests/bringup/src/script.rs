@@ -15,7 +15,7 @@ pub const GOALS: [(i32, u32); 6] =
     [(1_000, 5_000), (200, 2_500), (2_000, 2_500), (5_000, 2_500), (1_000, 2_500), (0, 1_000)];
 /// The goals among them that are steps from one force to another.
 pub const STEPS: core::ops::Range<usize> = 1..5;
-/// Torque is enabled so long after the start: the tare is over.
+/// Time from the start to torque on: the tare is over by then.
 const TORQUE_AT: u32 = TARE_FRAMES + 20;
 /// The first goal.
 const FIRST_AT: u32 = TORQUE_AT + 20;
@@ -41,12 +41,12 @@ const UNASKED: Command = Command {
     measure_request: 0,
 };
 
-/// How the force answered to a goal.
+/// Response of the force to a goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
     /// Which of [`GOALS`].
     pub goal: usize,
-    /// From 10 % to 90 % of the way, ms.
+    /// Time from 10 % to 90 % of the step, ms.
     pub rise_ms: f32,
     /// Beyond the goal, of the goal or of the step, whichever is smaller.
     pub overshoot_percent: f32,
@@ -54,7 +54,7 @@ pub struct Answer {
     pub settled_ms: f32,
 }
 
-/// The force on its way to a goal.
+/// Force during a step to a goal.
 #[derive(Clone, Copy)]
 struct Way {
     from_n: f32,
@@ -144,7 +144,7 @@ impl Bench {
         (*frames, *goal, *until, *way) = (0, None, FIRST_AT, Way::new(0.0, 0.0));
     }
 
-    /// What the next step takes, as a record, and the frame's time after it.
+    /// Inputs of the next step as a record, and the frame's time after it.
     pub fn record(&mut self, pipeline: &mut Pipeline) -> Record {
         let (frame, sense, command) = self.inputs();
         let record = Record { frame: *frame, sense: *sense, command: *command };
@@ -165,12 +165,12 @@ impl Bench {
         value as u32 ^ (value >> 32) as u32
     }
 
-    /// What the next step takes.
+    /// Inputs of the next step.
     pub fn inputs(&self) -> (&Frame, &Sense, &Command) {
         (&self.frame, &self.sense, &self.command)
     }
 
-    /// Whether the last goal is over.
+    /// True if the last goal is over.
     pub fn done(&self) -> bool {
         self.goal == Some(GOALS.len())
     }

@@ -1,13 +1,13 @@
 //! The lines between image and host: `bringup VERSION UID`, `figure NAME VALUE`, `cycles MEDIAN MOST KERNEL`, and `end
-//! CHECK`, a check over all before it. A line that begins with `#` only says how far it is.
+//! CHECK`, a check over all before it. A line that begins with `#` only reports progress.
 
 /// Of these lines.
 pub const VERSION: u32 = 1;
 /// The virtual COM port's speed.
 pub const BAUD: u32 = 115_200;
-/// What the image says while it waits for the host's `go`.
+/// Line that the image repeats while it waits for the host's `go`.
 pub const READY: &str = "ready: send `go` and a line's end, or `go FRAMES`";
-/// How many frames the rows are read back for, where nobody says.
+/// Default number of frames for which the rows are read back.
 pub const FRAMES: u32 = 1_000_000;
 
 /// The check over nothing.
@@ -18,7 +18,7 @@ pub const fn checked(check: u32, byte: u8) -> u32 {
     (check ^ byte as u32).wrapping_mul(0x0100_0193)
 }
 
-/// What the host's line asks for, if it is one.
+/// Parses the host's line; returns the number of frames that it requests.
 pub fn asked_frames(line: &str) -> Option<u32> {
     let rest = line.trim().strip_prefix("go")?;
     if rest.is_empty() { Some(FRAMES) } else { rest.trim().parse().ok() }

@@ -1,4 +1,4 @@
-//! `bringup-host` at a serial port, with a board that says what a board would.
+//! `bringup-host` at a serial port, with a simulated board.
 
 use bringup::checks::checks;
 use bringup::text::{CHECK, READY, checked};

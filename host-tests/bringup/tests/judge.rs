@@ -1,10 +1,10 @@
-//! What a report has to be, and that each check can fail.
+//! Format of a report, and that each check can fail.
 
+use bringup::checks;
 use bringup::checks::checks;
 use bringup::judge::{Board, Judgement, Verdict, judge};
 use bringup::listen::{Report, listen};
 use bringup::script::{Bench, STEPS};
-use bringup::steps;
 use bringup::text::{CHECK, READY, asked_frames, checked};
 use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::CoreCycles;
@@ -55,7 +55,7 @@ fn what_the_emulated_board_cannot_show_never_passes() {
     assert!(judgement.kernels.iter().all(|kernel| kernel.verdict == Verdict::NotShown));
 }
 
-/// A port that says this, and keeps what it hears.
+/// Port that sends this, and keeps the bytes that it receives.
 struct Port(Cursor<Vec<u8>>, Vec<u8>);
 
 impl Read for Port {
@@ -77,7 +77,7 @@ impl Write for Port {
     }
 }
 
-/// What the host makes of it, and what it said.
+/// Result of the host, and its output.
 fn heard(said: &str) -> (Result<Report>, String) {
     let mut port = Port(Cursor::new(said.as_bytes().to_vec()), Vec::new());
     let report = listen(&mut port, 7, &mut |_| {});
@@ -97,7 +97,7 @@ fn a_report_is_taken_in_among_other_lines_and_a_damaged_one_is_refused() {
         assert!(heard(&whole.replacen(from, to, 1)).0.is_err(), "{from} as {to}");
     }
     let again = whole.replacen("# far", &format!("# {READY}"), 1);
-    assert!(heard(&again).0.is_err_and(|error| error.to_string().contains("anew")));
+    assert!(heard(&again).0.is_err_and(|error| error.to_string().contains("restarted")));
     assert!(heard("# crashed: cause 2\n").0.is_err_and(|error| error.to_string().contains("cause 2")));
     assert!(heard("").0.is_err_and(|error| error.to_string().contains("silent")));
 }
@@ -121,7 +121,7 @@ fn its_steps_are_within_a_tenth_of_the_demonstrations() {
         assert_eq!(status.fault, None, "at {} mm", bench.finger.travel_mm());
         answers.extend(bench.pass(status, config.timing.frame_ns, CoreCycles(0)));
     }
-    let checks = steps::checks();
+    let checks = checks::steps();
     for (answer, of_step) in answers[STEPS].iter().zip(checks.chunks(3)) {
         let ours = [answer.rise_ms, answer.overshoot_percent, answer.settled_ms];
         for (ours, check) in ours.into_iter().zip(of_step) {

@@ -1,7 +1,7 @@
 //! The closed loop on any emulated core: reports its digest and the instructions per frame.
 //!
-//! Not for a board: it talks to the emulator by semihosting. A loop of known length tells how many instructions a tick of
-//! the core's counter is, so the counts do not depend on the emulator's clocks.
+//! Not for a board: it talks to the emulator by semihosting. A loop of known length measures the instructions in a tick
+//! of the core's counter is, so the counts do not depend on the emulator's clocks.
 #![no_std]
 #![no_main]
 
@@ -14,7 +14,7 @@ use cortex_m_rt::entry;
 #[cfg(target_arch = "riscv32")]
 use riscv_rt::entry;
 
-/// Instructions of the loop that tells how long a tick is.
+/// Instructions of the loop that measures the length of a tick.
 const LOOP_INSTRUCTIONS: u32 = 100_000;
 
 #[entry]

@@ -1,4 +1,4 @@
-//! What goes into a step and what comes out of it, as bytes: recordings to replay, and a digest to compare runs.
+//! Inputs and outputs of a step as bytes: recordings to replay, and a digest to compare runs.
 //!
 //! A recording is [`MAGIC`], the number of records as a little-endian u32, and that many records of [`Record::BYTES`].
 
@@ -21,9 +21,9 @@ const UNMEASURED: i32 = i32::MIN;
 pub struct Record {
     /// The frame.
     pub frame: Frame,
-    /// What was sensed beside it.
+    /// Sensed values other than the frame.
     pub sense: Sense,
-    /// What the host asked.
+    /// Command of the host.
     pub command: Command,
 }
 

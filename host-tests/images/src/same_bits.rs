@@ -5,12 +5,9 @@
 //! outside the functions' domains. What looks at a whole frame, [`machines::FRAMES`], takes every 8th input, and what
 //! is costly to make, [`made::MADE`], every 1024th.
 
-mod answers;
-mod frames;
 pub mod machines;
 pub mod made;
 pub mod model;
-mod pictures;
 
 use fingertip::config::ConfigError;
 use fingertip::shipped::Config;
@@ -20,7 +17,7 @@ use model::Sample;
 /// Inputs that a comparison takes.
 pub const INPUTS: u32 = 1_000_000;
 
-/// How many functions are compared.
+/// Number of functions that are compared.
 pub const FUNCTIONS: usize = model::FUNCTIONS.len() + machines::STEPS.len() + machines::FRAMES.len() + made::MADE.len();
 
 /// A seeded source of inputs: the upper half of a linear congruential generator.
@@ -91,7 +88,7 @@ impl Mix {
     }
 }
 
-/// A comparison under way.
+/// Running comparison.
 pub struct Comparison {
     source: Source,
     taken: u32,

@@ -1,4 +1,4 @@
-//! The contact of a single picture: the way the firmware does not go.
+//! Contact from a single tactile image; the firmware spreads this over frames.
 //!
 //! [`contact::Fit`](fingertip::contact::Fit) spreads a refinement over frames. Here all of it is done with one picture,
 //! from a start in closed form: dearer, and closer. It judges the fit, and the study has its price.
@@ -15,7 +15,7 @@ use fingertip::contact::{Contact, from_sums};
 use fingertip::pressure::Picture;
 use rim::Rim;
 
-/// How often the reading is refined.
+/// Number of refinements of the reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Refined {
     /// Once.
@@ -47,7 +47,7 @@ const FAR: u32 = 1 << (CENTRE_BITS - 7);
 /// Steps shorter than this end the refinement: 1/16384 of the radius.
 const RESTS: u32 = 1 << (CENTRE_BITS - 14);
 
-/// Reads the contact of a single picture. Any picture is taken.
+/// Reads the contact of a single tactile image. Any image is accepted.
 ///
 /// The sum decides whether there is a contact. A contact whose rim lies on the array, with no bad taxel in it, keeps
 /// the sum's force and centre; the model then only gives the confidence. So does a contact that the model explains with
@@ -90,7 +90,7 @@ pub fn read<const ROWS: usize, const COLUMNS: usize>(
     }
 }
 
-/// How far a guess and the picture are apart.
+/// Difference between a guess and the tactile image.
 fn misfit<const ROWS: usize, const COLUMNS: usize>(
     guess: &Guess,
     view: &View<ROWS, COLUMNS>,
@@ -103,7 +103,7 @@ fn misfit<const ROWS: usize, const COLUMNS: usize>(
     misfit
 }
 
-/// Refines a guess as often as asked for.
+/// Refines a guess the requested number of times.
 fn refine<const ROWS: usize, const COLUMNS: usize>(
     start: Guess,
     refined: Refined,

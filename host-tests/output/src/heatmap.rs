@@ -29,7 +29,7 @@ pub fn lines(pressures: &Pressures, full_kpa: f64) -> Vec<String> {
     pressures.iter().rev().map(line).collect()
 }
 
-/// What the colours mean, as long as the map is wide or longer.
+/// Legend of the colours, at least as wide as the map.
 pub fn legend(full_kpa: f64) -> String {
     let cells: String =
         RAMP.iter().map(|colour| style(" ").on_color256(*colour).force_styling(true).to_string()).collect();

@@ -2,7 +2,7 @@
 //!
 //! A file NAME is written as NAME.new beside it, brought to the disk and then renamed: whoever reads NAME finds what
 //! was there before or all that is new, whatever ends the writer. Meanwhile NAME.lock is locked. The system unlocks it
-//! when its process ends, however that is, so what a killed process left behind stands in nobody's way.
+//! when its process ends, however that is, so the files of a killed process block no other process.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -37,7 +37,7 @@ impl Lock {
         })
     }
 
-    /// The same, where who has it and by which file is told in other words.
+    /// The same, with another text for the holder and the lock file of a taken lock.
     pub fn take_or(path: &Path, taken: impl Fn(&str, &Path) -> String) -> io::Result<Self> {
         Self::get(path, |file, lock| match file.try_lock() {
             Ok(()) => Ok(()),
@@ -162,7 +162,7 @@ impl Drop for Whole {
 /// # Errors
 /// It cannot be written; what was there before still is.
 pub fn write(path: &Path, bytes: impl AsRef<[u8]>) -> io::Result<()> {
-    // What stands behind a link is replaced, and not the link.
+    // The target of a link is replaced, not the link.
     match fs::canonicalize(path) {
         Ok(known) if known.is_file() => Lock::wait(&known)?.write(bytes),
         Ok(known) => OpenOptions::new().write(true).open(known)?.write_all(bytes.as_ref()),

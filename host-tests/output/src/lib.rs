@@ -1,4 +1,4 @@
-//! What programs on the host say, draw and keep.
+//! Output of the programs on the host: text, pictures and files.
 
 pub mod heatmap;
 pub mod kept;

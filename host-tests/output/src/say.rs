@@ -1,4 +1,4 @@
-//! What a program says. A reader that goes away, such as `head`, or a full disk behind the output ends what is said,
+//! Output of a program. A reader that goes away, such as `head`, or a full disk behind the output ends the output,
 //! not the run.
 
 use std::fmt::{Arguments, Display};
@@ -24,7 +24,7 @@ fn show(text: Arguments) {
     }
 }
 
-/// Says a line to who looks after the program. Where nobody does, it is not said.
+/// Prints a line to standard error; a failure is ignored.
 pub fn aside(text: impl Display) {
     // In one piece: what several processes say stays lines.
     let _ = io::stderr().write_all(format!("{text}\n").as_bytes());

@@ -54,7 +54,7 @@ const OF_WHAT: &str = "goal";
 /// Behind the unit: thousandths of it.
 const THOUSANDTHS: &str = "_milli";
 
-/// The unit that a name ends with; none where it is a plain number.
+/// The unit that a name ends with; `None` for a plain number.
 pub fn of(name: &str) -> Option<String> {
     if let Some(whole) = name.strip_suffix(THOUSANDTHS) {
         return of(whole).map(|unit| format!("0.001 {unit}"));
@@ -78,7 +78,7 @@ pub fn of(name: &str) -> Option<String> {
     (!unit.is_empty()).then_some(unit)
 }
 
-/// How many words stand before the unit.
+/// Number of words before the unit.
 fn before_unit(words: &[&str]) -> usize {
     words.iter().rposition(|word| shown(word).is_none() && !["per", OF_WHAT].contains(word)).map_or(0, |last| last + 1)
 }

@@ -37,7 +37,7 @@ const SHAPE: [i64; 14] = [
 /// The largest share of a limit that is told apart.
 const SHARE_MAX: u64 = 1 << 31;
 
-/// What a contact can bear before it slips.
+/// Friction limit of a contact.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LimitSurface {
     /// The largest tangential force, `mu N`, at no moment.
@@ -78,7 +78,7 @@ fn shape(tip: &Tip, depth: u32) -> u64 {
 }
 
 impl LimitSurface {
-    /// How far a load is from slip: `1 - sqrt((f_t / (mu N))^2 + (m / m_max)^2)`.
+    /// Margin of a load to slip: `1 - sqrt((f_t / (mu N))^2 + (m / m_max)^2)`.
     ///
     /// 1 is no load, 0 is about to slip, below 0 slips. One minus the margin is the share of the limit that is used; it
     /// is told apart up to 180. Where a limit is 0, no load uses nothing of it and any other load all that can be told.

@@ -82,7 +82,7 @@ pub struct Relaxation<const N: usize> {
     terms: [Coefficients; N],
 }
 
-/// What a term does in a step: share in Q16, `A` and `B` in Q64.
+/// Coefficients of a term for a step: share in Q16, `A` and `B` in Q64.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Coefficients {
     share: i64,
@@ -90,7 +90,7 @@ struct Coefficients {
     lead: u64,
 }
 
-/// What the tip remembers of its load; see [`Relaxation::step`].
+/// Load history of the tip; see [`Relaxation::step`].
 ///
 /// ```
 /// use fingertip::units::Newtons;

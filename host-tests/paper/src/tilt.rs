@@ -19,7 +19,7 @@ use crate::units::{NewtonMillimetres, Radians};
 use fingertip::model::Tip;
 use fingertip::units::{Millimetres, Newtons};
 
-/// How an object has moved against the tip since they touched.
+/// Motion of an object against the tip since the touch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Displacement {
     /// Normal approach `d`: 0 to [`Tip::depth_max`].
@@ -30,7 +30,7 @@ pub struct Displacement {
     pub tilt: Radians,
 }
 
-/// What the tip answers to a [`Displacement`].
+/// Reaction of the tip to a [`Displacement`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Load {
     /// Force along the normal.
@@ -55,7 +55,7 @@ struct Pose {
 
 /// Normal force, tangential force and moment.
 ///
-/// What is outside the ranges of [`Displacement`] counts as the nearest value inside.
+/// A value outside the ranges of [`Displacement`] counts as the nearest value inside.
 pub fn load(tip: &Tip, displacement: Displacement) -> Load {
     let Pose { normal, shift, tangent, square } = pose(tip, displacement);
     let lean = shift_product(normal * normal, tangent, TANGENT_BITS);
@@ -71,7 +71,7 @@ pub fn load(tip: &Tip, displacement: Displacement) -> Load {
 
 /// Elastic energy `P` in mJ (N mm); its slopes are the parts of [`load`].
 ///
-/// What is outside the ranges of [`Displacement`] counts as the nearest value inside.
+/// A value outside the ranges of [`Displacement`] counts as the nearest value inside.
 pub fn energy(tip: &Tip, displacement: Displacement) -> NewtonMillimetres {
     let Pose { normal, shift, tangent, square } = pose(tip, displacement);
     // d tan t + s in Q40.

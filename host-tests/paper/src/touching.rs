@@ -56,7 +56,7 @@ pub fn compression_at(tip: &Tip, theta: Radians, d: Millimetres) -> Millimetres 
     tip.compression(distance_at(tip, theta, d), d)
 }
 
-/// How fast the distance grows with the touching angle: `dr/dtheta = (a - d) / cos^2(theta)` (eq. 7).
+/// Slope of the distance over the touching angle: `dr/dtheta = (a - d) / cos^2(theta)` (eq. 7).
 pub fn distance_slope(tip: &Tip, theta: Radians, d: Millimetres) -> MillimetresPerRadian {
     let (_, cosine) = sine_cosine_of(tip, theta, d);
     // Q24 over Q62 to Q16.

@@ -16,10 +16,10 @@ use output::say;
 use port::Event;
 use std::time::{Duration, Instant};
 
-/// Between two looks at a finger that nobody asks anything: what it has to catch up when somebody does.
+/// Interval at which an idle finger is moved on: what it has to catch up when a request comes.
 pub const TICK: Duration = Duration::from_millis(1);
 
-/// A finger, simulated in one way or another.
+/// A simulated finger.
 pub trait Finger {
     /// Why it cannot go on.
     type Error;
@@ -39,7 +39,7 @@ pub trait Finger {
     /// It cannot.
     fn hear(&mut self, bytes: &[u8]) -> Result<(), Self::Error>;
 
-    /// What it sends by now.
+    /// Returns the bytes that it sends by now.
     ///
     /// # Errors
     /// It cannot.
@@ -55,7 +55,7 @@ pub trait Finger {
         None
     }
 
-    /// Does what somebody asks at its side, and tells what was done.
+    /// Executes a command from the standard input, and returns what was done.
     ///
     /// # Errors
     /// It cannot be understood or done.

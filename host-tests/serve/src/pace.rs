@@ -1,4 +1,4 @@
-//! How a served finger keeps pace with the clock, and how soon it answers.
+//! Pace of a served finger against the clock, and its answer times.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 const BEHIND_MAX_S: f64 = 0.1;
 /// It is said to be behind where it does less of real time than this.
 const KEEPS_UP: f64 = 0.98;
-/// How often it is looked at, and how often it is said while it stays so.
+/// Interval of the checks, and of the reports while nothing changes.
 const LOOK: Duration = Duration::from_secs(1);
 const LOOKS_BETWEEN: u32 = 5;
 
-/// What a finger did while it was served.
+/// Statistics of a served finger.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Served {
     /// Its own time.
@@ -46,7 +46,7 @@ pub struct Pace {
     silent: u32,
 }
 
-/// What happened since the last look.
+/// Statistics since the last report.
 #[derive(Debug)]
 struct Look {
     at: Instant,
@@ -69,7 +69,7 @@ impl Pace {
         Self { begun, begun_s, lost_s: 0.0, late, always, asked: None, all: Served::default(), look, silent: 0 }
     }
 
-    /// What the finger's time would be where it kept up.
+    /// Time of a finger that keeps up, s.
     pub fn clock_s(&mut self, now_s: f64) -> f64 {
         let clock_s = self.begun_s + self.begun.elapsed().as_secs_f64() - self.lost_s;
         let beyond_s = clock_s - now_s - BEHIND_MAX_S;
@@ -106,7 +106,7 @@ impl Pace {
         }
     }
 
-    /// What is to be said of the time since the last look, where it is time to look.
+    /// Returns the report on the time since the last one, if one is due.
     pub fn tell(&mut self, now_s: f64) -> Option<String> {
         let wall_s = self.look.at.elapsed();
         if wall_s < LOOK {

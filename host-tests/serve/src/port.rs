@@ -1,28 +1,29 @@
-//! Where clients come in.
+//! Ports for clients.
 
-mod pty;
-mod tcp;
-
+use output::kept::Lock;
 use output::say;
-use pty::Pty;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::fd::AsFd;
+use rustix::fd::{AsFd, BorrowedFd};
+use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::Errno;
 use rustix::process::getpgrp;
-use rustix::termios::tcgetpgrp;
+use rustix::termios::{tcgetattr, tcgetpgrp};
+use serial2::SerialPort;
 use std::collections::VecDeque;
-use std::io::{self, IsTerminal as _, PipeReader, PipeWriter, Write as _};
-use std::path::PathBuf;
+use std::ffi::OsStr;
+use std::io::{self, ErrorKind, IsTerminal as _, PipeReader, PipeWriter, Write as _};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-use tcp::Tcp;
 
 /// More than any packet.
 const BUFFER: usize = 4096;
-/// A longer line at the side is none.
+/// Bytes of the longest command line; longer ones are ignored.
 const LINE_MAX: usize = 1000;
 
-/// Where to offer a finger.
+/// Kind and name of the port that offers a finger.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A pseudo-terminal, with a symbolic link to it where one is wanted.
@@ -31,7 +32,7 @@ pub enum Place {
     Tcp(u16),
 }
 
-/// What comes in.
+/// Input of a served finger.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Event {
     /// From the client.
@@ -99,7 +100,7 @@ impl Port {
         self
     }
 
-    /// What a client opens: a path, or address and port.
+    /// Name that a client opens: a path, or address and port.
     pub fn name(&self) -> &str {
         match &self.place {
             Opened::Pty(pty) => &pty.name,
@@ -112,7 +113,7 @@ impl Port {
         self.stop.clone()
     }
 
-    /// What comes in within this time. Bytes at another speed than this one are not heard, where the port can tell.
+    /// Waits for input, at most for this time. Drops bytes at another speed, if the port has one.
     pub fn wait(&mut self, within: Duration, baud: Option<u32>) -> Event {
         if let Some(line) = self.side.as_mut().and_then(|side| side.lines.pop_front()) {
             return Event::Command(line);
@@ -151,7 +152,7 @@ impl Port {
         if bytes.is_empty() { Event::Nothing } else { Event::Bytes(bytes) }
     }
 
-    /// Sends to the client. What does not fit is lost, as on a line to which nobody listens.
+    /// Sends to the client. Bytes that do not fit are lost, as on a line without a listener.
     pub fn send(&mut self, bytes: &[u8]) {
         match &mut self.place {
             Opened::Pty(pty) => pty.write(bytes),
@@ -190,14 +191,197 @@ impl Side {
     }
 }
 
-/// Whether this may read what is typed: who does so from the background is stopped by the system.
+/// True if this process may read the terminal: the system stops a background process that reads.
 fn in_front(input: impl AsFd) -> bool {
     tcgetpgrp(input).is_ok_and(|group| group == getpgrp()) || !io::stdin().is_terminal()
 }
 
-/// What is there to read.
+/// Sources that have input.
 fn read(from: impl AsFd) -> io::Result<Vec<u8>> {
     let mut buffer = [0; BUFFER];
     let count = rustix::io::read(from, &mut buffer)?;
     Ok(buffer[..count].to_vec())
+}
+
+// A pseudo-terminal, and a link to it that one process holds.
+
+#[derive(Debug)]
+struct Pty {
+    pub name: String,
+    /// The finger's end, and the client's end held open so that clients may come and go.
+    near: SerialPort,
+    far: SerialPort,
+    _link: Option<Link>,
+    /// The speed of what was not heard, once that was said.
+    unheard: Option<u32>,
+}
+
+/// A link to the terminal; gone when dropped.
+#[derive(Debug)]
+struct Link {
+    path: PathBuf,
+    device: PathBuf,
+    _lock: Lock,
+}
+
+impl Pty {
+    pub fn open(link: Option<&Path>) -> io::Result<Self> {
+        let (near, far) = SerialPort::pair()?;
+        let device = rustix::pty::ptsname(&near, Vec::new())?;
+        let device = PathBuf::from(OsStr::from_bytes(device.as_bytes()));
+        fcntl_setfl(&near, fcntl_getfl(&near)? | OFlags::NONBLOCK)?;
+        let name = link.unwrap_or(&device).display().to_string();
+        let link = link.map(|link| Link::make(link, device)).transpose()?;
+        Ok(Self { name, near, far, _link: link, unheard: None })
+    }
+
+    pub fn near(&self) -> &SerialPort {
+        &self.near
+    }
+
+    pub fn read(&mut self, baud: Option<u32>) -> Vec<u8> {
+        let bytes = read(&self.near).unwrap_or_default();
+        let (Some(baud), Some(set)) = (baud, self.baud()) else { return bytes };
+        if set == baud {
+            self.unheard = None;
+            return bytes;
+        }
+        if self.unheard.replace(set) != Some(set) {
+            say::aside(format_args!("unheard  a client sends at {set} baud, the finger listens at {baud}"));
+        }
+        Vec::new()
+    }
+
+    pub fn write(&mut self, bytes: &[u8]) {
+        // Without a reader it is lost.
+        let _ = rustix::io::write(&self.near, bytes);
+    }
+
+    /// As the client has set it.
+    fn baud(&self) -> Option<u32> {
+        tcgetattr(&self.far).ok().map(|settings| settings.output_speed())
+    }
+}
+
+impl Link {
+    fn make(path: &Path, device: PathBuf) -> io::Result<Self> {
+        let lock = Lock::take_or(path, |who, lock| {
+            format!(
+                "{who} serves a finger at {} and holds {}: end it, or name another link",
+                path.display(),
+                lock.display()
+            )
+        })
+        .map_err(|why| cannot_make(path, &why))?;
+        // A link that an earlier run left behind is replaced; a file is not.
+        if path.is_symlink() {
+            std::fs::remove_file(path)?;
+        } else if path.exists() {
+            let why = "a file of this name is there: name another link, or remove the file";
+            return Err(cannot_make(path, &io::Error::new(io::ErrorKind::AlreadyExists, why)));
+        }
+        std::os::unix::fs::symlink(&device, path).map_err(|why| cannot_make(path, &why))?;
+        Ok(Self { path: path.into(), device, _lock: lock })
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        // Somebody may have put another thing there.
+        if std::fs::read_link(&self.path).is_ok_and(|device| device == self.device) {
+            let _ = std::fs::remove_file(&self.path);
+        }
+    }
+}
+
+fn cannot_make(path: &Path, why: &io::Error) -> io::Error {
+    io::Error::new(why.kind(), format!("cannot make the link {}: {why}", path.display()))
+}
+
+// A TCP port with one client at a time.
+
+#[derive(Debug)]
+struct Tcp {
+    pub name: String,
+    listener: TcpListener,
+    client: Option<(TcpStream, SocketAddr)>,
+    /// Who was refused last, open until the next one comes.
+    refused: Option<TcpStream>,
+}
+
+/// More than a client can have sent that is not there any more.
+const LAST_READS: usize = 64;
+
+impl Tcp {
+    pub fn open(port: u16) -> io::Result<Self> {
+        let listener = TcpListener::bind(("127.0.0.1", port))
+            .map_err(|why| io::Error::new(why.kind(), format!("cannot open TCP port {port}: {why}")))?;
+        listener.set_nonblocking(true)?;
+        let name = listener.local_addr()?.to_string();
+        Ok(Self { name, listener, client: None, refused: None })
+    }
+
+    /// The listener, and the client where there is one.
+    pub fn watched(&self) -> impl Iterator<Item = BorrowedFd<'_>> {
+        [self.listener.as_fd()].into_iter().chain(self.client.iter().map(|(client, _)| client.as_fd()))
+    }
+
+    /// Takes a client in, and what the one that is there sends.
+    pub fn read(&mut self, new: bool, bytes: bool) -> Vec<u8> {
+        let mut heard = if bytes { self.hear() } else { Vec::new() };
+        if new && let Ok((client, from)) = self.listener.accept() {
+            // The one that is there may have gone since, behind what it sent last.
+            for _ in 0..LAST_READS {
+                let last = self.hear();
+                if last.is_empty() {
+                    break;
+                }
+                heard.extend(last);
+            }
+            self.welcome(client, from);
+        }
+        heard
+    }
+
+    fn hear(&mut self) -> Vec<u8> {
+        let Some((client, from)) = &self.client else { return Vec::new() };
+        match read(client) {
+            Ok(bytes) if !bytes.is_empty() => bytes,
+            Err(why) if matches!(why.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => Vec::new(),
+            _ => {
+                say::aside(format_args!("client   {from} went away"));
+                self.client = None;
+                Vec::new()
+            }
+        }
+    }
+
+    fn welcome(&mut self, mut client: TcpStream, from: SocketAddr) {
+        // Small packets, each of which somebody waits for.
+        let ready = client.set_nodelay(true).and_then(|()| client.set_nonblocking(true));
+        match &self.client {
+            Some((_, first)) => {
+                // One bus has one host. A refused client gets a text that no client takes for a packet.
+                let words = format!("busy: {first} is connected to this fingertip, one client at a time\n");
+                // In one piece: clients read once.
+                let _ = client.write(words.as_bytes());
+                // Were it closed with something unread, the words would be lost.
+                let _ = client.shutdown(Shutdown::Write);
+                self.refused = Some(client);
+                say::aside(format_args!("refused  {from}: {first} is connected, one client at a time"));
+            }
+            None if ready.is_ok() => {
+                say::aside(format_args!("client   {from} is connected"));
+                self.client = Some((client, from));
+            }
+            None => {}
+        }
+    }
+
+    pub fn write(&mut self, bytes: &[u8]) {
+        if let Some((client, _)) = &mut self.client {
+            // Without a reader it is lost; a client that left is noticed at the next read.
+            let _ = client.write(bytes);
+        }
+    }
 }

@@ -24,7 +24,7 @@ fn serve() -> Served {
     Served::begin(Stdio::inherit(), &[])
 }
 
-/// What an example says.
+/// Output of an example.
 fn example(served: &Served, name: &str, arguments: &[&str]) -> String {
     let example = Path::new(env!("FINGERTIP_ROOT")).join("python/examples").join(name);
     let mut command = python();

@@ -12,7 +12,7 @@ use std::process::{Command, Output, Stdio};
 /// As patient as it takes on the slowest machine.
 const PATIENCE: std::time::Duration = std::time::Duration::from_secs(3600);
 const PING: [u8; 10] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x03, 0x00, 0x01, 0x19, 0x4e];
-/// What the letters FT and the firmware's version come to.
+/// Model number from the letters FT, and the firmware's version.
 const PONG: [u8; 12] = [0xff, 0xff, 0xfd, 0x00, 0x01, 0x07, 0x00, 0x55, 0x00, b'F', b'T', 0x01];
 
 fn link(name: &str) -> PathBuf {
@@ -77,7 +77,7 @@ fn another_speed_is_not_heard() {
     let served = Served::begin(Stdio::piped(), &[]);
     let port = terminal(&served, 57_600);
     port.write_all(&PING).expect("a terminal takes it");
-    // It is told of what it does not hear, in its own time: then the answer is to the second alone.
+    // It learns later what it does not receive: then the answer is to the second alone.
     let mut served = served;
     let mut line = String::new();
     let mut complaints = BufReader::new(served.child.0.stderr.take().expect("it was asked for"));
@@ -107,7 +107,7 @@ fn tcp_takes_one_client_after_another_and_says_so() {
     assert!(words.starts_with("busy: 127.0.0.1:") && words.ends_with("one client at a time\n"), "{words}");
     ping(&mut first);
     drop(first);
-    // It may be told of the first one's end behind the second one's coming.
+    // The first client's end may be reported after the second one's connection.
     loop {
         let mut next = TcpStream::connect(&served.name).expect("it listens");
         let mut reply = [0; 14];

@@ -1,7 +1,7 @@
 //! Judges the fit of the contact on many pictures, and writes the tables of `docs/contact.md`.
 
 use fingertip::contact::FitLevel;
-use host_tests::fit_tables::{CASES, PAGE, markdown};
+use host_tests::fit_statistics::{CASES, PAGE, markdown};
 use host_tests::program::{Progress, ended};
 use std::process::ExitCode;
 

@@ -7,13 +7,13 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use host_tests::program::{Progress, ended};
-use host_tests::prove::domain::reference_tip;
+use host_tests::prove::random::reference_tip;
 use host_tests::prove::tally::Tally;
-use host_tests::prove::{beyond, exhaustive, oracle, random, tables};
+use host_tests::prove::{beyond, exhaustive, random, reference, tally};
 
 const USAGE: &str = "prove [--quick | --write | --check]";
 
-/// What becomes of the tables of `docs/model.md`.
+/// Handling of the tables of `docs/model.md`.
 enum Page {
     Leave,
     Write,
@@ -69,12 +69,12 @@ fn main() -> ExitCode {
         let beyond::LongRun { steps, low, high } = beyond::long_run(&pattern, paper::PERIODS_MAX / share as u32);
         println!("  {name}: repeats itself from step {steps} on, between {low} and {high} N");
     }
-    match oracle::check() {
+    match reference::check() {
         Ok(tallies) => {
             report.section("The points of `host-tests/oracle/park2003.csv`, 25 digits each", |_| tallies.to_vec())
         }
         Err(error) => {
-            eprintln!("{}: {error}", oracle::path().display());
+            eprintln!("{}: {error}", reference::path().display());
             report.broken += 1;
         }
     }
@@ -108,11 +108,11 @@ impl Report {
         if self.broken > 0 {
             return ExitCode::FAILURE;
         }
-        let text = tables::markdown(&self.sections);
+        let text = tally::markdown(&self.sections);
         ended(match page {
             Page::Leave => Ok(()),
-            Page::Write => tables::PAGE.check(&text).or_else(|_| tables::PAGE.write(&text)),
-            Page::Check => tables::PAGE.check(&text),
+            Page::Write => tally::PAGE.check(&text).or_else(|_| tally::PAGE.write(&text)),
+            Page::Check => tally::PAGE.check(&text),
         })
     }
 }

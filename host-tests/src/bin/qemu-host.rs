@@ -2,7 +2,7 @@
 //!
 //! `qemu-host IMAGE FOLDER [panic|hardfault|hang]`: the image, where to put the recording, a failure to inject.
 
-use host_tests::{emulator, stimulus};
+use host_tests::{program, stimulus};
 use std::{
     collections::BTreeMap,
     env,
@@ -39,7 +39,7 @@ fn compare(image: &Path, folder: &Path, failure: Option<&str>) -> Result<(), Box
     fs::rename(aside, folder.join(RECORDING))?;
 
     let words: Vec<_> = [RECORDING].into_iter().chain(failure).collect();
-    let text = emulator::run(image, folder, &words)?;
+    let text = program::run(image, folder, &words)?;
     let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
     let figure = |name| report.get(name).copied().ok_or_else(|| format!("the image reported no {name}:\n{text}"));
     let host = format!("{:016x}", stimulus::digest(&records));

@@ -3,7 +3,7 @@
 //!
 //! `same-bits IMAGE [INPUTS [FUNCTION]]`: the image, how many inputs (10^6), a function that is made to differ.
 
-use host_tests::emulator;
+use host_tests::program;
 use images::same_bits::{Comparison, INPUTS};
 use std::{env, error::Error, fmt::Write as _, path::Path, process::ExitCode, thread};
 
@@ -30,7 +30,7 @@ fn compare(image: &Path, inputs: u32, spoilt: Option<&str>) -> Result<String, Bo
     let count = inputs.to_string();
     let words: Vec<_> = ["same-bits", &count].into_iter().chain(spoilt).collect();
     let host = thread::spawn(move || digests(inputs));
-    let text = emulator::run(image, Path::new("."), &words)?;
+    let text = program::run(image, Path::new("."), &words)?;
     let host = host.join().map_err(|_| "FAILED: a function panicked on this machine")?;
     let emulated: Vec<_> = text.lines().filter_map(|line| line.strip_prefix("function ")).collect();
     if emulated.len() != host.len() {
@@ -49,13 +49,13 @@ fn compare(image: &Path, inputs: u32, spoilt: Option<&str>) -> Result<String, Bo
     let fewer: Vec<_> = host.iter().filter_map(|line| line.split_once(' ')).map(|(_, line)| line).skip(all).collect();
     Ok(format!(
         "{all} functions give the same bits for {count} inputs each on the emulated core and on this machine;\n\
-         so do {} for fewer, which look at whole frames or are made anew now and then: {}.",
+         so do {} for fewer, which look at whole frames or are rebuilt now and then: {}.",
         fewer.len(),
         fewer.join(", ")
     ))
 }
 
-/// What the image reports of each function: digest, inputs, name.
+/// Lines that the image reports for each function: digest, inputs, name.
 fn digests(inputs: u32) -> Vec<String> {
     let mut comparison = Comparison::new().expect("the default parameters are sound");
     (0..inputs).for_each(|_| comparison.take());

@@ -1,4 +1,4 @@
-//! What accuracy costs in time: makes the study's inputs, and tables and pictures of its run.
+//! Cost of accuracy in time: makes the study's inputs, and tables and pictures of its run.
 //!
 //! `study inputs FILE` writes the inputs for the image. `study few KEPT FULL` writes the few that the image of `cargo
 //! xtask bringup` keeps, and the same with the records that it makes itself.
@@ -9,7 +9,7 @@ use host_tests::program::ended;
 use host_tests::study::inputs::Inputs;
 use host_tests::study::kernels::KERNELS;
 use host_tests::study::page::Studied;
-use host_tests::study::{front, judge, output, page, pictures};
+use host_tests::study::{front, kernels, output, page};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -51,7 +51,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
     let [shipped, quick] = runs.map(read);
     let (runs, inputs) = (output::merged(shipped?, quick?)?, Inputs::new());
     let studied: Result<Vec<Studied>, String> =
-        KERNELS.iter().map(|kernel| Ok((kernel, judge::points(kernel, &runs, &inputs)?))).collect();
+        KERNELS.iter().map(|kernel| Ok((kernel, kernels::points(kernel, &runs, &inputs)?))).collect();
     let studied = studied?;
     if let Some(file) = json {
         fs::write(&file, page::json_lines(&studied)).map_err(|error| format!("{}: {error}", file.display()))?;
@@ -62,7 +62,7 @@ fn report(runs: [&str; 2], flags: &[&str]) -> Result<(), String> {
         files.push((page.name.to_owned(), page.renewed(&tables)?.1));
     }
     for (kernel, points) in studied.iter().filter(|(kernel, _)| kernel.has_error()) {
-        let picture = pictures::draw(kernel, points).map_err(|error| error.to_string())?;
+        let picture = front::draw(kernel, points).map_err(|error| error.to_string())?;
         files.push((format!("docs/pictures/study-{}.svg", kernel.name), picture));
     }
     verdicts(&studied);
@@ -130,6 +130,6 @@ fn renew(root: &Path, files: &[(String, String)], check: bool) -> Result<(), Str
     if stale.is_empty() {
         Ok(())
     } else {
-        Err(format!("stale: {}; write them anew with `cargo xtask study`", stale.join(", ")))
+        Err(format!("stale: {}; renew them with `cargo xtask study`", stale.join(", ")))
     }
 }

@@ -147,7 +147,7 @@ fn loops(scan: &str, config: &Config) -> Vec<Machine<SpeedLoop>> {
     inputs.map(machine).into()
 }
 
-/// A sound frame with every taxel at so many codes above a level of 372.
+/// Sound frame with every taxel the given codes above a level of 372.
 fn frame(codes: u16) -> Frame {
     let mut frame = Frame::EMPTY;
     for (slot, column) in (0..SLOTS).flat_map(|slot| (0..10).map(move |column| (slot, column))) {

@@ -1,16 +1,13 @@
 //! The rest of the model: angles, columns, tilt, friction, relaxation; random points in arbitrary precision.
 
-use std::ops::Range;
-
+use super::exhaustive::Progress;
+use super::random::{Point, SEED, at, mm, newtons};
+use super::reference::{Real, Reference, error_ulp, real};
+use super::tally::{Judged, Tally, parallel};
 use fastrand::Rng;
 use paper::units::{Radians, Ratio};
 use paper::{Displacement, PERIODS_MAX, Relaxation, RelaxationState, RelaxationTerm};
-
-use super::domain::{Point, at, mm, newtons};
-use super::exhaustive::Progress;
-use super::random::SEED;
-use super::reference::{Real, Reference, error_ulp, real};
-use super::tally::{Judged, Tally, parallel};
+use std::ops::Range;
 
 const CHUNK: u64 = 1_000;
 
@@ -181,7 +178,7 @@ fn real_u32(number: u32) -> Real {
     real((number >> 1) as i32, -1) + real((number & 1) as i32, 0)
 }
 
-/// How a filter that was fed the same inputs over and over ended.
+/// End state of a filter after repeating inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct LongRun {
     /// Steps until its state came back to one it had had: from there on everything repeats, however long it runs.

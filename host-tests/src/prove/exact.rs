@@ -95,13 +95,13 @@ pub fn indentation(tip: &Tip, force: i32, result: i32, bound: u32) -> Judged {
     }
 }
 
-/// Whether the exact indentation at a force is at most the deepest.
+/// True if the exact indentation at a force is at most the deepest.
 pub fn force_in_reach(tip: &Tip, force: i32) -> bool {
     let depth = wide(tip.depth_max().to_bits());
     (wide(force) * 1000) << 148 <= pi_times(modulus(tip)).0 * depth * depth
 }
 
-/// Whether the exact indentation at a contact radius is at most the deepest.
+/// True if the exact indentation at a contact radius is at most the deepest.
 pub fn radius_in_reach(tip: &Tip, contact_radius: i32) -> bool {
     let depth = wide(tip.depth_max().to_bits());
     wide(contact_radius) * wide(contact_radius) <= depth * (radius(tip) * 2 - depth)

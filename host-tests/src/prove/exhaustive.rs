@@ -1,13 +1,11 @@
 //! Every representable input of a tip, judged by integers.
 
-use std::ops::Range;
-
+use super::exact;
+use super::random::{at, boundary_distances, in_reach, mm, newtons};
+use super::tally::{Judged, Tally, parallel};
 use fingertip::model::Tip;
 use fingertip::units::Kilopascals;
-
-use super::domain::{at, boundary_distances, in_reach, mm, newtons};
-use super::exact;
-use super::tally::{Judged, Tally, parallel};
+use std::ops::Range;
 
 /// Told how much of how much is done.
 pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
@@ -15,7 +13,7 @@ pub type Progress<'a> = &'a (dyn Fn(u64, u64) + Sync);
 const CHUNK: u64 = 1 << 16;
 
 /// Every depth from one unit to the deepest: force, radius, stiffness, peak and mean pressure; that the force never
-/// falls and never jumps; and the way back from the force.
+/// falls and never jumps; and the inverse from the force.
 pub fn depths(tip: &Tip, range: Range<u64>, progress: Progress<'_>) -> [Tally; 7] {
     let round_trip_max = (tip.indentation(newtons(1)).to_bits() + 1).into();
     let tallies = [

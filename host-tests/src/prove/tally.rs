@@ -1,18 +1,18 @@
 //! Counting inputs and keeping the worst, over all cores.
 
+use crate::page::Page;
 use std::fmt;
+use std::fmt::Write as _;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::thread;
 
-/// How far a result is from its exact value.
+/// Difference of a result from its exact value.
 #[derive(Clone, Copy, Debug)]
 pub struct Judged {
     /// Result less exact value, in units of the result's last place.
     pub error_ulp: f64,
-    /// Whether no other representable value is closer, where that was asked; decided without rounding.
+    /// True if no other representable value is closer, where that was asked; decided without rounding.
     pub nearest: Option<bool>,
-    /// Whether the result is within the bound claimed; decided without rounding where the judge can.
+    /// True if the result is within the bound claimed; decided without rounding where the judge can.
     pub within: bool,
 }
 
@@ -23,18 +23,18 @@ impl Judged {
     }
 }
 
-/// What one function did over a set of inputs.
+/// Tally of one function over a set of inputs.
 #[derive(Clone, Debug)]
 pub struct Tally {
     /// The function.
     pub name: &'static str,
-    /// What is claimed, in units of the last place; 1/2 claims that every result is correctly rounded.
+    /// Claimed bound in units of the last place; 1/2 claims that every result is correctly rounded.
     pub bound_ulp: f64,
-    /// How many inputs were judged.
+    /// Number of inputs that were judged.
     pub inputs: u64,
-    /// How many results were the nearest representable value, where that was asked.
+    /// Number of results that are the nearest representable value, if that was asked.
     pub nearest: u64,
-    /// How many results were outside the bound.
+    /// Number of results outside the bound.
     pub outside: u64,
     /// The largest error, in units of the last place, with its sign.
     pub worst_ulp: f64,
@@ -70,7 +70,7 @@ impl Tally {
         self.outside += other.outside;
     }
 
-    /// Whether inputs were judged and all of them were as claimed.
+    /// True if inputs were judged and all of them were as claimed.
     pub fn holds(&self) -> bool {
         let rounded = self.bound_ulp != 0.5 || self.nearest == self.inputs;
         self.inputs > 0 && self.outside == 0 && rounded
@@ -93,7 +93,7 @@ impl fmt::Display for Tally {
     }
 }
 
-/// Splits a range into chunks, judges them on all cores and adds up; `progress` is told the share done.
+/// Splits a range into chunks, judges them on all cores and adds up the tallies; `progress` gets the share done.
 pub fn parallel<const N: usize>(
     range: Range<u64>,
     chunk: u64,
@@ -101,29 +101,88 @@ pub fn parallel<const N: usize>(
     progress: &(dyn Fn(u64, u64) + Sync),
     judge: impl Fn(Range<u64>, &mut [Tally; N]) + Sync,
 ) -> [Tally; N] {
-    let next = AtomicU64::new(range.start);
-    let mut total = tallies.clone();
-    thread::scope(|scope| {
-        let work = || {
-            let mut own = tallies.clone();
-            loop {
-                let start = next.fetch_add(chunk, Ordering::Relaxed);
-                if start >= range.end {
-                    return own;
-                }
-                judge(start..range.end.min(start + chunk), &mut own);
-                progress(start - range.start, range.end - range.start);
-            }
-        };
-        let cores = thread::available_parallelism().map_or(1, |cores| cores.get());
-        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(work)).collect();
-        for thread in threads {
-            // A panic in a judge is a failed proof: let it out.
-            let part = thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            for (total, part) in total.iter_mut().zip(&part) {
-                total.merge(part);
-            }
-        }
+    let parts = sim::cores::map(range.clone().step_by(chunk as usize), |start| {
+        let mut own = tallies.clone();
+        judge(start..range.end.min(start + chunk), &mut own);
+        progress(start - range.start, range.end - range.start);
+        own
     });
+    let mut total = tallies.clone();
+    for part in &parts {
+        total.iter_mut().zip(part).for_each(|(total, part)| total.merge(part));
+    }
     total
+}
+
+// The proof's figures as the tables of `docs/model.md`.
+
+/// Page with the tables.
+pub const PAGE: Page = Page { name: "docs/model.md", tables: "bounds", command: "cargo xtask prove --write" };
+
+/// A table for each section: its title and its functions.
+pub fn markdown(sections: &[(String, Vec<Tally>)]) -> String {
+    let mut text = String::new();
+    for (title, tallies) in sections {
+        let header = "| function | inputs | worst, ulp | claimed, ulp | |\n| --- | --- | --- | --- | --- |\n";
+        // A write to a string does not fail.
+        let _ = write!(text, "{title}:\n\n{header}");
+        for tally in tallies {
+            let rounded = if tally.nearest == tally.inputs { "all correctly rounded" } else { "" };
+            let (worst, claimed) = (number(tally.worst_ulp.abs()), number(tally.bound_ulp));
+            let _ =
+                writeln!(text, "| {} | {} | {worst} | {claimed} | {rounded} |", tally.name, thousands(tally.inputs));
+        }
+        text.push('\n');
+    }
+    let inputs = sections.iter().flat_map(|(_, tallies)| tallies).map(|tally| tally.inputs).sum();
+    let _ = writeln!(text, "{} results in all.", thousands(inputs));
+    text
+}
+
+/// Whole units as they are, anything else to 4 digits after the point. Rounded up: a worst case must not look better
+/// than it is.
+fn number(ulp: f64) -> String {
+    if ulp == ulp.trunc() { thousands(ulp as u64) } else { format!("{:.4}", (ulp * 1e4).ceil() / 1e4) }
+}
+
+fn thousands(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.char_indices() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prove::tally::Judged;
+
+    #[test]
+    fn a_table_says_how_many_and_how_bad() {
+        let mut tally = Tally::new("F(d)", 0.5);
+        for error_ulp in [0.25, -0.499_91] {
+            tally.add(Judged { error_ulp, nearest: Some(true), within: true }, [0; 4]);
+        }
+        tally.inputs = 1_234_567;
+        tally.nearest = tally.inputs;
+        let step = Tally { worst_ulp: -52_290.0, inputs: 12, ..Tally::new("back", 73_950.0) };
+        let text = markdown(&[("Every input".into(), vec![tally, step])]);
+        assert!(text.starts_with("Every input:\n\n| function |"), "{text}");
+        assert!(text.contains("| F(d) | 1,234,567 | 0.5000 | 0.5000 | all correctly rounded |\n"), "{text}");
+        assert!(text.contains("| back | 12 | 52,290 | 73,950 |  |\n"), "{text}");
+        assert!(text.ends_with("\n1,234,579 results in all.\n"), "{text}");
+        let page = |tables: &str| {
+            format!(
+                "a\n<!-- bounds: generated by `{}`, do not edit -->\n{tables}<!-- end of bounds -->\nb\n",
+                PAGE.command
+            )
+        };
+        assert_eq!(PAGE.replaced(&page("old\n"), "new\n"), Some(page("new\n")));
+        assert_eq!(PAGE.replaced("a\n", "new\n"), None);
+    }
 }

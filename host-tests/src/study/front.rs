@@ -1,15 +1,17 @@
 //! Which variants are worth choosing: those that no other beats in both error and time.
 
+use super::kernels::Kernel;
 use super::output::Cost;
+use output::plot::{Dot, Front, PlotError, front};
 
 /// A variant with its cost and its errors.
 #[derive(Clone, Debug)]
 pub struct Point {
     /// Its name.
     pub name: String,
-    /// Whether it is the firmware's.
+    /// True if it is the firmware's.
     pub firmware: bool,
-    /// What a call costs.
+    /// Cost of a call.
     pub cost: Cost,
     /// The largest error over the inputs.
     pub error_max: f64,
@@ -20,17 +22,17 @@ pub struct Point {
 }
 
 impl Point {
-    /// What is laid against the error: estimated cycles of the median call, without wait states.
+    /// Cost that is compared with the error: estimated cycles of the median call, without wait states.
     pub fn cycles(&self) -> i64 {
         self.cost.estimate.median
     }
 
-    /// Whether it competes with the others; a closed form among sums does not, nor what has no error.
+    /// True if it competes with the others; a closed form among sums does not, nor what has no error.
     pub fn competes(&self) -> bool {
         !self.name.contains("closed form") && !self.error_max.is_nan()
     }
 
-    /// Whether it is no worse in error and in time, and better in one.
+    /// True if it is no worse in error and in time, and better in one.
     fn beats(&self, other: &Self) -> bool {
         if !(self.competes() && other.competes()) {
             return false;
@@ -49,7 +51,7 @@ pub fn beaten_by(points: &[Point]) -> Vec<Option<usize>> {
     points.iter().map(beats).collect()
 }
 
-/// How far the front reaches: points on it, its errors' ratio, its cycles' ratio.
+/// Extent of the front: points on it, its errors' ratio, its cycles' ratio.
 pub fn span(points: &[Point]) -> (usize, f64, f64) {
     let beaten = beaten_by(points);
     let front: Vec<_> = points
@@ -63,6 +65,39 @@ pub fn span(points: &[Point]) -> (usize, f64, f64) {
         values().fold(0.0, f64::max) / values().fold(f64::INFINITY, f64::min)
     };
     (front.len(), ratio(&|point| point.error_max), ratio(&|point| point.cycles() as f64))
+}
+
+// Error against cycles, a plot for each kernel.
+
+/// Draws a kernel.
+///
+/// # Errors
+/// There is no variant, or no room for its label.
+pub fn draw(kernel: &Kernel, points: &[Point]) -> Result<String, PlotError> {
+    let dot = |(point, by): (&Point, Option<usize>)| Dot {
+        // An axis of logarithms has no place for less than a cycle.
+        x: point.cycles().max(1) as f64,
+        y: point.error_max,
+        label: point.name.replace('`', ""),
+        best: by.is_none() && point.competes(),
+        own: point.firmware,
+    };
+    let square = match points.iter().find(|point| point.firmware) {
+        Some(point) if point.competes() => "; the square is the firmware's",
+        Some(_) => " of the sums; the square is the firmware's, no sum",
+        None => "",
+    };
+    front(&Front {
+        title: &format!("{}: filled points are the front{square}", kernel.title),
+        x: "estimated cycles on a Cortex-M4F, median, without wait states",
+        y: &format!("largest {}", kernel.error),
+        dots: points
+            .iter()
+            .zip(beaten_by(points))
+            .filter(|(point, _)| point.competes() || point.firmware)
+            .map(dot)
+            .collect(),
+    })
 }
 
 #[cfg(test)]

@@ -43,7 +43,7 @@ pub struct Inputs {
 pub struct Seen {
     /// The truth.
     pub scene: Scene,
-    /// What the array shows.
+    /// Tactile image.
     pub pictures: Vec<Picture>,
 }
 
@@ -165,12 +165,12 @@ impl Inputs {
     }
 }
 
-/// What a board's image keeps of each section: every so manieth of the numbers, frames and contacts, and so many
+/// Inputs of each section that a board's image keeps: every n-th of the numbers, frames and contacts, and a number of
 /// pictures of a contact.
 const FEW: [usize; 4] = [32, 16, 16, 12];
 
 impl Inputs {
-    /// What the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
+    /// Inputs that the image of `cargo xtask bringup` keeps: a few of all but the records, which it makes itself.
     pub fn few_to_bytes(&self) -> Vec<u8> {
         let [number, frame, contact, pictures] = FEW;
         let few = |pairs: &[Pair], each| pairs_to_bytes(&pairs.iter().copied().step_by(each).collect::<Vec<_>>());

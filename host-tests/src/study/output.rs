@@ -1,4 +1,4 @@
-//! What the image said and what the timing model counted.
+//! Output of the image, and cycles by the timing model.
 
 use crate::prove::reference::{PRECISION, Real};
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ pub enum Number {
 }
 
 impl Number {
-    /// Its exact value; none where it is no number.
+    /// Its exact value; `None` if it is not a number.
     pub fn real(self) -> Option<Real> {
         let exact = match self {
             Self::Fixed(bits, fraction_bits) => Real::from_parts(bits.into(), -(fraction_bits as isize)),
@@ -81,11 +81,11 @@ pub struct Ran {
     pub kernel: String,
     /// Its name.
     pub name: String,
-    /// Whether it is the firmware's.
+    /// True if it is the firmware's.
     pub firmware: bool,
-    /// What it returned for each input.
+    /// Results for each input.
     pub returned: Vec<Vec<Number>>,
-    /// What a call costs, an empty one taken off.
+    /// Cost of a call, less that of an empty one.
     pub cost: Cost,
 }
 
@@ -128,7 +128,7 @@ pub fn parse(text: &str) -> Result<Vec<Ran>, String> {
     runs.into_iter().filter(|(region, _)| *region != 0).map(with_cost).collect()
 }
 
-/// The firmware's variants as they are shipped, the others as quick as the compiler makes them.
+/// The firmware's variants as shipped, all other variants at the compiler's highest speed.
 ///
 /// # Errors
 /// The runs are not of the same variants, or one returned something else than the other.

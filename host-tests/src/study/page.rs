@@ -95,7 +95,7 @@ fn costs(page: &mut String, kernel: &Kernel, points: &[Point]) {
     }
 }
 
-/// Where a variant stands.
+/// Position of a variant among the others.
 pub fn verdict(point: &Point, by: Option<&Point>) -> String {
     match by {
         Some(by) => format!("beaten by {}", by.name),

@@ -1,4 +1,4 @@
-//! What the simulation's own accuracy costs: the plant's integrator and step, and the points at which a taxel's
+//! Cost of the simulation's own accuracy: the plant's integrator and step, and the points at which a taxel's
 //! pressure is taken.
 
 use super::page::figure;
@@ -63,7 +63,7 @@ pub fn markdown() -> String {
         let worst = seen.iter().zip(&exact).map(|(seen, exact)| largest(seen, exact)).fold(0.0, f64::max);
         let force = |kpa: &[f64]| kpa.iter().sum::<f64>() * 1.5 * 1.5 * 1e-3;
         let closed = |d: &f64| Setup::default().tip.force_n(*d);
-        // The deepest contact reaches beyond the array: only the others have a force to compare with.
+        // The deepest contact reaches beyond the array: its force cannot be compared.
         let forces = seen.iter().zip(&DEPTHS_MM).take(2).map(|(seen, d)| (force(seen) - closed(d)).abs());
         let _ = writeln!(page, "| {name} | {points} | {} | {} |", figure(worst), figure(forces.fold(0.0, f64::max)));
     };

@@ -1,6 +1,5 @@
 //! Speed reference of an approach and a hold; in the modules that of a release, and the touch that both start from.
 
-mod release;
 mod touch;
 
 use crate::{config, mm};

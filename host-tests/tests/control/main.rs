@@ -1,15 +1,17 @@
 //! The parts of the force loop, each by itself: pace, drive, observer, profile, law, and what each mode asks of them.
 
-mod drive;
 mod grip;
-mod law;
-mod observer;
 mod pace;
 
 use fingertip::config::Config;
+use fingertip::control::Drive;
+use fingertip::control::Observer;
+use fingertip::control::Reference;
+use fingertip::control::SpeedLoop;
 use fingertip::params::Params;
 use fingertip::shipped;
-use fingertip::units::Millimetres;
+use fingertip::state::Limits;
+use fingertip::units::{Duty, Millimetres, MillimetresPerSecond, MillimetresPerSecond2};
 use std::ops::Deref;
 
 /// The reference finger's.
@@ -19,4 +21,372 @@ fn config() -> Config {
 
 fn mm(value: f64) -> Millimetres {
     Millimetres::from_bits((value * f64::from(1 << 24)).round() as i32)
+}
+
+// Slew, current and voltage, each by itself: duty, reported limits, and the load of a weak source.
+
+/// The largest voltage of the tests, Q8 mm/s^2.
+const MOST: i32 = 1 << 30;
+/// The supply that makes it.
+const SUPPLY_MV: u16 = 6_000;
+
+/// A drive that no limit holds but what the largest voltage is.
+fn free() -> Config {
+    let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: MOST, ..config() };
+    assert_eq!(config.params.voltage_max_mv, i32::from(SUPPLY_MV));
+    config
+}
+
+/// Duty that is passed on, and limits that are reported.
+fn apply(drive: &mut Drive, wanted: i32, back_emf: i32, config: &Config) -> (i32, u16) {
+    let mut limits = Limits::default();
+    drive.apply(wanted, back_emf, SUPPLY_MV, config, &mut limits);
+    assert_eq!(drive.acceleration(), drive.voltage() - back_emf);
+    (drive.voltage(), limits.0)
+}
+
+#[test]
+fn what_is_within_all_limits_is_let_through_and_nothing_told() {
+    let config = free();
+    let mut drive = Drive::new();
+    for wanted in [0, 1, -1, MOST, 0, -MOST, 12_345] {
+        assert_eq!(apply(&mut drive, wanted, 77, &config), (wanted, 0));
+    }
+}
+
+#[test]
+fn the_slew_limit_is_a_step_from_the_last_voltage() {
+    let config = Config { slew_limit: 1_000, ..free() };
+    let mut drive = Drive::new();
+    for (wanted, expected) in [
+        (1_000, (1_000, 0)),
+        (2_001, (2_000, Limits::SLEW)),
+        (MOST, (3_000, Limits::SLEW)),
+        (2_500, (2_500, 0)),
+        (-MOST, (1_500, Limits::SLEW)),
+        (499, (500, Limits::SLEW)),
+    ] {
+        assert_eq!(apply(&mut drive, wanted, 0, &config), expected);
+    }
+}
+
+/// The current is what the voltage has over the back-EMF.
+#[test]
+fn the_current_limit_lies_around_the_back_emf() {
+    let config = Config { current_limit: 1 << 20, ..free() };
+    let limit = 1 << 20;
+    for back_emf in [0, 5_000_000, -5_000_000] {
+        for (wanted, expected) in [
+            (back_emf + limit, (back_emf + limit, 0)),
+            (back_emf - limit, (back_emf - limit, 0)),
+            (back_emf + limit + 1, (back_emf + limit, Limits::CURRENT)),
+            (back_emf - limit - 1, (back_emf - limit, Limits::CURRENT)),
+        ] {
+            assert_eq!(apply(&mut Drive::new(), wanted, back_emf, &config), expected);
+        }
+    }
+}
+
+#[test]
+fn the_voltage_limit_is_the_last_and_each_that_cuts_is_told() {
+    let config = Config { voltage_limit: 10_000, ..free() };
+    assert_eq!(apply(&mut Drive::new(), 10_000, 0, &config), (10_000, 0));
+    assert_eq!(apply(&mut Drive::new(), 10_001, 0, &config), (10_000, Limits::VOLTAGE));
+    assert_eq!(apply(&mut Drive::new(), -10_001, 0, &config), (-10_000, Limits::VOLTAGE));
+    let all = Config { slew_limit: 40_000, current_limit: 1 << 14, ..config };
+    let told = Limits::SLEW | Limits::CURRENT | Limits::VOLTAGE;
+    assert_eq!(apply(&mut Drive::new(), 50_000, 0, &all), (10_000, told));
+}
+
+#[test]
+fn a_supply_below_the_motors_voltage_makes_as_much_less() {
+    let config = free();
+    for (supply_mv, share) in [(7_000, 1.0), (6_000, 1.0), (5_999, 5_999.0 / 6e3), (3_000, 0.5), (600, 0.1), (0, 0.0)] {
+        let mut drive = Drive::new();
+        drive.apply(MOST, 0, supply_mv, &config, &mut Limits::default());
+        let applied = f64::from(drive.voltage()) / f64::from(MOST);
+        assert!((applied - share).abs() < 2e-6, "{applied} at {supply_mv} mV");
+    }
+}
+
+/// Halved in each frame down to a sixteenth, and back by 1/128 in each.
+#[test]
+fn a_weak_source_is_given_less_current_at_once_and_more_again_slowly() {
+    let config = Config { current_limit: 1 << 20, ..free() };
+    let share_q8 = |drive: &mut Drive, supply_mv: i32| {
+        drive.apply(MOST, 0, supply_mv as u16, &config, &mut Limits::default());
+        drive.voltage() >> 12
+    };
+    let weak_mv = config.supply_weak_mv;
+    let mut drive = Drive::new();
+    assert_eq!(share_q8(&mut drive, weak_mv), 256, "all of it is there at the start");
+    let less = [(); 6].map(|()| share_q8(&mut drive, weak_mv - 1));
+    assert_eq!(less, [128, 64, 32, 16, 16, 16]);
+    for frame in 1..=120 {
+        assert_eq!(share_q8(&mut drive, weak_mv), 16 + 2 * frame);
+    }
+    assert_eq!(share_q8(&mut drive, weak_mv), 256, "never more than all");
+}
+
+#[test]
+fn the_duty_is_the_voltages_share_of_the_supply() {
+    let config = config();
+    for supply_mv in [6_000_u16, 8_000, 12_000, 24_000] {
+        for share in [1.0, 0.5, 0.01, -0.25, -1.0] {
+            let mut drive = Drive::new();
+            let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, ..config.clone() };
+            let wanted = (share * f64::from(config.voltage_limit)) as i32;
+            drive.apply(wanted, 0, supply_mv, &config, &mut Limits::default());
+            let expected = 32_767.0 * share * 6_000.0 / f64::from(supply_mv);
+            let duty = f64::from(drive.duty(supply_mv, &config).0);
+            assert!((duty - expected).abs() < 2.0, "{duty}, {expected} expected");
+            // The same voltage from hardly any supply is all that there is.
+            for none_mv in [0, 1, 2, 40] {
+                let full = if share > 0.0 { i16::MAX } else { i16::MIN };
+                assert_eq!(drive.duty(none_mv, &config), Duty(full), "{share} from {none_mv} mV");
+            }
+        }
+    }
+}
+
+/// The bridge then holds no voltage, but the motor still turns: what the back-EMF does stays.
+#[test]
+fn a_cut_takes_the_voltage_and_leaves_the_back_emf() {
+    let config = free();
+    let mut drive = Drive::new();
+    for (wanted, back_emf) in [(5_000, 300), (-2_000, -70), (40, 0)] {
+        apply(&mut drive, wanted, back_emf, &config);
+        drive.cut();
+        assert_eq!((drive.voltage(), drive.acceleration()), (0, -back_emf));
+        drive.cut();
+        assert_eq!((drive.voltage(), drive.acceleration()), (0, -back_emf), "once is enough");
+    }
+    assert_eq!(drive.duty(SUPPLY_MV, &config), Duty::ZERO);
+}
+
+// The law and the profile against their formulas in f64.
+
+fn speed(value: f64) -> MillimetresPerSecond {
+    MillimetresPerSecond::from_bits((value * 65_536.0).round() as i32)
+}
+
+fn acceleration(value: f64) -> MillimetresPerSecond2 {
+    MillimetresPerSecond2::from_bits((value * 256.0).round() as i32)
+}
+
+#[test]
+fn the_profile_is_the_line_near_the_goal_and_the_root_beyond() {
+    let config = config();
+    let mut rng = fastrand::Rng::with_seed(6);
+    let mut near = 0;
+    for case in 0..20_000 {
+        let gains = &config.gain_sets[case % config.gain_sets.len()];
+        let slope = f64::from(gains.speed_q18_per_s) / 2_f64.powi(18) / 3.0;
+        let brake = 10_f64.powf(rng.f64() * 2.0 + 3.5);
+        let way = (rng.f64() - 0.5) * 10_f64.powf(rng.f64() * 4.0 - 2.5);
+        let now = (rng.f64() - 0.5) * 500.0;
+        let reference = Reference::towards(mm(way), speed(now), acceleration(brake), gains);
+        let line = brake / (2.0 * slope * slope);
+        near += usize::from(way.abs() < line);
+        let (expected_speed, expected_acceleration) = if way.abs() <= line {
+            (f64::from(gains.slope_per_s) * way, -f64::from(gains.slope_per_s) * now)
+        } else {
+            let root = (2.0 * brake * way.abs()).sqrt();
+            // Never more than what braking makes, and a quarter.
+            ((root - brake / (2.0 * slope)).copysign(way), -(brake * (now / root).clamp(-1.25, 1.25)))
+        };
+        let name = format!("{way} mm, {now} mm/s, {brake} mm/s^2, k {slope}");
+        let found: f64 = reference.speed.0.to_num();
+        assert!(
+            (found - expected_speed).abs() <= 3e-3 * expected_speed.abs() + 0.02,
+            "{found}, {expected_speed}: {name}"
+        );
+        let found: f64 = reference.acceleration.0.to_num();
+        let unsure = 0.01 * expected_acceleration.abs() + 0.001 * brake + 1.0;
+        assert!((found - expected_acceleration).abs() <= unsure, "{found}, {expected_acceleration}: {name}");
+    }
+    assert!((5_000..15_000).contains(&near), "{near} near the goal");
+}
+
+/// However fast it goes, the curve asks for a quarter more than the brake at most.
+#[test]
+fn no_speed_asks_for_more_than_a_quarter_beyond_the_brake() {
+    let config = config();
+    for (bits, sign) in [(i32::MAX, -1.0), (1 << 29, -1.0), (-1 << 29, 1.0), (i32::MIN, 1.0)] {
+        for way in [mm(5.0), mm(-5.0)] {
+            let now = MillimetresPerSecond::from_bits(bits);
+            let reference = Reference::towards(way, now, acceleration(10_000.0), &config.gain_sets[0]);
+            let found: f64 = reference.acceleration.0.to_num();
+            assert!((found - sign * 12_500.0).abs() < 10.0, "{found} at {now:?}");
+        }
+    }
+}
+
+#[test]
+fn beyond_the_limit_there_is_no_curve_to_stay_on() {
+    let reference = Reference { speed: speed(30.0), acceleration: acceleration(-700.0) };
+    assert_eq!(reference.limited(speed(30.0)), reference);
+    let held = Reference { speed: speed(29.0), acceleration: MillimetresPerSecond2::ZERO };
+    assert_eq!(reference.limited(speed(29.0)), held);
+    let back = Reference { speed: speed(-30.0), ..reference };
+    assert_eq!(back.limited(speed(30.0)), back);
+    assert_eq!(back.limited(speed(29.0)), Reference { speed: speed(-29.0), ..held });
+}
+
+/// g V = k_v (v_ref - v) + a_ref + c v - w.
+#[test]
+fn the_law_is_the_documented_one() {
+    let config = Config { slew_limit: i32::MAX, current_limit: i32::MAX, voltage_limit: 1 << 30, ..config() };
+    let gain = f64::from(config.gain_sets[0].speed_q18_per_s) / 2_f64.powi(18);
+    let damping = f64::from(config.damping_q17_per_s) / 2_f64.powi(17);
+    let mut rng = fastrand::Rng::with_seed(7);
+    for _ in 0..10_000 {
+        let mut any = |reach: f64| (rng.f64() - 0.5) * 2.0 * reach;
+        let (wanted, now, feed, disturbance) = (any(250.0), any(250.0), any(50_000.0), any(50_000.0));
+        let mut motion = SpeedLoop::new();
+        motion.observer.speed = speed(now);
+        motion.observer.disturbance = acceleration(disturbance);
+        let reference = Reference { speed: speed(wanted), acceleration: acceleration(feed) };
+        let mut limits = Limits::default();
+        let duty = motion.follow(reference, 6_000, &config, &mut limits);
+        let expected = gain * (wanted - now) + feed + damping * now - disturbance;
+        let voltage = f64::from(motion.drive.voltage()) / 256.0;
+        assert!((voltage - expected).abs() < 1.0, "{voltage}, {expected} expected");
+        let net = f64::from(motion.drive.acceleration()) / 256.0;
+        assert!((net - (expected - damping * now)).abs() < 1.0, "{net}");
+        assert_eq!((limits, duty), (Limits::default(), motion.drive.duty(6_000, &config)));
+    }
+}
+
+/// A force that pushes back helps to stop where it presses, and drives where it lets go: 85 % of it is counted on,
+/// between a quarter and twice of what the motor can.
+#[test]
+fn the_brake_counts_on_the_force_where_it_helps() {
+    let config = config();
+    let [least, usual, most] = config.brake.map(|bits| f64::from(bits) / 256.0);
+    assert!((least * 4.0 / usual - 1.0).abs() < 1e-3 && (most / usual / 2.0 - 1.0).abs() < 1e-3);
+    for (disturbance, forward, back) in [
+        (0.0, usual, usual),
+        (-10_000.0, usual + 8_515.6, usual - 8_515.6),
+        (10_000.0, usual - 8_515.6, usual + 8_515.6),
+        (-4.0 * usual, most, least),
+        (4.0 * usual, least, most),
+    ] {
+        let mut motion = SpeedLoop::new();
+        motion.observer.disturbance = acceleration(disturbance);
+        for (way, expected) in [(mm(1.0), forward), (Millimetres::ZERO, forward), (mm(-1.0), back)] {
+            let brake: f64 = motion.brake(way, &config).0.to_num();
+            assert!((brake - expected).abs() < 2.0, "{brake}, {expected} expected with {disturbance}");
+        }
+    }
+}
+
+/// While the loop is quick every way counts; once it is calm, one within the slack is none, and of a longer one what is
+/// beyond it.
+#[test]
+fn a_calm_loop_leaves_a_way_within_the_slack() {
+    let config = config();
+    let slack = mm(0.004);
+    let speed_over = |motion: SpeedLoop, way: f64, slack: Millimetres| {
+        let (reference, limited) = { motion }.towards(mm(way), slack, config.speed_max, &config);
+        assert!(!limited);
+        reference.speed
+    };
+    let quick = SpeedLoop::new();
+    let mut calm = quick;
+    for _ in 0..10 * config.calm_frames {
+        calm.schedule.note(Millimetres::ZERO, &config);
+    }
+    assert!(speed_over(quick, 0.004, slack) > MillimetresPerSecond::ZERO);
+    for way in [0.004, 0.001, 0.0, -0.004] {
+        assert_eq!(speed_over(calm, way, slack), MillimetresPerSecond::ZERO, "{way} mm");
+    }
+    for way in [0.010, -0.010] {
+        assert_eq!(speed_over(calm, way, slack), speed_over(calm, 0.6 * way, Millimetres::ZERO), "{way} mm");
+        assert_ne!(speed_over(calm, way, slack), MillimetresPerSecond::ZERO);
+    }
+}
+
+// The observer against its equations in f64.
+
+/// The equations of the observer's documentation.
+struct Ideal {
+    beta: f64,
+    frame_s: f64,
+    travel: f64,
+    speed: f64,
+    disturbance: f64,
+}
+
+impl Ideal {
+    /// For a pace: its poles are 2.5 times as quick as the speed loop.
+    fn new(pace: usize, config: &Config) -> Self {
+        let frame_s = f64::from(config.frame_s_q37) / 2_f64.powi(37);
+        let speed_gain = f64::from(config.gain_sets[pace].speed_q18_per_s) / 2_f64.powi(18);
+        let half = 0.5 * 2.5 * speed_gain * frame_s;
+        Self { beta: (1.0 - half) / (1.0 + half), frame_s, travel: 0.0, speed: 0.0, disturbance: 0.0 }
+    }
+
+    fn update(&mut self, measured: f64, driven: f64) {
+        let Self { beta, frame_s: t, .. } = *self;
+        let gap = 1.0 - beta;
+        let acceleration = driven + self.disturbance;
+        self.travel += self.speed * t + acceleration * t * t / 2.0;
+        self.speed += acceleration * t;
+        let error = measured - self.travel;
+        self.travel += (1.0 - beta.powi(3)) * error;
+        self.speed += 1.5 * gap * gap * (1.0 + beta) / t * error;
+        self.disturbance += gap.powi(3) / (t * t) * error;
+    }
+}
+
+#[test]
+fn it_follows_its_equations_at_each_pace() {
+    let config = config();
+    let count_mm = config.mm_per_count_q40 as f64 / 2_f64.powi(40);
+    let mut rng = fastrand::Rng::with_seed(5);
+    for pace in 0..config.gain_sets.len() {
+        let (mut observer, mut reference) = (Observer::new(), Ideal::new(pace, &config));
+        let (mut counts, mut fastest, mut hardest) = (0, 0.0_f64, 0.0_f64);
+        for frame in 0..2_000 {
+            if frame % 50 == 0 {
+                counts += rng.i32(-40..=40);
+            }
+            counts += rng.i32(-2..=2);
+            let driven = rng.i32(-100_000..=100_000);
+            observer.update(counts, driven * 256, &config.gain_sets[pace], &config);
+            reference.update(f64::from(counts) * count_mm, driven.into());
+            let is = [
+                observer.travel.0.to_num::<f64>() - reference.travel,
+                observer.speed.0.to_num::<f64>() - reference.speed,
+                observer.disturbance.0.to_num::<f64>() - reference.disturbance,
+            ];
+            (fastest, hardest) = (fastest.max(reference.speed.abs()), hardest.max(reference.disturbance.abs()));
+            assert!(is[0].abs() < 1e-5, "travel is {} mm off in frame {frame} of pace {pace}", is[0]);
+            assert!(is[1].abs() < 1e-2, "speed is {} mm/s off in frame {frame} of pace {pace}", is[1]);
+            assert!(is[2].abs() < 20.0, "disturbance is {} mm/s^2 off in frame {frame} of pace {pace}", is[2]);
+        }
+        assert!(fastest > 5.0 && hardest > 500.0, "{fastest} mm/s and {hardest} mm/s^2 prove little");
+    }
+}
+
+#[test]
+fn what_no_motion_makes_is_a_jump_to_rest_at_the_new_place() {
+    for counts in [500, -500, 100_000, i32::MIN] {
+        let config = config();
+        let way = config.travel(counts);
+        // At rest it expects to stay: the error is the whole way.
+        let error = way.to_bits().unsigned_abs();
+        for (jump, jumps) in [(error, false), (error - 1, true)] {
+            let config = Config { jump, ..config.clone() };
+            let mut observer = Observer::zeroed_at(77);
+            observer.update(77_i32.wrapping_add(counts), 0, &config.gain_sets[0], &config);
+            let rests = observer.speed == MillimetresPerSecond::ZERO;
+            assert_eq!((rests, observer.disturbance == MillimetresPerSecond2::ZERO), (jumps, jumps), "{counts}");
+            if jumps {
+                assert_eq!(observer.travel, way);
+            }
+            assert_eq!(observer.measured(77, &config), Millimetres::ZERO, "zero stays where it was");
+        }
+    }
 }

@@ -1,7 +1,8 @@
 //! When the loop is quicker, and when it is calmer, frame by frame.
 
 use crate::config;
-use fingertip::config::{Config, GAIN_SETS};
+use fingertip::config::Config;
+use fingertip::config::GAIN_SETS;
 use fingertip::control::GainSchedule;
 use fingertip::params::Params;
 use fingertip::shipped;
@@ -9,12 +10,12 @@ use fingertip::units::Millimetres;
 
 /// The pace's number, by the gains that it gives.
 fn number(pace: &GainSchedule, config: &Config) -> usize {
-    let number = config.gain_sets.iter().position(|gains| gains == pace.gains(config)).expect("one of the gain sets");
+    let number = config.gain_sets.iter().position(|gains| gains == pace.gains(config)).expect("one of the paces");
     assert_eq!(pace.calm(), number > 0);
     number
 }
 
-/// After each of so many frames with a way of so many bits.
+/// Gain set after each of `frames` frames with a distance of `way` bits.
 fn run(pace: &mut GainSchedule, way: i32, frames: u32, config: &Config) -> Vec<usize> {
     let mut note = |_| {
         pace.note(Millimetres::from_bits(way), config);
@@ -40,7 +41,7 @@ fn without_a_way_each_pace_lasts_twice_as_long_as_the_one_before() {
         assert_eq!(run(&mut pace, 0, lasts, &config), vec![slower; lasts as usize]);
         assert_eq!(run(&mut pace, 0, 1, &config), [slower + 1]);
     }
-    assert_eq!(run(&mut pace, 0, 1_000, &config), [GAIN_SETS - 1; 1_000], "there is none calmer");
+    assert_eq!(run(&mut pace, 0, 1_000, &config), [GAIN_SETS - 1; 1_000], "no gain set is calmer");
 }
 
 /// Two bands at the calmest pace, twice that at each quicker one. A mean that comes down to its way meets it to the

@@ -34,7 +34,7 @@ pub struct Bench {
     frame: Frame,
     taxels: [[i32; COLUMNS]; ROWS],
     tare: [[i32; COLUMNS]; ROWS],
-    /// The time, which stands.
+    /// Time; does not advance by itself.
     pub tick_ms: u32,
     /// The made-up capture, and its bytes.
     pub capture: CaptureStatus,
@@ -83,7 +83,7 @@ impl Bench {
         self.status.taken = Taken { tare, clear, measure };
     }
 
-    /// What the bus sends in return, packet by packet.
+    /// Returns the packets that the bus sends in return.
     pub fn hear(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let snapshot = Snapshot {
             status: self.status,
@@ -155,7 +155,7 @@ impl Bench {
         u32::from_le_bytes(bytes.try_into().expect("four bytes"))
     }
 
-    /// How often an instruction was refused for this reason.
+    /// Number of instructions that were refused for this reason.
     pub fn refused(&self, error: StatusError) -> u16 {
         self.server.counters().refused(error)
     }

@@ -1,15 +1,350 @@
-//! The bus: packets, control table, server, and a client that nobody here wrote.
+//! The bus: packets, control table, server, and an independent client.
 
 mod bench;
-mod client;
-mod indirect;
-mod instructions;
 mod mirrors;
-mod noise;
-mod packets;
 mod recover;
-mod requests;
-mod safety;
 mod several;
 mod table;
-mod writes;
+
+use crate::bench::{Bench, ID, answer, hex, packet, receive};
+use dynamixel2::instructions::{FactoryResetKind, SyncWriteData};
+use dynamixel2::serial2::SerialPort;
+use dynamixel2::{Bus, MotorError, ReadError, TransferError};
+use fingertip::link::Actions;
+use fingertip::link::packet::{CRC_START, Event, LENGTH_MAX, Receiver, update_crc};
+use fingertip::shipped::{REGISTERS, address};
+use fingertip::state::Fault;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
+
+// Packets on the wire: the examples that the protocol's manual prints, stuffing, and any slicing of any bytes.
+
+/// Examples of the ROBOTIS e-manual, "Protocol 2.0": instruction and status packets with their CRC.
+const PUBLISHED: [&str; 16] = [
+    "FF FF FD 00 01 03 00 01 19 4E",
+    "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D",
+    "FF FF FD 00 FE 03 00 01 31 42",
+    "FF FF FD 00 01 07 00 02 84 00 04 00 1D 15",
+    "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0",
+    "FF FF FD 00 01 09 00 03 74 00 00 02 00 00 CA 89",
+    "FF FF FD 00 01 04 00 55 00 A1 0C",
+    "FF FF FD 00 01 09 00 04 68 00 C8 00 00 00 AE 8E",
+    "FF FF FD 00 01 03 00 05 02 CE",
+    "FF FF FD 00 01 04 00 06 01 A1 E6",
+    "FF FF FD 00 01 03 00 08 2F 4E",
+    "FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA",
+    "FF FF FD 00 FE 11 00 83 74 00 04 00 01 96 00 00 00 02 AA 00 00 00 82 87",
+    "FF FF FD 00 FE 0D 00 92 01 90 00 02 00 02 92 00 01 00 1A 05",
+    "FF FF FD 00 FE 10 00 93 01 20 00 02 00 A0 00 02 1F 00 01 00 50 B7 68",
+    "FF FF FD 00 01 08 00 10 01 44 58 4C 22 B1 DC",
+];
+
+#[test]
+fn published_packets_are_understood_and_made_alike() {
+    for text in PUBLISHED {
+        let bytes = hex(text);
+        let (body, crc) = bytes.split_at(bytes.len() - 2);
+        assert_eq!(update_crc(CRC_START, body).to_le_bytes(), crc, "{text}");
+        let expected = (bytes[4], bytes[7], body[8..].to_vec());
+        let (packets, events) = receive(&mut Receiver::new(), &bytes);
+        assert_eq!((packets, events), (vec![expected], vec![]), "{text}");
+        assert_eq!(packet(bytes[4], bytes[7], &body[8..]), bytes, "{text}");
+    }
+}
+
+#[test]
+fn a_header_inside_is_stuffed() {
+    for (params, stuffed) in [
+        ("FF FF FD", "FF FF FD FD"),
+        ("FF FF FD 00 01", "FF FF FD FD 00 01"),
+        ("FF FF FD FD", "FF FF FD FD FD"),
+        ("FF FF FF FD", "FF FF FF FD FD"),
+        ("FF FF FD FF FF FD", "FF FF FD FD FF FF FD FD"),
+        ("FF FD FD", "FF FD FD"),
+    ] {
+        let (params, stuffed) = (hex(params), hex(stuffed));
+        let bytes = packet(1, 3, &params);
+        assert_eq!(bytes[8..bytes.len() - 2], stuffed);
+        assert_eq!(usize::from(u16::from_le_bytes([bytes[5], bytes[6]])), stuffed.len() + 3);
+        assert_eq!(receive(&mut Receiver::new(), &bytes), (vec![(1, 3, params)], vec![]));
+    }
+}
+
+#[test]
+fn a_packet_cut_short_costs_no_other() {
+    let whole = packet(1, 3, &hex("00 01 FF FF FD 03 E8"));
+    let next = packet(1, 1, &[]);
+    for cut in 1..whole.len() {
+        let (packets, events) = receive(&mut Receiver::new(), &[&whole[..cut], &next[..]].concat());
+        assert_eq!(packets, vec![(1, 1, vec![])], "cut after {cut} bytes");
+        assert_eq!(events.len(), 1, "cut after {cut} bytes: {events:?}");
+    }
+}
+
+#[test]
+fn impossible_ids_and_lengths_are_no_packets() {
+    let next = packet(1, 1, &[]);
+    for id in [253, 255] {
+        let (packets, events) = receive(&mut Receiver::new(), &[&packet(id, 1, &[]), &next[..]].concat());
+        assert_eq!((packets.len(), events), (1, vec![Event::Framing]), "ID {id}");
+    }
+    for length in [0, 1, 2, LENGTH_MAX + 1, u16::MAX] {
+        let [low, high] = length.to_le_bytes();
+        let bytes = [&[0xFF, 0xFF, 0xFD, 0x00, 1, low, high, 1], &next[..]].concat();
+        let (packets, events) = receive(&mut Receiver::new(), &bytes);
+        assert_eq!((packets.len(), events), (1, vec![Event::Framing]), "length {length}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 2000, rng_seed: RngSeed::Fixed(20), failure_persistence: None, ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn what_is_sent_is_received(
+        packets in prop::collection::vec(
+            (0..=252u8, 0..=255u8, prop::collection::vec(prop::sample::select(&[0xFF, 0xFD, 0x00, 0x55][..]), 0..40)),
+            1..6,
+        ),
+        slice in 1..50usize,
+    ) {
+        let bytes: Vec<u8> = packets.iter().flat_map(|(id, number, params)| packet(*id, *number, params)).collect();
+        let mut receiver = Receiver::new();
+        let mut received = Vec::new();
+        for bytes in bytes.chunks(slice) {
+            let (packets, events) = receive(&mut receiver, bytes);
+            received.extend(packets);
+            prop_assert!(events.is_empty());
+        }
+        prop_assert_eq!(received, packets);
+    }
+
+    #[test]
+    fn garbage_hides_no_packet(
+        garbage in prop::collection::vec(prop::sample::select(&[0xFF, 0xFD, 0x00, 0x01, 0x03, 0x55][..]), 0..60),
+        params in prop::collection::vec(any::<u8>(), 0..20),
+    ) {
+        let bytes = [garbage, packet(1, 3, &params)].concat();
+        let (packets, _) = receive(&mut Receiver::new(), &bytes);
+        prop_assert_eq!(packets.last(), Some(&(1, 3, params)));
+    }
+}
+
+// Random and damaged bytes: nothing moves, nothing stops, and the next good packet is answered.
+
+/// Packets that would change something if they were believed.
+fn packets() -> Vec<Vec<u8>> {
+    vec![
+        packet(ID, 0x03, &[0, 1, 0xE8, 3, 0, 0]),
+        packet(ID, 0x03, &[64, 0, 1]),
+        packet(254, 0x83, &[0, 1, 4, 0, ID, 0xE8, 3, 0, 0]),
+        packet(ID, 0x04, &[98, 0, 0x7F]),
+        packet(ID, 0x08, &[]),
+        packet(254, 0x06, &[1]),
+        packet(ID, 0x03, &[0, 2, 0xFF, 0xFF, 0xFD, 0]),
+    ]
+}
+
+fn unmoved(bench: &mut Bench) {
+    assert_eq!(*bench.server.settings(), *Bench::new().server.settings());
+    assert_eq!(bench.server.take_actions(), Actions::default());
+    let replies = bench.hear(&packet(ID, 0x01, &[]));
+    assert_eq!(replies.last().map(|reply| answer(reply).data.len()), Some(3), "a good packet is answered");
+}
+
+#[test]
+fn a_million_random_and_mutated_bytes_change_nothing() {
+    let mut random = fastrand::Rng::with_seed(2);
+    let mut bench = Bench::new();
+    let packets = packets();
+    let mut sent: Vec<u8> = Vec::new();
+    while sent.len() < 1_000_000 {
+        let bytes: Vec<u8> = if random.bool() {
+            let mut bytes = packets[random.usize(..packets.len())].clone();
+            let place = random.usize(..bytes.len());
+            match random.u8(..4) {
+                0 => drop(bytes.remove(place)),
+                1 => bytes.insert(place, random.u8(..)),
+                2 => bytes[place] ^= 1 << random.u8(..8),
+                _ => bytes.truncate(place),
+            }
+            bytes
+        } else {
+            let likely = [0xFF, 0xFF, 0xFD, 0x00, 0x01, 0x03, 0xFE];
+            (0..random.usize(1..40))
+                .map(|_| if random.bool() { random.u8(..) } else { likely[random.usize(..7)] })
+                .collect()
+        };
+        // A piece that happens to complete a good packet is left out.
+        let before = sent.len();
+        sent.extend(&bytes);
+        let recent = &sent[before.saturating_sub(40)..];
+        if packets.iter().any(|good| recent.windows(good.len()).any(|bytes| bytes == good)) {
+            sent.truncate(before);
+            continue;
+        }
+        bench.hear(&bytes);
+    }
+    unmoved(&mut bench);
+    let counters = *bench.server.counters();
+    assert!(counters.framing > 1000, "{counters:?}");
+    assert!(bench.refused(fingertip::link::packet::StatusError::Crc) > 1000, "{counters:?}");
+}
+
+#[test]
+fn no_single_wrong_byte_is_believed() {
+    for good in packets() {
+        for place in 0..good.len() {
+            for change in 1..=255 {
+                let mut bytes = good.clone();
+                bytes[place] ^= change;
+                let mut bench = Bench::new();
+                let replies = bench.hear(&bytes);
+                assert!(replies.iter().all(|reply| answer(reply).number() == 3), "{bytes:02X?}");
+                unmoved(&mut bench);
+            }
+        }
+    }
+}
+
+/// Instruction packets with good CRCs and any content, mostly about registers that exist.
+fn any_packet() -> impl Strategy<Value = Vec<u8>> {
+    let instruction =
+        prop::sample::select(&[1, 2, 3, 3, 3, 4, 5, 6, 8, 0x55, 0x82, 0x83, 0x8A, 0x92, 0x93, 0x10, 0x20][..]);
+    let id = prop::sample::select(&[ID, ID, ID, 254, 2][..]);
+    let address = prop_oneof![
+        prop::sample::select(REGISTERS).prop_map(|register| register.address.to_le_bytes().to_vec()),
+        prop::collection::vec(any::<u8>(), 0..5),
+    ];
+    let rest = prop::collection::vec(prop_oneof![0..=4u8, any::<u8>()], 0..12);
+    (id, instruction, address, rest)
+        .prop_map(|(id, instruction, address, rest)| packet(id, instruction, &[address, rest].concat()))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 3000, rng_seed: RngSeed::Fixed(21), failure_persistence: None, ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn any_packets_keep_the_settings_sound(packets in prop::collection::vec(any_packet(), 1..30), slice in 1..40usize) {
+        let mut whole = Bench::new();
+        let mut sliced = Bench::new();
+        let bytes = packets.concat();
+        let replies = whole.hear(&bytes);
+        let in_slices: Vec<_> = bytes.chunks(slice).flat_map(|bytes| sliced.hear(bytes)).collect();
+        prop_assert_eq!(&replies, &in_slices);
+        prop_assert_eq!(whole.server.settings(), sliced.server.settings());
+        let settings = whole.server.settings();
+        prop_assert!(fingertip::shipped::Config::shipped(&settings.record.params).is_ok());
+        prop_assert!(settings.record.id <= 252 && settings.record.baud_code <= 5 && settings.status_return_level <= 2);
+        prop_assert!(settings.command.bus_watchdog_ms <= 127 * 20);
+        let goal = settings.command.goal;
+        prop_assert!(goal >= fingertip::units::Newtons::ZERO);
+        prop_assert!(goal <= fingertip::config::newtons(settings.record.params.force_max_mn));
+    }
+}
+
+// An independent client: the crate `dynamixel2`, over a pseudo-terminal.
+//
+// Its timeouts follow the bus speed, so the terminal is set to 1 baud: the shortest is then two minutes of a device
+// that hangs.
+
+type Client = Bus<Vec<u8>, Vec<u8>>;
+
+/// Runs a talk with a device behind the other end of the terminal, and gives back the device.
+fn with_client(mut bench: Bench, talk: impl FnOnce(&mut Client)) -> Bench {
+    let (mut host, device) = SerialPort::pair().expect("a pseudo-terminal");
+    let mut speed = host.get_configuration().expect("its settings");
+    speed.set_baud_rate(1).expect("1 baud");
+    host.set_configuration(&speed).expect("its settings");
+    let mut client = Bus::with_buffers(host, vec![0; 512], vec![0; 512]).expect("a client");
+    std::thread::scope(|scope| {
+        let served = scope.spawn(move || {
+            let mut bytes = [0; 64];
+            // The read ends with an error when the other end is closed.
+            while let Ok(count @ 1..) = device.read(&mut bytes) {
+                for reply in bench.hear(&bytes[..count]) {
+                    device.write_all(&reply).expect("the terminal takes a reply");
+                }
+            }
+            bench
+        });
+        talk(&mut client);
+        drop(client);
+        served.join().expect("the device did not panic")
+    })
+}
+
+/// The error number of a refusal.
+fn number<T: std::fmt::Debug>(result: Result<T, TransferError>) -> u8 {
+    match result {
+        Err(TransferError::ReadError(ReadError::MotorError(MotorError { raw }))) => raw & 0x7F,
+        other => panic!("not refused by the device: {other:?}"),
+    }
+}
+
+#[test]
+fn a_foreign_client_reads_and_writes() {
+    let mut bench = Bench::new();
+    bench.status.contact.force = fingertip::config::newtons(1234);
+    let bench = with_client(bench, |client| {
+        let pong = client.ping(ID).expect("a ping");
+        assert_eq!((pong.motor_id, pong.data.model, pong.data.firmware, pong.alert), (ID, 0x5446, 1, false));
+        assert_eq!(client.read_u32(ID, address::PRESENT_FORCE_MN).expect("a read").data, 1234);
+        client.write_u32(ID, address::GOAL_FORCE_MN, 2500).expect("a write");
+        assert_eq!(client.read_u32(ID, address::GOAL_FORCE_MN).expect("a read").data, 2500);
+        let codes = client.read(ID, address::RAW_CODES, 220).expect("a read").data.to_vec();
+        assert_eq!((codes.len(), codes[218], codes[219]), (220, 0x55, 0x04));
+        client.reg_write_u8(ID, address::BUS_WATCHDOG, 10).expect("a reg write");
+        client.action(ID).expect("an action");
+        assert_eq!(client.read_u8(ID, address::BUS_WATCHDOG).expect("a read").data, 10);
+    });
+    assert_eq!(bench.server.command().bus_watchdog_ms, 200);
+}
+
+#[test]
+fn a_foreign_client_talks_to_all() {
+    with_client(Bench::new(), |client| {
+        client.write_instruction(254, 0x01, 0, |_| ()).expect("a broadcast ping");
+        let reply = client.read_status_response(3).expect("an answer");
+        assert_eq!((reply.packet_id(), reply.parameters()), (ID, &b"FT\x01"[..]));
+        let goal = SyncWriteData { motor_id: ID, data: 700u32 };
+        client.sync_write_u32(address::GOAL_FORCE_MN, &[goal]).expect("a sync write");
+        let goals = client.sync_read_u32(&[ID], address::GOAL_FORCE_MN).expect("a sync read");
+        assert_eq!(goals.iter().map(|goal| goal.data).collect::<Vec<_>>(), [700]);
+    });
+}
+
+#[test]
+fn a_foreign_client_understands_stuffed_data() {
+    let mut bench = Bench::new();
+    bench.status.sequence = 0x00FD_FFFF;
+    with_client(bench, |client| {
+        assert_eq!(client.read_u32(ID, address::FRAME_COUNTER).expect("a read").data, 0x00FD_FFFF);
+        let params = client.write_u32(ID, address::PARAMS, 0x00FD_FFFF);
+        assert_eq!(number(params), 4, "out of range, not damaged");
+    });
+}
+
+#[test]
+fn a_foreign_client_understands_refusals_and_the_alert() {
+    let mut bench = Bench::new();
+    bench.set_fault(Some(Fault::SupplyLow));
+    let bench = with_client(bench, |client| {
+        assert!(client.ping(ID).expect("a ping").alert);
+        assert_eq!(number(client.write_u8(ID, address::TORQUE_ENABLE, 1)), 1);
+        assert_eq!(number(client.transfer_single(ID, 0x11, 0, 0, |_| ()).map(|_| ())), 2);
+        assert_eq!(number(client.write_u32(ID, address::GOAL_FORCE_MN, 200_000)), 4);
+        assert_eq!(number(client.write_u16(ID, address::GOAL_FORCE_MN, 1)), 5);
+        assert_eq!(number(client.write_u32(ID, address::GOAL_FORCE_MN, 7_001)), 6);
+        assert_eq!(number(client.write_u16(ID, address::MODEL_NUMBER, 1)), 7);
+        assert_eq!(number(client.read(ID, 9_999, 1).map(|_| ())), 7);
+        client.factory_reset(ID, FactoryResetKind::KeepIdAndBaudRate).expect("a factory reset");
+        client.reboot(ID).expect("a reboot");
+    });
+    let mut server = bench.server;
+    let actions = server.take_actions();
+    assert!(actions.save && actions.reboot);
+}

@@ -1,11 +1,13 @@
 //! Second names of registers: for drivers whose addresses or lengths have 8 bits, and for those of X-series servos.
 
+use crate::bench::Bench;
+use fingertip::link::packet::StatusError;
+use fingertip::link::table::indirect::{BLOCK, COUNT};
 use fingertip::link::table::{Access, READ_MAX, mirrors};
+use fingertip::params::Params;
 use fingertip::shipped::{REGISTERS, TAXELS, address};
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, MillimetresPerSecond};
-
-use crate::bench::Bench;
 
 fn busy() -> Bench {
     let mut bench = Bench::new();
@@ -93,7 +95,7 @@ fn state_time_and_pressures_fit_one_read_of_255_bytes() {
     assert_eq!(owned, length, "no gap between");
 }
 
-/// What drivers of X-series servos read and write under their own names.
+/// Registers that drivers of X-series servos read and write under their own names.
 #[test]
 fn a_servos_driver_finds_effort_speed_and_supply() {
     let mut bench = busy();
@@ -132,4 +134,190 @@ fn read_only_mirrors_stay_read_only() {
         let access = |address| REGISTERS.iter().find(|register| register.address == address).expect("one").access;
         assert_eq!(access(mirror) == Access::ReadOnly, access(of) == Access::ReadOnly);
     }
+}
+
+// Indirect addresses and data: read and written as the registers that they lead to.
+
+/// Address and data of each block.
+const BLOCKS: [(u16, u16); 2] = [
+    (address::INDIRECT_ADDRESS_1, address::INDIRECT_DATA_1),
+    (address::INDIRECT_ADDRESS_29, address::INDIRECT_DATA_29),
+];
+
+/// Leads bytes from `place` on to addresses that follow each other.
+fn lead(bench: &mut Bench, block: u16, place: u16, target: u16, bytes: u16) {
+    let addresses: Vec<u8> = (target..target + bytes).flat_map(u16::to_le_bytes).collect();
+    assert_eq!(bench.write(block + 2 * place, &addresses), Ok(()));
+}
+
+/// The blocks are where drivers of X-series servos expect them.
+#[test]
+fn the_first_block_stands_where_servos_have_it() {
+    assert_eq!(BLOCKS[0], (168, 224));
+    assert_eq!((BLOCK, COUNT), (28, 56));
+    for (addresses, data) in BLOCKS {
+        assert_eq!(addresses + 2 * BLOCK as u16, data, "one right after the other");
+    }
+}
+
+#[test]
+fn every_readable_byte_can_be_led_to() {
+    let mut bench = Bench::new();
+    bench.status.mode = Mode::Force;
+    bench.status.contact.force = fingertip::config::newtons(1_234);
+    let indirect = |name: &str| name.starts_with("INDIRECT");
+    // Not what the reads and writes themselves change.
+    let counts = [address::GOOD_PACKETS, address::SAVED_STATE];
+    let mut led_to = 0;
+    for register in REGISTERS.iter().filter(|register| register.address >= 64 && !indirect(register.name)) {
+        for offset in (0..register.bytes()).step_by(BLOCK) {
+            let bytes = (register.bytes() - offset).min(BLOCK as u16);
+            for (addresses, data) in BLOCKS {
+                lead(&mut bench, addresses, 0, register.address + offset, bytes);
+                let direct = bench.read(register.address + offset, bytes);
+                if counts.contains(&register.address) {
+                    continue;
+                }
+                assert_eq!(bench.read(data, bytes), direct, "{}", register.name);
+                led_to += 1;
+            }
+        }
+    }
+    assert!(led_to > 2 * (REGISTERS.len() - 20), "{led_to}");
+}
+
+#[test]
+fn bytes_are_gathered_from_anywhere_in_one_read() {
+    let mut bench = Bench::new();
+    bench.status.contact.force = fingertip::config::newtons(1_234);
+    bench.status.fault = Some(Fault::Bridge);
+    let (addresses, data) = BLOCKS[1];
+    lead(&mut bench, addresses, 0, address::PRESENT_FORCE_MN, 4);
+    lead(&mut bench, addresses, 4, address::FAULT, 1);
+    lead(&mut bench, addresses, 5, address::PRESSURES + 198, 2);
+    lead(&mut bench, addresses, 7, address::PARAMS + 3, 2); // across two parameters
+    let expected = [&1_234i32.to_le_bytes()[..], &[11], &20_099u16.to_le_bytes(), &[0, 0x90], &[0; 19]].concat();
+    assert_eq!(bench.read(data, 28), Ok(expected.clone()));
+    // From the middle of the addresses into the data, and byte by byte.
+    for (place, byte) in expected.iter().enumerate() {
+        assert_eq!(bench.read(data + place as u16, 1), Ok(vec![*byte]), "{place}");
+    }
+    let across = bench.read(addresses, 84).expect("addresses and data");
+    assert_eq!((&across[..4], &across[56..]), (&[0x0C, 0x01, 0x0D, 0x01][..], &expected[..]));
+    assert!(bench.read(addresses - 20, READ_MAX).is_ok(), "gaps around them");
+}
+
+#[test]
+fn a_write_reaches_whole_registers_by_their_own_rules() {
+    let mut bench = Bench::new();
+    let (addresses, data) = BLOCKS[0];
+    lead(&mut bench, addresses, 0, address::GOAL_FORCE_MN, 4);
+    lead(&mut bench, addresses, 4, address::TORQUE_ENABLE, 1);
+    lead(&mut bench, addresses, 5, address::PRESENT_MODE, 1);
+    lead(&mut bench, addresses, 6, address::PARAMS, 4);
+    let goal = |mn: i32| mn.to_le_bytes();
+    assert_eq!(bench.write(data, &goal(1_500)), Ok(()));
+    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 1_500);
+    assert_eq!(bench.write(data, &[&goal(1_600)[..], &[1]].concat()), Ok(()), "two registers at once");
+    assert!(bench.server.command().torque);
+
+    for (at, bytes, error, what) in [
+        (data, &goal(8_000)[..], StatusError::Limit, "beyond force_max_mn"),
+        (data, &goal(-1)[..], StatusError::Range, "out of its range"),
+        (data, &goal(1)[..3], StatusError::Length, "not to its end"),
+        (data + 1, &goal(1)[..3], StatusError::Length, "from its middle"),
+        (data + 5, &[0][..], StatusError::Access, "read only"),
+        (data + 6, &20_000i32.to_le_bytes()[..], StatusError::Access, "stored, and torque is on"),
+        (data + 10, &[0][..], StatusError::Access, "leads nowhere"),
+        (data, &[&goal(500)[..], &[2]].concat()[..], StatusError::Range, "the second is refused"),
+        (data, &[&goal(500)[..], &[1, 0]].concat()[..], StatusError::Access, "the third is refused"),
+        (data + 4, &[0; 40][..], StatusError::Access, "into what is read only"),
+    ] {
+        let before = *bench.server.settings();
+        assert_eq!(bench.write(at, bytes), Err(error as u8), "{what}");
+        assert_eq!(*bench.server.settings(), before, "{what}: nothing half-written");
+    }
+    bench.write(address::TORQUE_ENABLE, &[0]).expect("off");
+    assert_eq!(bench.write(data + 6, &9_000i32.to_le_bytes()), Ok(()));
+    assert_eq!(bench.number(address::PARAMS, 4), 9_000);
+}
+
+/// Bytes of a register in another order, or of two registers, are no register.
+#[test]
+fn what_is_led_to_in_pieces_cannot_be_written() {
+    let mut bench = Bench::new();
+    let (addresses, data) = BLOCKS[0];
+    for (place, offset) in [0, 1, 3, 2].into_iter().enumerate() {
+        lead(&mut bench, addresses, place as u16, address::GOAL_FORCE_MN + offset, 1);
+    }
+    assert_eq!(bench.write(data, &[0; 4]), Err(5));
+    // The register's end would lie in the other block.
+    lead(&mut bench, addresses, 26, address::GOAL_FORCE_MN, 2);
+    lead(&mut bench, BLOCKS[1].0, 0, address::GOAL_FORCE_MN + 2, 2);
+    assert_eq!(bench.write(data + 26, &[0; 2]), Err(5));
+    assert_eq!(bench.write(data + 26, &[0; 4]), Err(5));
+    assert_eq!(bench.read(data + 26, 2), Ok(vec![0, 0]));
+}
+
+/// One packet may say where its bytes go, and bring them.
+#[test]
+fn addresses_count_from_the_same_write_on() {
+    let mut bench = Bench::new();
+    let (addresses, _) = BLOCKS[0];
+    let targets = (address::GOAL_FORCE_MN..).take(4).chain([0; 24]).flat_map(u16::to_le_bytes);
+    let bytes: Vec<u8> = targets.chain(700i32.to_le_bytes()).collect();
+    assert_eq!(bench.write(addresses, &bytes), Ok(()));
+    assert_eq!(bench.number(address::GOAL_FORCE_MN, 4), 700);
+    // Refused as a whole: the addresses stay.
+    let elsewhere: Vec<u8> = [address::MIRROR_GOAL_MN; 28].into_iter().flat_map(u16::to_le_bytes).collect();
+    assert_eq!(bench.write(addresses, &[elsewhere, vec![1, 2]].concat()), Err(5));
+    assert_eq!(bench.number(addresses, 2), u32::from(address::GOAL_FORCE_MN));
+}
+
+#[test]
+fn none_leads_to_another_nor_below_64_nor_into_a_gap() {
+    let mut bench = Bench::new();
+    let last = REGISTERS.last().expect("registers");
+    let end = last.address + last.bytes();
+    let (addresses, data) = BLOCKS[1];
+    let indirect =
+        |target: u16| BLOCKS.iter().any(|&(addresses, data)| (addresses..data + BLOCK as u16).contains(&target));
+    let owned = |target: u16| {
+        REGISTERS.iter().any(|register| (register.address..register.address + register.bytes()).contains(&target))
+    };
+    // What the talk itself counts is not compared.
+    let counts = address::RESULT_ERRORS..address::GOOD_PACKETS + 4;
+    let mut led_to = 0;
+    for target in (0..end + 100).chain([u16::MAX]) {
+        let good = target == 0 || target >= 64 && owned(target) && !indirect(target);
+        let expected = if good { Ok(()) } else { Err(StatusError::Range as u8) };
+        assert_eq!(bench.write(addresses + 10, &target.to_le_bytes()), expected, "{target}");
+        led_to = if good { target } else { led_to };
+        assert_eq!(bench.number(addresses + 10, 2), u32::from(led_to));
+        if !counts.contains(&led_to) {
+            let byte = if led_to == 0 { Ok(vec![0]) } else { bench.read(led_to, 1) };
+            assert_eq!(bench.read(data + 5, 1), byte, "{target}");
+        }
+    }
+}
+
+/// Stored registers below 64 stay out of reach; all parameters are within it, also the last one.
+#[test]
+fn indirection_reaches_every_parameter() {
+    let mut bench = Bench::new();
+    let last = address::PARAMS + 4 * (Params::COUNT as u16 - 1);
+    let stored = REGISTERS.iter().filter(|register| register.access == Access::Stored && register.address >= 64);
+    assert_eq!(stored.count(), Params::COUNT + 1, "and the gains");
+    lead(&mut bench, BLOCKS[0].0, 0, last, 4);
+    let value = bench.read(last, 4).expect("a parameter");
+    assert_eq!(bench.write(BLOCKS[0].1, &value), Ok(()));
+}
+
+#[test]
+fn a_reset_of_the_stored_registers_leaves_them_and_a_new_server_has_none() {
+    let mut bench = Bench::new();
+    lead(&mut bench, BLOCKS[0].0, 0, address::FAULT, 1);
+    assert_eq!(bench.ask(0x06, &[0x02]).number(), 0);
+    assert_eq!(bench.number(BLOCKS[0].0, 2), u32::from(address::FAULT));
+    assert_eq!(Bench::new().read(BLOCKS[0].0, 84), Ok(vec![0; 84]));
 }

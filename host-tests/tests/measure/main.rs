@@ -1,8 +1,278 @@
 //! Motions that measure: what begins, what ends them, and what is left of them.
 
-mod finger;
 mod interrupted;
-mod properties;
-mod record;
-mod refused;
 mod series;
+
+use crate::series::{Record, decode};
+use fingertip::capture::{Capture, Ended as CaptureEnded, State as Kept};
+use fingertip::config::newtons;
+use fingertip::contact::Contact;
+use fingertip::control::SpeedLoop;
+use fingertip::measure::press::{HOLDS_MS, PARTS, Press, ROWS_MAX, Step, View};
+use fingertip::measure::{Ended, MeasureStatus, State, Task};
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{COLUMNS, Config, Picture, ROWS, TARE_FRAMES};
+use fingertip::units::Celsius;
+use host_tests::finger::config;
+use images::record::Record as Given;
+use sim::native::bench::Bench;
+use sim::setup::Setup;
+
+// A finger whose motions are recorded as on the board.
+
+struct Finger<const BYTES: usize = { 44 << 10 }> {
+    bench: Bench,
+    capture: Box<Capture<ROWS, COLUMNS, BYTES>>,
+}
+
+fn params() -> Params {
+    Params { direction_confirmed: 1, ..Params::DEFAULT }
+}
+
+impl<const BYTES: usize> Finger<BYTES> {
+    /// 5 mm from the wall, not tared.
+    fn with(params: &Params) -> Self {
+        let config = Config::shipped(params).expect("allowed");
+        Self { bench: Bench::of(&Setup::default(), &config), capture: Box::new(Capture::NEW) }
+    }
+
+    /// Tared, torque off.
+    fn tared() -> Self {
+        let mut finger = Self::with(&params());
+        finger.bench.command().tare_request += 1;
+        (0..TARE_FRAMES + 2).for_each(|_| _ = finger.frame());
+        finger
+    }
+
+    /// The motion in its first frame, with the torque that it needs.
+    fn begun(task: Task) -> Self {
+        let mut finger = Self::tared();
+        finger.begin(task);
+        finger
+    }
+
+    fn begin(&mut self, task: Task) {
+        self.bench.command().torque = task == Task::Press;
+        for _ in 0..3_000 {
+            self.frame();
+        }
+        self.bench.request(task);
+        let status = self.frame();
+        assert_eq!(
+            (status.measure.task, status.measure.state),
+            (task, fingertip::measure::State::Running),
+            "{status:?}"
+        );
+    }
+
+    fn frame(&mut self) -> Status {
+        self.frame_with(|_| {})
+    }
+
+    /// A frame as the board takes it, where somebody changes what the core is given.
+    fn frame_with(&mut self, change: impl FnOnce(&mut Given)) -> Status {
+        let Self { bench, capture } = self;
+        let due = capture.is_due(bench.status(), &bench.record().command);
+        if due {
+            capture.begin(bench.pipeline());
+        }
+        let mut given = bench.record();
+        let status = bench.step_with(|record| {
+            change(record);
+            given = *record;
+        });
+        capture.record(&given.frame, &given.sense, &given.command, &status);
+        capture.follow(bench.pipeline());
+        status
+    }
+
+    /// Steps until the motion ends; its last frame.
+    fn ends(&mut self) -> Status {
+        for _ in 0..400_000 {
+            let status = self.frame();
+            if status.measure.state != fingertip::measure::State::Running {
+                return status;
+            }
+        }
+        panic!("no end: {:?}", self.bench.status());
+    }
+
+    /// The record, which must be closed.
+    fn record(&self) -> Record {
+        assert_eq!(self.capture.standing().state, Kept::Done);
+        decode(self.capture.data())
+    }
+
+    /// The motion and its record have the same end.
+    fn assert_ended(&self, task: Task, ended: Ended) {
+        let measure = self.bench.status().measure;
+        assert_eq!((measure.task, measure.ended), (task, ended), "{measure:?}");
+        if task != Task::Jog {
+            let record = self.record();
+            assert_eq!((record.ended, record.value), (ended as u8, measure.value));
+            assert_eq!(
+                (record.kind, record.rows),
+                (if task == Task::Press { 1 } else { 2 }, self.capture.standing().frames)
+            );
+        }
+    }
+}
+
+// What a motion leaves in the memory, and who else wants it.
+
+#[test]
+fn a_press_is_recorded_whole() {
+    let mut finger = Finger::<{ 44 << 10 }>::begun(Task::Press);
+    finger.ends();
+    finger.assert_ended(Task::Press, Ended::Complete);
+    let record = finger.record();
+    assert!(record.steps.len() <= ROWS_MAX && record.steps.len() > 80, "{} rows", record.steps.len());
+    // In and back twice, and a hold without motion.
+    let turns = record.steps.windows(2).filter(|pair| pair[0].back != pair[1].back).count();
+    assert_eq!(turns, 3);
+    let held = record
+        .steps
+        .windows(2)
+        .filter(|pair| {
+            pair[1].counts[0].abs_diff(pair[0].counts[1]) < 20
+                && !pair[1].back
+                && pair[1].counts[0].abs_diff(pair[1].counts[1]) < 20
+        })
+        .count();
+    assert!(held + 1 >= HOLDS_MS.len(), "{held} rows of a hold");
+    for pair in record.steps.windows(2) {
+        // Those in which the step before is handed over are left out.
+        assert_eq!(pair[0].frames[1].wrapping_add(PARTS.into()), pair[1].frames[0]);
+    }
+    let deepest = record.steps.iter().map(|step| step.means.iter().sum::<f64>()).fold(0.0, f64::max);
+    assert!(deepest > 1_000.0, "{deepest} codes");
+}
+
+#[test]
+fn strokes_are_recorded_whole() {
+    let mut finger = Finger::<{ 44 << 10 }>::begun(Task::Strokes);
+    finger.ends();
+    finger.assert_ended(Task::Strokes, Ended::Complete);
+    let record = finger.record();
+    let strokes = record.samples.iter().filter(|[count, _]| *count == i16::MIN).count();
+    assert_eq!((strokes, record.delay_ns), (32, 33_000));
+    assert!(finger.capture.standing().bytes < 40 << 10, "{} bytes", finger.capture.standing().bytes);
+}
+
+/// The rows that fit are kept, and the record is closed as full; the motion goes on.
+#[test]
+fn a_memory_that_is_full_keeps_what_it_has() {
+    let mut finger = Finger::<{ 2 << 10 }>::begun(Task::Press);
+    assert_eq!(finger.ends().measure.state, State::Done);
+    let (record, standing) = (finger.record(), finger.capture.standing());
+    assert_eq!((record.ended, record.value, record.rows), (Ended::Full as u8, 5, 5));
+    assert_eq!((standing.ended, standing.frames), (CaptureEnded::Full, 5));
+}
+
+/// Armed: the motion takes the memory. Recording: the frames keep it, and the motion has no record.
+#[test]
+fn a_capture_and_a_motion_share_the_memory() {
+    let mut finger = Finger::<{ 44 << 10 }>::tared();
+    finger.capture.arm();
+    finger.begin(Task::Press);
+    finger.capture.arm();
+    finger.ends();
+    finger.assert_ended(Task::Press, Ended::Complete);
+
+    let mut finger = Finger::<{ 44 << 10 }>::tared();
+    finger.capture.arm();
+    finger.bench.command().tare_request += 1;
+    (0..330).for_each(|_| _ = finger.frame());
+    assert_eq!(finger.capture.standing().state, Kept::Recording);
+    finger.bench.request(Task::Strokes);
+    (0..5).for_each(|_| _ = finger.frame());
+    assert_eq!(finger.bench.status().measure.state, State::Running);
+    finger.capture.end(CaptureEnded::Asked);
+    assert_eq!(finger.capture.data()[..3], *b"FTC");
+    let frames = finger.capture.standing().frames;
+    assert_eq!(frames, 335);
+    finger.ends();
+    assert_eq!((finger.capture.standing().frames, finger.capture.standing().count), (frames, 1));
+}
+
+// Whatever a press is shown, its record has a bound; whatever a finger is shown, motions neither panic nor overflow.
+
+/// Frames of 83 us to 10 ms, an encoder that moves, jumps or rests, and a force that comes and goes.
+#[test]
+fn a_press_has_no_more_rows_than_stated() {
+    let mut most = 0;
+    for seed in 0..400 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut config = config();
+        config.timing.frame_ns = random.u32(83_000..10_000_000);
+        let (mut motion, mut standing) = (SpeedLoop::new(), MeasureStatus::running(Task::Press));
+        let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, Picture::EMPTY);
+        let mut contact = Contact::default();
+        motion.observe(0, &config);
+        let mut press = Press::begin(&motion);
+        let (mut encoder, mut rows, mut sequence) = (0_i32, 0, 0_u32);
+        let stride = [3, 60, 600, 40_000][random.usize(0..4)];
+        while press.running() && sequence < 40_000 {
+            sequence += 1;
+            if random.u32(0..40) == 0 {
+                contact.force = newtons([0, 50, 2_000][random.usize(0..3)]);
+            }
+            if random.u32(0..500) == 0 {
+                picture.taxels = [[random.i32(-200_000..200_000); COLUMNS]; ROWS];
+                picture.bad_count = random.u16(0..2);
+            }
+            encoder = encoder.wrapping_add(random.i32(-stride..=stride));
+            motion.observe(encoder, &config);
+            let chip = random.bool().then(|| Celsius::from_bits(random.i32(..)));
+            let view = View {
+                sequence,
+                picture: &picture,
+                contact: &contact,
+                encoder,
+                motion: &motion,
+                applied_mv: random.i32(-20_000..20_000),
+                chip,
+            };
+            press.observe(&view, &mut step, &mut standing, &config);
+            rows += usize::from(press.part() == Some(0));
+        }
+        most = most.max(rows);
+        assert!(rows <= ROWS_MAX, "seed {seed}: {rows} rows");
+        assert_eq!(press.running(), standing.state == State::Running);
+    }
+    assert!(most > ROWS_MAX / 2, "{most} rows at most: the inputs show nothing");
+}
+
+/// Codes, counts and supplies of any kind while a motion is under way.
+#[test]
+fn a_motion_takes_anything_and_closes_its_record() {
+    for seed in 0..60 {
+        let mut random = fastrand::Rng::with_seed(seed);
+        let task = [Task::Jog, Task::Strokes, Task::Press][seed as usize % 3];
+        let mut finger = Finger::<{ 44 << 10 }>::begun(task);
+        (0..random.u32(0..30_000)).for_each(|_| _ = finger.frame());
+        let odd = random.u32(2..200);
+        for _ in 0..3_000 {
+            finger.frame_with(|record| {
+                if random.u32(0..odd) == 0 {
+                    let code = random.u16(..);
+                    record.frame.set_code(random.usize(0..=ROWS), random.usize(0..COLUMNS), code);
+                    record.sense.encoder = record.sense.encoder.wrapping_add(random.i32(-60..60));
+                    record.sense.chip = Some(Celsius::from_bits(random.i32(..)));
+                }
+                if random.u32(0..20 * odd) == 0 {
+                    record.sense.encoder = random.i32(..);
+                    record.sense.supply_mv = random.u16(..);
+                }
+            });
+        }
+        finger.bench.request(Task::Stop);
+        finger.frame();
+        if finger.ends().measure.state != State::None && task != Task::Jog {
+            let record = decode(finger.capture.data());
+            assert!(task != Task::Press || record.steps.len() <= ROWS_MAX);
+        }
+        assert_ne!(finger.capture.standing().state, Kept::Recording);
+    }
+}

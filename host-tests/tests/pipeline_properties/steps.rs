@@ -1,7 +1,6 @@
 //! Runs of steps, judged one by one.
 
-use crate::inputs::{Arguments, Input, any_inputs};
-use crate::params::{any_params, config};
+use crate::{Arguments, Input, any_inputs, any_params, config};
 use fingertip::measure::{Ended, State, Task};
 use fingertip::params::Params;
 use fingertip::pipeline::{Status, Taring};

@@ -1,7 +1,290 @@
 //! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can
 //! bring.
 
-mod closed_loop;
-mod finger;
 mod rates;
 mod worst;
+
+use fingertip::command::Command;
+use fingertip::config::{Shaped, newtons};
+use fingertip::contact::FitLevel;
+use fingertip::frame::{Frame, Sense, Shape};
+use fingertip::params::Params;
+use fingertip::pipeline::{Pipeline, Status};
+use fingertip::scan::Clocks;
+use fingertip::shipped::CLOCKS;
+use fingertip::state::Mode;
+use fingertip::units::CoreCycles;
+use images::record::Digest;
+use sim::bridge::Bridge;
+use sim::mechanics::cells::Cell;
+use sim::mechanics::dynamics::Dynamics;
+use sim::mechanics::rotor::{Shaft, Source};
+use sim::native::DUTY_DELAY_SLOTS;
+use sim::setup::Setup;
+
+// A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end
+// and motor.
+
+/// The finger with its controller.
+struct Finger<const ROWS: usize, const COLUMNS: usize> {
+    setup: Setup,
+    pipeline: Pipeline<ROWS, COLUMNS>,
+    command: Command,
+    /// Of every step.
+    digest: Digest,
+    frame: Frame<ROWS, COLUMNS>,
+    shaft: Shaft,
+    slot_s: f64,
+    idle_s: f64,
+    bridge: Bridge,
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
+    /// With taxels so far apart, whose array meets the plane there.
+    fn new(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel) -> Self {
+        Self::with_clocks(pitch_um, centre_mm, fit_level, &CLOCKS)
+    }
+
+    /// The same on a board with other clocks.
+    fn with_clocks(pitch_um: i32, centre_mm: [f64; 2], fit_level: FitLevel, clocks: &Clocks) -> Self {
+        let params = Params { pitch_um, ..images::CONFIRMED };
+        let config = Shaped::<ROWS, COLUMNS>::new(&params, clocks).expect("a pitch that is allowed");
+        let mut setup = Setup::default();
+        setup.array.pitch_mm = f64::from(pitch_um) * 1e-3;
+        [setup.wall.centre_x_mm, setup.wall.centre_y_mm] = centre_mm;
+        Self {
+            setup,
+            pipeline: Pipeline::new(&config),
+            command: Command { fit_level, ..Command::default() },
+            digest: Digest::new(),
+            frame: Frame::EMPTY,
+            shaft: Shaft::default(),
+            slot_s: f64::from(config.timing.slot.0) / f64::from(clocks.timer_hz),
+            idle_s: f64::from(config.timing.idle.0) / f64::from(clocks.timer_hz),
+            bridge: Bridge::Coast,
+        }
+    }
+
+    fn indentation_mm(&self) -> f64 {
+        let travel_mm = Dynamics::new(&self.setup).travel_mm(self.shaft.angle_rad);
+        (travel_mm - self.setup.wall.distance_mm).max(0.0)
+    }
+
+    /// The true contact force.
+    fn force_n(&self) -> f64 {
+        self.setup.tip.force_n(self.indentation_mm())
+    }
+
+    fn frame_s(&self) -> f64 {
+        self.slot_s * Shape::<ROWS, COLUMNS>::SLOTS as f64 + self.idle_s
+    }
+
+    fn advance(&mut self, seconds: f64) {
+        let supply = &self.setup.supply;
+        let source = match self.bridge {
+            Bridge::Coast => Source::OPEN,
+            Bridge::Driven { duty } => {
+                let ohms = supply.circuit_ohm(&self.setup.motor, duty);
+                Source { volts: duty * supply.source_v, ohms, ..Source::OPEN }
+            }
+        };
+        self.shaft = Dynamics::new(&self.setup).advance(self.shaft, seconds, &source);
+    }
+
+    /// The codes of a row under the present load, or of the slot with none driven.
+    fn scan(&mut self, slot: usize) {
+        let array = self.setup.array;
+        let tip = self.setup.tip.flattened(self.indentation_mm());
+        let [centre_x, centre_y] = [self.setup.wall.centre_x_mm, self.setup.wall.centre_y_mm];
+        let side = |place: usize, of: usize, centre: f64| {
+            let low = (place as f64 - 0.5 * of as f64) * array.pitch_mm - centre;
+            [low, low + array.pitch_mm]
+        };
+        let siemens: [f64; COLUMNS] = core::array::from_fn(|column| {
+            let cell = Cell { x_mm: side(column, COLUMNS, centre_x), y_mm: side(slot, ROWS, centre_y) };
+            array.preload_siemens + array.siemens_per_kpa * cell.mean_kpa(&tip)
+        });
+        let driven = if slot < ROWS { array.feedback_ohm * array.drive_v } else { 0.0 };
+        let scale = driven / (1.0 + array.row_ohm * siemens.iter().sum::<f64>());
+        for (column, siemens) in siemens.into_iter().enumerate() {
+            let volts = (array.ground_v + siemens * scale).min(array.reference_v);
+            self.frame.set_code(slot, column, array.code(volts));
+        }
+    }
+
+    /// A frame, row by row while the finger moves on, and a control step.
+    fn step(&mut self) -> Status {
+        let slots = Shape::<ROWS, COLUMNS>::SLOTS;
+        if self.idle_s > 0.0 {
+            // The duty acts at once, and the scan follows the idle time.
+            self.bridge = Bridge::of(self.pipeline.status());
+            let steps = (self.idle_s / self.slot_s).ceil() as u32;
+            (0..steps).for_each(|_| self.advance(self.idle_s / f64::from(steps)));
+        }
+        for slot in 0..slots {
+            if slot == DUTY_DELAY_SLOTS.min(slots - 1) {
+                self.bridge = Bridge::of(self.pipeline.status());
+            }
+            self.advance(self.slot_s);
+            self.scan(slot);
+        }
+        self.frame.sequence = self.frame.sequence.wrapping_add(1);
+        let status = self.repeat();
+        assert_eq!(status.fault, None, "at {} N", self.force_n());
+        status
+    }
+
+    /// A control step with the frame of the last one.
+    fn repeat(&mut self) -> Status {
+        let turns = self.shaft.angle_rad / core::f64::consts::TAU;
+        let encoder = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
+        let supply_mv = (self.setup.supply.source_v * 1e3) as u16;
+        let sense =
+            Sense { encoder, supply_mv, bus_silent_ms: 0, bridge_fault: false, chip: None, answer: CoreCycles(0) };
+        let (duty, status) = self.pipeline.step(&self.frame, &sense, &self.command);
+        let status = *status;
+        self.digest.add(duty, &status);
+        status
+    }
+
+    /// Runs for the given time, s, and returns the last status.
+    fn run(&mut self, seconds: f64) -> Status {
+        (0..(seconds / self.frame_s()) as u32).map(|_| self.step()).last().expect("a step")
+    }
+
+    /// Tares and enables torque with no goal.
+    fn start(&mut self) {
+        self.command.tare_request = self.command.tare_request.wrapping_add(1);
+        for _ in 0..fingertip::pressure::Array::<ROWS, COLUMNS>::TARE_FRAMES + 2 {
+            self.step();
+        }
+        self.command.torque = true;
+    }
+
+    /// Presses for the given time, s; returns the least and largest true force of the last 50 ms and the last status.
+    fn hold(&mut self, goal_mn: i32, seconds: f64) -> ([f64; 2], Status) {
+        self.command.goal = newtons(goal_mn);
+        self.run(seconds - 0.05);
+        let end = 0.05 / self.frame_s();
+        let mut forces = [f64::INFINITY, 0.0_f64];
+        for _ in 0..end as u32 {
+            self.step();
+            forces = [forces[0].min(self.force_n()), forces[1].max(self.force_n())];
+        }
+        let status = *self.pipeline.status();
+        assert_eq!(status.mode, Mode::Force);
+        (forces, status)
+    }
+}
+
+// The loop closed over a finger: it approaches, holds 1 N and 2 N, and lets go.
+
+/// Presses for a time: the true force stays within a share of the goal, and the centre within a distance of its place.
+/// Gives the share of the force that the array does not see, and the last status.
+fn presses<const ROWS: usize, const COLUMNS: usize>(
+    finger: &mut Finger<ROWS, COLUMNS>,
+    goal_mn: i32,
+    seconds: f64,
+    [share, off_mm]: [f64; 2],
+) -> (f64, Status) {
+    let ([least, most], status) = finger.hold(goal_mn, seconds);
+    let goal = f64::from(goal_mn) * 1e-3;
+    let seen = finger.pipeline.array().picture().force(finger.pipeline.config()).0.to_num::<f64>();
+    let hidden = 1.0 - seen / finger.force_n();
+    let centre = [status.contact.centre_x, status.contact.centre_y].map(|place| place.0.to_num::<f64>());
+    println!(
+        "{ROWS} x {COLUMNS}, {:?}: {goal} N held to {least:.4} .. {most:.4} N with {hidden:.3} hidden, centre \
+         {centre:.2?} mm, confidence {}",
+        finger.command.fit_level, status.contact.confidence
+    );
+    assert!(goal * (1.0 - share) < least && most < goal * (1.0 + share), "{least} .. {most} N");
+    let is = [finger.setup.wall.centre_x_mm, finger.setup.wall.centre_y_mm];
+    assert!(centre.iter().zip(is).all(|(found, place)| (found - place).abs() < off_mm), "{centre:?}");
+    (hidden, status)
+}
+
+/// The whole run; the digest of every step.
+fn run<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, fit_level: FitLevel) -> u64 {
+    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, [0.0, 0.0], fit_level);
+    finger.start();
+    for goal_mn in [1_000, 2_000] {
+        let (_, status) = presses(&mut finger, goal_mn, 0.6, [0.01, 0.05]);
+        assert_eq!((status.contact.bad_taxels, status.contact.doubt), (0, 0));
+    }
+    finger.command.goal = fingertip::units::Newtons::ZERO;
+    let status = finger.run(0.4);
+    assert_eq!((status.mode, finger.force_n()), (Mode::Release, 0.0));
+    finger.digest.value()
+}
+
+fn holds<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32) {
+    let digests = [(); 2].map(|()| run::<ROWS, COLUMNS>(pitch_um, FitLevel::OneRow));
+    assert_eq!(digests[0], digests[1], "the same run twice");
+    assert_ne!(run::<ROWS, COLUMNS>(pitch_um, FitLevel::AllRows), digests[0]);
+}
+
+#[test]
+fn three_by_three() {
+    holds::<3, 3>(4_000);
+}
+
+#[test]
+fn three_by_five() {
+    holds::<3, 5>(4_000);
+}
+
+#[test]
+fn four_by_four() {
+    holds::<4, 4>(3_500);
+}
+
+#[test]
+fn eight_by_eight() {
+    holds::<8, 8>(1_750);
+}
+
+#[test]
+fn ten_by_ten() {
+    holds::<10, 10>(1_500);
+}
+
+#[test]
+fn sixteen_by_sixteen() {
+    holds::<16, 16>(900);
+}
+
+#[test]
+fn sixteen_by_thirty_two() {
+    holds::<16, 32>(900);
+}
+
+/// A contact that reaches over the array's edge: what the array sees is too little, and the fit has to find the rest.
+/// Gives the share of the force that the array does not see.
+fn over_the_edge<const ROWS: usize, const COLUMNS: usize>(
+    pitch_um: i32,
+    centre_mm: [f64; 2],
+    fit_level: FitLevel,
+) -> f64 {
+    let mut finger = Finger::<ROWS, COLUMNS>::new(pitch_um, centre_mm, fit_level);
+    finger.start();
+    let hidden = [1_000, 2_000].map(|goal_mn| {
+        let (hidden, status) = presses(&mut finger, goal_mn, 0.8, [0.03, 0.15]);
+        assert!(status.contact.confidence > 200, "{}", status.contact.confidence);
+        hidden
+    });
+    hidden[1]
+}
+
+#[test]
+fn the_fit_finds_what_an_edge_hides() {
+    for fit_level in [FitLevel::OneRow, FitLevel::TwoRows, FitLevel::FiveRows, FitLevel::AllRows] {
+        let hidden = [
+            over_the_edge::<8, 8>(1_500, [4.5, 0.0], fit_level),
+            over_the_edge::<8, 8>(1_500, [-2.0, -4.0], fit_level),
+            over_the_edge::<16, 16>(750, [4.5, 1.0], fit_level),
+            over_the_edge::<16, 32>(700, [9.0, -4.0], fit_level),
+            over_the_edge::<9, 7>(1_500, [-3.5, 4.5], fit_level),
+        ];
+        assert!(hidden.iter().all(|hidden| (0.1..0.6).contains(hidden)), "{hidden:?}");
+    }
+}

@@ -1,6 +1,6 @@
 //! The loop closed at chosen frame rates, with one converter and with two.
 
-use super::finger::Finger;
+use super::Finger;
 use fingertip::config::newtons;
 use fingertip::contact::FitLevel;
 use fingertip::scan::Clocks;

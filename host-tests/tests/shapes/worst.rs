@@ -95,7 +95,7 @@ fn frames<const ROWS: usize, const COLUMNS: usize>() -> Vec<Frame<ROWS, COLUMNS>
     all
 }
 
-/// What the sums should be, in sixteenths of a code.
+/// Expected sums, in sixteenths of a code.
 fn sums<const ROWS: usize, const COLUMNS: usize>(
     frame: &Frame<ROWS, COLUMNS>,
     gain: u16,

@@ -1,6 +1,383 @@
 //! The parameters in flash: bytes, two sectors in turns, and losses of power at every word.
 
-mod bytes;
-mod nor;
-mod taken;
 mod tear;
+
+use crate::tear::{Nor, bits, record, with_gains};
+use fingertip::params::{ParamError, Params};
+use fingertip::shipped::{Config, Gains, Loaded, Record};
+use fingertip::store::{Flash as _, Journal, Remark, SLOT_BYTES, SaveError, Sector, number, settle};
+use host_tests::page::{PAGE, table};
+use sim::encode;
+
+// A record's bytes, and what is never taken for a record.
+
+const SIZE: usize = 8 * SLOT_BYTES;
+
+/// Result of a start with these bytes in a sector, and the other one blank.
+fn start_in(sector: Sector, bytes: &[u8]) -> (Loaded, Vec<Remark>) {
+    let mut nor = Nor::blank(SIZE);
+    nor.sector(sector)[..bytes.len()].copy_from_slice(bytes);
+    let mut remarks = Vec::new();
+    (Journal::new(&nor).load(&nor, |remark| remarks.push(remark)), remarks)
+}
+
+fn start(bytes: &[u8]) -> Loaded {
+    start_in(Sector::A, bytes).0
+}
+
+#[test]
+fn an_erased_board_has_the_defaults_and_no_fault() {
+    assert_eq!(start_in(Sector::A, &[]), (Loaded { record: Record::DEFAULT, sound: true }, vec![]));
+    let none = Nor::blank(0);
+    assert_eq!(Journal::new(&none).load(&none, |_| ()), Loaded { record: Record::DEFAULT, sound: true });
+}
+
+#[test]
+fn garbage_is_a_fault_with_the_defaults_and_the_next_save_ends_it() {
+    let garbage: Vec<u8> = (0..SIZE as u64).map(|place| bits(place) as u8).collect();
+    for both in [false, true] {
+        let other = if both { garbage.clone() } else { vec![0xFF; SIZE] };
+        let mut nor = Nor::new([garbage.clone(), other]);
+        let mut journal = Journal::new(&nor);
+        assert_eq!(
+            journal.load(&nor, |remark| assert_eq!(remark, Remark::NoneWhole)),
+            Loaded { record: Record::DEFAULT, sound: false }
+        );
+        assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(both));
+        assert_eq!(journal.save(&mut nor, &record(1), || ()), Ok(()));
+        let journal = Journal::new(&nor);
+        assert_eq!(journal.load(&nor, |_| ()), Loaded { record: record(1), sound: true });
+    }
+}
+
+/// Bytes of a record without what fills it up to the next one's place.
+fn whole() -> usize {
+    12 + 8 * names().len() + 4
+}
+
+#[test]
+fn the_bytes_are_the_documented_ones() {
+    let bytes = encode(&record(9), 0x1234_5678);
+    assert_eq!(bytes[..], of_values(&named(&record(9)), 0x1234_5678));
+    assert_eq!(bytes[..8], *b"FTPR\x78\x56\x34\x12");
+    assert_eq!(bytes[12..16], crc32(b"id").to_le_bytes());
+    assert_eq!(bytes[16..20], 9u32.to_le_bytes());
+}
+
+#[test]
+fn every_flipped_bit_of_the_newest_is_seen_and_the_one_before_counts() {
+    for sector in [Sector::A, Sector::B] {
+        let mut both = [encode(&record(1), 1), encode(&record(2), 2)].concat();
+        assert_eq!(start_in(sector, &both).0, Loaded { record: record(2), sound: true });
+        for place in SLOT_BYTES..SLOT_BYTES + whole() {
+            for bit in 0..8 {
+                both[place] ^= 1 << bit;
+                let (loaded, remarks) = start_in(sector, &both);
+                assert_eq!(loaded, Loaded { record: record(1), sound: false }, "bit {bit} of byte {place}");
+                assert_eq!(remarks, [Remark::Torn]);
+                both[place] ^= 1 << bit;
+            }
+        }
+    }
+}
+
+#[test]
+fn a_write_cut_short_anywhere_is_no_record() {
+    let bytes = encode(&record(2), 2);
+    for cut in 1..whole() {
+        let both = [&encode(&record(1), 1)[..], &bytes[..cut]].concat();
+        assert_eq!(start(&both), Loaded { record: record(1), sound: false }, "cut after {cut} bytes");
+        assert_eq!(start(&bytes[..cut]), Loaded { record: Record::DEFAULT, sound: false });
+    }
+}
+
+#[test]
+fn the_sequence_tells_which_sector_is_newer_also_where_it_wraps() {
+    for first in [0, 1, 0x7FFF_FFFF, 0x8000_0000, u32::MAX - 1, u32::MAX] {
+        let mut nor = Nor::blank(SIZE);
+        nor.sector(Sector::A)[..SLOT_BYTES].copy_from_slice(&encode(&record(1), first));
+        nor.sector(Sector::B)[..SLOT_BYTES].copy_from_slice(&encode(&record(2), first.wrapping_add(1)));
+        let load = |nor: &Nor| Journal::new(nor).load(nor, |_| ());
+        assert_eq!(load(&nor), Loaded { record: record(2), sound: true }, "{first}");
+        nor.sector(Sector::A)[..SLOT_BYTES].copy_from_slice(&encode(&record(3), first.wrapping_add(2)));
+        assert_eq!(load(&nor), Loaded { record: record(3), sound: true }, "{first}");
+        let mut journal = Journal::new(&nor);
+        assert_eq!(journal.save(&mut nor, &record(4), || ()), Ok(()));
+        assert_eq!(nor.bytes(Sector::A)[SLOT_BYTES + 4..][..4], first.wrapping_add(3).to_le_bytes());
+    }
+}
+
+#[test]
+fn a_count_that_no_record_has_is_none() {
+    for count in [257, 0x1000_0000, 0x2000_0000, u32::MAX] {
+        let mut bytes = encode(&record(1), 1);
+        bytes[8..12].copy_from_slice(&count.to_le_bytes());
+        assert_eq!(start(&bytes), Loaded { record: Record::DEFAULT, sound: false });
+    }
+}
+
+#[test]
+fn a_sector_with_older_records_is_not_written_before_it_is_erased() {
+    let mut nor = Nor::blank(SIZE);
+    for number in 0..7 {
+        let place = number as usize * SLOT_BYTES;
+        nor.sector(Sector::A)[place..place + SLOT_BYTES].copy_from_slice(&encode(&record(number), 9 + number as u32));
+    }
+    // What an erase that was cut short may leave: behind it some bits are weak.
+    nor.sector(Sector::B)[..SLOT_BYTES].copy_from_slice(&encode(&record(100), 1));
+    let mut journal = Journal::new(&nor);
+    assert_eq!(journal.save(&mut nor, &record(7), || ()), Ok(()));
+    assert_eq!(journal.save(&mut nor, &record(8), || ()), Err(SaveError::Full));
+    let mut journal = Journal::new(&nor);
+    assert_eq!(journal.make_room(&mut nor, SLOT_BYTES), Ok(true));
+    assert_eq!(journal.save(&mut nor, &record(8), || ()), Ok(()));
+    assert_eq!(Journal::new(&nor).load(&nor, |_| ()), Loaded { record: record(8), sound: true });
+}
+
+#[test]
+fn something_happens_before_each_word_of_a_save() {
+    let mut nor = Nor::blank(SIZE);
+    let mut fed = 0;
+    assert_eq!(Journal::new(&nor).save(&mut nor, &record(1), || fed += 1), Ok(()));
+    assert_eq!(fed, SLOT_BYTES / 4);
+}
+
+#[test]
+fn the_table_of_saves_is_fresh() {
+    PAGE.check(&table()).expect("docs/firmware.md");
+}
+
+// Values that a firmware loads from another firmware's record, and remarks on the rest.
+
+#[test]
+fn a_changed_layout_is_no_fault_and_every_known_value_is_taken() {
+    for other in OTHERS {
+        let (bytes, expected) = other.record(3, 9);
+        let (loaded, remarks) = start_in(Sector::B, &bytes);
+        assert_eq!(loaded, Loaded { record: expected, sound: true }, "{other:?}");
+        let expected = match other {
+            Other::None => vec![],
+            Other::More => vec![Remark::Unknown { number: number("one_more"), value: -5 }],
+            Other::Fewer => vec![Remark::New(LACKED)],
+            Other::Renamed => {
+                vec![Remark::Unknown { number: number("another_name"), value: 777 }, Remark::New(LACKED)]
+            }
+        };
+        assert_eq!(remarks, expected, "{other:?}");
+    }
+}
+
+#[test]
+fn the_order_of_the_values_does_not_count() {
+    let mut values = named(&record(8));
+    values.reverse();
+    assert_eq!(start_in(Sector::B, &of_values(&values, 1)).0, Loaded { record: record(8), sound: true });
+}
+
+#[test]
+fn a_value_out_of_its_range_is_its_default_and_a_fault() {
+    let heads =
+        [("id", 252), ("baud_code", 5), ("return_delay_2us", 254), ("fit_level", 5)].map(|(name, max)| (name, 0, max));
+    let params = Params::RANGES.iter().map(|(name, _, min, max)| (*name, *min, *max));
+    let whole = record(3);
+    for (place, (name, min, max)) in heads.into_iter().chain(params).enumerate() {
+        for value in [min - 1, max + 1, i32::MIN, i32::MAX] {
+            let mut values = named(&whole);
+            values[place].1 = value;
+            let (loaded, remarks) = start_in(Sector::B, &of_values(&values, 1));
+            assert_eq!(remarks, [Remark::Refused(ParamError { name, value, min, max })]);
+            assert!(!loaded.sound);
+            values[place].1 = named(&Record::DEFAULT)[place].1;
+            assert_eq!(named(&loaded.record), values, "all others are taken");
+        }
+        for value in [min, max] {
+            let mut values = named(&whole);
+            values[place].1 = value;
+            let (loaded, _) = start_in(Sector::B, &of_values(&values, 1));
+            assert!(loaded.sound);
+            assert_eq!(named(&loaded.record), values);
+        }
+    }
+}
+
+/// The gains as their documentation has them: two in a value, the first in its low half.
+fn with_gains_of(record: &Record, words: core::ops::Range<u32>, change: impl Fn(u32, u32) -> u32) -> Vec<u8> {
+    let mut bytes = of_values(&named(record), 1);
+    let values = bytes.len().saturating_sub(16) / 8;
+    let count = named(record).len() + words.len();
+    assert!(values <= count);
+    bytes.truncate(12 + 8 * named(record).len());
+    bytes[8..12].copy_from_slice(&(count as u32).to_le_bytes());
+    for word in words {
+        bytes.extend((crc32(b"gains_10x10").wrapping_add(word)).to_le_bytes());
+        bytes.extend(change(word, record.gains.word(word as usize)).to_le_bytes());
+    }
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    bytes.resize(bytes.len().next_multiple_of(16), 0xFF);
+    bytes
+}
+
+#[test]
+fn gains_are_stored_two_in_a_value_behind_the_parameters() {
+    let record = with_gains(4);
+    let bytes = with_gains_of(&record, 0..50, |_, gains| gains);
+    assert_eq!(bytes, encode(&record, 1));
+    assert_eq!(start_in(Sector::A, &bytes), (Loaded { record, sound: true }, vec![]));
+}
+
+#[test]
+fn gains_are_taken_all_or_not_at_all() {
+    let whole = with_gains(4);
+    let expected = Record { gains: Gains::ONE, ..whole };
+    let refused = |bytes: &[u8], taken| {
+        let error = ParamError { name: "gains", value: taken, min: 8_192, max: 32_767 };
+        assert_eq!(
+            start_in(Sector::A, bytes),
+            (Loaded { record: expected, sound: false }, vec![Remark::Refused(error)])
+        );
+    };
+    refused(&with_gains_of(&whole, 0..49, |_, gains| gains), 49);
+    refused(&with_gains_of(&whole, 1..50, |_, gains| gains), 49);
+    for bad in [0, 8_191, 0x8000, 0xFFFF] {
+        refused(
+            &with_gains_of(&whole, 0..50, |word, gains| if word == 17 { gains & 0xFFFF | bad << 16 } else { gains }),
+            49,
+        );
+    }
+    // None, or another array's: what this firmware has no name for.
+    let (loaded, remarks) = start_in(Sector::A, &with_gains_of(&whole, 50..60, |_, gains| gains));
+    assert_eq!(loaded, Loaded { record: expected, sound: true });
+    assert_eq!(remarks.len(), 10);
+}
+
+#[test]
+fn no_values_at_all_are_all_defaults() {
+    let (loaded, remarks) = start_in(Sector::B, &of_values(&[], 1));
+    assert_eq!(loaded, Loaded { record: Record::DEFAULT, sound: true });
+    assert_eq!(remarks.len(), named(&Record::DEFAULT).len());
+}
+
+#[test]
+fn what_contradicts_goes_back_to_its_defaults_and_the_rest_stays() {
+    let settled = |mut params: Params| {
+        let mut told = 0;
+        let made = settle(&mut params, Config::shipped, |_| told += 1);
+        assert_eq!(made.expect("a configuration").params, params);
+        (params, told)
+    };
+    let own = Params { pitch_um: 1_777, ..Params::DEFAULT };
+    assert_eq!(settled(own), (own, 0));
+    assert_eq!(settled(Params { contact_on_mn: 100, contact_off_mn: 200, ..own }), (own, 1));
+    assert_eq!(settled(Params { sample_cycles: 16, ..own }), (own, 1));
+    assert_eq!(settled(Params { pitch_um: 1, ..own }), (Params { pitch_um: 1_500, ..own }, 1));
+    // What goes back contradicts the next.
+    let (params, told) = settled(Params {
+        force_max_mn: 3_000,
+        force_fault_mn: 2_900,
+        contact_on_mn: 1_000,
+        contact_off_mn: 1_900,
+        ..own
+    });
+    assert!(told >= 2);
+    assert_eq!(params.pitch_um, 1_777);
+    // All at an end of their ranges.
+    for end in 0..2 {
+        let mut values = Params::RANGES.map(|(_, _, min, max)| [min, max][end]);
+        values[0] += 1 - 2 * end as i32;
+        settled(Params::from_array(&values));
+    }
+    // If nothing helps, a remark reports it.
+    let mut params = own;
+    let error = Config::shipped(&Params { pitch_um: 1, ..own }).expect_err("out of range");
+    assert!(settle(&mut params, |_| Err::<(), _>(error), |_| ()).is_none());
+    assert_eq!(params, Params::DEFAULT);
+}
+
+/// CRC-32 (ISO-HDLC), bit by bit.
+fn crc32(bytes: &[u8]) -> u32 {
+    let mut crc = !0u32;
+    for byte in bytes {
+        crc ^= u32::from(*byte);
+        for _ in 0..8 {
+            crc = if crc & 1 == 1 { crc >> 1 ^ 0xEDB8_8320 } else { crc >> 1 };
+        }
+    }
+    !crc
+}
+
+fn finish(mut bytes: Vec<u8>) -> Vec<u8> {
+    bytes.extend(crc32(&bytes).to_le_bytes());
+    bytes.resize(bytes.len().next_multiple_of(16), 0xFF);
+    bytes
+}
+
+/// The names before the parameters, and the parameters' names.
+fn names() -> Vec<&'static str> {
+    let head = ["id", "baud_code", "return_delay_2us", "fit_level"].into_iter();
+    head.chain(Params::RANGES.iter().map(|(name, ..)| *name)).collect()
+}
+
+/// Names and values of a record, in the order in which they are stored.
+fn named(record: &Record) -> Vec<(&'static str, i32)> {
+    let head = [record.id, record.baud_code, record.return_delay_2us, record.fit_level as u8];
+    let values = head.map(i32::from).into_iter().chain(record.params.to_array());
+    names().into_iter().zip(values).collect()
+}
+
+/// A record as its documentation describes it.
+fn of_values(values: &[(&str, i32)], sequence: u32) -> Vec<u8> {
+    let mut bytes = b"FTPR".to_vec();
+    bytes.extend(sequence.to_le_bytes());
+    bytes.extend((values.len() as u32).to_le_bytes());
+    for (name, value) in values {
+        assert_eq!(number(name), crc32(name.as_bytes()));
+        bytes.extend(number(name).to_le_bytes());
+        bytes.extend(value.to_le_bytes());
+    }
+    finish(bytes)
+}
+
+/// Difference of another firmware's records.
+#[derive(Clone, Copy, Debug)]
+enum Other {
+    /// Nothing: they are this one's.
+    None,
+    /// It has one parameter more.
+    More,
+    /// It has one fewer.
+    Fewer,
+    /// One parameter has another name.
+    Renamed,
+}
+
+const OTHERS: [Other; 4] = [Other::None, Other::More, Other::Fewer, Other::Renamed];
+
+/// The parameter that others lack.
+const LACKED: &str = "clearance_um";
+
+impl Other {
+    /// Bytes of its record with this number, and the record that this firmware has to load from them.
+    fn record(self, number: i32, sequence: u32) -> (Vec<u8>, Record) {
+        let mut whole = record(number);
+        whole.params.clearance_um = 777;
+        let mut lacking = whole;
+        lacking.params.clearance_um = Params::DEFAULT.clearance_um;
+        let mut values = named(&whole);
+        let place = values.iter().position(|(name, _)| *name == LACKED).expect("there is such a parameter");
+        match self {
+            Self::None => (of_values(&values, sequence), whole),
+            Self::More => {
+                values.insert(place, ("one_more", -5));
+                (of_values(&values, sequence), whole)
+            }
+            Self::Fewer => {
+                values.remove(place);
+                (of_values(&values, sequence), lacking)
+            }
+            Self::Renamed => {
+                values[place].0 = "another_name";
+                (of_values(&values, sequence), lacking)
+            }
+        }
+    }
+}

@@ -37,7 +37,7 @@ const UNEVEN: f64 = 0.05;
 pub struct Fit {
     /// The parameters.
     pub p: Parameters,
-    /// How friction depends on speed.
+    /// Dependence of friction on speed.
     pub law: Law,
     /// Sum of squares of the residuals, rad^2.
     pub cost: f64,
@@ -74,7 +74,7 @@ struct Normal {
     follow: Vec<(Own, SMatrix<f64, 3, ALL>)>,
 }
 
-/// What is fitted.
+/// Parameters of the fit.
 struct Problem<'a> {
     paths: &'a [Path],
     law: Law,
@@ -259,7 +259,7 @@ impl Fit {
         Ok(problem.judged(&problem.minimum(point)?))
     }
 
-    /// What a parameter that is not fitted would be, with its standard uncertainty.
+    /// Value of a parameter that is not fitted, with its standard uncertainty.
     pub fn probed(&self, index: usize) -> (f64, f64) {
         let (value, sigma, _) = self.probes[index - FITTED];
         (value, sigma)

@@ -35,7 +35,7 @@ impl Form {
     }
 }
 
-/// How friction depends on speed in a fit.
+/// Dependence of friction on speed in a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Law {
     /// The form.
@@ -120,7 +120,7 @@ pub struct Path {
 }
 
 impl Path {
-    /// The parts of a stroke to fit; none where it hardly moved. A stroke above `fast`, rad/s, has longer parts.
+    /// The parts of a stroke to fit; `None` if it hardly moved. A stroke above `fast`, rad/s, has longer parts.
     pub fn parts(record: &Record, number: usize, ends: [f64; 2], fast: f64) -> Vec<Self> {
         let stroke = &record.strokes[number];
         let Some(forward) = stroke.forward() else { return Vec::new() };

@@ -1,7 +1,6 @@
 //! A simulated finger that presses as the chip will: the tip is carried along a plan, and every frame goes through the
 //! effects of the scene. Hysteresis, creep and relaxation go on from press to press.
 
-use crate::series;
 use fingertip::params::Params;
 use sim::effects::contact;
 use sim::effects::sensor::{self, Readout};
@@ -19,7 +18,7 @@ pub const FRAME_S: f64 = 0.5e-3;
 pub const FRAME_NS: u32 = 500_000;
 const TARE_FRAMES: usize = 256;
 
-/// What a finger is drawn as.
+/// Drawn properties of a finger.
 #[derive(Clone, Debug)]
 pub struct Draw {
     pub seed: u64,
@@ -71,7 +70,7 @@ impl Draw {
         }
     }
 
-    /// What each taxel reads of a pressure, as a factor; 0 for a dead one.
+    /// Factor of each taxel's reading; 0 for a dead one.
     pub fn gains(&self) -> Vec<f64> {
         use sim::effects::sensor::Stages;
         let alone = Self { creep_percent: 0.0, hysteresis_percent: 0.0, extra: String::new(), ..self.clone() };
@@ -113,7 +112,7 @@ impl Draw {
     }
 }
 
-/// Where the plate is met.
+/// Travel at which the tip meets the plate.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Place {
     pub centre_mm: [f64; 2],
@@ -268,11 +267,11 @@ impl Finger {
         let tip = Tip { radius_mm: self.setup.tip.radius_mm, modulus_kpa: 250.0 };
         let array = Array { rows: ROWS, columns: COLUMNS, pitch_mm: self.setup.array.pitch_mm, codes_per_kpa: 24.0 };
         let press = Press { tip, array, steps, ended: None };
-        record::press(&series::press(&press, FRAME_NS, -777), &Params::DEFAULT).expect("a series")
+        record::press(&crate::press(&press, FRAME_NS, -777), &Params::DEFAULT).expect("a series")
     }
 
     pub fn travel_mm(&self) -> f64 {
-        (self.travel_mm / series::mm_per_count()).floor() * series::mm_per_count()
+        (self.travel_mm / crate::mm_per_count()).floor() * crate::mm_per_count()
     }
 }
 

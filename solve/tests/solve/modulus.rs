@@ -1,7 +1,6 @@
 //! Young's modulus of drawn tips.
 
 use crate::finger::{Draw, FRAME_NS, Finger, Part, Place, cycle, plan, presses, stairs};
-use crate::series;
 use fingertip::params::Params;
 use solve::gains::{Condition, NoGains};
 use solve::judge::Verdict;
@@ -77,7 +76,7 @@ fn other_motions_are_solved_too() {
         let [median, worst, .., within] = summary(name, &errors(300..303, 1, &plan));
         assert!(median < 4.0 && worst < 10.0 && within >= 2.0, "{name} {median} {worst} {within}");
     }
-    // The way in alone shows less than both ways.
+    // The forward stroke alone shows less than both strokes.
     let [median, worst, .., within] = summary("in alone", &errors(300..303, 1, &cycle(5.0, 3.0)[..2]));
     assert!(median < 6.0 && within >= 2.0, "{median} {worst} {within}");
 }
@@ -99,7 +98,7 @@ fn an_array_of_any_shape_gives_the_modulus() {
                 let kept = step.taxels.chunks(10).skip(row).take(rows);
                 step.taxels = kept.flat_map(|taxels| taxels[column..column + columns].to_vec()).collect();
             }
-            let bytes = series::press(press, FRAME_NS, 5);
+            let bytes = crate::press(press, FRAME_NS, 5);
             let press = record::press(&bytes, &Params::DEFAULT).expect("a series");
             let found = modulus(std::slice::from_ref(&press)).unwrap_or_else(|why| panic!("{why} {draw:?}"));
             println!("{found}");

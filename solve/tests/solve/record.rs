@@ -1,7 +1,7 @@
 //! The bytes of a series: read to the last bit, and never a panic.
 
 use crate::finger::{Draw, FRAME_NS, cycle, presses};
-use crate::series::{self, Head, deviation, sealed};
+use crate::{Head, deviation, sealed};
 use fingertip::measure::series::{HEAD, check, step_bytes};
 use fingertip::params::Params;
 use proptest::prelude::*;
@@ -46,7 +46,7 @@ fn a_step_is_read_as_it_was_written() {
     close(step.time_s[0], 1.0);
     close(step.time_s[1], 2.0);
     close(step.travel_mm[0], 0.0);
-    close(step.travel_mm[1], 1000.0 * series::mm_per_count());
+    close(step.travel_mm[1], 1000.0 * crate::mm_per_count());
     assert_eq!((step.frames, step.branch), (300, Branch::Unloading));
     close(step.bridge_v, -1.0);
     close(step.chip_c.expect("a temperature"), 298.2 - 273.15);
@@ -161,7 +161,7 @@ fn good_with(body: &[u8], at: usize, byte: u8) -> Vec<u8> {
 fn a_press_with_changed_bytes_is_solved_or_refused() {
     let taken = presses(&Draw::plain(250.0), 1, &cycle(5.0, 3.0)).remove(0);
     let (length, records) = (step_bytes(100), taken.steps.len() as u32);
-    let bytes = series::press(&taken, FRAME_NS, 0);
+    let bytes = crate::press(&taken, FRAME_NS, 0);
     for seed in 0..8 {
         let mut rng = fastrand::Rng::with_seed(seed);
         let mut body = bytes[HEAD..].to_vec();

@@ -1,11 +1,17 @@
 //! The drive solved from recorded strokes, on simulated drives: what is found, how true it is, and what never happens.
 
-mod chip;
 mod drive;
 
 use core::ops::Range;
-use drive::{Drive, Rig};
-use solve::record::{Ended, Reason};
+use drive::{DELAY_S, Drive, FRAME_S, Rig};
+use fingertip::measure::Ended;
+use fingertip::measure::series::{CHECK, HEAD, Head, Out};
+use fingertip::measure::strokes::{Kept, Strokes, View};
+use fingertip::measure::{MeasureStatus, Row, State, Task};
+use fingertip::params::Params;
+use fingertip::shipped::Config;
+use fingertip::units::Newtons;
+use solve::record::{self, Reason};
 use solve::strokes::{Record, Refusal, solve};
 
 /// Recorded strokes: all, and the slow ones alone.
@@ -77,7 +83,7 @@ impl Figures {
     }
 
     fn add(&mut self, number: usize, rig: &mut Rig, strokes: usize) {
-        let record = chip::measure(rig, strokes);
+        let record = measure(rig, strokes);
         self.travels.push((rig.travel_mm, number));
         self.forces.push((1e3 * rig.force_n, number));
         let samples: usize = record.strokes.iter().map(|stroke| stroke.samples.len()).sum();
@@ -137,7 +143,7 @@ impl Figures {
         let worst = |values: &[(f64, usize)]| values.iter().map(|(value, _)| *value).fold(0.0, f64::max);
         assert!(self.silent.is_empty());
         assert!(self.measured >= measured, "{} measured", self.measured);
-        assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= chip::ROWS as f64);
+        assert!(worst(&self.travels) < TRAVEL_MM && worst(&self.samples) <= ROWS as f64);
         assert_eq!(worst(&self.forces), 0.0);
         // By encoders of 256 to 4096 counts, k cannot be exact for every drive of a population.
         if measured >= 20 {
@@ -227,13 +233,13 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     // The controller's own: the motor's leads swapped, and an encoder without supply.
     for (counts, reason) in [(-1, Reason::Reversed), (0, Reason::Still)] {
         let mut rig = Rig::new(Drive { counts, ..drive.clone() }, 1);
-        let refusal = refused(&chip::measure(&mut rig, ALL));
+        let refusal = refused(&measure(&mut rig, ALL));
         let Refusal::Ended(ended) = refusal else { panic!("{refusal}") };
         assert_eq!(ended.reason, reason);
         assert!(ended.value > 0 && rig.travel_mm < TRAVEL_MM);
     }
     // What the samples alone show.
-    let record = chip::measure(&mut Rig::new(drive, 1), ALL);
+    let record = measure(&mut Rig::new(drive, 1), ALL);
     let changed = |change: fn(i32) -> i32| {
         let mut record = record.clone();
         record
@@ -249,13 +255,13 @@ fn a_refusal_states_its_reason_and_the_number_behind_it() {
     assert_eq!(refused(&changed(|_| 7)), Refusal::Still(0));
     assert!(matches!(refused(&changed(|count| if count > 60 { count + 50 } else { count })), Refusal::Astray(_)));
     // A memory that was full before the motions ended: the strokes in it count, but for the last.
-    let full = Ended { reason: Reason::Full, value: 5_000 };
+    let full = record::Ended { reason: Reason::Full, value: 5_000 };
     let cut = Record { strokes: record.strokes[..25].to_vec(), ended: Some(full), ..record.clone() };
     let whole = Record { strokes: record.strokes[..24].to_vec(), ..record.clone() };
     assert_eq!(solve(&cut), solve(&whole));
     assert!(solve(&cut).is_ok());
     assert_eq!(refused(&Record { strokes: record.strokes[..4].to_vec(), ..record.clone() }), Refusal::Few(2));
-    let touched = Ended { reason: Reason::Touched, value: 50 };
+    let touched = record::Ended { reason: Reason::Touched, value: 50 };
     assert_eq!(refused(&Record { ended: Some(touched), ..record }), Refusal::Ended(touched));
 }
 
@@ -282,7 +288,7 @@ fn in_the_way(count: usize) {
         drive.object = Some((0.02 + 0.78 * rng.f64(), kpa));
         drive.blind = number % 2 == 1;
         let mut rig = Rig::new(drive, rng.u64(..));
-        let record = chip::measure(&mut rig, ALL);
+        let record = measure(&mut rig, ALL);
         forces.push((1e3 * rig.force_n, number));
         match solve(&record) {
             Err(refusal) => reasons.push(refusal.to_string()),
@@ -296,4 +302,70 @@ fn in_the_way(count: usize) {
     let worst = tell("k of those %", &through);
     assert!(worst < 5.0);
     assert!(tell("force mN", &forces) < 1e3 * FORCE_N);
+}
+
+// The strokes of the core on a simulated drive, and the record that it keeps of them.
+
+/// Rows that the memory of a capture holds.
+const ROWS: usize = (40 * 1024 - HEAD) / 4;
+/// PWM steps of the full duty.
+const PWM: f64 = 8400.0;
+
+/// The parameters by the drive's sheet.
+fn params(rig: &Rig) -> Params {
+    let d = &rig.drive;
+    Params {
+        encoder_counts_per_turn: d.counts_per_turn as i32,
+        reduction_mrad_per_mm: (1e3 * d.rad_per_mm).round() as i32,
+        resistance_mohm: (1e3 * d.ohmmeter_ohm).round() as i32,
+        torque_constant_unm_per_a: (1e6 * d.sheet_k).round() as i32,
+        inertia_ug_m2: (1e9 * d.sheet_inertia).round() as i32,
+        ..Params::DEFAULT
+    }
+}
+
+/// All motions, of which the record keeps the first strokes, up to this number.
+fn measure(rig: &mut Rig, strokes: usize) -> Record {
+    let params = params(rig);
+    let config = Config::shipped(&params).expect("a sheet that is allowed");
+    let first = rig.view();
+    let mut run = Strokes::begin(Task::Strokes, first.count);
+    let mut standing = MeasureStatus::running(Task::Strokes);
+    let mut bytes = vec![0; 4 * ROWS];
+    let (mut check, mut length, mut begun, mut applied, mut full) = (CHECK, 0, 0, 0.0, false);
+    while run.running() {
+        let now = rig.view();
+        let view = View {
+            encoder: now.count,
+            force: Newtons::from_bits((now.force_n * 65_536.0) as i32),
+            supply_mv: (1e3 * now.supply_v).round() as u16,
+            applied: (4e3 * applied) as i32,
+        };
+        run.observe(&view, &mut standing, &config);
+        let row = run.row();
+        begun += usize::from(row == Some(Kept::Stroke));
+        if let Some(row) = row.filter(|_| begun <= strokes && !full) {
+            let row: Row<'_, 10, 10> = match row {
+                Kept::Stroke => Row::Stroke,
+                Kept::Sample(count, voltage) => Row::Sample { count, voltage },
+            };
+            let mut out = Out::new(&mut bytes[length..], 0, check);
+            out.row(&row);
+            full = out.full;
+            if !full {
+                (check, length) = (out.check, length + out.count);
+            }
+        }
+        let duty = (f64::from(run.voltage_mv()) * 1e-3 / now.supply_v * PWM).round() / PWM;
+        applied = duty * now.supply_v;
+        rig.frame(duty);
+    }
+    assert_ne!(standing.state, State::Running);
+    let [frame_ns, delay_ns] = [FRAME_S, DELAY_S].map(|time_s| (1e9 * time_s).round() as u32);
+    let rows = (length / 4) as u32;
+    let ended = if full { Ended::Full } else { standing.ended };
+    let value = standing.value;
+    let head = Head { kind: 2, shape: [10; 2], ended, rows, check, frame_ns, origin: run.origin(), delay_ns, value };
+    let series = [&head.bytes(), &bytes[..length]].concat();
+    record::strokes(&series, &params).expect("a series")
 }

@@ -1,34 +1,35 @@
 //! Captures on the host: reads their bytes ([`fingertip::capture`] has the layout), and feeds the frames through the core
 //! again, whose answers must be the same to the bit.
 
-mod bits;
-mod frames;
-mod head;
-
-pub use frames::{Frames, Refusal, Taken};
-
-use fingertip::capture::{Head, digest_step, digest_words, short_digest};
-use fingertip::config::Shaped;
-use fingertip::control::Winding;
-use fingertip::pipeline::{Pipeline, Status};
-use fingertip::pressure::Calibration;
+use fingertip::capture::{
+    ESCAPE, Ended, Head, LAYOUT, Last, MAGIC, VERSION, digest_step, digest_words, short_digest, width,
+};
+use fingertip::command::Command;
+use fingertip::config::{ConfigError, Shaped};
+use fingertip::contact::FitLevel;
+use fingertip::control::{self, Winding};
+use fingertip::frame::{Frame, Sense};
+use fingertip::params::Params;
+use fingertip::pipeline::{self, Pipeline, Status};
+use fingertip::pressure::{Calibration, Gains};
 use fingertip::scan::Clocks;
+use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
 
 /// A capture that was fed through the core again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Replayed<const ROWS: usize, const COLUMNS: usize> {
     /// Its beginning.
     pub head: Head<ROWS, COLUMNS>,
-    /// Where the core answered otherwise first.
+    /// First difference of the core's answers.
     pub difference: Option<Difference>,
 }
 
-/// Where a replay leaves its capture.
+/// First difference between a replay and its capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// The frame, from 0.
     pub frame: u32,
-    /// What differs.
+    /// Field that differs.
     pub field: Field,
     /// Its value as captured.
     pub captured: i64,
@@ -36,7 +37,7 @@ pub struct Difference {
     pub replayed: i64,
 }
 
-/// What a step answers, as far as a capture keeps it.
+/// Outputs of a step that a capture keeps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Field {
     /// The duty, Q15.
@@ -110,4 +111,316 @@ pub fn replay<const ROWS: usize, const COLUMNS: usize>(
         difference = Some(Difference { frame, field: Field::Digest, captured, replayed });
     }
     Ok(Replayed { head, difference })
+}
+
+// The frames of a capture, read.
+
+/// Why bytes are no capture that this version replays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// They do not begin as a capture does.
+    NoCapture,
+    /// Another version of the layout.
+    Version(u8),
+    /// Of an array with other rows and columns.
+    Shape {
+        /// Its rows.
+        rows: u8,
+        /// Its columns.
+        columns: u8,
+    },
+    /// Of a firmware with other parameters.
+    Layout,
+    /// It was not ended on the board.
+    Unfinished,
+    /// Bytes are missing.
+    Cut,
+    /// There is more than a capture.
+    Longer,
+    /// It is not as the board wrote it.
+    Damaged,
+    /// Parameters that make no configuration.
+    Config(ConfigError),
+    /// The scan's time by the parameters is another: other clocks.
+    FrameTime {
+        /// As captured, ns.
+        captured: u32,
+        /// By the parameters, ns.
+        here: u32,
+    },
+    /// The bits of a frame, counted from 0, make no frame.
+    Frame(u32),
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NoCapture => f.write_str("no capture: it does not begin as one"),
+            Self::Version(version) => write!(f, "a capture of layout {version}; this firmware's is layout {VERSION}"),
+            Self::Shape { rows, columns } => {
+                write!(f, "a capture of {rows} x {columns} taxels, which this is not built for")
+            }
+            Self::Layout => write!(
+                f,
+                "a capture of a firmware with other parameters than these {}: replay it with the version that it names",
+                Params::COUNT
+            ),
+            Self::Unfinished => f.write_str("the capture was not ended on the board"),
+            Self::Cut => f.write_str("the capture is cut off"),
+            Self::Longer => f.write_str("the capture is longer than it says"),
+            Self::Damaged => f.write_str("the capture is damaged: it is not as the board wrote it"),
+            Self::Config(error) => write!(f, "the capture's parameters make no configuration: {error}"),
+            Self::FrameTime { captured, here } => {
+                write!(f, "captured with a frame each {captured} ns; by its parameters it is {here} ns here")
+            }
+            Self::Frame(frame) => write!(f, "the capture is damaged: frame {frame} makes no sense"),
+        }
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// A frame as the board took it, and what it answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken<const ROWS: usize, const COLUMNS: usize> {
+    /// The frame.
+    pub frame: Frame<ROWS, COLUMNS>,
+    /// Sensed values other than the frame.
+    pub sense: Sense,
+    /// Command of the host.
+    pub command: Command,
+    /// The duty that the step answered.
+    pub duty: Duty,
+    /// The mode after it, by its number.
+    pub mode: u8,
+    /// Number of the fault; 0 without one.
+    pub fault: u8,
+    /// The upper half of the digest of all that the steps so far reported.
+    pub digest: u16,
+}
+
+/// The frames of a capture, in order.
+#[derive(Clone, Debug)]
+pub struct Frames<'a, const ROWS: usize, const COLUMNS: usize> {
+    bits: Reader<'a>,
+    last: Last<ROWS, COLUMNS>,
+    read: u32,
+    count: u32,
+}
+
+impl<'a, const ROWS: usize, const COLUMNS: usize> Frames<'a, ROWS, COLUMNS> {
+    /// Of a capture, and its beginning.
+    ///
+    /// # Errors
+    /// The bytes are no capture, or one of another array, layout or version; or the capture is damaged, shorter or longer
+    /// than it says.
+    pub fn new(bytes: &'a [u8]) -> Result<(Head<ROWS, COLUMNS>, Self), Refusal> {
+        let head = read_head(bytes)?;
+        let body = bytes.get(Head::<ROWS, COLUMNS>::BYTES..).ok_or(Refusal::Cut)?;
+        let need = head.bits.div_ceil(8) as usize;
+        if body.len() < need {
+            return Err(Refusal::Cut);
+        }
+        if body.len() > need {
+            return Err(Refusal::Longer);
+        }
+        if check(body, head.bits) != head.check {
+            return Err(Refusal::Damaged);
+        }
+        let frames = Self { bits: Reader::new(body, head.bits), last: Last::NONE, read: 0, count: head.frames };
+        Ok((head, frames))
+    }
+
+    fn take(&mut self) -> Option<Taken<ROWS, COLUMNS>> {
+        let (bits, last) = (&mut self.bits, &mut self.last);
+        let step = bits.signed(width::SEQUENCE)?.cast_unsigned().wrapping_add(1);
+        let sequence = last.frame.sequence.wrapping_add(step);
+        let sense = sense(bits, &last.sense)?;
+        let command = command(bits, &last.command)?;
+        let duty = i16::try_from(i32::from(last.duty).checked_add(bits.signed(width::DUTY)?)?).ok()?;
+        if bits.get(1)? == 1 {
+            let both = bits.get(16)?;
+            (last.mode, last.fault) = (both as u8, (both >> 8) as u8);
+        }
+        let digest = bits.get(16)? as u16;
+        let (width, mut spread) = (last.width(), 0_u32);
+        let mut frame = Frame { sequence, ..last.frame };
+        for code in frame.codes.rows.as_flattened_mut().iter_mut().chain(&mut frame.codes.undriven) {
+            let folded = bits.folded(width, 16)?;
+            spread = spread.wrapping_add(folded);
+            *code = unfold(folded, *code);
+        }
+        *last = Last { frame, sense, command, duty, spread, ..*last };
+        Some(Taken { frame, sense, command, duty: Duty(duty), mode: last.mode, fault: last.fault, digest })
+    }
+}
+
+impl<const ROWS: usize, const COLUMNS: usize> Iterator for Frames<'_, ROWS, COLUMNS> {
+    type Item = Result<Taken<ROWS, COLUMNS>, Refusal>;
+
+    /// The next frame; after one that makes no sense there are no more.
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.read == self.count {
+            return None;
+        }
+        let taken = self.take();
+        self.read += 1;
+        let over = self.read == self.count && !self.bits.is_empty();
+        match taken {
+            Some(taken) if !over => Some(Ok(taken)),
+            _ => {
+                self.count = self.read;
+                Some(Err(Refusal::Frame(self.read - 1)))
+            }
+        }
+    }
+}
+
+fn sense(bits: &mut Reader<'_>, last: &Sense) -> Option<Sense> {
+    let short =
+        |bits: &mut Reader<'_>, last: u16, width| u16::try_from(i32::from(last).checked_add(bits.signed(width)?)?).ok();
+    Some(Sense {
+        encoder: last.encoder.wrapping_add(bits.signed(width::ENCODER)?),
+        supply_mv: short(bits, last.supply_mv, width::SUPPLY)?,
+        bus_silent_ms: short(bits, last.bus_silent_ms, width::SILENT)?,
+        bridge_fault: bits.get(1)? == 1,
+        answer: CoreCycles(last.answer.0.wrapping_add(bits.signed(width::ANSWER)?.cast_unsigned())),
+        chip: if bits.get(1)? == 1 { Some(chip(bits, last)?) } else { None },
+    })
+}
+
+fn chip(bits: &mut Reader<'_>, last: &Sense) -> Option<Celsius> {
+    Some(Celsius::from_bits(last.chip.unwrap_or_default().to_bits().wrapping_add(bits.signed(width::CHIP)?)))
+}
+
+fn command(bits: &mut Reader<'_>, last: &Command) -> Option<Command> {
+    if bits.get(1)? == 0 {
+        return Some(*last);
+    }
+    let byte = |bits: &mut Reader<'_>| bits.get(8).map(|byte| byte as u8);
+    Some(Command {
+        torque: bits.get(1)? == 1,
+        tare_forced: bits.get(1)? == 1,
+        goal: Newtons::from_bits(bits.get(32)?.cast_signed()),
+        bus_watchdog_ms: bits.get(16)? as u16,
+        fit_level: FitLevel::from_number(byte(bits)?),
+        tare_request: byte(bits)?,
+        clear_request: byte(bits)?,
+        measure_request: byte(bits)?,
+    })
+}
+
+// A capture's beginning, read.
+
+/// Reads the head of a capture.
+///
+/// # Errors
+/// The bytes are no capture, or one of another array, layout or version.
+fn read_head<const ROWS: usize, const COLUMNS: usize>(bytes: &[u8]) -> Result<Head<ROWS, COLUMNS>, Refusal> {
+    let mut words = bytes.as_chunks::<4>().0.iter().copied();
+    let mut next = || words.next().ok_or(Refusal::Cut);
+    let magic = next()?;
+    if magic[..3] != MAGIC[..3] {
+        return Err(Refusal::NoCapture);
+    }
+    if magic != MAGIC {
+        return Err(Refusal::Version(magic[3]));
+    }
+    let [rows, columns, ended, zero] = next()?;
+    if [usize::from(rows), usize::from(columns)] != [ROWS, COLUMNS] {
+        return Err(Refusal::Shape { rows, columns });
+    }
+    if u32::from_le_bytes(next()?) != LAYOUT {
+        return Err(Refusal::Layout);
+    }
+    let ended = Ended::of(ended).filter(|&ended| ended != Ended::No).ok_or(Refusal::Unfinished)?;
+    let [frames, bits] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+    let [digest, check] = [u32::from_le_bytes(next()?), u32::from_le_bytes(next()?)];
+    let missed_frames = u32::from_le_bytes(next()?);
+    let taken = pipeline::Taken::from_word(u32::from_le_bytes(next()?)).filter(|_| zero == 0);
+    let taken = taken.ok_or(Refusal::Damaged)?;
+    let frame_ns = u32::from_le_bytes(next()?);
+    let mut winding = [0; control::WINDING_WORDS];
+    for word in &mut winding {
+        *word = u32::from_le_bytes(next()?);
+    }
+    let mut values = [0; Params::COUNT];
+    for value in &mut values {
+        *value = i32::from_le_bytes(next()?);
+    }
+    let mut gains = Gains::ONE;
+    for word in 0..Gains::<ROWS, COLUMNS>::WORDS {
+        if !gains.set_word(word, u32::from_le_bytes(next()?)) {
+            return Err(Refusal::Damaged);
+        }
+    }
+    let params = Params::from_array(&values);
+    Ok(Head { ended, frames, bits, digest, check, missed_frames, taken, winding, frame_ns, params, gains })
+}
+
+// Reads bits, and the numbers that a capture folds into them.
+
+/// Reads the bits of a capture's frames.
+#[derive(Clone, Debug)]
+pub struct Reader<'a> {
+    bytes: &'a [u8],
+    at: u32,
+    /// Number of bits.
+    end: u32,
+}
+
+impl<'a> Reader<'a> {
+    /// From the first bit on.
+    pub fn new(bytes: &'a [u8], bits: u32) -> Self {
+        Self { bytes, at: 0, end: bits }
+    }
+
+    /// True if all was read.
+    pub fn is_empty(&self) -> bool {
+        self.at == self.end
+    }
+
+    /// Reads a number of `count` bits, at most 32; `None` if they are not there.
+    pub fn get(&mut self, count: u32) -> Option<u32> {
+        let end = self.at.checked_add(count).filter(|&end| end <= self.end)?;
+        let mut value = 0;
+        for (place, bit) in (self.at..end).enumerate() {
+            let byte = self.bytes.get((bit / 8) as usize)?;
+            value |= u32::from(byte >> (bit % 8) & 1) << place;
+        }
+        self.at = end;
+        Some(value)
+    }
+
+    /// A folded number of at most `all` bits.
+    pub fn folded(&mut self, width: u32, all: u32) -> Option<u32> {
+        let mut ones = 0;
+        while ones < ESCAPE && self.get(1)? == 1 {
+            ones += 1;
+        }
+        if ones == ESCAPE { self.get(all) } else { Some(ones << width | self.get(width)?) }
+    }
+
+    /// A difference of 32 bits.
+    pub fn signed(&mut self, width: u32) -> Option<i32> {
+        let folded = self.folded(width, 32)?;
+        Some((folded >> 1).cast_signed() ^ -(folded & 1).cast_signed())
+    }
+}
+
+/// The check sum over all words of the frames' bits, the last one filled up with zeros.
+pub fn check(bytes: &[u8], bits: u32) -> u32 {
+    let words = (0..=bits / 32).map(|place| {
+        let rest = bytes.get(4 * place as usize..).unwrap_or_default();
+        let mut word = [0; 4];
+        word.iter_mut().zip(rest).for_each(|(to, byte)| *to = *byte);
+        u32::from_le_bytes(word)
+    });
+    digest_words(0, words)
+}
+
+/// Undoes the folding of a difference of 16 bits.
+pub fn unfold(folded: u32, last: u16) -> u16 {
+    let difference = (folded >> 1) as u16 ^ ((folded & 1) as u16).wrapping_neg();
+    last.wrapping_add(difference)
 }

@@ -1,8 +1,7 @@
 //! `fingertip calibrate`.
 
 use super::guided::result::{self, Found};
-use super::guided::session::Session;
-use super::guided::{Options, Presses, Run, hold, motion, press};
+use super::guided::{Options, Presses, Run, Session, hold, motion};
 use crate::commands::press::direction_confirmed;
 use crate::{Client, Error, numbers};
 use serde_json::json;
@@ -14,7 +13,7 @@ const GOALS_N: [f64; 3] = [1.0, 2.5, 4.0];
 /// Name of the press after the controller became warmer.
 const WARM: &str = "warm.fts";
 
-/// What to calibrate.
+/// Options of the calibration.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip calibrate --session finger-1                  (leads through all of it; asks before it writes)\n  \
@@ -31,7 +30,7 @@ pub struct Args {
     /// No scale: forces stay as wrong as the taxels' common gain
     #[arg(long)]
     no_scale: bool,
-    /// Numbers that the scale shows, N, in the order of --scale-n; asked for without it
+    /// Numbers that the scale shows, N, in the order of --scale-n; without it the command asks
     #[arg(long, value_name = "NEWTONS", value_delimiter = ',', value_parser = hold::newtons, conflicts_with = "no_scale")]
     shown_n: Vec<f64>,
     /// Also measure creep, by a weight that lies on the tip for this time
@@ -87,11 +86,11 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let run = Run::begin(&args.options, json)?;
     let mut session = Session::open(args.options.session(), "calibrate", client)?;
     result::same_settings(&session, client)?;
-    press::all(args.presses, &args.how, &mut session, &run, client)?;
-    let modulus = press::solved(args.presses, &mut session, &run)?;
+    motion::all(args.presses, &args.how, &mut session, &run, client)?;
+    let modulus = motion::solved(args.presses, &mut session, &run)?;
     let mut found = Found::default();
-    press::report(&modulus, &mut found);
-    press::gains(&modulus, &session, &mut found);
+    motion::report(&modulus, &mut found);
+    motion::gains(&modulus, &session, &mut found);
     scale(args, &modulus, &mut found, &mut session, &run, client)?;
     if let Some(seconds) = args.creep_s {
         creep(seconds, args, &mut found, &mut session, &run, client)?;
@@ -187,15 +186,15 @@ fn temperature(
     run: &Run<'_>,
     client: &mut Client,
 ) -> Result<(), Error> {
-    let cold = press::read(&press::name(args.presses), session)?;
+    let cold = motion::read(&motion::name(args.presses), session)?;
     if session.record(WARM).is_none() {
         let chip_c = cold.steps.iter().find_map(|step| step.chip_c);
         let chip_c = chip_c.ok_or("the controller does not measure its temperature: leave --warm out")?;
         motion::warm(chip_c + 5.0, Duration::from_secs_f64(args.warm_within_s), run, client)?;
     }
     let question = "the controller is warm: leave finger and plate where they were in the last press";
-    press::one(WARM, question, &args.how, session, run, client)?;
-    match solve::temperature(&cold, &press::read(WARM, session)?) {
+    motion::one(WARM, question, &args.how, session, run, client)?;
+    match solve::temperature(&cold, &motion::read(WARM, session)?) {
         Ok(found_) => {
             found.row("array_gain_ppm_per_k", 1e6 * found_.per_k.value, Some(1e6 * found_.per_k.sigma));
             found.row("array_gain_at_c", found_.chip_c[0], None);

@@ -15,16 +15,16 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// How often it looks.
+/// Interval of the checks.
 const LOOK: Duration = Duration::from_millis(5);
 /// `CAPTURE_STATE`.
 const ARMED: i64 = State::Armed as i64;
 const RECORDING: i64 = State::Recording as i64;
 const DONE: i64 = State::Done as i64;
-/// What contributed captures are under.
+/// Licence of contributed captures.
 const LICENCE: &str = "Apache-2.0 OR MIT, as the project: contributed by who captured it";
 
-/// What to capture.
+/// Options of a capture.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip capture --out tare.mcap    (nothing moves: a tare, and the frames after it)\n  \
@@ -37,10 +37,10 @@ pub struct Args {
     /// Write over a file that is there
     #[arg(long)]
     force: bool,
-    /// Touch and hold so many newtons from the tare on, until the memory is full; then let go
+    /// Force to touch and hold after the tare, N, until the memory is full; then the finger releases
     #[arg(long, value_name = "NEWTONS", value_parser = numbers::goal_mn)]
     press: Option<i64>,
-    /// End after so many frames; without it, when the memory is full
+    /// Number of frames after which the capture ends; without it, when the memory is full
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// The board: what it is, and what hangs on it
@@ -49,13 +49,13 @@ pub struct Args {
     /// The image on it, by its SHA-256 as `cargo xtask flash` prints it
     #[arg(long, default_value = "not told")]
     image: String,
-    /// What else one should know: object, distance, what happened
+    /// Notes: object, distance, what happened
     #[arg(long, default_value = "")]
     notes: String,
     /// Contribute it to the project under the project's licences
     #[arg(long)]
     contribute: bool,
-    /// How long it may take until the capture is done
+    /// Longest time until the capture is done
     #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
@@ -73,7 +73,7 @@ impl Args {
 /// Arms a capture, tares and, where asked to, presses; reads what the board kept, and writes it as a file.
 ///
 /// # Errors
-/// A fault stands or comes, torque is on, the capture does not come about, or the file cannot be written.
+/// There is a fault, torque is on, the capture does not start, or the file cannot be written.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     motion::alone(client)?;
@@ -162,7 +162,7 @@ fn keep(
             return Ok(count);
         }
         if count == before && state != ARMED {
-            return Err("the capture is gone: the controller started anew, or another host called it off".into());
+            return Err("the capture is gone: the controller restarted, or another host cancelled it".into());
         }
         // Zeros that hide a touch would let it press harder than it was asked to.
         if args.press.is_some() && state == RECORDING {
@@ -209,7 +209,7 @@ pub(super) fn fetch(
     }
     let block = client.block(address::CAPTURE_STATE, address::CAPTURE_COUNT)?;
     if [block.number(address::CAPTURE_STATE), block.number(address::CAPTURE_COUNT)] != [DONE, count] {
-        return Err("another host began a capture while this one was read, or the controller started anew".into());
+        return Err("another host began a capture while this one was read, or the controller restarted".into());
     }
     Ok(bytes)
 }

@@ -1,10 +1,8 @@
 //! `fingertip commission`.
 
-use super::guided::ask::yes_or_no;
 use super::guided::result::{self, Found};
-use super::guided::session::Session;
-use super::guided::{Options, Run, motion};
-use super::params::set;
+use super::guided::{Options, Run, Session, motion, yes_or_no};
+use super::params;
 use crate::{Client, Error, table};
 use fingertip::measure::Task;
 use serde_json::json;
@@ -17,7 +15,7 @@ const JOG: &str = "jog";
 const STROKES: &str = "strokes.fts";
 const DIRECTION: &str = "direction_confirmed";
 
-/// What to know before.
+/// Options of the commissioning.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip commission                                    (watch the tip; asks before it writes)\n  \
@@ -27,7 +25,7 @@ pub struct Args {
     /// Resistance of motor and bridge together, Ohm, by an ohmmeter; resistance_mohm without it
     #[arg(long, value_name = "OHM", value_parser = ohm)]
     resistance_ohm: Option<f64>,
-    /// Whether the jog first moves the tip towards the object: asked for without it
+    /// Answer to whether the jog first moves the tip towards the object: without it the command asks
     #[arg(long, value_name = "yes|no", value_parser = yes_or_no)]
     forward: Option<bool>,
     #[command(flatten)]
@@ -50,7 +48,7 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let run = Run::begin(&args.options, json)?;
     let mut session = Session::open(args.options.session(), "commission", client)?;
     result::same_settings(&session, client)?;
-    // A controller that started anew does not know it any more.
+    // A controller that restarted does not know it any more.
     if session.step(JOG).is_none() || super::press::direction_confirmed(client).is_err() {
         direction(args, &mut session, &run, client)?;
     }
@@ -75,7 +73,7 @@ fn direction(args: &Args, session: &mut Session, run: &Run<'_>, client: &mut Cli
         None => run.ask.yes("did the tip first move towards the object?", "--forward yes or --forward no")?,
     };
     let confirmed = i64::from(forward);
-    set::set(&[(table::find(DIRECTION)?, confirmed)], client)?;
+    params::set(&[(table::find(DIRECTION)?, confirmed)], client)?;
     if !forward {
         return Err(
             "the tip first moved away from the object: swap the motor's leads and the encoder's channels, both, \

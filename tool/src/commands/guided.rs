@@ -1,15 +1,20 @@
-//! What the guided procedures (`commission`, `identify`, `calibrate`) have in common.
+//! Common parts of the guided procedures (`commission`, `identify`, `calibrate`).
 
-pub(super) mod ask;
 pub(super) mod hold;
 pub(super) mod motion;
-pub(super) mod press;
 pub(super) mod result;
-pub(super) mod session;
 
 use super::Interrupt;
-use crate::{Error, numbers};
-use ask::Ask;
+use crate::commands::aside;
+use crate::commands::params::file;
+use crate::{Client, Error, numbers, table, whole};
+use fingertip::params::Params;
+use fingertip::shipped::address;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Options of every guided procedure.
@@ -58,7 +63,7 @@ impl Presses {
     }
 }
 
-/// What a procedure runs with.
+/// Context of a procedure.
 pub(super) struct Run<'a> {
     options: &'a Options,
     interrupt: Interrupt,
@@ -79,5 +84,284 @@ impl<'a> Run<'a> {
         if !self.json {
             super::aside(text);
         }
+    }
+}
+
+// Questions to the person at the terminal.
+
+/// Time without a look at the signals, ns.
+const POLL_NS: i64 = 50_000_000;
+/// Wrong answers to one question after which the procedure ends.
+const TRIES: u32 = 3;
+
+/// Asks, unless answers are for scripts.
+pub struct Ask {
+    interrupt: Interrupt,
+    json: bool,
+}
+
+impl Ask {
+    /// Questions that a signal ends.
+    pub fn new(interrupt: Interrupt, json: bool) -> Self {
+        Self { interrupt, json }
+    }
+
+    /// Asks until the answer can be parsed. `idle` runs every 50 ms meanwhile. `option` gives the answer without a question.
+    ///
+    /// # Errors
+    /// With `--json` there are no questions; the text names the option. Nobody answers, a signal came, or three answers
+    /// were wrong.
+    pub fn parsed<T>(
+        &self,
+        question: &str,
+        option: &str,
+        parse: impl Fn(&str) -> Result<T, String>,
+        idle: &mut dyn FnMut() -> Result<(), Error>,
+    ) -> Result<T, Error> {
+        if self.json {
+            return Err(Error::NotUnderstood(format!("--json asks no questions: give {option} (\"{question}\")")));
+        }
+        let mut why = String::new();
+        for _ in 0..TRIES {
+            aside(question);
+            let line = self.line(option, idle)?;
+            match parse(line.trim()) {
+                Ok(answer) => return Ok(answer),
+                Err(wrong) => why = format!("`{}`: {wrong}", line.trim()),
+            }
+            aside(&why);
+        }
+        Err(format!("{why}. {TRIES} answers to \"{question}\" were not understood; {option} gives the answer").into())
+    }
+
+    /// Yes or no.
+    ///
+    /// # Errors
+    /// As [`Self::parsed`].
+    pub fn yes(&self, question: &str, option: &str) -> Result<bool, Error> {
+        self.parsed(&format!("{question} [yes/no]"), option, yes_or_no, &mut || Ok(()))
+    }
+
+    /// Waits for Enter.
+    ///
+    /// # Errors
+    /// As [`Self::parsed`].
+    pub fn enter(&self, question: &str, option: &str) -> Result<(), Error> {
+        self.parsed(&format!("{question}; then press Enter"), option, |_| Ok(()), &mut || Ok(()))
+    }
+
+    fn line(&self, option: &str, idle: &mut dyn FnMut() -> Result<(), Error>) -> Result<String, Error> {
+        let input = io::stdin();
+        let wait = Timespec { tv_sec: 0, tv_nsec: POLL_NS };
+        loop {
+            self.interrupt.check()?;
+            idle()?;
+            match poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&wait)) {
+                Ok(0) | Err(rustix::io::Errno::INTR) => continue,
+                Ok(_) => {}
+                Err(why) => return Err(format!("cannot read an answer: {why}").into()),
+            }
+            let line = unbuffered_line().map_err(|why| format!("cannot read an answer: {why}"))?;
+            return line.ok_or_else(|| format!("nobody answers: give {option}").into());
+        }
+    }
+}
+
+/// A line of the standard input; none at its end. Bytes behind the line stay for the next question.
+fn unbuffered_line() -> io::Result<Option<String>> {
+    let (mut line, mut byte) = (Vec::new(), [0]);
+    loop {
+        match rustix::io::read(io::stdin(), &mut byte) {
+            Ok(0) if line.is_empty() => return Ok(None),
+            Ok(0) => break,
+            Ok(_) if byte == *b"\n" => break,
+            Ok(_) => line.extend(byte),
+            Err(rustix::io::Errno::INTR) => {}
+            Err(why) => return Err(why.into()),
+        }
+    }
+    Ok(Some(String::from_utf8_lossy(&line).into_owned()))
+}
+
+/// Parses yes or no.
+pub fn yes_or_no(text: &str) -> Result<bool, String> {
+    match text.to_lowercase().as_str() {
+        "y" | "yes" => Ok(true),
+        "n" | "no" => Ok(false),
+        _ => Err("yes or no is expected".into()),
+    }
+}
+
+// A session: parameters and gains before it, and the steps that are done. With a folder it outlives the program.
+//
+// | file | content |
+// | --- | --- |
+// | `session.json` | command, device, parameters and gains before, and the steps by name |
+// | `press-1.fts`, `strokes.fts` | a motion's record, byte for byte as the controller delivered it |
+//
+// A file is written beside its place and renamed once it is whole. A record is listed in `session.json` after it was
+// written: a kill between the two repeats the motion.
+
+/// Version of `session.json`.
+const VERSION: u64 = 1;
+
+/// Parameters and gains of the controller at one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// The parameters.
+    pub params: Params,
+    /// Gains in 1/16384, row by row.
+    pub gains: Vec<Vec<u16>>,
+}
+
+impl Settings {
+    /// Reads them.
+    ///
+    /// # Errors
+    /// See [`Error`].
+    pub fn read(client: &mut Client) -> Result<Self, Error> {
+        let bytes = client.again(|client| client.read(address::PARAMS, 4 * Params::COUNT as u16))?;
+        let block = table::Block { first: address::PARAMS, bytes };
+        let mut values = [0; Params::COUNT];
+        for (index, value) in values.iter_mut().enumerate() {
+            *value = block.number(address::PARAMS + 4 * index as u16) as i32;
+        }
+        Ok(Self { params: Params::from_array(&values), gains: file::read_gains(client)? })
+    }
+
+    /// Value of a parameter by its name.
+    pub fn get(&self, name: &str) -> Option<i32> {
+        let index = Params::RANGES.iter().position(|(known, ..)| *known == name)?;
+        self.params.to_array().get(index).copied()
+    }
+
+    fn json(&self) -> Value {
+        let names = Params::RANGES.iter().map(|(name, ..)| (*name).to_owned());
+        let params: Map<_, _> = names.zip(self.params.to_array().map(Value::from)).collect();
+        json!({ "params": params, "gains": self.gains })
+    }
+
+    fn of(value: &Value) -> Option<Self> {
+        let mut values = [0; Params::COUNT];
+        for (value_, (name, ..)) in values.iter_mut().zip(Params::RANGES) {
+            *value_ = value["params"][name].as_i64()?.try_into().ok()?;
+        }
+        let row = |row: &Value| -> Option<Vec<u16>> {
+            row.as_array()?.iter().map(|gain| gain.as_u64()?.try_into().ok()).collect()
+        };
+        let gains = value["gains"].as_array()?.iter().map(row).collect::<Option<_>>()?;
+        Some(Self { params: Params::from_array(&values), gains })
+    }
+}
+
+/// A session.
+#[derive(Debug)]
+pub struct Session {
+    folder: Option<PathBuf>,
+    command: &'static str,
+    id: u8,
+    /// Settings with which all records were made.
+    pub before: Settings,
+    steps: Map<String, Value>,
+    records: BTreeMap<String, Vec<u8>>,
+}
+
+impl Session {
+    /// Begins a session, or resumes the one in the folder.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written, or has a session of another command or device.
+    pub fn open(folder: Option<&Path>, command: &'static str, client: &mut Client) -> Result<Self, Error> {
+        let mut session = Self {
+            folder: folder.map(Path::to_owned),
+            command,
+            id: client.id,
+            before: Settings::read(client)?,
+            steps: Map::new(),
+            records: BTreeMap::new(),
+        };
+        let Some(folder) = folder else { return Ok(session) };
+        fs::create_dir_all(folder).map_err(|why| Error::file("make the folder", folder, why))?;
+        let file = folder.join("session.json");
+        let text = match fs::read_to_string(&file) {
+            Ok(text) => text,
+            Err(why) if why.kind() == std::io::ErrorKind::NotFound => {
+                session.keep()?;
+                return Ok(session);
+            }
+            Err(why) => return Err(Error::file("read", &file, why)),
+        };
+        let not_one = |why: &str| Error::Other(format!("{}: {why}; name another folder", file.display()));
+        let value: Value = serde_json::from_str(&text).map_err(|why| not_one(&why.to_string()))?;
+        if value["version"].as_u64() != Some(VERSION) {
+            return Err(not_one("not a session that this version knows"));
+        }
+        if value["command"] != command || value["id"] != client.id {
+            let (command, id) = (&value["command"], &value["id"]);
+            return Err(not_one(&format!("a session of the command {command} with ID {id}")));
+        }
+        session.before = Settings::of(&value["before"]).ok_or_else(|| not_one("the settings before are damaged"))?;
+        session.steps = value["steps"].as_object().cloned().ok_or_else(|| not_one("the steps are damaged"))?;
+        for name in session.steps.keys().filter(|name| name.ends_with(".fts")) {
+            let file = folder.join(name);
+            let bytes = fs::read(&file).map_err(|why| Error::file("read", &file, why))?;
+            session.records.insert(name.clone(), bytes);
+        }
+        Ok(session)
+    }
+
+    /// The folder, for the result.
+    pub fn folder(&self) -> Option<String> {
+        self.folder.as_ref().map(|folder| folder.display().to_string())
+    }
+
+    /// A step that is done.
+    pub fn step(&self, name: &str) -> Option<&Value> {
+        self.steps.get(name)
+    }
+
+    /// A record that was read.
+    pub fn record(&self, name: &str) -> Option<&[u8]> {
+        self.records.get(name).map(Vec::as_slice)
+    }
+
+    /// Keeps a step.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn done(&mut self, name: &str, value: Value) -> Result<(), Error> {
+        self.steps.insert(name.into(), value);
+        self.keep()
+    }
+
+    /// Keeps a record.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn recorded(&mut self, name: &str, bytes: Vec<u8>) -> Result<(), Error> {
+        if let Some(folder) = &self.folder {
+            whole::write(&folder.join(name), true, &bytes)?;
+        }
+        let length = bytes.len();
+        self.records.insert(name.into(), bytes);
+        self.done(name, json!({ "bytes": length }))
+    }
+
+    /// Forgets steps that begin with this, so that the next run repeats them.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn forget(&mut self, begin: &str) -> Result<(), Error> {
+        self.steps.retain(|name, _| !name.starts_with(begin));
+        self.records.retain(|name, _| !name.starts_with(begin));
+        self.keep()
+    }
+
+    fn keep(&self) -> Result<(), Error> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let value = json!({
+            "version": VERSION, "command": self.command, "id": self.id, "before": self.before.json(), "steps": self.steps,
+        });
+        whole::write(&folder.join("session.json"), true, &serde_json::to_vec_pretty(&value).unwrap_or_default())
     }
 }

@@ -1,13 +1,12 @@
 //! `fingertip identify`.
 
 use super::guided::result::{self, Found};
-use super::guided::session::Session;
-use super::guided::{Options, Presses, Run, press};
+use super::guided::{Options, Presses, Run, Session, motion};
 use crate::commands::press::direction_confirmed;
 use crate::{Client, Error};
 use serde_json::json;
 
-/// How to press.
+/// Options of the presses.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip identify                                      (asks before it writes)\n  \
@@ -33,10 +32,10 @@ pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let run = Run::begin(&args.options, json)?;
     let mut session = Session::open(args.options.session(), "identify", client)?;
     result::same_settings(&session, client)?;
-    press::all(args.presses, &args.how, &mut session, &run, client)?;
-    let modulus = press::solved(args.presses, &mut session, &run)?;
+    motion::all(args.presses, &args.how, &mut session, &run, client)?;
+    let modulus = motion::solved(args.presses, &mut session, &run)?;
     let mut found = Found::default();
-    press::report(&modulus, &mut found);
+    motion::report(&modulus, &mut found);
     found.row("modulus_pa", 1e3 * modulus.kpa, Some(1e3 * modulus.sigma_kpa));
     found.more.insert("remaining".into(), json!({ "modulus_percent": 100.0 * modulus.sigma_kpa / modulus.kpa }));
     result::finish(&found, &mut session, &run, client)

@@ -18,7 +18,7 @@ const COUNTERS: [u16; 8] = [
     address::FRAMING_ERRORS,
 ];
 
-/// Tells what the controller is and how it stands.
+/// Shows identity and status of the controller.
 pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let pong = client.ping()?;
     let state = State::read(client)?;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 const FIRST: u16 = address::PRESENT_MODE;
 const LENGTH: u16 = 54;
 
-/// What to measure.
+/// Options of the measurement.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip latency --seconds 10")]
 pub struct Args {
@@ -19,7 +19,7 @@ pub struct Args {
     seconds: f64,
 }
 
-/// Reads 54 bytes again and again without a pause, and tells how long answers took.
+/// Reads 54 bytes repeatedly without a pause, and reports the times of the answers.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     let interrupt = Interrupt::catch()?;
     let delay_us = 2 * client.number(address::RETURN_DELAY_TIME)?;

@@ -14,7 +14,7 @@ const WATCHDOG_MS: i64 = 500;
 const WATCHDOG: i64 = WATCHDOG_MS / 20;
 /// Longest release at the end of a command, in seconds of the controller's clock.
 const RELEASE_S: f64 = 10.0;
-/// Longest wait for the controller, for example where no frames come and its clock stands still.
+/// Longest wait for the controller, for example if no frames come and its clock does not advance.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// `MEASURE`: stops the motion.
 const STOP: i64 = Task::Stop as i64;
@@ -48,7 +48,7 @@ impl<'a> Moving<'a> {
     /// Stops the finger, whatever the command came to, and puts the watchdog back.
     ///
     /// # Errors
-    /// The command's own, and what failed on the way to rest.
+    /// Errors of the command, and of the stop.
     pub fn finish<T>(mut self, done: Result<T, Error>) -> Result<T, Error> {
         let Err(second) = self.stop() else { return done };
         let why = done.err().map_or(String::new(), |why| format!("{why}; "));

@@ -1,8 +1,6 @@
 //! `fingertip params`: what outlives a reset.
 
-mod file;
-pub(super) mod gains;
-pub(super) mod set;
+pub(super) mod file;
 
 use super::{say, say_json};
 use crate::state::ANEW;
@@ -11,7 +9,8 @@ use crate::{Client, Error};
 use fingertip::link::table::Register;
 use fingertip::params::Params;
 use fingertip::pressure::GAIN_ONE;
-use fingertip::shipped::address;
+use fingertip::shipped::{Config, address};
+use fingertip::store::BAUD_RATES;
 use serde_json::{Map, json};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -22,7 +21,7 @@ const CHANGED: i64 = 1;
 /// A save makes the core wait for the flash.
 const SAVE_WITHIN: Duration = Duration::from_secs(5);
 
-/// What to do with them.
+/// Actions on the parameters.
 #[derive(Debug, clap::Subcommand)]
 #[command(after_help = "Examples:\n  \
     fingertip params get modulus_pa force_max_mn\n  \
@@ -91,7 +90,7 @@ pub fn run(command: &Command, client: &mut Client, json: bool) -> Result<(), Err
             Ok(())
         }
         Command::Backup { file, force } => {
-            let kept = file::Kept { values: read_all(client)?, gains: Some(gains::read(client)?) };
+            let kept = file::Kept { values: read_all(client)?, gains: Some(file::read_gains(client)?) };
             file::write(file, *force, client, &kept)?;
             let count = kept.values.len();
             told(json, &kept.values, &format!("{count} parameters and the taxels' gains in {}", file.display()));
@@ -149,20 +148,20 @@ fn restore(
     if client.number(address::TORQUE_ENABLE)? != 0 {
         return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
     }
-    let before = gains.map_or(Ok(None), |gains| gains::set(gains, client))?;
+    let before = gains.map_or(Ok(None), |gains| file::set_gains(gains, client))?;
     if before.is_some() && !json {
         say("the taxels' gains are others now: tare");
     }
-    change(values, save, client, json).map_err(|why| match before.map(|before| gains::set(&before, client)) {
+    change(values, save, client, json).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
         None => why,
         Some(Ok(_)) => Error::Other(format!("{why}; the taxels' gains are put back")),
         Some(Err(second)) => Error::Other(format!("{why}; and the taxels' gains could not be put back: {second}")),
     })
 }
 
-/// Sets them, saves them where that is asked for, and says what changed.
+/// Sets them, saves them on request, and reports the changes.
 fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> Result<(), Error> {
-    let changed = set::set(values, client)?;
+    let changed = set(values, client)?;
     let lines: Vec<String> =
         changed.iter().map(|(register, from, to)| format!("{}: {from} -> {to}", name(register))).collect();
     let now: Vec<Value> = changed.iter().map(|(register, _, to)| (*register, *to)).collect();
@@ -180,7 +179,7 @@ fn change(values: &[Value], save_too: bool, client: &mut Client, json: bool) -> 
 pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     let meant = read_all(client)?;
     client.set(address::SAVE_PARAMETERS, 1)?;
-    // The core stands while the flash is written, and may stay silent for that long.
+    // The core halts while the flash is written, and may stay silent for that long.
     let timeout = client.set_timeout(SAVE_WITHIN);
     let begun = Instant::now();
     let saved = loop {
@@ -191,7 +190,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
     };
     client.set_timeout(timeout);
     let saved = saved?;
-    // One that started anew has what the flash had, and calls that the same.
+    // A controller that restarted has the values of the flash, and reports no difference.
     if saved == SAME && read_all(client)? != meant {
         return Err(format!("not saved: {ANEW}, and has what the flash holds. Set them again").into());
     }
@@ -207,7 +206,7 @@ pub(super) fn save(client: &mut Client, json: bool) -> Result<(), Error> {
 }
 
 fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Result<(), Error> {
-    let (now, gains_now) = (read_all(client)?, gains::read(client)?);
+    let (now, gains_now) = (read_all(client)?, file::read_gains(client)?);
     let (other, other_gains, what) = match file {
         Some(path) => {
             let file::Kept { values, gains } = file::read(path)?;
@@ -249,16 +248,17 @@ fn diff(file: Option<&std::path::Path>, client: &mut Client, json: bool) -> Resu
 fn assignment(text: &str) -> Result<Value, String> {
     let (wanted, value) = text.split_once('=').ok_or_else(|| format!("`{text}`: NAME=VALUE is asked for"))?;
     let register = table::find(wanted.trim())?;
-    let value = value.trim().parse().map_err(|_| {
-        format!("{}: `{}` is no whole number; its unit stands in its name", name(register), value.trim())
-    })?;
+    let value = value
+        .trim()
+        .parse()
+        .map_err(|_| format!("{}: `{}` is no whole number; its unit is in its name", name(register), value.trim()))?;
     Ok((register, value))
 }
 
-/// What is wrong with a list in which a register stands twice: which of its values is meant, nobody knows.
+/// Returns what is wrong with a list that has a register twice: it is ambiguous which value is meant.
 fn twice(values: &[Value]) -> Option<String> {
     let again = |at: usize| values[..at].iter().any(|(register, _)| register.address == values[at].0.address);
-    (0..values.len()).find(|at| again(*at)).map(|at| format!("{} stands there twice", name(values[at].0)))
+    (0..values.len()).find(|at| again(*at)).map(|at| format!("{} is there twice", name(values[at].0)))
 }
 
 fn is_param(register: &Register) -> bool {
@@ -275,4 +275,133 @@ fn as_json(values: &[Value]) -> serde_json::Value {
 
 fn told(json: bool, values: &[Value], text: &str) {
     if json { say_json(&as_json(values)) } else { say(text) }
+}
+
+// Sets stored registers, all of them or none.
+//
+// The parameters lie side by side, so they go out in one packet, which the controller takes whole or not at all. The
+// few others have a packet each: where one is refused, what was set before is put back.
+
+/// A register, what it was, and what it is now.
+pub(in crate::commands) type Changed = (&'static Register, i64, i64);
+
+/// Sets them; what changed.
+///
+/// # Errors
+/// Something is wrong with a value, or torque is on: nothing was changed. Or the controller refused: the text says how
+/// it stands.
+pub(in crate::commands) fn set(values: &[Value], client: &mut Client) -> Result<Vec<Changed>, Error> {
+    let wrong: Vec<String> = values.iter().filter_map(wrong).chain(twice(values)).collect();
+    if !wrong.is_empty() {
+        return Err(format!("{}; nothing was changed", wrong.join("; ")).into());
+    }
+    let (params, others): (Vec<Value>, Vec<Value>) =
+        values.iter().copied().partition(|(register, _)| is_param(register));
+    let before = client.read(address::PARAMS, 4 * Params::COUNT as u16)?;
+    let block = table::Block { first: address::PARAMS, bytes: before.clone() };
+    let mut after = before.clone();
+    for (register, value) in &params {
+        let at = usize::from(register.address - address::PARAMS);
+        after[at..at + 4].copy_from_slice(&table::encode(register, *value));
+    }
+    check_together(&after)?;
+    if client.number(address::TORQUE_ENABLE)? != 0 {
+        return Err("torque is on: parameters are set with torque off. Nothing was changed".into());
+    }
+    for (_, id) in others.iter().filter(|(register, _)| register.address == address::ID) {
+        if *id != i64::from(client.id) && client.is_taken(*id as u8)? {
+            let why = "two with one ID cannot be told apart, nor set apart again";
+            return Err(format!("another device has the ID {id}: {why}. Nothing was changed").into());
+        }
+    }
+    let mut changed: Vec<Changed> = params.iter().map(|(r, value)| (*r, block.number(r.address), *value)).collect();
+    changed.retain(|(_, from, to)| from != to);
+    if after != before {
+        client.again(|client| client.write(address::PARAMS, &after)).map_err(|why| unsure(&why))?;
+    }
+    // Those of the bus come last: behind them the controller is found elsewhere.
+    let (bus, plain): (Vec<Value>, Vec<Value>) = others.into_iter().partition(|(register, _)| is_bus(register));
+    for (register, value) in plain.into_iter().chain(bus) {
+        let done = client.again(|client| client.number(register.address)).and_then(|from| {
+            if from == value {
+                return Ok(());
+            }
+            // Before it is known: where its answer is lost it is set all the same.
+            changed.push((register, from, value));
+            set_one(register, value, client)
+        });
+        if let Err(why) = done {
+            return Err(put_back(&before, &changed, client, &why));
+        }
+    }
+    for (register, _, to) in &changed {
+        let now = client.again(|client| client.number(register.address)).map_err(|why| unsure(&why))?;
+        if now != *to {
+            return Err(format!("{} was set to {to}, but reads {now}: the others are set", name(register)).into());
+        }
+    }
+    Ok(changed)
+}
+
+/// Error after a lost answer.
+fn unsure(why: &Error) -> Error {
+    Error::Other(format!("{why}. Whether they are set is not known: `fingertip params get` shows it"))
+}
+
+fn set_one(register: &'static Register, value: i64, client: &mut Client) -> Result<(), Error> {
+    client.set_register(register, value)?;
+    match register.address {
+        address::ID => client.id = value as u8,
+        address::BAUD_RATE => {
+            let baud = BAUD_RATES.get(value as usize).copied();
+            client.set_baud(baud.ok_or_else(|| format!("baud_rate of {value}: no such code"))?)?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// Returns what is wrong with a single value.
+fn wrong((register, value): &Value) -> Option<String> {
+    let (min, max) = (register.min, register.max);
+    if !table::is_stored(register) {
+        return Some(format!("{} is no parameter: it is not stored", name(register)));
+    }
+    (!(min..=max).contains(value)).then(|| format!("{} of {value}: {min} to {max} are allowed", name(register)))
+}
+
+/// Refuses parameters that contradict each other, by the core's own check.
+fn check_together(bytes: &[u8]) -> Result<(), Error> {
+    let mut values = [0; Params::COUNT];
+    for (value, bytes) in values.iter_mut().zip(bytes.as_chunks::<4>().0) {
+        *value = i32::from_le_bytes(*bytes);
+    }
+    let checked = Config::shipped(&Params::from_array(&values));
+    let config =
+        checked.map_err(|why| Error::Other(format!("these do not go together: {why}; nothing was changed")))?;
+    config.warnings().for_each(|warning| eprintln!("warning: {warning}"));
+    Ok(())
+}
+
+/// Undoes what was set; the error has the result.
+fn put_back(params: &[u8], changed: &[Changed], client: &mut Client, why: &Error) -> Error {
+    let mut undone = if changed.iter().any(|(r, ..)| is_param(r)) {
+        client.again(|client| client.write(address::PARAMS, params))
+    } else {
+        Ok(())
+    };
+    for (register, from, _) in changed.iter().rev().filter(|(register, ..)| !is_param(register)) {
+        undone = undone.and_then(|()| set_one(register, *from, client));
+    }
+    match undone {
+        Ok(()) => Error::Other(format!("{why}; what was set before is put back: nothing was changed")),
+        Err(second) => {
+            let names: Vec<String> = changed.iter().map(|(register, ..)| name(register)).collect();
+            Error::Other(format!(
+                "{why}; and putting back failed: {second}. Only some are set, of {}: \
+                 a reboot brings back what was saved",
+                names.join(", ")
+            ))
+        }
+    }
 }

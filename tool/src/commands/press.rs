@@ -10,10 +10,10 @@ use serde_json::json;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::time::{Duration, Instant};
 
-/// How often it looks, and how often it says what it sees.
+/// Interval of the checks, and of the reports.
 const LOOK: Duration = Duration::from_millis(10);
 const SAY: Duration = Duration::from_millis(500);
-/// How often it rewrites the line of a terminal, and what clears that line.
+/// Interval at which the line of a terminal is rewritten, and the text that clears that line.
 const REWRITE: Duration = Duration::from_millis(100);
 const CLEAR: &str = "\r\x1b[K";
 /// Least tolerance of a held force, for small goals: the resolution of a usual array, mN.
@@ -24,7 +24,7 @@ const SETTLED_S: f64 = 0.1;
 /// A status packet's error for a value beyond what other registers allow.
 const BEYOND: u8 = 6;
 
-/// What to press, and for how long.
+/// Options of a press.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  fingertip press 1.5\n  fingertip press 0.5 --seconds 10 --tolerance-percent 2\n\n\
@@ -35,21 +35,21 @@ pub struct Args {
     /// Force to hold, N
     #[arg(value_name = "NEWTONS", allow_negative_numbers = true, value_parser = numbers::goal_mn)]
     goal_mn: i64,
-    /// How long to hold it
+    /// Time for which the force is held
     #[arg(long, default_value_t = 2.0, value_parser = numbers::seconds)]
     seconds: f64,
     /// Tolerance of the held force as the controller senses it, in percent of the goal; 20 mN at least
     #[arg(long, default_value_t = 5.0, value_parser = numbers::percent)]
     tolerance_percent: f64,
-    /// How long it may take until the force is reached
+    /// Longest time until the force is reached
     #[arg(long, default_value_t = 10.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
-/// What was held, and the last state.
+/// Held forces, and the last state.
 #[derive(Default)]
 struct Held {
-    /// States while the force was held; none where it was not reached.
+    /// States while the force was held; empty if it was not reached.
     count: u32,
     outside: u32,
     sum_mn: f64,
@@ -63,7 +63,7 @@ struct Held {
 /// Touches, holds, releases, turns torque off. Whatever ends it, it releases before.
 ///
 /// # Errors
-/// A fault stands or comes, the tip is not tared, or the force is not reached or not held.
+/// There is a fault, the tip is not tared, or the force is not reached or not held.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     if Limits(client.number(address::LIMITS)? as u16).has(Limits::NOT_TARED) {

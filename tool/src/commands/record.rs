@@ -1,29 +1,31 @@
 //! `fingertip record`.
 
-mod csv;
-mod mcap;
-
 use super::{Interrupt, aside, say_json};
-use crate::messages::device;
-use crate::state::{ANEW, Stamp, Stamps, State};
+use crate::messages::{Topic, device};
+use crate::state::{ANEW, SHAPE, Stamp, Stamps, State};
 use crate::whole::Part;
 use crate::{Client, Error, numbers};
 use clap::ValueEnum;
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{McapError, WriteOptions, Writer};
 use serde_json::json;
-use std::io::{self, BufWriter, Write};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Seek as _, Write};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// So many reads in a row that fail end it.
+/// Number of failed reads in a row that ends the recording.
 const LOST_MAX: u64 = 20;
-/// What is later is not made up for.
+/// Delay beyond which missed states are not made up for.
 const LATE_MAX: Duration = Duration::from_millis(100);
 /// Time after which what was recorded goes to the file: a killed program loses no more.
 const FLUSH_EVERY: Duration = Duration::from_millis(200);
 /// Buffer that holds more than that, so that the file gets whole lines, each time by one call of the system.
 const BUFFER: usize = 1 << 20;
 
-/// What to record.
+/// Options of a recording.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip record --seconds 10 --rate-hz 200 force.csv\n  \
@@ -35,7 +37,7 @@ pub struct Args {
     /// For how long; without it, until Ctrl-C
     #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
-    /// How many states a second to ask for; 0 asks as fast as answers come
+    /// Requested states per second; 0 requests as fast as answers come
     #[arg(long, default_value_t = 200.0, value_parser = numbers::rate_hz_or_all)]
     rate_hz: f64,
     /// With the pressure of each taxel
@@ -49,7 +51,7 @@ pub struct Args {
     format: Option<Format>,
 }
 
-/// How a recording is written.
+/// Output of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// A row for each state.
@@ -83,9 +85,9 @@ pub fn run(args: &Args, format: Format, client: &mut Client, json: bool) -> Resu
         Format::Csv => {
             let to: Box<dyn Write> = to.map_or_else(|| Box::new(io::stdout()) as _, |file| Box::new(file) as _);
             let to = BufWriter::with_capacity(BUFFER, to);
-            Box::new(csv::Csv::new(to, args.pressures).map_err(file)?)
+            Box::new(Csv::new(to, args.pressures).map_err(file)?)
         }
-        Format::Mcap => Box::new(mcap::Mcap::new(to, client.id, device, args.pressures).map_err(file)?),
+        Format::Mcap => Box::new(Mcap::new(to, client.id, device, args.pressures).map_err(file)?),
     };
     let begun = Instant::now();
     let taken = take(args, client, &interrupt, &mut *sink);
@@ -191,5 +193,172 @@ pub fn format(args: &Args) -> Result<Format, Error> {
             "{}: a name that ends with .csv or .mcap is asked for, or --format",
             file.display()
         ))),
+    }
+}
+
+// A row for each state: numbers only, so there is nothing to quote.
+
+struct Csv<W> {
+    out: W,
+    line: String,
+}
+
+impl<W: Write> Csv<W> {
+    pub fn new(mut out: W, pressures: bool) -> io::Result<Self> {
+        let names = State::default().numbers().map(|(name, _)| name.to_owned());
+        let [rows, columns] = if pressures { SHAPE } else { [0, 0] };
+        let taxels = (0..rows).flat_map(|row| (0..columns).map(move |column| format!("pressure_{row}_{column}_pa")));
+        let head: Vec<String> =
+            ["time_s", "unix_time_s"].map(String::from).into_iter().chain(names).chain(taxels).collect();
+        writeln!(out, "{}", head.join(","))?;
+        Ok(Self { out, line: String::new() })
+    }
+}
+
+impl<W: Write> Sink for Csv<W> {
+    fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()> {
+        use std::fmt::Write as _;
+        self.line.clear();
+        // Writing to a string does not fail.
+        let (unix_s, unix_us) = (stamp.read_ns / 1_000_000_000, stamp.read_ns / 1_000 % 1_000_000);
+        let _ = write!(self.line, "{:.6},{unix_s}.{unix_us:06}", stamp.time_s);
+        for value in state.numbers().into_iter().map(|(_, value)| value).chain(state.pressures_pa.iter().copied()) {
+            let _ = write!(self.line, ",{value}");
+        }
+        self.line.push('\n');
+        self.out.write_all(self.line.as_bytes())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+// MCAP with the messages of [`crate::messages`].
+
+struct Mcap {
+    out: Writer<NoSeek<Chunks>>,
+    channels: Vec<(Topic, u16)>,
+    sequence: u32,
+}
+
+/// Chunks on their way to a file, or to standard output without one. In a file the end of an MCAP file without a summary
+/// follows each chunk, by the same call of the system, and the next chunk takes its place: a program that is killed leaves
+/// a file that every reader opens.
+struct Chunks {
+    file: Option<File>,
+    buffer: Vec<u8>,
+}
+
+impl Chunks {
+    fn hand_on(&mut self, end: &[u8]) -> io::Result<()> {
+        if let Some(file) = &mut self.file {
+            self.buffer.extend(end);
+            file.write_all(&self.buffer)?;
+            file.seek_relative(-(end.len() as i64))?;
+        } else {
+            io::stdout().write_all(&self.buffer)?;
+            io::stdout().flush()?;
+        }
+        self.buffer.clear();
+        Ok(())
+    }
+}
+
+impl Write for Chunks {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.buffer.extend(bytes);
+        Ok(bytes.len())
+    }
+
+    /// `DataEnd` (15) without a checksum, `Footer` (2) without a summary, each with its length, and the magic.
+    fn flush(&mut self) -> io::Result<()> {
+        let records = [&[15, 4, 0, 0, 0, 0, 0, 0, 0][..], &[0; 4], &[2, 20, 0, 0, 0, 0, 0, 0, 0], &[0; 20]];
+        self.hand_on(&[&records.concat(), mcap::MAGIC].concat())
+    }
+}
+
+fn failed(why: McapError) -> io::Error {
+    match why {
+        McapError::Io(why) => why,
+        other => io::Error::other(other),
+    }
+}
+
+impl Mcap {
+    /// Into a file, or to standard output.
+    pub fn new(file: Option<File>, id: u8, device: BTreeMap<String, String>, pressures: bool) -> io::Result<Self> {
+        Self::begin(Chunks { file, buffer: Vec::new() }, id, device, pressures).map_err(failed)
+    }
+
+    fn begin(to: Chunks, id: u8, device: BTreeMap<String, String>, pressures: bool) -> mcap::McapResult<Self> {
+        let options = WriteOptions::new().profile("").library(concat!("fingertip/", env!("CARGO_PKG_VERSION")));
+        let mut out = options.disable_seeking(true).create(NoSeek::new(to))?;
+        let metadata = Metadata { name: "fingertip.device".into(), metadata: device };
+        out.write_metadata(&metadata)?;
+        let topics = [Some(Topic::Scalars), pressures.then_some(Topic::Image)];
+        let channel = |topic: Topic| {
+            let schema = out.add_schema(topic.schema_name(), "jsonschema", &topic.schema())?;
+            Ok((topic, out.add_channel(schema, &topic.name(id), "json", &metadata.metadata)?))
+        };
+        let channels = topics.into_iter().flatten().map(channel).collect::<mcap::McapResult<_>>()?;
+        Ok(Self { out, channels, sequence: 0 })
+    }
+}
+
+impl Sink for Mcap {
+    fn put(&mut self, stamp: &Stamp, state: &State) -> io::Result<()> {
+        let (sequence, log_time, publish_time) = (self.sequence, stamp.read_ns, stamp.frame_ns);
+        for (topic, channel_id) in &self.channels {
+            let header = MessageHeader { channel_id: *channel_id, sequence, log_time, publish_time };
+            self.out.write_to_known_channel(&header, &topic.message(stamp, state)).map_err(failed)?;
+        }
+        self.sequence += 1;
+        Ok(())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush().map_err(failed)
+    }
+
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.out.finish().map_err(failed)?;
+        let mut chunks = self.out.into_inner().into_inner();
+        chunks.hand_on(&[])?;
+        // The library may have flushed behind the summary.
+        chunks.file.map_or(Ok(()), |mut file| file.stream_position().and_then(|end| file.set_len(end)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mcap::{MessageStream, Summary};
+
+    #[test]
+    fn a_file_is_whole_after_every_flush() {
+        let path = std::env::temp_dir().join(format!("fingertip-flushed-{}.mcap", std::process::id()));
+        let file = File::create(&path).expect("a file");
+        let mut sink = Box::new(Mcap::new(Some(file), 1, BTreeMap::new(), true).expect("it can be written"));
+        let read = || {
+            let bytes = std::fs::read(&path).expect("it is there");
+            let messages = MessageStream::new(&bytes).expect("MCAP").map(|message| message.expect("whole").sequence);
+            (messages.collect::<Vec<_>>(), Summary::read(&bytes).expect("MCAP").is_some())
+        };
+        for count in 1..=20 {
+            sink.put(&Stamp::default(), &State::default()).expect("it can be written");
+            sink.flush().expect("it can be written");
+            assert_eq!(read(), ((0..count).flat_map(|n| [n, n]).collect(), false));
+        }
+        sink.finish().expect("it can be written");
+        assert_eq!(read(), ((0..20).flat_map(|n| [n, n]).collect(), true));
+        assert!(
+            std::fs::read(&path).is_ok_and(|bytes| bytes.windows(8).filter(|eight| *eight == mcap::MAGIC).count() == 2)
+        );
+        std::fs::remove_file(&path).expect("it is there");
     }
 }

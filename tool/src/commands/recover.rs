@@ -8,13 +8,13 @@ use std::time::Duration;
 
 /// The controller takes a frame or two.
 const WITHIN: Duration = Duration::from_secs(2);
-/// A status packet's error where something stands in the way.
+/// Error number of a status packet if something prevents the request.
 const RESULT: u8 = 1;
 
 /// Clears what stopped the motor: one register does it.
 ///
 /// # Errors
-/// Something stands in the way, or the fault comes back.
+/// Something prevents it, or the fault comes back.
 pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let fault = client.number(address::FAULT)?;
     let tripped = client.number(address::BUS_WATCHDOG)? < 0;
@@ -30,7 +30,7 @@ pub fn run(client: &mut Client, json: bool) -> Result<(), Error> {
     let left = wait_for(client, address::FAULT, WITHIN, |fault| fault == 0)?;
     if left != 0 {
         let words = table::meaning(address::FAULT, left);
-        return Err(format!("fault {left} ({words}) stands again: what causes it is still there").into());
+        return Err(format!("fault {left} ({words}) is back: what causes it is still there").into());
     }
     let untared = client.number(address::LIMITS)? as u16 & fingertip::state::Limits::NOT_TARED != 0;
     let on = client.number(address::TORQUE_ENABLE)? != 0;

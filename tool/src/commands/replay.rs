@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What to replay.
+/// Options of a replay.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip replay press.mcap\n  fingertip replay captures")]
 pub struct Args {
@@ -60,7 +60,7 @@ fn find(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// What came of a file, and whether that is as it should be.
+/// Result of a file, and whether it is as expected.
 fn replay(file: &Path) -> (Value, bool) {
     let kept = match captured::open(file) {
         Ok(kept) => kept,

@@ -6,7 +6,7 @@ use crate::{Client, Error, line, table};
 use fingertip::store::BAUD_RATES;
 use serde_json::json;
 
-/// Where to look.
+/// Ports and speeds to scan.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip scan\n  fingertip --port /dev/ttyUSB0 scan --speeds 57600,1000000")]
 pub struct Args {
@@ -15,7 +15,7 @@ pub struct Args {
     speeds: Vec<u32>,
 }
 
-/// Looks, and tells what is there.
+/// Lists the devices that answer.
 ///
 /// # Errors
 /// Nothing is, or the port that was named cannot be opened.

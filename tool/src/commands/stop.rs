@@ -16,7 +16,7 @@ const ROLL_OUT: Duration = Duration::from_secs(2);
 /// A tip that still presses with more force gets a hint.
 const RESIDUAL_MN: i64 = 50;
 
-/// What to stop.
+/// Options of a stop.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip stop\n  \

@@ -5,7 +5,7 @@ mod server;
 
 use crate::{Client, Error, numbers};
 
-/// Where to stream to.
+/// Address of the stream.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fingertip stream    (in Foxglove: Open connection, Foxglove WebSocket, ws://localhost:8765)")]

@@ -12,19 +12,19 @@ use std::time::Duration;
 const RUNNING: i64 = 1;
 const DONE: i64 = 2;
 
-/// How to tare.
+/// Options of the tare.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fingertip tare")]
 pub struct Args {
-    /// How long it may take; a real controller needs 20 ms
+    /// Longest time that it may take; a real controller needs 20 ms
     #[arg(long, default_value_t = 5.0, value_parser = numbers::seconds)]
     within_s: f64,
 }
 
-/// Tares, and tells what came of it.
+/// Tares, and reports the result.
 ///
 /// # Errors
-/// Torque is on, a fault stands, or something touched.
+/// Torque is on, there is a fault, or something touched.
 pub fn run(args: &Args, client: &mut Client, json: bool) -> Result<(), Error> {
     no_fault(client)?;
     motion::alone(client)?;

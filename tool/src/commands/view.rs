@@ -13,22 +13,22 @@ use std::collections::VecDeque;
 use std::io::{self, IsTerminal as _};
 use std::time::{Duration, Instant};
 
-/// How much of the past is shown.
+/// Time span that is shown.
 const PAST_S: f64 = 10.0;
 
-/// How to watch.
+/// Options of the view.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  fingertip view --rate-hz 30    (q ends)")]
 pub struct Args {
     /// Updates a second
     #[arg(long, default_value_t = 30.0, value_parser = numbers::rate_hz)]
     rate_hz: f64,
-    /// Ends after so long
+    /// Time after which it ends
     #[arg(long, value_parser = numbers::seconds)]
     seconds: Option<f64>,
 }
 
-/// What is shown.
+/// State of the view.
 #[derive(Debug, Default)]
 pub struct Seen {
     /// Whom it is of, for the first line.
@@ -46,7 +46,7 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// Takes the next state, or why there is none.
+    /// Takes the next state, or the reason for its absence.
     pub fn take(&mut self, read: Result<State, Error>) {
         match read {
             Ok(state) => {
@@ -124,7 +124,7 @@ const TAXEL: u16 = 4;
 const HEAT: [u8; 10] = [234, 17, 18, 54, 90, 126, 161, 196, 208, 226];
 /// From which of them on writing is dark.
 const BRIGHT: usize = 8;
-/// Pa that the hottest colour stands for, at least.
+/// Least pressure of the hottest colour, Pa.
 const HOTTEST_PA: i64 = 20_000;
 
 /// Draws what is seen.

@@ -1,4 +1,4 @@
-//! What a host's program must not do, whatever it is asked and whatever happens to the controller meanwhile.
+//! Robustness of the host's program against any request and any failure of the controller.
 
 use crate::served::Served;
 use fingertip::link::packet::instruction::REBOOT;
@@ -74,7 +74,7 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     let output = child.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(1), "{said}");
-    assert!(said.contains("the recording ends after") && said.contains("started anew"), "{said}");
+    assert!(said.contains("the recording ends after") && said.contains("restarted"), "{said}");
     // What it had is whole, and its times are.
     let text = fs::read_to_string(&file).expect("it is there");
     let times: Vec<f64> =
@@ -87,14 +87,14 @@ fn a_controller_that_starts_anew_ends_a_recording_and_a_press() {
     let mut line = String::new();
     while !line.starts_with("force") {
         line.clear();
-        reader.read_line(&mut line).expect("it says how it stands");
+        reader.read_line(&mut line).expect("it reports its status");
     }
     finger.command(&format!("raw {REBOOT}"));
     let mut rest = String::new();
     reader.read_to_string(&mut rest).expect("it says why it ends");
     let output = child.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(1), "{rest}{}", String::from_utf8_lossy(&output.stdout));
-    assert!(rest.contains("started anew"), "{rest}");
+    assert!(rest.contains("restarted"), "{rest}");
 }
 
 #[test]
@@ -102,12 +102,12 @@ fn a_register_that_is_named_twice_changes_nothing() {
     let finger = Served::begin("wall");
     let before = finger.json(&["params", "get"]);
     let why = finger.refused(&["params", "set", "modulus_pa=300000", "clearance_um=500", "MODULUS_PA=200000"]);
-    assert!(why.contains("modulus_pa stands there twice") && why.contains("nothing was changed"), "{why}");
+    assert!(why.contains("modulus_pa is there twice") && why.contains("nothing was changed"), "{why}");
     let file = finger.file("twice.toml");
     fs::write(&file, "[parameters]\nmodulus_pa = 300000\nclearance_um = 500\nModulus_Pa = 200000\n").expect("a file");
     for command in ["restore", "diff"] {
         let why = finger.refused(&["params", command, &file]);
-        assert!(why.contains("modulus_pa stands there twice"), "{why}");
+        assert!(why.contains("modulus_pa is there twice"), "{why}");
     }
     assert_eq!(finger.json(&["params", "get"]), before);
 }
@@ -130,7 +130,7 @@ fn a_backup_that_was_cut_changes_nothing() {
         assert!(why.contains("cannot read"), "cut at {at}: {why}");
         assert_eq!(finger.json(&["params", "get"]), before, "cut at {at}");
     }
-    // Who leaves some out says so.
+    // A client that leaves some out reports it.
     fs::write(&file, "[parameters]\nmodulus_pa = 300000").expect("a file");
     finger.done(&["params", "restore", &file]);
     assert_eq!(finger.json(&["params", "get", "modulus_pa"]), serde_json::json!({ "modulus_pa": 300_000 }));
@@ -144,7 +144,7 @@ fn an_address_that_another_has_is_refused() {
     let ids: Vec<_> = finger.json(&["scan", "--speeds", "1000000"]).as_array().expect("a list").clone();
     assert_eq!(ids.iter().map(|found| found["id"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2)]);
     assert_ne!(finger.json(&["params", "get", "modulus_pa"])["modulus_pa"], 300_000);
-    // Its own is none, and a free one is free.
+    // Its own ID does not count as taken, and a free one is free.
     finger.done(&["params", "set", "id=1"]);
     finger.done(&["params", "set", "id=3"]);
     finger.done(&["--id", "3", "params", "set", "id=1"]);

@@ -33,7 +33,7 @@ fn a_capture_is_taken_and_replays() {
     assert_eq!(told, format!("{file}: {frames} frames, the same to the bit\n"));
     let told = finger.json(&["replay", &file]);
     assert_eq!((told[0]["frames"].as_u64(), told[0]["difference"].is_null()), (Some(frames), true));
-    // It let go.
+    // The finger released.
     assert_eq!(client(&finger).number(address::TORQUE_ENABLE).expect("it answers"), 0);
     let full = fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
     let why = captured::write(full, &kept.bytes, &kept.about).expect_err("it is full");

@@ -1,4 +1,4 @@
-//! How commands end: the exit codes of docs/host.md, errors in JSON, and the help of every command.
+//! Ends of commands: the exit codes of docs/host.md, errors in JSON, and the help of every command.
 
 use crate::served::Served;
 use serde_json::Value;

@@ -214,7 +214,7 @@ fn a_program_is_asked_nothing() {
     }
 }
 
-/// How a procedure ends before its end: by a signal, a cable that is pulled out, or a controller without power.
+/// Early end of a procedure: by a signal, a cable that is pulled out, or a controller without power.
 #[derive(Clone, Copy, Debug)]
 enum End {
     Signal(Signal),
@@ -276,8 +276,8 @@ fn a_procedure_that_ends_at_any_instant_resumes() {
     }
 }
 
-/// Ends a procedure behind so many packets and resumes it: whether the parameters were those before, and by how much the
-/// result is off.
+/// Ends a procedure after the given number of packets and resumes it: whether the parameters were those before, and by
+/// how much the result is off.
 fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bool, f64) {
     let finger = patient("wall");
     let (old, session, what) =
@@ -329,7 +329,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     assert!(kept || off(&now) < 0.1, "{what}: {now} of {old} and {new}");
     let (_, mut resumed, why) = output(&finger, &arguments);
     if matches!(end, End::Power) && why.contains("seemed to touch the tip") {
-        // A tip that still creeps back spoils the first tare, which says so.
+        // A tip that still creeps back spoils the first tare, which reports it.
         resumed = finger.json(&arguments);
     }
     let off = off(&resumed["after"]);

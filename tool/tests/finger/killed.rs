@@ -1,4 +1,4 @@
-//! What a killed command leaves behind: KILL after each of its packets, or after some of them where there are hundreds.
+//! State after a killed command: KILL after each of its packets, or after some of them where there are hundreds.
 
 use crate::served::Served;
 use crate::stopped::client;
@@ -32,7 +32,7 @@ fn a_restore_leaves_the_old_parameters_or_the_new_ones() {
         // Until the next reset: the parameters go together, those beside them one by one, each whole.
         assert!(all_of(side("modulus_pa")), "killed after {packets}: {now}");
         assert!(beside.iter().all(|name| now[*name] == side(name)[*name]), "killed after {packets}: {now}");
-        // What differs is told.
+        // Differences are reported.
         let differing = finger.json(&["params", "diff", &new]);
         assert_eq!(differing.as_object().map(serde_json::Map::is_empty), Some(now == after), "killed after {packets}");
         // Behind a reset: all old, or all new.
@@ -47,7 +47,7 @@ fn a_restore_leaves_the_old_parameters_or_the_new_ones() {
     assert!(!fs::exists(finger.file("new.toml.part")).expect("a folder"));
 }
 
-/// A controller that starts anew has what the flash holds, and calls that saved.
+/// A controller that restarts has the values of the flash, and reports them as saved.
 #[test]
 fn a_save_during_which_the_controller_starts_anew_is_not_told_as_one() {
     let finger = Served::begin("wall");
@@ -139,7 +139,7 @@ fn a_controller_that_starts_anew_was_not_commissioned() {
     let finger = Served::begin("wall");
     finger.command(&format!("trap Strokes {REBOOT}"));
     let why = finger.refused(&["commission", "--forward", "yes"]);
-    assert!(why.contains("came to no end") && why.contains("started anew"), "{why}");
+    assert!(why.contains("came to no end") && why.contains("restarted"), "{why}");
 }
 
 #[test]

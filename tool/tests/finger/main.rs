@@ -132,7 +132,7 @@ fn parameters_are_set_all_or_none_and_saved() {
     assert_eq!(finger.json(&["info"])["saved_state"], 0);
     assert_eq!(finger.json(&["params", "save"]), serde_json::json!({ "saved": true }));
 
-    // What is wrong with one leaves the others as they were.
+    // An error of one finger does not affect the other one.
     for (values, why) in [
         (&["tip_radius_um=9000", "modulus_pa=4"][..], "modulus_pa of 4: 20000 to 2000000"),
         (&["tip_radius_um=9000", "contact_on_mn=10"], "contact_off_mn of 15"),
@@ -202,7 +202,7 @@ fn a_backup_is_restored_whole() {
     finger.done(&["params", "restore", &file]);
     assert_eq!(finger.json(&["params", "diff", &file]), serde_json::json!({}));
 
-    // A damaged file changes nothing, and all that is wrong with it is told.
+    // A damaged file changes nothing, and all its errors are reported.
     for (from, to, why) in [
         ("modulus_pa = 300000", "modulus_pa = 3", "modulus_pa of 3"),
         ("modulus_pa = 300000", "modulus_pb = 3", "no register `modulus_pb`"),

@@ -74,7 +74,7 @@ fn a_recording_that_is_interrupted_is_whole() {
     assert!(text.ends_with('\n') && text.starts_with("time_s,"));
     assert!(!fs::exists(format!("{file}.part")).expect("a folder"));
 
-    // One whose line is lost keeps what it had, and says why it ends.
+    // A recording whose connection is lost keeps its rows, and reports why it ends.
     let lost = finger.file("lost.csv");
     let child = finger.start(&["record", &lost]);
     while fs::metadata(format!("{lost}.part")).is_err() {

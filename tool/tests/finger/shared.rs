@@ -13,7 +13,7 @@ use std::process::{Child, Command, Output, Stdio};
 /// A force that a stopped finger may still show, N.
 const RESIDUAL_N: f64 = 0.05;
 
-/// How long a client of the broker waits by its `--timeout-ms`.
+/// Time that a client of the broker waits by its `--timeout-ms`.
 const TIMEOUT: &str = "3000";
 
 /// A served finger and a broker in front of it.

@@ -27,17 +27,17 @@ pub struct Served {
     thread: RefCell<Option<JoinHandle<()>>>,
 }
 
-/// A finger that does what it is told between two looks at it.
+/// A finger that executes commands between two polls.
 struct Told {
     native: Native<Named>,
     commands: Receiver<(String, Sender<Result<String, String>>)>,
-    /// How many more packets it hears before it is deaf, how many those are that it does not hear, and how many came.
+    /// Packets until it stops receiving, packets that it misses then, and packets that came.
     ears: Option<(u64, u64, u64)>,
     /// An instruction to all that comes as soon as the finger's state has this word.
     trap: Option<(String, u8)>,
     /// Packets on a line that stalls.
     stalled: Option<Vec<Vec<u8>>>,
-    /// How many more packets it hears before it starts anew.
+    /// Number of packets before it restarts.
     restart: Option<u64>,
     /// Its clock waits for the host: it goes on for `PATIENT_S` after a packet. On a loaded machine the bus watchdog must not
     /// outrun the program under test.
@@ -51,7 +51,7 @@ struct Told {
 const PATIENT_S: f64 = 0.1;
 
 impl Told {
-    /// What is no command of a served finger.
+    /// Inputs that are not commands of a served finger.
     fn told(&mut self, command: &str) -> Option<Result<String, String>> {
         let words: Vec<&str> = command.split_whitespace().collect();
         let number = |text: &str| text.parse().expect("a number");
@@ -221,7 +221,7 @@ impl Served {
         self.folder.join(name).display().to_string()
     }
 
-    /// Kills a command once the finger heard so many of its packets; whether it got so far before it ended.
+    /// Kills a command once the finger received `packets` of its packets; false if it ended before.
     pub fn killed_after(&self, packets: u64, arguments: &[&str]) -> bool {
         self.command(&format!("deaf after {packets} for {}", u64::MAX));
         let mut child = self.start(arguments);
@@ -259,7 +259,7 @@ impl Served {
         command
     }
 
-    /// What it says where it does what is asked.
+    /// Output of a command that succeeds.
     pub fn done(&self, arguments: &[&str]) -> String {
         said(&self.fingertip(arguments).output().expect("it starts"))
     }
@@ -270,7 +270,7 @@ impl Served {
         serde_json::from_str(&text).unwrap_or_else(|why| panic!("{why}: {text}"))
     }
 
-    /// What it complains of where it does not.
+    /// Error of a command that fails.
     pub fn refused(&self, arguments: &[&str]) -> String {
         complained(&self.fingertip(arguments).output().expect("it starts"))
     }
@@ -281,7 +281,7 @@ impl Served {
         complained(&command.env_remove("FINGERTIP_PORT").args(arguments).output().expect("it starts"))
     }
 
-    /// What it complains of where it does not understand.
+    /// Error of a command line that is not understood.
     pub fn not_understood(arguments: &[&str]) -> String {
         let output = Command::new(env!("CARGO_BIN_EXE_fingertip"))
             .env("FINGERTIP_PORT", "/nowhere")
@@ -304,12 +304,12 @@ impl Served {
         rustix::process::kill_process(pid, signal).expect("it runs");
     }
 
-    /// Waits until the finger's state has this word, its mode for example. The finger's clock goes by itself.
+    /// Waits until the finger's state has this word, its mode for example. The finger's clock runs by itself.
     pub fn until(&self, word: &str) {
         self.until_by("look", word);
     }
 
-    /// The same where nobody asks a patient finger anything: each look moves its clock on.
+    /// The same for a patient finger without requests: each poll moves its clock on.
     pub fn until_alone(&self, word: &str) {
         self.until_by("state", word);
     }
@@ -347,7 +347,7 @@ impl Drop for Served {
     }
 }
 
-/// An instruction to all, which nobody answers, without parameters.
+/// An instruction to all devices without parameters; no device answers.
 fn instruction(number: u8) -> Vec<u8> {
     let mut packet = Reply::new();
     packet::Sender::new(&mut packet, BROADCAST, number).finish();

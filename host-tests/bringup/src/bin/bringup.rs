@@ -1,5 +1,5 @@
 //! The image of `cargo xtask bringup`: measures a bare NUCLEO-F446RE with the firmware's own board layer, closes the
-//! loop on a finger that it simulates, and tells all of it on the virtual COM port.
+//! loop on a finger that it simulates, and reports all of it on the virtual COM port.
 //!
 //! It judges nothing: `bringup::checks` does, on the host. What ends in a reset comes first, see `stages`.
 #![no_std]
@@ -39,7 +39,6 @@ use cortex_m::peripheral::DWT;
 use defmt_rtt as _;
 use fingertip::control::Winding;
 use fingertip::link::snapshot::CrashCause;
-use fingertip::params::Params;
 use fingertip::pipeline::Taken;
 use fingertip::shipped::{Config, Pipeline};
 use stages::{Kept, Stage};
@@ -141,7 +140,7 @@ fn count_cycles() {
     }
 }
 
-/// Whether so many cycles have passed since then.
+/// True once the given number of cycles passed since then.
 fn passed(since: u32, cycles: u32) -> bool {
     DWT::cycle_count().wrapping_sub(since) >= cycles
 }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Nothing that the image does takes so long without a line.
+/// Silence after which the image counts as hung; each of its steps reports earlier.
 const SILENT: Duration = Duration::from_secs(60);
 
 /// Takes the report of a board at a serial port and judges it.
@@ -23,7 +23,7 @@ struct Arguments {
     /// SHA-256 of what was flashed.
     #[arg(long, value_name = "SHA-256")]
     sha256: String,
-    /// How many frames the rows are read back for.
+    /// Number of frames for which the rows are read back.
     #[arg(long, default_value_t = FRAMES)]
     frames: u32,
     /// Estimated cycles, a line `CYCLES KERNEL` each.
@@ -45,7 +45,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whether nothing fails.
+/// True if nothing fails.
 fn run(arguments: &Arguments) -> Result<bool, Box<dyn Error>> {
     let Arguments { port, sha256, frames, estimates: path, json } = arguments;
     let mut port = SerialPort::open(port, BAUD).map_err(|error| format!("{}: {error}", port.display()))?;

@@ -55,7 +55,7 @@ pub fn means(mut analogue: Analogue) {
     }
 }
 
-/// The standard deviation of the codes; none where the scan stands.
+/// Standard deviation of the codes; `None` if the scan stopped.
 fn deviation(scan: &mut scan::Scan, bench: &mut Bench, pipeline: &mut Pipeline) -> Option<f32> {
     let (mut count, mut sum, mut squares) = (0u64, 0u64, 0u64);
     let mut frame = Frame::EMPTY;

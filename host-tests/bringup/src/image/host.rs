@@ -1,4 +1,4 @@
-//! What the study's kernels ask of a host: to tell a line, and to give up.
+//! Host functions of the study's kernels: report a line, and give up.
 
 use core::fmt::{Arguments, Display, Write};
 

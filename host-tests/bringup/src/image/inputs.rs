@@ -1,5 +1,5 @@
 //! The kernels' inputs: some of the study's from the image, and behind them the records of the loop on the simulated
-//! finger, made anew each time that they are asked for.
+//! finger, computed again for each request.
 
 use bringup::script::{Bench, RECORDS};
 use fingertip::control::Winding;
@@ -12,7 +12,7 @@ use crate::host::fail;
 /// As `study few` writes them.
 static BYTES: &[u8] = include_bytes!("../inputs.bin");
 
-/// Where the next byte is.
+/// Address of the next byte.
 pub struct Inputs<'a> {
     place: usize,
     bench: &'a mut Bench,
@@ -48,7 +48,7 @@ impl<'a> Inputs<'a> {
         })
     }
 
-    /// Where the next byte lies.
+    /// Position of the next byte.
     pub fn place(&self) -> usize {
         self.place
     }

@@ -16,13 +16,13 @@ use inputs::Inputs;
 
 use crate::report;
 
-/// Passes of a kernel whose median is told; all count for the most.
+/// Passes of a kernel that count for the median; all count for the most.
 const PASSES: usize = 1_200;
 
 static PASSED: Mutex<RefCell<Passed>> =
     Mutex::new(RefCell::new(Passed { kernel: heapless::String::new(), cycles: heapless::Vec::new(), most: 0 }));
 
-/// What the passes of the present kernel took.
+/// Cycles of the passes of the present kernel.
 struct Passed {
     kernel: heapless::String<64>,
     cycles: heapless::Vec<u32, PASSES>,
@@ -36,7 +36,7 @@ pub fn run(config: &Config, bench: &mut Bench, pipeline: &mut Pipeline) {
     begin("");
 }
 
-/// Another kernel begins: tells of the one before.
+/// Begins another kernel and reports the one before.
 pub fn begin(kernel: &str) {
     free(|section| {
         let Passed { kernel: name, cycles, most } = &mut *PASSED.borrow(section).borrow_mut();
@@ -52,7 +52,7 @@ pub fn begin(kernel: &str) {
     });
 }
 
-/// A pass took so long.
+/// Records the cycles of a pass.
 fn note(cycles: u32) {
     free(|section| {
         let passed = &mut *PASSED.borrow(section).borrow_mut();

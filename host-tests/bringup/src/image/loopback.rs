@@ -18,7 +18,7 @@ const SPEEDS: [(&str, u32); 5] = [
     ("loopback_3000000", 3_000_000),
 ];
 
-/// Tells of each speed how many bytes came back wrong, or not.
+/// Reports for each speed the number of bytes that came back wrong.
 pub fn run() {
     report::flush();
     pac::GPIOA.pupdr().modify(|w| w.set_pupdr(TX_PIN, Pupdr::PULL_UP));
@@ -39,7 +39,7 @@ fn single_wire(on: bool) {
     pac::USART2.cr1().modify(|w| w.set_ue(true));
 }
 
-/// How many bytes are wrong.
+/// Returns the number of wrong bytes.
 fn at(baud: u32) -> u32 {
     report::set_baud(baud);
     single_wire(true);

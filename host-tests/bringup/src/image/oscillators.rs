@@ -16,7 +16,7 @@ const EXTERNAL: u32 = 0b10;
 /// TIM5's option register, and its fourth input from the low-speed oscillator.
 const TIM5_OPTIONS: usize = 0x50;
 const LOW_SPEED: u32 = 0b01 << 6;
-/// A capture each so many periods.
+/// Periods between two captures.
 const EACH: f32 = 8.0;
 const BY_EIGHT: u8 = 0b11;
 /// Captures between the first and the last.
@@ -25,7 +25,7 @@ const SLOW_CAPTURES: u32 = 64;
 /// Looks for a capture: some ms each.
 const LOOKS: u32 = 50_000;
 
-/// The external clock by the internal one, which runs the core just now; none where no capture comes.
+/// The external clock by the internal one, which runs the core just now; `None` without a capture.
 pub fn external_by_internal() -> Option<f32> {
     pac::RCC.apb2enr().modify(|w| w.set_tim11en(true));
     // A megahertz, as the manual asks for.

@@ -77,7 +77,7 @@ pub fn end() {
     let _ = writeln!(Port, "end {check:08x}");
 }
 
-/// Waits for `go`, or `go FRAMES`; says each half second that it does.
+/// Waits for `go`, or `go FRAMES`; reports each half second that it waits.
 pub fn wait_for_go() -> u32 {
     let mut word = heapless::String::<32>::new();
     let mut said = None;
@@ -89,7 +89,7 @@ pub fn wait_for_go() -> u32 {
         }
         let Some(byte) = received() else { continue };
         if byte != b'\n' && byte != b'\r' {
-            // A longer line is none of the host's.
+            // The host sends no longer line.
             let _ = word.push(char::from(byte));
             continue;
         }

@@ -10,10 +10,10 @@ use crate::{CYCLES_PER_US, passed, report};
 const ALL: u32 = (1 << ROWS) - 1;
 /// A slow edge is over by then: 200 ns.
 const EDGE_CYCLES: u32 = 34;
-/// So many lines say how far it is.
+/// Number of progress lines.
 const LINES: u32 = 10;
 
-/// Watches so many frames.
+/// Watches the given number of frames.
 pub fn run(frames: u32) {
     report::say(format_args!("rows: {frames} frames of 100 us"));
     report::flush();
@@ -21,7 +21,7 @@ pub fn run(frames: u32) {
     interrupt::DMA2_STREAM1.disable();
     interrupt::DMA2_STREAM2.disable();
     let mut seen = Seen { frames: 0, wrong: 0, least: u32::MAX, most: 0, frame_cycles: 0, stands: false };
-    // A line takes many slots: the watch begins anew behind it.
+    // A line takes many slots: the watch restarts behind it.
     while seen.frames < frames && !seen.stands {
         seen.watch(frames.min(seen.frames + frames / LINES + 1));
         report::say(format_args!("rows: {} frames", seen.frames));
@@ -42,7 +42,7 @@ pub fn run(frames: u32) {
     report::figure("frame_ns", ns(seen.frame_cycles as f32 / seen.frames.max(1) as f32));
 }
 
-/// What the pins did.
+/// State of the pins.
 struct Seen {
     frames: u32,
     wrong: u32,
@@ -64,7 +64,7 @@ const fn next(rows: u32) -> u32 {
 }
 
 impl Seen {
-    /// Watches until so many frames were seen.
+    /// Watches until the given number of frames was seen.
     fn watch(&mut self, frames: u32) {
         let (mut rows, mut edge, mut first) = (driven(), None::<u32>, None::<u32>);
         let mut looked = DWT::cycle_count();

@@ -10,7 +10,7 @@ use fingertip::scan::ScanTiming;
 use crate::board::watchdog::Watchdogs;
 use crate::{CYCLES_PER_US, passed, report};
 
-/// What comes next.
+/// Next stage.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// For the host.
@@ -46,21 +46,21 @@ struct Words {
 #[unsafe(link_section = ".uninit.bringup")]
 static mut KEPT: MaybeUninit<Words> = MaybeUninit::uninit();
 
-/// What is kept through a reset.
+/// State that is kept through a reset.
 #[derive(Clone, Copy)]
 pub struct Kept {
-    /// What comes next.
+    /// Next stage.
     pub stage: Stage,
-    /// How many frames the rows are read back for.
+    /// Number of frames for which the rows are read back.
     pub frames: u32,
-    /// How long the watchdogs waited, window and independent: 0 where one did not bite.
+    /// Times after which the watchdogs reset, window and independent: 0 without a reset.
     pub cycles: [u32; 2],
 }
 
 impl Kept {
     const NOTHING: Self = Self { stage: Stage::Waits, frames: 0, cycles: [0; 2] };
 
-    /// What was kept; nothing after a power-on.
+    /// Returns the kept state; `None` after a power-on.
     pub fn load(reset: ResetCause) -> Self {
         // SAFETY: any bit pattern is valid, and nothing else runs.
         let Words { magic, stage, frames, cycles } = unsafe { (&raw const KEPT).cast::<Words>().read_volatile() };

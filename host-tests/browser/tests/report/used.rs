@@ -1,4 +1,4 @@
-//! A report in use: zoomed, played through, laid over another one; judged by what the page says, never by the time.
+//! A report in use: zoomed, played through, laid over another one; judged by the page's state, never by the time.
 
 use super::{PHONE, SCREEN, address, browser, ran};
 use browser::{Browser, events, look, shoot};
@@ -29,7 +29,7 @@ fn opened(name: &str, so: browser::Look) -> (PathBuf, Browser, PathBuf) {
     (folder, browser, path)
 }
 
-/// What the page says of itself.
+/// State that the page reports.
 fn said(browser: &mut Browser) -> Value {
     browser
         .evaluate(
@@ -209,7 +209,7 @@ fn another_run_is_laid_over_this_one() {
     assert!(browser.evaluate(metric).unwrap().as_str().unwrap().starts_with('1'), "no metric of the other run");
     assert_eq!(browser.evaluate("document.title").unwrap(), "wall: simulated run");
     shoot(&mut browser, &folder.join("laid.png")).unwrap();
-    // It goes again, and what is no report says so.
+    // The other report can be removed again, and a file that is not a report is refused.
     browser.evaluate("document.getElementById('alone').click()").unwrap();
     assert_eq!(browser.evaluate(others).unwrap(), 0);
     for (wrong, why) in [

@@ -47,7 +47,7 @@ pub fn say(text: Arguments) {
         fail("a line is too long")
     }
     if let Ok(mut host) = hio::hstdout() {
-        // Where the host is gone, nobody is left to tell.
+        // Without a host there is nowhere to report.
         let _ = host.write_str(&line);
     }
 }

@@ -3,13 +3,14 @@
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line is one of
 //!
-//! - `FILE [panic|hardfault|hang]`: replays the recording, counts instructions, and fails half way as it is told to;
-//! - `same-bits INPUTS [FUNCTION]`: gives so many inputs to every function, and changes the digest of the one named.
+//! - `FILE [panic|hardfault|hang]`: replays the recording, counts instructions, and fails half way on request;
+//! - `same-bits INPUTS [FUNCTION]`: gives that number of inputs to every function, and changes the digest of the one
+//! named.
 //!
 //! Each failure prints a line that begins with `FAILED:` and ends the emulator with an error.
 //!
-//! SysTick is stopwatch and watchdog in one: it starts anew before each step, and if it ever runs out, the step hangs.
-//! A loop of known length tells how many instructions a tick is, so the counts do not depend on the emulator's clocks.
+//! SysTick is stopwatch and watchdog in one: it restarts before each step, and if it ever runs out, the step hangs.
+//! A loop of known length measures the instructions in a tick, so the counts do not depend on the emulator's clocks.
 #![no_std]
 #![no_main]
 
@@ -19,7 +20,6 @@ use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use cortex_m_rt::{ExceptionFrame, exception};
 use cortex_m_semihosting::debug;
 use embassy_executor::Spawner;
-use fingertip::params::Params;
 use fingertip::shipped::{Config, Pipeline};
 use fingertip::units::Duty;
 use host::{File, command_line, fail, say};
@@ -32,9 +32,9 @@ static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 
 /// SysTick counts down from here, 24 bits.
 const TICKS_MAX: u32 = 0x00ff_ffff;
-/// Instructions of the loop that tells how long an instruction is.
+/// Instructions of the loop that measures the time of an instruction.
 const LOOP_INSTRUCTIONS: u64 = 1_000_000;
-/// Inputs that the functions take before SysTick starts anew.
+/// Inputs that the functions take between two restarts of SysTick.
 const INPUTS_A_WATCH: u32 = 16;
 
 #[embassy_executor::main]

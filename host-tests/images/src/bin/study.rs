@@ -1,4 +1,4 @@
-//! Every variant of every kernel of the study, over fixed inputs, for the timing model: says what each returned.
+//! Every variant of every kernel of the study, over fixed inputs, for the timing model: reports what each returned.
 //!
 //! Not for a board: it talks to the emulator by semihosting. The command line names the file of inputs. A line
 //! `region NUMBER KERNEL: VARIANT` begins a variant, a line for each input follows; `docs/study.md` has the results.
@@ -14,7 +14,6 @@ mod inputs;
 mod kernels;
 
 use cortex_m_semihosting::debug;
-use fingertip::params::Params;
 use fingertip::shipped::Config;
 use host::fail;
 use inputs::Inputs;

@@ -18,7 +18,6 @@ use fingertip::contact;
 use fingertip::contact::Contact;
 use fingertip::control::{Reference, SpeedLoop, TemperatureDrift, Winding};
 use fingertip::grip::{Goal, Grip};
-use fingertip::params::Params;
 use fingertip::shipped::{Array, COLUMNS, Config, Fit, Picture, Pipeline, ROWS};
 use fingertip::state::{Limits, Mode};
 use fingertip::touch::Touch;
@@ -34,7 +33,7 @@ use static_cell::StaticCell;
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 static PRESS: StaticCell<Press> = StaticCell::new();
 
-/// What the kernels read and write.
+/// Data that the kernels read and write.
 struct Bench<'a> {
     config: &'a Config,
     /// With a characteristic that is no line, creep, and a gain that drifts with temperature.
@@ -232,7 +231,7 @@ fn main() -> ! {
     }
 }
 
-/// The step first: the others work on what it left.
+/// The step first: the other kernels work on its results.
 fn measure_frame(bench: &mut Bench) {
     pass_on(STEP as u32, step, bench);
     let status = *bench.pipeline.status();

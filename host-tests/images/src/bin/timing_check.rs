@@ -58,7 +58,7 @@ unsafe extern "C" {
 const BYTES: usize = 4096;
 const PASSES: u32 = 5;
 
-/// What a kernel's second argument is.
+/// Second argument of a kernel.
 enum Second {
     /// The input.
     Input,
@@ -149,7 +149,7 @@ fn main() -> ! {
     }
 }
 
-/// Whether the command line is this word.
+/// True if the command line is this word.
 fn asked_for(word: &[u8]) -> bool {
     let mut line = [0u8; 256];
     let mut request = [line.as_mut_ptr() as usize, line.len()];

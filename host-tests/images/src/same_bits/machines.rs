@@ -1,13 +1,17 @@
-//! What has a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's observer,
-//! profile and drive.
+//! Functions with a state or a configuration: the viscoelastic filter, the array's reading, the fit, the loop's
+//! observer, profile and drive.
 
-use super::answers::{add_contact, add_picture, add_reference};
-use super::model::Sample;
-use super::pictures::Pictures;
-use super::{Mix, frames};
+use super::made::{add_contact, add_picture, add_reference};
+use super::model::{Pictures, Sample};
+use super::{Mix, made};
 use crate::single::{self, Refined};
 use fingertip::contact::{self, Contact, FitLevel};
-use fingertip::control::{Drive, Observer, Reference, SpeedLoop, TemperatureDrift, Winding};
+use fingertip::control::Drive;
+use fingertip::control::Observer;
+use fingertip::control::Reference;
+use fingertip::control::SpeedLoop;
+use fingertip::control::TemperatureDrift;
+use fingertip::control::Winding;
 use fingertip::grip::{Goal, Grip};
 use fingertip::shipped::{Array, Budget, COLUMNS, Config, Fit, Frame};
 use fingertip::state::Limits;
@@ -57,18 +61,18 @@ impl Machines {
             pictures: Pictures::new(),
             fit: Fit::default(),
             budget: Budget::new(),
-            frame: frames::plausible(),
+            frame: made::plausible(),
             array: Array::new(),
         }
     }
 }
 
-/// What looks at a whole frame, of 100 taxels, takes one input in so many.
+/// Inputs for each input that functions of a whole frame (100 taxels) take.
 pub const FRAME_EVERY: u32 = 8;
 /// A step of every machine that looks at a whole frame.
 pub const FRAMES: [Step; 6] = [
     ("Array::read", |m, s, mix| {
-        frames::change(&mut m.frame, s);
+        made::change(&mut m.frame, s);
         add_picture(mix, m.array.read(&m.frame, &m.config));
     }),
     ("Array::follow_drift", |m, s, mix| {
@@ -208,7 +212,7 @@ pub const STEPS: [Step; 20] = [
     }),
 ];
 
-/// The way of an input at its speed, with its braking.
+/// Distance to go, speed and braking of an input.
 fn towards(machines: &Machines, sample: &Sample) -> Reference {
     let [way, speed, brake, _] = sample.words;
     let brake = MillimetresPerSecond2::from_bits(brake.clamp(0, BRAKE_MAX));

@@ -1,12 +1,20 @@
 //! Constructors: too costly for every input.
 
 use super::machines::Machines;
-use super::{Mix, Source, frames};
-use fingertip::config::{self, ArrayDrift, ConfigError, Curve, Gains, Heat, Lag, Motions};
+use super::model::Sample;
+use super::{Mix, Source};
+use fingertip::config::ArrayDrift;
+use fingertip::config::Curve;
+use fingertip::config::Gains;
+use fingertip::config::Motions;
+use fingertip::config::{self, ConfigError};
+use fingertip::config::{Heat, Lag};
+use fingertip::contact::Contact;
+use fingertip::control::Reference;
 use fingertip::params::Params;
-use fingertip::pressure::CalibrationError;
+use fingertip::pressure::{CalibrationError, GAIN_MAX};
 use fingertip::scan::ScanTiming;
-use fingertip::shipped::Config;
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Picture, ROWS, SLOTS};
 use fingertip::units::Newtons;
 use paper::units::Ratio;
 use paper::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
@@ -14,13 +22,13 @@ use paper::{Relaxation, RelaxationError, RelaxationState, RelaxationTerm};
 /// A constructor's name, and one call of it with what that adds to its digest.
 pub type Make = (&'static str, fn(&mut Machines, &mut Source, &mut Mix));
 
-/// One input of so many makes new machines: each takes up to half a million instructions.
+/// Inputs between two that make new machines: each takes up to half a million instructions.
 pub const MADE_EVERY: u32 = 1_024;
 
 /// The sampling times that the converter has.
 const SAMPLE_CYCLES: [i32; 8] = [3, 15, 28, 56, 84, 112, 144, 480];
 
-/// What is made for every [`MADE_EVERY`]th input.
+/// Machines that are made for every [`MADE_EVERY`]th input.
 pub const MADE: [Make; 3] = [
     ("Config::new", |m, source, mix| match Config::shipped(&params(source)) {
         Ok(config) => {
@@ -32,7 +40,7 @@ pub const MADE: [Make; 3] = [
         // The scan.
         Err(_) => mix.add(-1),
     }),
-    ("Calibration::new", |m, source, mix| match frames::calibration(source) {
+    ("Calibration::new", |m, source, mix| match calibration(source) {
         // The gains show in what the array reads.
         Ok(calibration) => m.array.calibrate(&calibration),
         Err(CalibrationError::Gain { row, column, value }) => {
@@ -222,4 +230,75 @@ fn add_config(mix: &mut Mix, config: &Config) {
         mix.add(*frames);
     }
     mix.add(touch.to_bits());
+}
+
+// What the machines answer, number by number into a digest.
+
+/// Reference of the profile.
+pub fn add_reference(mix: &mut Mix, reference: Reference) {
+    mix.add(reference.speed.to_bits());
+    mix.add(reference.acceleration.to_bits());
+}
+
+/// All fields of a tactile image.
+pub fn add_picture(mix: &mut Mix, picture: &Picture) {
+    let Picture { taxels, sum, moment_x, moment_y, peak, bad, bad_count, bad_again, undriven_max, peak_codes } =
+        picture;
+    taxels.iter().flatten().chain([sum, moment_x, moment_y, peak]).for_each(|number| mix.add(*number));
+    bad.iter().for_each(|row| mix.add(*row));
+    [undriven_max, peak_codes].into_iter().for_each(|number| mix.add(*number));
+    mix.add(*bad_count);
+    mix.add(*bad_again);
+}
+
+/// All of a contact.
+pub fn add_contact(mix: &mut Mix, contact: &Contact) {
+    let Contact { force, indentation, centre_x, centre_y, radius, peak_pa, confidence, doubt, bad_taxels } = *contact;
+    mix.add(force.to_bits());
+    for length in [indentation, centre_x, centre_y, radius] {
+        mix.add(length.to_bits());
+    }
+    mix.add(peak_pa);
+    mix.add(confidence);
+    mix.add(doubt);
+    mix.add(bad_taxels);
+}
+
+// Frames for the array's reading: a plausible one that changes code by code, with wild codes in between.
+
+/// Codes of a column with no row driven.
+const LEVEL: u16 = 372;
+
+/// A frame with no load.
+pub fn plausible() -> Frame {
+    let mut frame = Frame::EMPTY;
+    for (slot, column) in (0..SLOTS).flat_map(|slot| (0..COLUMNS).map(move |column| (slot, column))) {
+        frame.set_code(slot, column, if slot < ROWS { LEVEL + 40 } else { LEVEL });
+    }
+    frame
+}
+
+/// Changes a code to a plausible one, and one in fifty to any.
+pub fn change(frame: &mut Frame, sample: &Sample) {
+    let [wild, when, ..] = sample.words;
+    let bits = sample.share_q32;
+    let place = |bits: u32, count: usize| (((bits & 0xff) * count as u32) >> 8) as usize;
+    let (slot, column) = (place(bits, SLOTS), place(bits >> 8, COLUMNS));
+    let above = if slot < ROWS { (bits >> 16) as u16 & 0x7ff } else { (bits >> 16) as u16 & 0x1f };
+    frame.set_code(slot, column, if when == 0 { wild as u16 } else { LEVEL + above });
+}
+
+/// Gains within their range and masks of a few taxels; now and then one that is refused.
+pub fn calibration(source: &mut Source) -> Result<Calibration, CalibrationError> {
+    let mut gains = [[0; COLUMNS]; ROWS];
+    gains.as_flattened_mut().iter_mut().for_each(|gain| *gain = source.within(1, GAIN_MAX.into()) as u16);
+    let mut mask = [0; ROWS];
+    mask.iter_mut().for_each(|row| *row = source.word() & source.word() & source.word() & 0x3ff);
+    match source.up_to(15) {
+        0 => mask[3] |= 0x400,
+        1 => gains[7][2] = 0,
+        2 => gains[2][7] = GAIN_MAX + 1,
+        _ => {}
+    }
+    Calibration::new(&gains, &mask)
 }

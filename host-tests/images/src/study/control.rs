@@ -18,7 +18,7 @@ const SLEW: f64 = 0.03;
 const BITS: i8 = 24;
 type Coefficient = dsp_fixedpoint::Q<i32, i64, BITS>;
 
-/// What the variants read and write.
+/// Data that the variants read and write.
 struct Bench {
     error: i32,
     error_single: f32,

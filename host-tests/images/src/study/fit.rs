@@ -1,4 +1,4 @@
-//! From a picture to a contact: from a single one, and followed from frame to frame at each fit level.
+//! From a tactile image to a contact: from a single image, and followed from frame to frame at each fit level.
 
 use super::call::pass_on;
 use super::inputs::Inputs;
@@ -8,7 +8,7 @@ use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Fit, Picture, ROWS};
 use images::single::{self, Refined};
 
-/// What the variants read and write.
+/// Data that the variants read and write.
 struct Bench<'a> {
     picture: Picture,
     config: &'a Config,
@@ -18,7 +18,7 @@ struct Bench<'a> {
 
 type Kernel = extern "C" fn(&mut Bench);
 
-/// The name, the way, and of one that follows the pictures its fit level.
+/// Name, method, and the fit level of a method that follows the frames.
 const VARIANTS: [(&str, Kernel, Option<FitLevel>); 9] = [
     ("One", one, None),
     ("Two", two, None),

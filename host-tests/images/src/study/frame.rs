@@ -22,7 +22,7 @@ pub struct Sums<T> {
     pub peak: T,
 }
 
-/// What the variants read and write.
+/// Data that the variants read and write.
 pub struct Bench {
     /// The firmware's constants.
     pub config: Config,
@@ -52,9 +52,9 @@ pub struct Bench {
     pub out_single: Sums<f32>,
     /// In codes.
     pub out_double: Sums<f64>,
-    /// What the firmware had before.
+    /// Earlier version of the firmware.
     pub sparse: Sparse,
-    /// Whether a taxel is dead or saturated.
+    /// True if a taxel is dead or saturated.
     pub suspect: bool,
 }
 
@@ -67,7 +67,7 @@ pub struct Float<T> {
 
 #[derive(Clone, Copy)]
 enum Format {
-    /// Where the firmware leaves it: sixteenths, in the array's picture.
+    /// Format of the firmware: sixteenths, in the array's tactile image.
     Picture,
     /// Fractional bits of a code.
     Fixed(u32),
@@ -147,7 +147,7 @@ pub fn pairs(frame: &Frame) -> &[[u32; BANK_COLUMNS]; SLOTS] {
 }
 
 impl Bench {
-    /// What the firmware's way left in the array.
+    /// State that the firmware's variant left in the array.
     fn collect(&mut self, format: Format) {
         if let Format::Picture = format {
             let Picture { sum, moment_x, moment_y, peak, bad_count, .. } = *self.array.picture();

@@ -31,7 +31,7 @@ impl Inputs {
         })
     }
 
-    /// Where the next byte lies.
+    /// Position of the next byte.
     pub fn place(&self) -> usize {
         self.place
     }

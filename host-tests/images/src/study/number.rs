@@ -1,4 +1,4 @@
-//! What the same formula is worked out in.
+//! Number formats in which the same formula is computed.
 
 use super::scalar::{Constants, Tools, root_f32};
 use core::ops::{Add, Div, Mul, Sub};

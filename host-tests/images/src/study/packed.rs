@@ -20,7 +20,7 @@ struct Row {
     moment: i32,
 }
 
-/// What all rows share.
+/// Data that all rows share.
 struct Frame {
     signs: u32,
     peaks: u32,

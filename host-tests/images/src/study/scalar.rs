@@ -24,7 +24,7 @@ pub struct Constants<T> {
     pub inverse: T,
 }
 
-/// What a variant may use, in RAM.
+/// RAM of a variant.
 pub struct Tools {
     /// The firmware's own model.
     pub tip: Tip,
@@ -83,7 +83,7 @@ pub fn root_f32(x: f32) -> f32 {
     f32::from_bits(bits)
 }
 
-/// How a variant is called: fractional bits before and after where it is fixed-point.
+/// Name of a variant: fractional bits before and after if it is fixed-point.
 #[derive(Clone, Copy)]
 pub enum Call {
     /// In 32 bits.
@@ -96,7 +96,7 @@ pub enum Call {
     Double(extern "C" fn(f64, f64, &Tools) -> f64),
 }
 
-/// A way to work a kernel out.
+/// Variant of a kernel.
 pub type Variant = (&'static str, Call);
 
 /// Measures all variants of a kernel over the next section of inputs; the regions count on from `region`.

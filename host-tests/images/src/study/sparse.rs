@@ -1,5 +1,5 @@
-//! What the dense pass replaced: a pass that only sums the rows up, and single taxels by rows, where somebody looks at
-//! them.
+//! Variants that the dense pass replaced: a pass that only sums the rows up, and single taxels by rows, where somebody
+//! looks at them.
 //!
 //! The pass takes codes above floors, which a dead taxel falls short of: it then shows as a huge number. What the
 //! floors hold back of a row's sums these begin with.

@@ -22,7 +22,7 @@ use static_cell::StaticCell;
 static PIPELINE: StaticCell<Pipeline> = StaticCell::new();
 static CORRECTED_CONFIG: StaticCell<Config> = StaticCell::new();
 
-/// What the parts read and write.
+/// Data that the parts read and write.
 struct Bench<'a> {
     config: &'a Config,
     /// With a characteristic that is no line, creep, and a gain that drifts with temperature.

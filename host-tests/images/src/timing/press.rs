@@ -1,4 +1,4 @@
-//! What a press adds to a frame: its share of the step, and the row that a complete step makes.
+//! Cost that a press adds to a frame: its share of the step, and the row that a complete step makes.
 
 use super::Bench;
 use fingertip::config::newtons;

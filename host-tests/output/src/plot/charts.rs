@@ -20,11 +20,11 @@ const SMOOTH_S: f64 = 0.01;
 pub struct Sample {
     /// When.
     pub time_s: f64,
-    /// The force asked for.
+    /// Requested force.
     pub goal_n: f64,
     /// The contact force as it is.
     pub true_force_n: f64,
-    /// How far the tip has come.
+    /// Travel of the tip.
     pub travel_mm: f64,
     /// Indentation of the tip.
     pub indentation_mm: f64,
@@ -35,15 +35,15 @@ pub struct Sample {
 /// A stretch of the run to look at more closely.
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
-    /// What happens.
+    /// Event.
     pub title: String,
     /// The samples.
     pub samples: &'a [Sample],
     /// The instant that counts as 0.
     pub zero_s: f64,
-    /// How much before and after it is shown.
+    /// Time before and after it that is shown.
     pub shown_ms: [f64; 2],
-    /// How long the motor needs at least, where that is known.
+    /// Least time that the motor needs, if known.
     pub time_optimal_ms: Option<f64>,
 }
 
@@ -93,7 +93,7 @@ pub fn steps(panels: &[Panel<'_>]) -> Result<String, PlotError> {
     })
 }
 
-/// What the lines of the panels are.
+/// Legend of the panels' lines.
 fn draw_key(area: &Area<'_>) -> Result<(), PlotError> {
     let range = [0.0, 6.0];
     let context = ChartBuilder::on(area).margin(20 * FINE).build_cartesian_2d(0.0..1.0, range[0]..range[1]);
@@ -140,7 +140,7 @@ pub(super) struct Frame<'a> {
 type Points = [(f64, f64)];
 type Cartesian = Cartesian2d<plotters::coord::types::RangedCoordf64, plotters::coord::types::RangedCoordf64>;
 
-/// What a chart's lines are drawn on.
+/// Axes of a chart.
 pub(super) struct Chart<'a, 'b> {
     context: ChartContext<'a, SVGBackend<'b>, Cartesian>,
     range: [f64; 2],

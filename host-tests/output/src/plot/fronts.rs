@@ -29,18 +29,18 @@ pub struct Dot {
     pub x: f64,
     /// Error; 0 is drawn on the lower axis.
     pub y: f64,
-    /// What stands beside it.
+    /// Label.
     pub label: String,
-    /// Whether it is on the front: filled, on the line.
+    /// True if it is on the front: filled, on the line.
     pub best: bool,
-    /// Whether it is drawn as a square, its label framed.
+    /// True if it is drawn as a square, its label framed.
     pub own: bool,
 }
 
 /// A picture.
 #[derive(Clone, Debug)]
 pub struct Front<'a> {
-    /// What it shows.
+    /// Title.
     pub title: &'a str,
     /// The horizontal axis, with its unit.
     pub x: &'a str,
@@ -136,7 +136,7 @@ impl Box4 {
         l < or && ol < r && u < od && ou < d
     }
 
-    /// Whether a straight line meets it.
+    /// True if a straight line meets it.
     fn is_crossed(&self, from: (f64, f64), to: (f64, f64)) -> bool {
         // Enough places along the line to miss nothing of a label's size.
         (0..=40).map(|n| f64::from(n) / 40.0).any(|t| {

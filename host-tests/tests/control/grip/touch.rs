@@ -193,3 +193,197 @@ fn a_force_that_stays_away_is_released_and_sought_again() {
     }
     assert_eq!((hand.touch.stage(), hand.grip.mode(&hand.touch)), (Stage::None, Mode::Approach));
 }
+
+// A release: where it rests, and what moves that place.
+
+/// To the clearance behind the surface; fast until the force is a quarter of the largest one, and never again then.
+#[test]
+fn a_release_goes_to_the_clearance_behind_the_surface() {
+    let config = config();
+    let (hand, _, travel) = Hand::pressing(&config);
+    let mut released = hand;
+    let mut goes = |force_mn: i32, from: Option<Millimetres>, limit| {
+        let contact = contact(force_mn, &config);
+        // The surface is at 5 mm.
+        let from = from.unwrap_or(plus(mm(5.0), contact.indentation));
+        let got = released.frame(0, &contact, at(from), &config);
+        assert_eq!(released.grip.mode(&released.touch), Mode::Release);
+        assert_eq!(got, over(minus(mm(4.0), from), config.count, limit, at(from), &config), "{force_mn} mN, {from:?}");
+    };
+    goes(1_000, Some(travel), config.speed_max);
+    for force_mn in [800, 600, 450, 330, 251] {
+        goes(force_mn, None, config.speed_max);
+    }
+    for force_mn in [249, 400, 600, 400, 250, 150, 80, 40, 20, 0] {
+        goes(force_mn, None, config.approach);
+    }
+    for from_mm in [4.6, 4.0, 3.9] {
+        goes(0, Some(mm(from_mm)), config.approach);
+    }
+    // Slow from the start where the contact is lost, and where most of the force was gone before.
+    for left_mn in [249, 10] {
+        let mut hand = hand;
+        for force_mn in (left_mn..1_000).rev().step_by(40) {
+            hand.frame(1_000, &contact(force_mn, &config), at(travel), &config);
+        }
+        let (reference, _) = hand.frame(0, &contact(left_mn, &config), at(travel), &config);
+        assert!(!is_fast(reference), "{left_mn} mN");
+    }
+}
+
+#[test]
+fn a_release_never_goes_forward_and_without_a_touch_nowhere() {
+    let config = config();
+    let (mut hand, _, travel) = Hand::pressing(&config);
+    for force_mn in (0..1_000).rev().step_by(27) {
+        hand.frame(1_000, &contact(force_mn, &config), at(travel), &config);
+    }
+    assert_eq!(hand.touch.stage(), Stage::Lost);
+    // Released when already farther back than the clearance: it stays there.
+    for _ in 0..2 {
+        let got = hand.frame(0, &Contact::default(), at(mm(2.0)), &config);
+        assert_eq!(got.0.speed, MillimetresPerSecond::ZERO);
+    }
+    let got = Hand::free(&config).frame(0, &contact(39, &config), at(mm(7.0)), &config);
+    assert_eq!(got.0.speed, MillimetresPerSecond::ZERO, "no surface is known");
+}
+
+/// The force that was there before torque may be a residue: it gets a place once it is exceeded, and its release is slow.
+#[test]
+fn a_touch_from_before_torque_has_no_place_until_its_force_rises() {
+    let config = config();
+    for (force_mn, known) in [(39, false), (40, true), (2_000, true)] {
+        let mut hand = Hand { grip: Grip::default(), touch: Touch::default() };
+        let held = contact(force_mn, &config);
+        hand.frame(force_mn, &held, at(Millimetres::ZERO), &config);
+        assert_eq!(hand.touch.surface().is_some(), known, "{force_mn} mN");
+        assert!(!hand.touch.placed());
+        if !known {
+            continue;
+        }
+        // The surface moves with the tip, and the tip is slow forward and back.
+        let more = contact(force_mn + 39, &config);
+        hand.frame(7_000, &more, at(mm(3.0)), &config);
+        let (reference, _) = hand.frame(7_000, &more, at(mm(3.0)), &config);
+        assert!(!hand.touch.placed() && !is_fast(reference), "{force_mn} mN");
+        assert_eq!(hand.touch.surface(), Some(minus(mm(3.0), more.indentation)));
+        let mut released = hand;
+        assert!(!is_fast(released.frame(0, &more, at(mm(3.0)), &config).0));
+        // Above it by the force of a contact: from here on the surface stays. What this force presses deeper than the
+        // last one does not move it back.
+        let surface = hand.touch.surface();
+        for travel_mm in [3.0, 3.1] {
+            hand.frame(7_000, &contact(force_mn + 41, &config), at(mm(travel_mm)), &config);
+            assert!(hand.touch.placed(), "{force_mn} mN");
+            assert_eq!(hand.touch.surface(), surface, "{force_mn} mN at {travel_mm} mm");
+        }
+    }
+}
+
+/// A surface without a place moves forward with the tip, and back only where a release finds that the force falls: an
+/// object that follows the tip does that, a residue does not.
+#[test]
+fn a_surface_without_a_place_moves_back_only_where_the_force_falls() {
+    let config = config();
+    let mut hand = Hand { grip: Grip::default(), touch: Touch::default() };
+    let held = contact(1_000, &config);
+    for (travel_mm, farthest_mm) in [(0.0, 0.0), (2.0, 2.0), (1.0, 2.0), (-1.0, 2.0), (2.5, 2.5)] {
+        hand.frame(1_000, &held, at(mm(travel_mm)), &config);
+        assert!(!hand.touch.placed());
+        assert_eq!(hand.touch.surface(), Some(minus(mm(farthest_mm), held.indentation)), "at {travel_mm} mm");
+    }
+    let surface = hand.touch.surface();
+    // In thousandths of a newton for a millimetre back: half a millimetre must lower 1 N by 0.1 N.
+    for (falls, follows) in [(0.0, false), (190.0, false), (210.0, true), (400.0, true)] {
+        let mut hand = hand;
+        for back_um in 0..1_000 {
+            let travel = mm(2.5 - 1e-3 * f64::from(back_um));
+            let seen = contact((1_000.0 - 1e-3 * falls * f64::from(back_um)) as i32, &config);
+            hand.frame(0, &seen, at(travel), &config);
+            let (found, name) = (hand.touch.surface(), format!("{falls} mN/mm, {back_um} um back"));
+            if back_um <= 500 || !follows {
+                assert_eq!(found, surface, "{name}");
+            } else if back_um == 501 {
+                assert_eq!(found, Some(minus(travel, seen.indentation)), "{name}");
+            }
+        }
+    }
+}
+
+/// What the array reads while the tip moves back from `from_mm`, as a function of the distance moved; the place of rest.
+fn released_mm(mut hand: Hand, from_mm: f64, force_mn: impl Fn(f64) -> f64, config: &Config) -> f64 {
+    let mut travel_mm = from_mm;
+    // 30 mm/s, a frame of 0.1 ms.
+    loop {
+        let seen = contact(force_mn(from_mm - travel_mm) as i32, config);
+        let (reference, _) = hand.frame(0, &seen, at(mm(travel_mm)), config);
+        if reference.speed >= MillimetresPerSecond::ZERO || travel_mm < from_mm - 25.0 {
+            return travel_mm;
+        }
+        travel_mm -= 0.003;
+    }
+}
+
+/// An object that follows the tip is released as long as each half millimetre lowers its force by 1/64 and a bit.
+#[test]
+fn a_release_moves_back_while_the_force_falls() {
+    let config = config();
+    let (hand, held, travel) = Hand::pressing(&config);
+    let (from_mm, depth_mm): (f64, f64) = (travel.0.to_num(), held.indentation.0.to_num());
+    let at_once = |back_mm: f64| 1_000.0 * (1.0 - back_mm / depth_mm).max(0.0).powi(2);
+    let rest_mm = released_mm(hand, from_mm, at_once, &config);
+    assert!((rest_mm - 4.0).abs() < 0.02, "{rest_mm} mm");
+    // It yields 5 mm: the tip goes on to where the force ends.
+    let rest_mm = released_mm(hand, from_mm, |back_mm| 1_000.0 * (1.0 - back_mm / 5.0).max(0.0), &config);
+    assert!((from_mm - 6.0 - depth_mm..from_mm - 5.5).contains(&rest_mm), "{rest_mm} mm");
+    // A residue stays: it may hide by how much it indents the tip, and no more.
+    for residue_mn in [50.0, 200.0] {
+        let left = |back_mm: f64| at_once(back_mm).max(residue_mn);
+        let rest_mm = released_mm(hand, from_mm, left, &config);
+        let hidden_mm: f64 = config.tip.indentation(newtons(residue_mn as i32)).0.to_num();
+        let name = format!("a residue of {residue_mn} mN: {rest_mm} mm");
+        assert!((4.0 - hidden_mm - 0.02..4.02).contains(&rest_mm), "{name}");
+    }
+}
+
+/// A residue from before torque does not make the tip go back for ever.
+#[test]
+fn a_residue_from_before_torque_does_not_move_the_place_of_rest_for_ever() {
+    let config = config();
+    for residue_mn in [50.0, 200.0] {
+        let mut hand = Hand { grip: Grip::default(), touch: Touch::default() };
+        hand.see(&contact(residue_mn as i32, &config), at(Millimetres::ZERO), &config);
+        let rest_mm = released_mm(hand, 0.0, |_| residue_mn, &config);
+        let depth_mm: f64 = config.tip.indentation(newtons(residue_mn as i32)).0.to_num();
+        assert!(rest_mm >= -depth_mm - 1.7, "a residue of {residue_mn} mN: {rest_mm} mm");
+    }
+}
+
+/// Behind half of the clearance what the array reads is a residue, which the baseline may learn; never while it presses.
+#[test]
+fn only_behind_the_surface_the_baseline_learns_a_residue() {
+    let config = config();
+    let (mut hand, held, travel) = Hand::pressing(&config);
+    let learns = |hand: &Hand, force_mn| hand.touch.learns(newtons(force_mn), 10, &config).is_some();
+    assert!(!learns(&hand, 1_000) && !learns(&hand, 0));
+    // A residue of 30 mN: less than a contact, so it moves nothing.
+    let (mut back_mm, from_mm): (f64, f64) = (0.0, travel.0.to_num());
+    let depth_mm: f64 = held.indentation.0.to_num();
+    while from_mm - back_mm > 4.52 {
+        let force_mn = (1_000.0 * (1.0 - back_mm / depth_mm).max(0.0).powi(2)).max(30.0);
+        hand.frame(0, &contact(force_mn as i32, &config), at(mm(from_mm - back_mm)), &config);
+        assert!(!learns(&hand, 30), "{back_mm} mm back");
+        back_mm += 0.003;
+    }
+    for from_mm in [4.48, 4.47] {
+        hand.frame(0, &contact(30, &config), at(mm(from_mm)), &config);
+    }
+    assert_eq!(hand.touch.stage(), Stage::Clear);
+    // Up to a quarter of what was held.
+    assert!(learns(&hand, 30) && learns(&hand, 250) && !learns(&hand, 251));
+    // 40 mN more than that are another touch.
+    hand.frame(0, &contact(69, &config), at(mm(4.4)), &config);
+    assert!(learns(&hand, 30));
+    hand.frame(0, &contact(71, &config), at(mm(4.4)), &config);
+    assert!(hand.touch.held() && !learns(&hand, 30));
+}

@@ -40,9 +40,9 @@ pub struct Drive {
     pub period_rad: f64,
     /// Friction of each motion differs by up to this share of it.
     pub unrest: f64,
-    /// How the encoder counts: 1, -1 against the motor, 0 not at all.
+    /// Count direction of the encoder: 1, -1 against the motor, 0 not at all.
     pub counts: i32,
-    /// What the parameters hold.
+    /// Values of the parameters.
     pub sheet_k: f64,
     pub sheet_inertia: f64,
     /// The resistance that an ohmmeter shows, with the bridge's by its sheet.
@@ -118,7 +118,7 @@ impl Drive {
     }
 }
 
-/// What the controller sees in a frame.
+/// Inputs of the controller in a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub count: i32,

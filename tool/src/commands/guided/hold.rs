@@ -1,7 +1,6 @@
 //! Forces that are held on a scale, and a weight that lies on the tip.
 
-use super::Run;
-use super::session::Session;
+use super::{Run, Session};
 use crate::commands::moving::Moving;
 use crate::commands::{press, stopped};
 use crate::state::State;

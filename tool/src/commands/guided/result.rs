@@ -1,9 +1,7 @@
 //! The end of a procedure: a table of what was found, and one write of all of it.
 
-use super::Run;
-use super::motion;
-use super::session::{Session, Settings};
-use crate::commands::params::{self, gains, set};
+use super::{Run, Session, Settings, motion};
+use crate::commands::params::{self, file};
 use crate::commands::say;
 use crate::{Client, Error, table};
 use fingertip::pressure::GAIN_ONE;
@@ -141,8 +139,8 @@ fn write(found: &Found, values: &[params::Value], session: &mut Session, client:
     let named: Map<_, _> = values.iter().map(|(register, value)| (table::name(register), json!(value))).collect();
     let all = found.gains.as_ref().map(|gains| &gains.after);
     session.done(WRITTEN, json!({ "parameters": named, "gains": all }))?;
-    let before = all.map_or(Ok(None), |all| gains::set(all, client))?;
-    set::set(values, client).map(drop).map_err(|why| match before.map(|before| gains::set(&before, client)) {
+    let before = all.map_or(Ok(None), |all| file::set_gains(all, client))?;
+    params::set(values, client).map(drop).map_err(|why| match before.map(|before| file::set_gains(&before, client)) {
         None => why,
         Some(Ok(_)) => Error::Other(format!("{why}; the gains are put back")),
         Some(Err(second)) => Error::Other(format!("{why}; and the gains could not be put back: {second}")),

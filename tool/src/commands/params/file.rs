@@ -2,26 +2,25 @@
 
 use super::{Value, twice};
 use crate::table::{self, name};
-use crate::whole::Part;
-use crate::{Client, Error};
+use crate::{Client, Error, whole};
 use fingertip::shipped::{Gains, address};
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{ErrorKind, Write as _};
+use std::io::ErrorKind;
 use std::path::Path;
 use toml_edit::Document;
 
 const TABLE: &str = "parameters";
 /// The taxels', in rows.
 const GAINS: &str = "gains";
-/// How many there are: a file that was cut has fewer, or a last line without an end.
+/// Number of entries: a file that was cut has fewer, or a last line without an end.
 const COUNT: &str = "entries";
 
-/// What it holds.
+/// Content of a backup.
 pub(super) struct Kept {
     /// Of registers with a name.
     pub values: Vec<Value>,
-    /// The taxels' gains, in rows; none where the file has none.
+    /// The taxels' gains, in rows; `None` if the file has none.
     pub gains: Option<Vec<Vec<u16>>>,
 }
 
@@ -29,7 +28,6 @@ pub(super) struct Kept {
 pub(super) fn write(path: &Path, force: bool, client: &mut Client, kept: &Kept) -> Result<(), Error> {
     let Kept { values, gains } = kept;
     let gains = gains.as_deref().unwrap_or_default();
-    let failed = |why: std::io::Error| Error::file("write", path, why);
     let information = client.number(address::MODEL_INFORMATION)?;
     let pong = client.ping()?;
     let mut text = format!(
@@ -51,9 +49,7 @@ pub(super) fn write(path: &Path, force: bool, client: &mut Client, kept: &Kept) 
     for (row, gains) in gains.iter().enumerate() {
         let _ = writeln!(text, "row_{row} = {gains:?}");
     }
-    let part = Part::begin(path, force)?;
-    part.file().and_then(|mut file| file.write_all(text.as_bytes())).map_err(failed)?;
-    part.place()
+    whole::write(path, force, text.as_bytes())
 }
 
 /// Reads it.
@@ -106,4 +102,32 @@ pub(super) fn read(path: &Path) -> Result<Kept, Error> {
         }
     }
     if wrong.is_empty() { Ok(Kept { values, gains }) } else { Err(Error::file("read", path, wrong.join("; "))) }
+}
+
+// The taxels' gains, which outlive a reset beside the parameters.
+
+/// All of them, in rows.
+pub(in crate::commands) fn read_gains(client: &mut Client) -> Result<Vec<Vec<u16>>, Error> {
+    let columns = (client.number(address::MODEL_INFORMATION)? >> 8 & 0xFF).max(1) as usize;
+    let gains = client.block(address::GAINS, address::GAINS)?.numbers(address::GAINS);
+    // The registers have 16 bits.
+    Ok(gains.chunks(columns).map(|row| row.iter().map(|gain| *gain as u16).collect()).collect())
+}
+
+/// Sets them, all or none, with torque off. What they were, where that is something else: a tare is needed then.
+pub(in crate::commands) fn set_gains(gains: &[Vec<u16>], client: &mut Client) -> Result<Option<Vec<Vec<u16>>>, Error> {
+    let before = read_gains(client)?;
+    let shape = |rows: &[Vec<u16>]| rows.iter().map(Vec::len).collect::<Vec<_>>();
+    if shape(gains) != shape(&before) {
+        let [rows, columns] = [before.len(), before.first().map_or(0, Vec::len)];
+        return Err(
+            format!("the array has {rows} rows of {columns} gains, the file others; nothing was changed").into()
+        );
+    }
+    if before == gains {
+        return Ok(None);
+    }
+    let bytes: Vec<u8> = gains.iter().flatten().flat_map(|gain| gain.to_le_bytes()).collect();
+    client.again(|client| client.write(address::GAINS, &bytes))?;
+    Ok(Some(before))
 }

@@ -9,11 +9,11 @@ use foxglove::{ChannelBuilder, Context, PartialMetadata, Schema, WebSocketServer
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// How often to look for who wants the stream.
+/// Interval of the checks for clients of the stream.
 const LOOK: Duration = Duration::from_millis(50);
 const TOPICS: [Topic; 2] = [Topic::Scalars, Topic::Image];
 
-/// Streams until Ctrl-C. The bus is left alone while nobody looks.
+/// Streams until Ctrl-C. Without a client the bus is not used.
 ///
 /// # Errors
 /// The port is taken.
@@ -42,7 +42,7 @@ pub(super) fn run(args: &Args, client: &mut Client) -> Result<(), Error> {
         match State::read_picture(client) {
             Ok(state) => {
                 lost = false;
-                // Where it started anew its time counts on from now.
+                // After a restart of the controller its time counts on from now.
                 let stamp = stamps.stamp(&state).or_else(|| stamps.stamp(&state)).unwrap_or_default();
                 for (topic, channel) in &channels {
                     let when = PartialMetadata::with_log_time(stamp.read_ns);

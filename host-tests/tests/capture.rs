@@ -1,0 +1,473 @@
+//! Captures in the core: kept frames come back to the bit, damage is reported, and a replay finds differences.
+
+use fingertip::capture::{Capture, Ended, State};
+use fingertip::command::Command;
+use fingertip::config::newtons;
+use fingertip::contact::FitLevel;
+use fingertip::frame::Sense;
+use fingertip::measure::Task;
+use fingertip::params::Params;
+use fingertip::pipeline::Status;
+use fingertip::pressure::GAIN_ONE;
+use fingertip::scan::Clocks;
+use fingertip::shipped::{CLOCKS, COLUMNS, Calibration, Frame, Gains, Pipeline, ROWS, SLOTS, TARE_FRAMES, TAXELS};
+use fingertip::state::{Fault, Mode};
+use fingertip::units::{Celsius, CoreCycles, Duty, Newtons};
+use host_tests::finger::config;
+use images::record::Record;
+use proptest::prelude::*;
+use replay::{Field, Frames, Refusal, replay};
+use sim::native::bench::Bench;
+use sim::setup::Setup;
+
+// A finger that is captured from its tare on.
+
+type Burst<const BYTES: usize> = Capture<ROWS, COLUMNS, BYTES>;
+
+struct Finger<const BYTES: usize> {
+    native: Bench,
+    capture: Box<Burst<BYTES>>,
+}
+
+impl<const BYTES: usize> Finger<BYTES> {
+    /// 0.4 mm from the wall, with gains that differ.
+    fn new() -> Self {
+        let config = config();
+        let mut setup = Setup::default();
+        setup.wall.distance_mm = 0.4;
+        let mut native = Bench::of(&setup, &config);
+        native.pipeline().calibrate(&Calibration::of(&gains()));
+        Self { native, capture: Box::new(Burst::NEW) }
+    }
+
+    /// A frame, as a board takes it.
+    fn frame(&mut self) {
+        self.frame_with(|_| {});
+    }
+
+    /// The same, where somebody changes what the core is given.
+    fn frame_with(&mut self, change: impl FnOnce(&mut Record)) {
+        let Self { native, capture } = self;
+        if capture.is_due(native.status(), &native.record().command) {
+            capture.begin(native.pipeline());
+        }
+        let mut given = native.record();
+        native.step_with(|record| {
+            change(record);
+            given = *record;
+        });
+        capture.record(&given.frame, &given.sense, &given.command, native.status());
+    }
+
+    /// Arms, tares, touches and holds until the memory is full.
+    fn press(&mut self) {
+        self.capture.arm();
+        self.native.command().tare_request += 1;
+        self.frame();
+        self.native.command().torque = true;
+        self.native.command().goal = newtons(800);
+        self.until_done();
+    }
+
+    fn until_done(&mut self) {
+        while self.capture.standing().state == State::Recording {
+            self.frame();
+        }
+        assert_eq!(self.capture.standing().ended, Ended::Full);
+    }
+
+    /// A press of a fresh finger.
+    fn pressed() -> Self {
+        let mut finger = Self::new();
+        finger.press();
+        finger
+    }
+}
+
+/// Of all sizes.
+fn gains() -> Gains {
+    let mut gains = Gains::ONE;
+    for place in 0..TAXELS {
+        assert!(gains.set(place, GAIN_ONE - 1_000 + 20 * place as u16));
+    }
+    gains
+}
+
+// Whatever frames hold, they come back.
+
+const CODED_BYTES: usize = 8 << 10;
+
+/// A step's arguments and answer, by how far they may stray from frame to frame.
+#[derive(Clone, Debug)]
+struct Step {
+    frame: Frame,
+    sense: Sense,
+    command: Command,
+    status: Status,
+}
+
+fn step(spread: u16) -> impl Strategy<Value = Step> {
+    let codes = prop::collection::vec(0..=spread, SLOTS * COLUMNS);
+    let sense = (any::<i32>(), any::<u16>(), any::<u16>(), any::<bool>(), any::<u32>(), any::<bool>());
+    let command = (any::<[u8; 3]>(), any::<[bool; 2]>(), any::<i32>(), any::<u16>(), 0..6_u8, any::<bool>());
+    let answer = (any::<i16>(), any::<bool>(), any::<bool>(), any::<u32>());
+    (codes, sense, command, answer).prop_map(move |(codes, sense, command, (duty, force, faulted, sequence))| {
+        let mut frame = Frame { sequence, ..Frame::EMPTY };
+        for (place, code) in codes.into_iter().enumerate() {
+            frame.set_code(place / COLUMNS, place % COLUMNS, code);
+        }
+        let (encoder, supply_mv, bus_silent_ms, bridge_fault, answer, wild) = sense;
+        let sense = if wild {
+            let chip = answer.is_multiple_of(2).then_some(Celsius::from_bits(encoder.rotate_left(9)));
+            Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, chip, answer: CoreCycles(answer) }
+        } else {
+            Sense { encoder: encoder & 3, supply_mv: 6_000 | supply_mv & 7, ..Sense::default() }
+        };
+        let ([tare, clear, measure], bools, goal, watchdog, level, wild) = command;
+        let [torque, tare_forced] = bools;
+        let command = Command {
+            torque,
+            goal: Newtons::from_bits(goal),
+            bus_watchdog_ms: watchdog,
+            fit_level: FitLevel::from_number(level),
+            tare_request: tare,
+            tare_forced,
+            clear_request: clear,
+            measure_request: measure,
+        };
+        let status = Status {
+            duty: Duty(duty),
+            mode: if force { Mode::Force } else { Mode::Fault },
+            fault: faulted.then_some(Fault::BrownOutLevel),
+            ..Status::default()
+        };
+        Step { frame, sense, command: if wild { command } else { Command::default() }, status }
+    })
+}
+
+fn steps() -> impl Strategy<Value = Vec<Step>> {
+    let spread = prop_oneof![Just(2_u16), Just(40), Just(4_095), Just(u16::MAX)];
+    prop::collection::vec(spread.prop_flat_map(step), 1..30)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn every_frame_comes_back_to_the_bit(steps in steps()) {
+        let mut pipeline = Pipeline::new(&config());
+        let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
+        capture.arm();
+        capture.begin(&mut pipeline);
+        let mut kept = 0;
+        for step in &steps {
+            capture.record(&step.frame, &step.sense, &step.command, &step.status);
+            kept += usize::from(capture.standing().state == State::Recording);
+        }
+        capture.end(Ended::Asked);
+        let (head, frames) = Frames::<ROWS, COLUMNS>::new(capture.data()).expect("a capture");
+        prop_assert_eq!(head.frames as usize, kept);
+        prop_assert!(kept == steps.len() || head.ended == Ended::Full);
+        let frames: Vec<_> = frames.collect::<Result<_, _>>().expect("every frame");
+        prop_assert_eq!(frames.len(), kept);
+        for (taken, step) in frames.iter().zip(&steps) {
+            prop_assert_eq!(&taken.frame, &step.frame);
+            prop_assert_eq!(taken.sense, step.sense);
+            prop_assert_eq!(taken.command, step.command);
+            prop_assert_eq!(taken.duty, step.status.duty);
+            let fault = step.status.fault.map_or(0, |fault| fault as u8);
+            prop_assert_eq!((taken.mode, taken.fault), (step.status.mode as u8, fault));
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_read_without_a_panic(bytes in prop::collection::vec(any::<u8>(), 0..900), real in any::<bool>()) {
+        let mut bytes = bytes;
+        if real {
+            let mut pipeline = Pipeline::new(&config());
+            let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
+            capture.arm();
+            capture.begin(&mut pipeline);
+            capture.end(Ended::Asked);
+            let mut head = capture.data().to_vec();
+            let bits = 8 * bytes.len() as u32;
+            head[12..16].copy_from_slice(&u32::MAX.to_le_bytes());
+            head[16..20].copy_from_slice(&bits.to_le_bytes());
+            head[24..28].copy_from_slice(&check(&bytes).to_le_bytes());
+            bytes = [head, bytes].concat();
+        }
+        let read = Frames::<ROWS, COLUMNS>::new(&bytes);
+        prop_assert_eq!(read.is_ok(), real);
+        if let Ok((_, frames)) = read {
+            prop_assert!(frames.filter(Result::is_err).count() <= 1);
+        }
+    }
+}
+
+/// As the board's, so that the frames are reached.
+fn check(bytes: &[u8]) -> u32 {
+    let padded = [bytes, &vec![0; 4 - bytes.len() % 4]].concat();
+    let words = padded.chunks_exact(4).map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")));
+    words.fold(0, |check: u32, word| (check.rotate_left(5) ^ word).wrapping_mul(0x9E37_79B1))
+}
+
+#[test]
+fn out_of_turn_nothing_is_kept() {
+    let config = config();
+    let mut pipeline = Pipeline::new(&config);
+    let mut capture = Box::new(Burst::<CODED_BYTES>::NEW);
+    let (status, tare) = (Status::default(), Command { tare_request: 1, ..Command::default() });
+    assert!(!capture.is_due(&status, &tare), "nobody armed it");
+    capture.end(Ended::Asked);
+    capture.record(&Frame::EMPTY, &Sense::default(), &tare, &status);
+    assert_eq!((capture.standing(), capture.data()), (Default::default(), &[][..]));
+    capture.arm();
+    capture.arm();
+    assert_eq!(capture.standing().state, State::Armed);
+    assert!(!capture.is_due(&status, &Command::default()), "nobody tares");
+    for mode in [Mode::Fault, Mode::Force, Mode::Tare] {
+        assert!(!capture.is_due(&Status { mode, ..status }, &tare), "{mode:?}");
+    }
+    assert!(capture.is_due(&status, &tare));
+    // New parameters do not call it off, the host does.
+    capture.end(Ended::Configured);
+    assert_eq!(capture.standing().state, State::Armed);
+    capture.end(Ended::Asked);
+    assert_eq!(capture.standing().state, State::None);
+    capture.arm();
+    capture.begin(&mut pipeline);
+    capture.record(&Frame::EMPTY, &Sense::default(), &tare, &status);
+    capture.arm();
+    assert_eq!((capture.standing().state, capture.standing().frames), (State::Recording, 1), "armed twice");
+    assert!(capture.data().is_empty(), "it is not done");
+    capture.end(Ended::Stopped);
+    capture.end(Ended::Asked);
+    let standing = capture.standing();
+    assert_eq!((standing.state, standing.ended, standing.count), (State::Done, Ended::Stopped, 1));
+    assert_eq!(capture.data().len(), standing.bytes as usize);
+    capture.arm();
+    assert!(capture.data().is_empty());
+}
+
+/// As `docs/captures.md` has it.
+#[test]
+fn a_frame_takes_what_its_noise_says() {
+    let config = config();
+    let mut state = 1_u32;
+    let mut uniform = || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        f64::from(state) / f64::from(u32::MAX) - 0.5
+    };
+    for (noise, most) in [(0.0, 20.0), (0.5, 33.0), (1.0, 46.0), (2.0, 62.0)] {
+        let mut pipeline = Pipeline::new(&config);
+        let mut capture = Box::new(Burst::<{ 44 << 10 }>::NEW);
+        capture.arm();
+        capture.begin(&mut pipeline);
+        let mut frame = Frame::EMPTY;
+        while capture.standing().state == State::Recording {
+            frame.sequence += 1;
+            for place in 0..SLOTS * COLUMNS {
+                // Twelve of them make a normal number.
+                let normal: f64 = (0..12).map(|_| uniform()).sum();
+                frame.set_code(place / COLUMNS, place % COLUMNS, (372.3 + noise * normal).round() as u16);
+            }
+            let sense =
+                Sense { supply_mv: 6_000 + (8.0 * uniform()) as u16, answer: CoreCycles(5_000), ..Sense::default() };
+            capture.record(&frame, &sense, &Command::default(), &Status::default());
+        }
+        let frames = capture.standing().frames;
+        let each = capture.data().len() as f64 / f64::from(frames);
+        println!("| {noise} | {each:.0} bytes | {frames} | {:.0} ms |", f64::from(frames) / 10.0);
+        assert!(each < most, "{each} bytes at {noise} codes");
+    }
+}
+
+// A capture that is not as the board wrote it: refused, or found to differ; never taken.
+
+const DAMAGED_BYTES: usize = 1 << 10;
+
+fn verdict(bytes: &[u8]) -> Result<bool, Refusal> {
+    replay::<ROWS, COLUMNS>(bytes, &CLOCKS, |_, _| {}).map(|replayed| replayed.difference.is_none())
+}
+
+#[test]
+fn every_bit_counts() {
+    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let mut bytes = finger.capture.data().to_vec();
+    assert_eq!(verdict(&bytes), Ok(true));
+    for place in 0..bytes.len() {
+        for bit in 0..8 {
+            bytes[place] ^= 1 << bit;
+            assert_ne!(verdict(&bytes), Ok(true), "bit {bit} of byte {place}");
+            bytes[place] ^= 1 << bit;
+        }
+    }
+}
+
+#[test]
+fn a_cut_is_told_at_every_length() {
+    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let bytes = finger.capture.data();
+    for length in 0..bytes.len() {
+        assert_eq!(verdict(&bytes[..length]), Err(Refusal::Cut), "{length} bytes");
+    }
+    assert_eq!(verdict(&[bytes, &[0]].concat()), Err(Refusal::Longer));
+}
+
+#[test]
+fn others_are_told_apart() {
+    let finger = Finger::<DAMAGED_BYTES>::pressed();
+    let changed = |place: usize, value: u8| {
+        let mut bytes = finger.capture.data().to_vec();
+        bytes[place] = value;
+        verdict(&bytes)
+    };
+    assert_eq!(changed(0, b'X'), Err(Refusal::NoCapture));
+    assert_eq!(changed(3, 1), Err(Refusal::Version(1)));
+    assert_eq!(changed(4, 8), Err(Refusal::Shape { rows: 8, columns: 10 }));
+    assert_eq!(changed(6, Ended::No as u8), Err(Refusal::Unfinished));
+    assert_eq!(changed(8, 0), Err(Refusal::Layout));
+    let slower = Clocks { timer_hz: CLOCKS.timer_hz / 2, core_hz: CLOCKS.core_hz / 2, ..CLOCKS };
+    let slower = Box::leak(Box::new(slower));
+    let refusal = replay::<ROWS, COLUMNS>(finger.capture.data(), slower, |_, _| {});
+    assert!(matches!(refusal, Err(Refusal::FrameTime { .. })), "{refusal:?}");
+    for refusal in [Refusal::Layout, Refusal::Cut, Refusal::Version(2), Refusal::Frame(7)] {
+        assert!(refusal.to_string().contains("capture"), "{refusal}");
+    }
+}
+
+// A replay from the parameters, the gains and the frames alone.
+
+const BYTES: usize = 44 << 10;
+
+fn agrees<const BYTES: usize>(finger: &Finger<BYTES>) -> u32 {
+    let mut last = Status::default();
+    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| last = *status);
+    let replayed = replayed.expect("a capture");
+    assert_eq!(replayed.difference, None);
+    replayed.head.frames
+}
+
+#[test]
+fn a_press_replays_to_the_bit_also_with_gains() {
+    let finger = Finger::<BYTES>::pressed();
+    let (mut modes, mut force_n) = (Vec::new(), 0.0);
+    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
+        if modes.last() != Some(&status.mode) {
+            modes.push(status.mode);
+        }
+        force_n = status.contact.force.0.to_num::<f64>();
+    });
+    let replayed = replayed.expect("a capture");
+    assert_eq!(replayed.difference, None);
+    assert_eq!((replayed.head.ended, replayed.head.gains), (Ended::Full, gains()));
+    assert_eq!(modes, [Mode::Tare, Mode::Off, Mode::Approach, Mode::Force], "a press is in it");
+    assert!((force_n - 0.8).abs() < 0.1, "{force_n} N");
+    assert!(replayed.head.frames > TARE_FRAMES + 600, "{} frames", replayed.head.frames);
+}
+
+#[test]
+fn what_the_finger_did_before_does_not_matter() {
+    let mut finger = Finger::<{ 8 << 10 }>::new();
+    finger.native.tare();
+    finger.native.command().goal = newtons(1_500);
+    (0..3_000).for_each(|_| {
+        finger.native.step();
+    });
+    finger.native.request(Task::Press);
+    (0..3_000).for_each(|_| {
+        finger.native.step();
+    });
+    finger.native.command().goal = newtons(0);
+    (0..3_000).for_each(|_| {
+        finger.native.step();
+    });
+    finger.native.step_with(|record| record.sense.bridge_fault = true);
+    assert_eq!(finger.native.status().fault, Some(Fault::Bridge));
+    *finger.native.command() = Command { torque: false, clear_request: 1, ..*finger.native.command() };
+    (0..500).for_each(|_| {
+        finger.native.step();
+    });
+    for _ in 0..2 {
+        finger.press();
+        agrees(&finger);
+        *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
+        (0..300).for_each(|_| finger.frame());
+    }
+    assert_eq!(finger.capture.standing().count, 2);
+}
+
+/// The current limit keeps its state when a record begins.
+#[test]
+fn the_motor_stays_as_warm_as_it_is() {
+    let mut finger = Finger::<BYTES>::new();
+    finger.native.tare();
+    *finger.native.command() = Command { torque: true, goal: newtons(6_000), ..*finger.native.command() };
+    (0..5_000).for_each(|_| finger.frame());
+    *finger.native.command() = Command { torque: false, goal: newtons(0), ..*finger.native.command() };
+    (0..200).for_each(|_| finger.frame());
+    let before: f64 = finger.native.status().winding.0.to_num();
+    assert!(before > 88.5, "{before} C: it is warmer than after a reset");
+    finger.press();
+    let mut coldest = f64::MAX;
+    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, status| {
+        coldest = coldest.min(status.winding.0.to_num());
+    });
+    assert_eq!(replayed.expect("a capture").difference, None);
+    assert!(coldest > before - 0.1, "{coldest} C after {before} C");
+}
+
+#[test]
+fn a_fault_is_in_it_and_what_comes_after() {
+    let mut finger = Finger::<BYTES>::new();
+    finger.capture.arm();
+    finger.native.command().tare_request += 1;
+    (0..300).for_each(|_| finger.frame());
+    finger.native.command().torque = true;
+    finger.native.command().goal = newtons(500);
+    (0..100).for_each(|_| finger.frame());
+    (0..5).for_each(|_| finger.frame_with(|record| record.sense.supply_mv = 0));
+    (0..20).for_each(|_| finger.frame());
+    assert_eq!(finger.native.status().fault, Some(Fault::SupplyLow));
+    finger.capture.end(Ended::Asked);
+    assert_eq!(agrees(&finger), 425);
+    // What acts on the loop between steps ends it; what is there replays.
+    let mut finger = Finger::<BYTES>::new();
+    finger.capture.arm();
+    finger.native.command().tare_request += 1;
+    (0..200).for_each(|_| finger.frame());
+    finger.native.pipeline().stop(Fault::LostFrames);
+    finger.capture.end(Ended::Stopped);
+    (0..20).for_each(|_| finger.frame());
+    assert_eq!(finger.capture.standing().state, State::Done);
+    assert_eq!(agrees(&finger), 200);
+}
+
+#[test]
+fn another_parameter_or_a_step_that_answers_otherwise_is_found_where_it_is() {
+    let finger = Finger::<BYTES>::pressed();
+    let mut bytes = finger.capture.data().to_vec();
+    // A creep's share more, though its effect comes late.
+    let place = Params::RANGES.iter().position(|(name, ..)| *name == "modulus_pa").expect("a parameter");
+    bytes[72 + 4 * place] ^= 1;
+    let replayed = replay::<ROWS, COLUMNS>(&bytes, &CLOCKS, |_, _| {}).expect("a capture");
+    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((0, Field::Digest)));
+    let told = replayed.difference.map(|difference| difference.to_string()).unwrap_or_default();
+    assert!(told.contains("frame 0: digest captured") && told.contains("replayed"), "{told}");
+
+    // A duty that is one more than the core's.
+    let mut finger = Finger::<BYTES>::new();
+    finger.capture.arm();
+    finger.native.command().tare_request += 1;
+    finger.native.command().fit_level = fingertip::contact::FitLevel::TwoRows;
+    (0..20).for_each(|_| finger.frame());
+    let mut status = *finger.native.status();
+    status.duty.0 += 1;
+    let given = finger.native.record();
+    finger.capture.record(&given.frame, &given.sense, &given.command, &status);
+    finger.capture.end(Ended::Asked);
+    let replayed = replay::<ROWS, COLUMNS>(finger.capture.data(), &CLOCKS, |_, _| {}).expect("a capture");
+    assert_eq!(replayed.difference.map(|difference| (difference.frame, difference.field)), Some((20, Field::Duty)));
+}

@@ -8,7 +8,7 @@ use core::f64::consts::{PI, TAU};
 use fastrand::Rng;
 use fingertip::params::Params;
 use fingertip::shipped::{COLUMNS, Config, Picture, ROWS};
-use sim::mechanics::cells::Cell;
+use sim::mechanics::pressures::Cell;
 use sim::setup::Setup;
 
 /// Radius of the reference tip.

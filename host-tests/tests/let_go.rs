@@ -4,7 +4,7 @@ use fingertip::config::newtons;
 use fingertip::measure::{State, Task};
 use fingertip::state::Mode;
 use host_tests::finger::config;
-use sim::effects::set::{Named, Set};
+use sim::effects::{Named, Set};
 use sim::native::bench::Bench;
 use sim::scene::read;
 use sim::setup::Setup;

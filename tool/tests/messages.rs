@@ -28,7 +28,7 @@ fn names(schema: &Value) -> Vec<&str> {
 fn the_scalars_are_those_of_the_scenes_that_a_controller_knows() {
     let [scenes, own] = both(Topic::Scalars);
     let own = names(&own);
-    assert_eq!(names(&scenes), SCALARS.map(|(name, _)| name));
+    assert_eq!(names(&scenes), SCALARS.map(|(name, ..)| name));
     let known: Vec<&str> = names(&scenes).into_iter().filter(|name| own.contains(name)).collect();
     assert_eq!(known, own, "by the same names, in the same order");
     let message: Value =

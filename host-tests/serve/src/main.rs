@@ -4,7 +4,7 @@ use clap::Parser;
 use output::say;
 use serve::native::Native;
 use serve::{Place, Port};
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::native::served::Bus;
 use std::io::{self, Write as _};
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! The native core and link with a scene's world.
 
 use crate::Finger;
-use sim::effects::set::Set;
+use sim::effects::Set;
 use sim::native::served::Bus;
 use std::convert::Infallible;
 

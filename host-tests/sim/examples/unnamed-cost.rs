@@ -6,7 +6,7 @@
 //! `cargo run --profile host -p sim --example unnamed-cost -- [SCENE] [PAIRS]`
 
 use sim::cli;
-use sim::effects::set::{Named, Set};
+use sim::effects::{Named, Set};
 use sim::native::simulate_with;
 use sim::registry::{self, Description};
 use sim::scene::{Scene, read, text};

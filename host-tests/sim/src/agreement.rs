@@ -1,27 +1,26 @@
-//! Whether two boards do the same in a scene: the second one's trajectory beside the first one's.
+//! Comparison of two boards in a scene by their trajectories.
 //!
-//! Both begin with the script. They cannot be alike to the bit: the emulated board's frames run on through the script's
-//! times, so a goal is taken up to two frames sooner or later; its duty acts some microseconds beside the native
-//! board's; its PWM counts in steps; a row is sampled where its conversions begin, not at its slot's end. All but the
-//! PWM's steps is a shift in time. So the bound is a tube: at each time the second board lies between the least and the
-//! largest value of the first one within [`SHIFT_S`], or beyond them by a little: [`BEYOND_N`] and [`BEYOND_MM`]. The
-//! loop rests where it is within two counts of the encoder, so two boards may rest four counts apart, 4.4 um of the
-//! reference finger, one on this side of the goal and one on the other.
+//! Both begin with the script. They cannot be alike to the bit: a goal is taken up to two frames earlier or later, as
+//! the frames of the emulated board do not start with the script; its duty acts some microseconds beside that of the
+//! native board; its PWM counts in steps; and a row is sampled where its conversions begin, not at the end of its slot.
+//! Except for the steps of the PWM these are shifts in time. So the bound is a tube: at each time the second board lies
+//! between the least and the largest value of the first one within [`SHIFT_S`], or beyond them by at most [`BEYOND_N`]
+//! and [`BEYOND_MM`]. The loop rests within two counts of the encoder, so two boards may rest four counts apart, 4.4 um
+//! of the reference finger, on different sides of the goal.
 
 use crate::scene::Scene;
 use crate::watch::{Step, Watch};
 use std::fmt;
 
-/// How far the two may be shifted in time.
+/// Largest shift in time between the two boards.
 pub const SHIFT_S: f64 = 0.5e-3;
-/// How far beyond the tube the force may be: what [`BEYOND_MM`] makes at 2 N, where the tip has 2.5 N/mm.
+/// Largest force beyond the tube: the force of [`BEYOND_MM`] at 2 N, where the tip has 2.5 N/mm.
 pub const BEYOND_N: f64 = 0.0125;
-/// How far beyond the tube the travel may be.
+/// Largest travel beyond the tube.
 pub const BEYOND_MM: f64 = 0.005;
-/// What draws its numbers by the sample draws others on the other board.
+/// Effects that draw a number for each sample. They draw others on the other board.
 const NOISE: [&str; 2] = ["noise", "burst"];
 
-/// Force and travel at a time.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     time_s: f64,
@@ -42,7 +41,7 @@ impl Watch for Path {
 }
 
 impl Path {
-    /// What another board's step differs by: force in N, travel in mm; none where the path is not known.
+    /// Returns the difference of a step on another board, N and mm; none at times outside of the path.
     pub fn difference(&self, step: &Step) -> Option<[f64; 2]> {
         let points = self.0.get(step.finger)?;
         let after = points.partition_point(|point| point.time_s < step.time_s);
@@ -52,7 +51,7 @@ impl Path {
         Some(core::array::from_fn(|n| here[n] - from.values[n] - share * (to.values[n] - from.values[n])))
     }
 
-    /// How far a step lies beyond what the path was within the shift.
+    /// Returns the distance of a step from the range of the path within the shift.
     fn beyond(&self, step: &Step) -> Option<[f64; 2]> {
         let points = self.0.get(step.finger)?;
         let first = points.partition_point(|point| point.time_s < step.time_s - SHIFT_S).saturating_sub(1);
@@ -72,7 +71,7 @@ fn point(step: &Step) -> Point {
     Point { time_s: step.time_s, values: [step.truth.force_n, step.truth.travel_mm] }
 }
 
-/// The largest of something and when it was.
+/// Largest value and its time.
 type Largest = (f64, f64);
 
 /// Watches the second board.
@@ -81,19 +80,18 @@ pub struct Agreement {
     first: Path,
     noisy: bool,
     steps: u64,
-    /// Force and travel.
     difference: [Largest; 2],
     beyond: [Largest; 2],
 }
 
 impl Agreement {
-    /// With the first board's path.
+    /// Creates the watcher from the path of the first board.
     pub fn new(scene: &Scene, first: Path) -> Self {
         let noisy = scene.effects.iter().any(|named| NOISE.contains(&named.effect.name));
         Self { first, noisy, steps: 0, difference: [(0.0, 0.0); 2], beyond: [(0.0, 0.0); 2] }
     }
 
-    /// Whether the second board stayed in the tube; a scene with noise is not judged.
+    /// True if the second board stayed in the tube. A scene with noise is not judged.
     pub fn held(&self) -> bool {
         let [(force_n, _), (travel_mm, _)] = self.beyond;
         self.noisy || self.steps > 0 && force_n <= BEYOND_N && travel_mm <= BEYOND_MM
@@ -104,7 +102,7 @@ impl Agreement {
         self.difference.map(|(largest, _)| largest)
     }
 
-    /// How far beyond the tube the second board was: N and mm.
+    /// Largest distance of the second board from the tube, N and mm.
     pub fn beyond(&self) -> [f64; 2] {
         self.beyond.map(|(largest, _)| largest)
     }

@@ -1,10 +1,10 @@
-//! The motor's bridge, as the world sees it.
+//! Bridge of the motor, as the world sees it.
 
+use crate::metrics;
 use fingertip::pipeline::{self, Status};
-use fingertip::units::Duty;
 use serde::{Deserialize, Serialize};
 
-/// What the bridge does.
+/// State of the bridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Bridge {
     /// Both half bridges open.
@@ -18,12 +18,12 @@ pub enum Bridge {
 }
 
 impl Bridge {
-    /// What a step means at the bridge.
+    /// State of the bridge that a control step requests.
     pub fn of(status: &Status) -> Self {
         match status.bridge() {
             pipeline::Bridge::Asleep | pipeline::Bridge::Open => Self::Coast,
             pipeline::Bridge::Brakes => Self::Driven { duty: 0.0 },
-            pipeline::Bridge::Driven(duty) => Self::Driven { duty: f64::from(duty.0) / f64::from(Duty::FULL) },
+            pipeline::Bridge::Driven(duty) => Self::Driven { duty: metrics::duty(duty) },
         }
     }
 }

@@ -1,13 +1,16 @@
-//! The command line of `sim`, the same for both boards.
+//! Command line of `sim`, the same for both boards, with the run and its files, and the replay.
 
-use crate::explain;
-use crate::metrics;
-use crate::run::{Run, RunError};
+use crate::agreement::{Agreement, Path};
+use crate::part::{cannot_write, make_folder};
+use crate::recording::{Recorder, replay};
+use crate::report::{Over, Report, Trace, page};
+use crate::run::{Run, RunError, ablate, ablation_text, run};
 use crate::scene::{Scene, library, read, text};
-use crate::session;
+use crate::watch::Watch;
+use crate::{explain, metrics, native};
 use clap::{Parser, ValueEnum};
-use output::say;
-use std::path::PathBuf;
+use output::{kept, say};
+use std::path::{self, PathBuf};
 use std::process::ExitCode;
 
 /// Runs a scene: a text file that names what is simulated around the fingertip's controller.
@@ -59,33 +62,33 @@ pub struct Args {
     pub keys: bool,
 }
 
-/// What runs the controller.
+/// Board that runs the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Board {
     /// The same core on the host.
     Native,
     /// The flash image on the emulated microcontroller.
     Virtual,
-    /// Both, one after the other, and compared: results are the emulated one's.
+    /// Both, one after the other, and compared. The results are those of the emulated one.
     Both,
 }
 
 impl Args {
-    /// Whether a scene is to be run, and not only shown or replayed.
+    /// True if a scene runs and is not only shown or replayed.
     pub fn runs(&self) -> bool {
         !self.list && !self.keys && !self.explain && self.replay.is_none()
     }
 
-    /// The scene that is asked for, with what is set and checked.
+    /// Returns the scene of the arguments, changed as requested and checked.
     ///
     /// # Errors
-    /// There is no such scene, or it is not one; the text is for people.
+    /// There is no such scene, or it has mistakes. The text is for people.
     pub fn scene(&self) -> Result<Scene, String> {
         load(self.scene.as_deref().unwrap_or_default(), &self.set, self.seed)
     }
 }
 
-/// A scene by its path or its name in the library, with `TABLE.KEY=VALUE` set in its text.
+/// Loads a scene by its path or its name in the library, with `TABLE.KEY=VALUE` set in its text.
 pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, String> {
     let (path, mut source) = library::text(scene)?;
     let file = path.to_string_lossy();
@@ -95,20 +98,20 @@ pub fn load(scene: &str, set: &[String], seed: Option<u64>) -> Result<Scene, Str
     if assignments.is_empty() {
         return read(&source);
     }
-    // What is wrong in the file is told as it stands there.
+    // Reports mistakes of the file at their place in it.
     read(&source)?;
     for assignment in &assignments {
         let (place, value) = assignment
             .split_once('=')
-            .ok_or_else(|| format!("--set {assignment}: TABLE.KEY=VALUE is asked for, such as tip.modulus_kpa=300"))?;
+            .ok_or_else(|| format!("--set {assignment}: needs TABLE.KEY=VALUE, such as tip.modulus_kpa=300"))?;
         source = text::set(&source, place.trim(), value.trim())?;
     }
     let scene = read(&source).map_err(|errors| format!("with {assignments:?} set, {errors}"))?;
     Ok(Scene { set: set.to_vec(), ..scene })
 }
 
-/// Does what is asked for. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2: it
-/// could not be done.
+/// Carries out the arguments. Exit code 0: done, and every bound held; 1: a bound is broken, or a replay differs; 2:
+/// not done.
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     let done = if args.list {
         explain::list().map(say::text).map(|()| true)
@@ -118,14 +121,14 @@ pub fn answer(args: &Args, board: Run) -> ExitCode {
     } else if args.explain {
         args.scene().map(|scene| say::text(explain::scene(&scene))).map(|()| true).map_err(Into::into)
     } else if let Some(path) = &args.replay {
-        session::replay_file(path)
+        replay_file(path)
     } else {
-        args.scene().map_err(Into::into).and_then(|scene| session::run_scene(args, &scene, board))
+        args.scene().map_err(Into::into).and_then(|scene| run_scene(args, &scene, board))
     };
     verdict(done)
 }
 
-/// The exit code of what was done, and said: nothing is said behind it.
+/// Reports a failure and returns the exit code. Nothing may be printed after it.
 pub fn verdict(done: Result<bool, RunError>) -> ExitCode {
     match (done, say::end()) {
         (Ok(true), true) => ExitCode::SUCCESS,
@@ -136,4 +139,88 @@ pub fn verdict(done: Result<bool, RunError>) -> ExitCode {
             ExitCode::from(2)
         }
     }
+}
+
+/// Runs a scene and writes the requested files. Returns true if every bound held.
+///
+/// # Errors
+/// The board cannot run the scene, or a file cannot be written.
+pub fn run_scene(args: &Args, scene: &Scene, board: Run) -> Result<bool, RunError> {
+    let name = match args.board {
+        Board::Native => "native",
+        Board::Virtual => "virtual",
+        Board::Both => "virtual, compared with native",
+    };
+    // Reports an unreadable file before the run.
+    let over = args.over.as_deref().map(Over::read).transpose()?;
+    let mut trace = Trace::new(scene.duration_s);
+    let mut agreement = None;
+    if args.board == Board::Both {
+        let mut path = Path::default();
+        native::simulate(scene, &mut path)?;
+        trace.compare_with(path.clone());
+        agreement = Some(Agreement::new(scene, path));
+    }
+    let mut recorder = match &args.out {
+        Some(out) => {
+            make_folder(out)?;
+            let path = out.join("run.mcap");
+            Some(match args.board {
+                Board::Native => Recorder::new(&path, scene, args.every)?,
+                // The emulated board shows a step each millisecond.
+                Board::Virtual | Board::Both => Recorder::new(&path, scene, 1)?.seen_from_outside(),
+            })
+        }
+        None => None,
+    };
+    let mut watchers: Vec<&mut dyn Watch> = Vec::new();
+    if let Some(recorder) = &mut recorder {
+        watchers.extend([recorder as &mut dyn Watch, &mut trace]);
+    }
+    if let Some(agreement) = &mut agreement {
+        watchers.push(agreement);
+    }
+    say::line(format_args!("{}: {} (seed {}, board {name}; simulated)\n", scene.name, scene.about, scene.seed));
+    let outcome = run(scene, board, &mut watchers)?;
+    // The recording is closed first.
+    let recorded = recorder.map_or(Ok(()), |recorder| recorder.finish(&outcome.summary.digest));
+    say::text(outcome.text());
+    if let Some(agreement) = &agreement {
+        say::line(agreement);
+    }
+    let ablated = if args.ablate { ablate(scene, board)? } else { Vec::new() };
+    if args.ablate {
+        let text = ablation_text(&outcome.measured, &ablated);
+        say::line(format_args!("\nWhat each effect adds:\n{text}"));
+    }
+    let json = || format!("{:#}\n", outcome.json(scene, name, &ablated));
+    let json = args.json.as_ref().map_or(Ok(()), |path| write(path, &json()));
+    let report =
+        Report { scene, board: name, outcome: &outcome, trace: &trace, ablated: &ablated, over: over.as_ref() };
+    let reported = args.out.as_ref().map_or(Ok(()), |out| write(&out.join("report.html"), &page(&report)?));
+    // A file that cannot be written does not affect the others.
+    let failed: Vec<String> =
+        [recorded, json, reported].into_iter().filter_map(Result::err).map(|error| error.to_string()).collect();
+    if !failed.is_empty() {
+        return Err(failed.join("\n").into());
+    }
+    if let Some(out) = &args.out {
+        let [report, recording] = ["report.html", "run.mcap"].map(|name| out.join(name));
+        say::line(format_args!("wrote {} and {}", report.display(), recording.display()));
+    }
+    Ok(outcome.passed() && agreement.is_none_or(|agreement| agreement.held()))
+}
+
+fn write(path: &path::Path, text: &str) -> Result<(), RunError> {
+    Ok(kept::write(path, text).map_err(|error| cannot_write(path, &error))?)
+}
+
+/// Replays a recording and reports the result. Returns true if every bit is the same.
+pub fn replay_file(path: &path::Path) -> Result<bool, RunError> {
+    let replayed = replay(path)?;
+    match &replayed.difference {
+        Some(difference) => say::line(format_args!("{}: {difference}", path.display())),
+        None => say::line(format_args!("{}: {} steps, the same to the bit", path.display(), replayed.steps)),
+    }
+    Ok(replayed.difference.is_none())
 }

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, mpsc};
 use std::thread;
 
-/// Does the tasks on all cores, the first ones first. The results are in the order of the tasks.
+/// Runs the tasks on all cores, in order of their start. The results are in the order of the tasks.
 ///
 /// # Panics
-/// Where a task does.
+/// A task panics.
 pub fn map<T, R: Send>(tasks: impl IntoIterator<Item = T, IntoIter: Send>, work: impl Fn(T) -> R + Sync) -> Vec<R> {
     let tasks = Mutex::new(tasks.into_iter().enumerate());
     let next = || tasks.lock().expect("a task is only taken there").next();
@@ -28,7 +28,7 @@ fn count() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// Does the tasks on all cores, and hands each result to `done` as it comes, in any order. The first error ends it.
+/// Runs the tasks on all cores and passes each result to `done` as soon as it is there. The first error ends the run.
 pub fn each<T: Sync, R: Send>(
     tasks: &[T],
     work: impl Fn(&T) -> Result<R, RunError> + Sync,

@@ -1,32 +1,30 @@
-//! The demonstration: a scene of a touch, four force steps and letting go, judged step by step by the true force, and drawn.
+//! Demonstration: a scene of a touch, four force steps and a release, measured by the true force, and drawn.
 //!
-//! It runs on the native board and, in the package `virtual-board`, on the flash image. [`Trace`] watches either, and the same figures,
-//! table and pictures come of it.
+//! It runs on the native board and, in the package `virtual-board`, on the flash image. [`Trace`] watches both and
+//! keeps the goals, the world at every frame, and the array at the end of each hold.
 
 pub mod figures;
-pub mod pictures;
-pub mod table;
-mod trace;
 
-pub use figures::{Check, Forces};
-pub use trace::{Taxels, Trace};
+pub use crate::demo::figures::{Check, Forces};
 
-use crate::metrics::{self, Meter};
+use crate::metrics::{self, Meter, newtons};
 use crate::optimal::Unreachable;
 use crate::scene::{Scene, library, read};
+use crate::watch::{Controller, Step, Watch};
+use fingertip::shipped::{COLUMNS, Frame, SLOTS};
+use fingertip::state::Fault;
 use output::heatmap::Pressures;
 use output::plot::{PlotError, Sample};
 use std::path::PathBuf;
 
-/// The scene's name in the library.
 const SCENE: &str = "demo";
-/// How long goals stand in the quick run: the first, which has a way to go, and the others.
+/// Duration of the goals in the quick run: of the first, which includes the approach, and of the others.
 const QUICK_S: [f64; 2] = [0.5, 0.25];
 
-/// The array at the end of a hold, and what the controller made of it.
+/// Array at the end of a hold, with the contact that the controller sensed.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture {
-    /// The force asked for.
+    /// Requested force.
     pub goal_n: f64,
     /// Sensed force.
     pub force_n: f64,
@@ -34,57 +32,57 @@ pub struct Picture {
     pub centre_mm: [f64; 2],
     /// Contact radius.
     pub radius_mm: f64,
-    /// Pressures by the frame's codes.
+    /// Pressures from the codes of the frame.
     pub pressures_kpa: Pressures,
 }
 
-/// A goal and what came of it.
+/// Goal and the response to it.
 #[derive(Clone, Debug)]
 pub struct Asked {
-    /// When it reached the controller.
+    /// Time at which the goal reached the controller.
     pub at_s: f64,
-    /// The force asked for.
+    /// Requested force.
     pub goal_n: f64,
-    /// The true force then.
+    /// True force at that time.
     pub from_n: f64,
-    /// What is measured until the next one.
+    /// Measurement until the next goal.
     pub meter: Meter,
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Clone, Debug, Default)]
 pub struct Run {
-    /// The goals.
+    /// Goals in order.
     pub goals: Vec<Asked>,
-    /// The world.
+    /// State of the world at each frame.
     pub trace: Vec<Sample>,
     /// Pressure maps.
     pub pictures: Vec<Picture>,
-    /// Frames that the controller says it missed.
+    /// Frames that the controller missed, by its own count.
     pub missed_frames: u32,
 }
 
 impl Run {
-    /// The samples from one instant to before another.
+    /// Returns the samples from one time to before another.
     pub fn between(&self, from_s: f64, to_s: f64) -> &[Sample] {
         let [start, end] = [from_s, to_s].map(|at_s| self.trace.partition_point(|sample| sample.time_s < at_s));
         &self.trace[start..end.max(start)]
     }
 }
 
-/// The demonstration has no result.
+/// Reason why the demonstration has no result.
 #[derive(Debug, thiserror::Error)]
 pub enum DemoError {
-    /// Its scene is broken.
+    /// The scene has a mistake.
     #[error("{0}")]
     Scene(String),
-    /// It cannot be simulated.
+    /// The scene cannot be simulated.
     #[error(transparent)]
     Simulated(#[from] crate::SimError),
     /// The run has no touch or no release.
     #[error("nothing was touched, or it was not let go")]
     NoTouch,
-    /// The motor cannot do a step at all.
+    /// The motor cannot reach a force at all.
     #[error("no bound for a step: {0}")]
     Unreachable(#[from] Unreachable),
     /// The controller stopped with this fault.
@@ -96,17 +94,17 @@ pub enum DemoError {
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
 }
 
-/// The scene; quick, with the same goals held for a shorter time.
+/// Returns the scene. The quick one holds the same goals for a shorter time.
 ///
 /// # Errors
-/// It is not where it was when this was compiled, or is broken.
+/// The scene is missing or has a mistake.
 pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     let (path, text) = library::text(SCENE).map_err(DemoError::Scene)?;
     let scene = read(&path.to_string_lossy(), &text, &metrics::names());
@@ -121,7 +119,121 @@ pub fn scene(quick: bool) -> Result<Scene, DemoError> {
     Ok(scene)
 }
 
-/// What a goal asks for, in words.
+/// Text for a goal.
 pub fn what(goal_n: f64) -> String {
     if goal_n > 0.0 { format!("hold {goal_n} N") } else { "let go".into() }
+}
+
+/// Smallest force of a hold that is drawn. Each force is drawn once.
+const DRAWN_N: f64 = 1.0;
+
+/// Watches the demonstration's scene.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    array: Taxels,
+    run: Run,
+    controllers: Vec<Controller>,
+    /// Last tactile image under the last goal.
+    last: Option<Picture>,
+    fault: Option<Fault>,
+}
+
+impl Trace {
+    /// Creates the watcher of a run of this scene.
+    pub fn new(scene: &Scene) -> Self {
+        Self { array: Taxels::of(scene), run: Run::default(), controllers: Vec::new(), last: None, fault: None }
+    }
+
+    /// Returns the result of the run.
+    pub fn finish(mut self) -> Result<Run, DemoError> {
+        self.keep();
+        match self.fault {
+            Some(fault) => Err(DemoError::Fault(fault as u8)),
+            None => Ok(self.run),
+        }
+    }
+
+    /// Keeps the tactile image of a hold that is over.
+    fn keep(&mut self) {
+        let last = self.last.take().filter(|last| last.goal_n >= DRAWN_N);
+        let known = |new: &Picture| self.run.pictures.iter().any(|picture| picture.goal_n == new.goal_n);
+        if let Some(new) = last.filter(|new| !known(new)) {
+            self.run.pictures.push(new);
+        }
+    }
+}
+
+impl Watch for Trace {
+    fn wants_every_frame(&self) -> bool {
+        true
+    }
+
+    fn begin(&mut self, controllers: &[Controller]) {
+        self.controllers = controllers.to_vec();
+    }
+
+    fn step(&mut self, step: &Step) {
+        let (truth, status) = (step.truth, step.status);
+        // The requested goal, in whole mN.
+        let goal_n = (newtons(step.command.goal) * 1e3).round() / 1e3;
+        let known_n = self.run.goals.last().map_or(0.0, |asked| asked.goal_n);
+        if goal_n != known_n {
+            self.keep();
+            let mut meter = Meter::default();
+            meter.begin(&self.controllers);
+            self.run.goals.push(Asked { at_s: step.time_s, goal_n, from_n: truth.force_n, meter });
+        }
+        let Some(asked) = self.run.goals.last_mut() else { return };
+        asked.meter.step(step);
+        self.fault = self.fault.or(status.fault);
+        self.run.missed_frames = status.missed_frames;
+        self.run.trace.push(Sample {
+            time_s: step.time_s,
+            goal_n,
+            true_force_n: truth.force_n,
+            travel_mm: truth.travel_mm,
+            indentation_mm: truth.indentation_mm,
+            duty: truth.duty,
+        });
+        let contact = &status.contact;
+        self.last = Some(Picture {
+            goal_n,
+            force_n: newtons(contact.force),
+            centre_mm: [contact.centre_x.0.to_num(), contact.centre_y.0.to_num()],
+            radius_mm: contact.radius.0.to_num(),
+            pressures_kpa: self.array.kilopascals(step.frame),
+        });
+    }
+}
+
+/// Conversion of the codes of a frame to pressures, by the parameters of the controller.
+#[derive(Clone, Copy, Debug)]
+pub struct Taxels {
+    preload_codes: f64,
+    codes_per_kpa: f64,
+    sag_per_code: f64,
+}
+
+impl Taxels {
+    /// Conversion for the array of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let params = scene.params();
+        Self {
+            preload_codes: scene.table("array").number("preload_codes"),
+            codes_per_kpa: f64::from(params.codes_per_kpa_milli) * 1e-3,
+            sag_per_code: f64::from(params.row_sag_ppb_per_code) * 1e-9,
+        }
+    }
+
+    /// Returns the pressures of a frame as `fingertip::pressure` does: n codes in a row of N in all are n / (1 - rho N)
+    /// behind a perfect switch.
+    pub fn kilopascals(&self, frame: &Frame) -> Pressures {
+        core::array::from_fn(|row| {
+            let net: [f64; COLUMNS] = core::array::from_fn(|column| {
+                f64::from(frame.code(row, column)) - f64::from(frame.code(SLOTS - 1, column))
+            });
+            let boost = 1.0 / (1.0 - self.sag_per_code * net.iter().sum::<f64>());
+            net.map(|codes| ((codes * boost - self.preload_codes) / self.codes_per_kpa).max(0.0))
+        })
+    }
 }

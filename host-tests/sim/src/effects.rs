@@ -1,14 +1,12 @@
-//! The effects: what a scene may name, each in a file of its own with its equations, its source and its keys.
+//! Effects that a scene may name. The files of the families hold their equations, sources and keys.
 //!
-//! An effect acts at one stage and knows no other effect. A stage holds the named ones in the order of the registry, so
-//! an effect that is not named has no state and is never called.
+//! An effect acts at one stage and knows no other effect. A stage holds the named effects in the order of the registry.
+//! An effect that is not named has no state and is never called.
 
-use fastrand::Rng;
-
-/// A family's named effects: a list for each stage, filled from the parts of that name.
+/// Named effects of a family: a list for each stage.
 macro_rules! named {
     ($($part:ident($list:ident: $effect:ty),)*) => {
-        /// The named effects.
+        /// Named effects of the family.
         #[derive(Default)]
         pub struct Named {
             any: bool,
@@ -16,7 +14,7 @@ macro_rules! named {
         }
 
         impl Named {
-            /// Takes an effect in behind those that are there; gives back what belongs elsewhere.
+            /// Appends an effect to the list of its stage. Returns a part of another family.
             pub fn take(&mut self, name: &'static str, part: Part) -> Option<Part> {
                 match part {
                     $(Part::$part(part) => self.$list.push(Metered::new(name, part)),)*
@@ -26,12 +24,12 @@ macro_rules! named {
                 None
             }
 
-            /// Whether there is one.
+            /// True if there is one.
             pub fn any(&self) -> bool {
                 self.any
             }
 
-            /// What each has cost so far.
+            /// Cost of each effect so far.
             pub fn costs(&self) -> impl Iterator<Item = Cost> {
                 core::iter::empty()$(.chain(self.$list.iter().map(Metered::cost)))*
             }
@@ -43,64 +41,56 @@ pub mod contact;
 pub mod drive;
 pub mod link;
 pub mod sensor;
-pub mod set;
 
-use crate::key::Values;
+use crate::registry;
+use crate::scene::Scene;
+use crate::scene::tables::Values;
 use crate::watch::Cost;
+use fastrand::Rng;
 use std::time::{Duration, Instant};
 
-/// What an effect is built from.
+/// Input of the construction of an effect.
 #[derive(Clone, Copy, Debug)]
 pub struct Build<'a> {
-    /// Its checked values.
+    /// Checked values of its keys.
     pub values: &'a Values,
-    /// Its own stream of random numbers: of the scene's seed, its name and the finger.
+    /// Seed of its own random numbers, from the seed of the scene, its name and the finger.
     pub seed: u64,
 }
 
-/// A built effect, by the stage at which it acts.
+impl Build<'_> {
+    /// Value of a key that is a number.
+    pub fn number(&self, name: &str) -> f64 {
+        self.values.number(name)
+    }
+}
+
+/// Built effect, by the stage at which it acts.
+#[expect(missing_docs, reason = "each variant holds the type of its name")]
 pub enum Part {
-    /// See [`sensor::Pressure`].
     Pressure(Box<dyn sensor::Pressure>),
-    /// See [`sensor::Conductance`].
     Conductance(Box<sensor::Conductance>),
-    /// See [`sensor::Network`].
     Network(Box<sensor::Network>),
-    /// See [`sensor::Volts`].
     Volts(Box<sensor::Volts>),
-    /// See [`sensor::Codes`].
     Codes(Box<sensor::Codes>),
-    /// See [`contact::Shape`].
     Shape(Box<dyn contact::Shape>),
-    /// See [`contact::Memory`].
     Memory(Box<dyn contact::Memory>),
-    /// See [`contact::Series`].
     Series(Box<contact::Series>),
-    /// See [`contact::Strength`].
     Strength(Box<dyn contact::Strength>),
-    /// See [`contact::Tangent`].
     Tangent(Box<contact::Tangent>),
-    /// See [`contact::Body`].
     Body(Box<contact::Body>),
-    /// See [`drive::Inertia`].
     Inertia(Box<drive::Inertia>),
-    /// See [`drive::Electric`].
     Electric(Box<dyn drive::Electric>),
-    /// See [`drive::Resist`].
     Resist(Box<drive::Resist>),
-    /// See [`drive::Potential`].
     Potential(Box<dyn drive::Potential>),
-    /// See [`drive::Play`].
     Play(Box<drive::Play>),
-    /// See [`drive::Encoder`].
     Encoder(Box<drive::Encoder>),
-    /// See [`link::Clock`].
     Clock(Box<link::Clock>),
-    /// See [`link::Packets`].
     Packets(Box<link::Packets>),
 }
 
-/// The seed of an effect's or a drawn value's own stream, so that naming one does not change the numbers of another.
+/// Returns the seed of the stream of an effect or of a drawn value. One more name does not change the numbers of
+/// another.
 pub fn stream(seed: u64, name: &str, finger: usize) -> u64 {
     // FNV-1a over the name, then SplitMix64 over all three.
     let name = name
@@ -112,11 +102,11 @@ pub fn stream(seed: u64, name: &str, finger: usize) -> u64 {
     z ^ (z >> 31)
 }
 
-/// One of so many calls is timed: reading the clock costs about as much as a small effect.
+/// One of this number of calls is timed: reading the clock costs about as much as a small effect.
 const TIMED: u64 = 256;
 
-/// An effect with the meter for its ledger. What it measures never reaches the run.
-pub struct Metered<T: ?Sized> {
+/// Effect with a meter of its cost. The measurement never reaches the run.
+pub(crate) struct Metered<T: ?Sized> {
     name: &'static str,
     calls: u64,
     timed_calls: u64,
@@ -125,12 +115,10 @@ pub struct Metered<T: ?Sized> {
 }
 
 impl<T: ?Sized> Metered<T> {
-    /// With nothing on the meter.
     pub fn new(name: &'static str, part: Box<T>) -> Self {
         Self { name, calls: 0, timed_calls: 0, timed: Duration::ZERO, part }
     }
 
-    /// Calls the effect.
     pub fn call<R>(&mut self, f: impl FnOnce(&mut T) -> R) -> R {
         self.calls += 1;
         if self.calls % TIMED != 1 {
@@ -143,21 +131,20 @@ impl<T: ?Sized> Metered<T> {
         result
     }
 
-    /// The effect, to look at.
     pub fn part(&self) -> &T {
         &self.part
     }
 
-    /// What it has cost so far.
+    /// Cost so far.
     pub fn cost(&self) -> Cost {
         let share = self.calls as f64 / self.timed_calls.max(1) as f64;
         Cost { effect: self.name, evaluations: self.calls, seconds: self.timed.as_secs_f64() * share }
     }
 }
 
-/// A number of the normal distribution, mean 0 and deviation 1: Marsaglia's polar method. The logarithm is libm's own,
-/// in plain Rust.
-pub fn normal(rng: &mut Rng) -> f64 {
+/// Draws from the normal distribution, mean 0 and deviation 1, by Marsaglia's polar method. The logarithm is libm's, in
+/// plain Rust.
+pub(crate) fn normal(rng: &mut Rng) -> f64 {
     loop {
         let (u, v) = (2.0 * rng.f64() - 1.0, 2.0 * rng.f64() - 1.0);
         let s = u * u + v * v;
@@ -167,9 +154,9 @@ pub fn normal(rng: &mut Rng) -> f64 {
     }
 }
 
-/// So many of them, to the bit what [`normal`] gives one after the other, but quicker: no draw that is thrown away is
-/// waited for.
-pub fn normals<const COUNT: usize>(rng: &mut Rng) -> [f64; COUNT] {
+/// Draws `COUNT` numbers, to the bit those of consecutive calls of [`normal`], but faster: no rejected draw is waited
+/// for.
+pub(crate) fn normals<const COUNT: usize>(rng: &mut Rng) -> [f64; COUNT] {
     let (mut first, mut squares) = ([0.0; COUNT], [0.0; COUNT]);
     let mut drawn = 0;
     while drawn < COUNT {
@@ -184,9 +171,8 @@ pub fn normals<const COUNT: usize>(rng: &mut Rng) -> [f64; COUNT] {
     first
 }
 
-/// One of [`normal`], drawn again beyond three deviations: for what a part is made with, since worse parts are thrown
-/// away.
-pub fn normal_within_3(rng: &mut Rng) -> f64 {
+/// Draws by [`normal`], again beyond three deviations: worse parts are not delivered.
+pub(crate) fn normal_within_3(rng: &mut Rng) -> f64 {
     loop {
         let draw = normal(rng);
         if draw.abs() <= 3.0 {
@@ -195,9 +181,83 @@ pub fn normal_within_3(rng: &mut Rng) -> f64 {
     }
 }
 
-/// A waiting time of a Poisson process; infinite at rate 0.
-pub fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
+/// Draws a waiting time of a Poisson process; infinite at rate 0.
+pub(crate) fn waiting_s(rng: &mut Rng, rate_per_s: f64) -> f64 {
     -libm::log(1.0 - rng.f64()) / rate_per_s
+}
+
+/// Effects of one finger by family.
+pub struct Parts<E: Set + ?Sized> {
+    /// On the array.
+    pub sensor: E::Sensor,
+    /// On the contact.
+    pub contact: E::Contact,
+    /// On the drive.
+    pub drive: E::Drive,
+    /// On clock and bus.
+    pub link: E::Link,
+}
+
+/// Set of effects: [`Named`], or `()`, which has none compiled in.
+pub trait Set {
+    /// On the array.
+    type Sensor: sensor::Stages;
+    /// On the contact.
+    type Contact: contact::Stages;
+    /// On the drive.
+    type Drive: drive::Stages;
+    /// On clock and bus.
+    type Link: link::Stages;
+
+    /// Effects of one finger.
+    fn of(scene: &Scene, finger: usize) -> Parts<Self>;
+
+    /// Cost of each effect so far.
+    fn costs(sensor: &Self::Sensor, contact: &Self::Contact, drive: &Self::Drive, link: &Self::Link) -> Vec<Cost>;
+}
+
+impl Set for () {
+    type Sensor = ();
+    type Contact = ();
+    type Drive = ();
+    type Link = ();
+
+    fn of(_scene: &Scene, _finger: usize) -> Parts<Self> {
+        Parts { sensor: (), contact: (), drive: (), link: () }
+    }
+
+    fn costs(_sensor: &(), _contact: &(), _drive: &(), _link: &()) -> Vec<Cost> {
+        Vec::new()
+    }
+}
+
+/// Effects that the scene names.
+pub struct Named;
+
+impl Set for Named {
+    type Sensor = sensor::Named;
+    type Contact = contact::Named;
+    type Drive = drive::Named;
+    type Link = link::Named;
+
+    fn of(scene: &Scene, finger: usize) -> Parts<Self> {
+        let mut parts: Parts<Self> = Parts {
+            sensor: sensor::Named::default(),
+            contact: contact::Named::default(),
+            drive: drive::Named::default(),
+            link: link::Named::default(),
+        };
+        for (name, part) in registry::build(&scene.effects, scene.seed, finger) {
+            let rest = parts.sensor.take(name, part).and_then(|part| parts.contact.take(name, part));
+            let rest = rest.and_then(|part| parts.drive.take(name, part)).and_then(|part| parts.link.take(name, part));
+            assert!(rest.is_none(), "{name} acts at no stage");
+        }
+        parts
+    }
+
+    fn costs(sensor: &sensor::Named, contact: &contact::Named, drive: &drive::Named, link: &link::Named) -> Vec<Cost> {
+        sensor.costs().chain(contact.costs()).chain(drive.costs()).chain(link.costs()).collect()
+    }
 }
 
 #[cfg(test)]

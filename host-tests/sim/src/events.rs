@@ -1,13 +1,12 @@
-//! Events of a scene: what happens to the finger, to its object and to what its controller is given.
+//! Events of a scene: disturbances of the finger, of its object and of the inputs of its controller.
 //!
 //! An event acts at one of three places, and both boards share all of them: the world moves the object, slips the
-//! encoder and lowers the supply; the readout changes the array's codes; the host sends requests or falls silent.
+//! encoder and lowers the supply; the readout changes the codes of the array; the host sends requests or is silent.
 //! Every event acts on all fingers of the scene.
 
 use crate::effects::stream;
-use crate::key::{Key, Kind, Values};
 use crate::scene::Scene;
-use crate::scene::tables::Table;
+use crate::scene::tables::{Key, Kind, Table, Values};
 use core::f64::consts::TAU;
 use fastrand::Rng;
 use fingertip::command::Command;
@@ -24,25 +23,21 @@ const REQUEST_S: f64 = 0.02;
 /// Time after a defect for which it may still be the cause of a fault, s.
 const AFTERMATH_S: f64 = 1.0;
 
-const fn number(name: &'static str, about: &'static str, min: f64, max: f64) -> Key {
-    Key { name, about, kind: Kind::Number { min, max, default: None } }
-}
-
 const fn whole(name: &'static str, about: &'static str, min: i64, max: i64) -> Key {
     Key { name, about, kind: Kind::Whole { min, max, default: None } }
 }
 
-const AT: Key = number("at_s", "Time of the event, from the start.", 0.0, 1e6);
-const FOR: Key = number("for_s", "Duration of the event.", 0.0, 1e6);
+const AT: Key = Key::required("at_s", "Time of the event, from the start.", 0.0, 1e6);
+const FOR: Key = Key::required("for_s", "Duration of the event.", 0.0, 1e6);
 const KIND: Key = Key { name: "kind", about: "Kind of the event, one of those below.", kind: Kind::Text };
 const ROW: Key = whole("row", "Row of the array.", 0, ROWS as i64 - 1);
 const CODE: Key = whole("to_codes", "Code that is read instead.", 0, CODE_MAX);
 
-/// What every event has.
+/// Keys of every event.
 pub const EVENT: Table = Table {
     name: "event",
-    about: "What happens to the finger, to its object or to its controller, in order of time; may stand many times. Each kind has \
-            keys of its own.",
+    about: "Disturbance of the finger, its object or its controller, in order of time; may occur many times. Each kind has its own \
+            keys.",
     keys: &[AT, KIND],
 };
 
@@ -51,24 +46,24 @@ pub const EVENT: Table = Table {
 #[rustfmt::skip]
 pub const KINDS: [Table; 15] = [
     Table { name: "object_move", about: "The object moves along the finger's motion and stays there.", keys: &[AT, KIND,
-        number("by_mm", "Way of the object. Negative moves it towards the (first) finger.", -20.0, 100.0),
-        number("speed_mm_per_s", "Speed of the object.", 0.1, 1000.0)] },
+        Key::required("by_mm", "Displacement of the object; negative is towards the (first) finger.", -20.0, 100.0),
+        Key::required("speed_mm_per_s", "Speed of the object.", 0.1, 1000.0)] },
     Table { name: "object_oscillate", about: "The object moves to and fro along the finger's motion, for as many whole periods as fit.", keys: &[AT, KIND,
-        number("amplitude_mm", "Amplitude of the sine.", 0.0, 5.0),
-        number("rate_hz", "Frequency.", 1.0, 10.0), FOR] },
-    Table { name: "object_removed", about: "The object is taken away, then put back. Where the tip stands in its way, it is pushed back at 20 mm/s.", keys: &[AT, KIND, FOR] },
+        Key::required("amplitude_mm", "Amplitude of the sine.", 0.0, 5.0),
+        Key::required("rate_hz", "Frequency.", 1.0, 10.0), FOR] },
+    Table { name: "object_removed", about: "The object is removed, then put back. If the tip is in its place, the object returns at 20 mm/s.", keys: &[AT, KIND, FOR] },
     Table { name: "torque_off", about: "The host disables torque, then enables it again.", keys: &[AT, KIND, FOR] },
     Table { name: "tare", about: "The host tares: torque off, after 20 ms a tare, after 100 ms torque on.", keys: &[AT, KIND] },
     Table { name: "recover", about: "The host clears a fault: torque off, after 20 ms clear, after 40 ms torque on.", keys: &[AT, KIND] },
     Table { name: "encoder_slip", about: "The encoder loses or gains counts, for good.", keys: &[AT, KIND,
         whole("by_counts", "Counts that are added.", -100_000, 100_000)] },
     Table { name: "brown_out", about: "The supply falls to a voltage.", keys: &[AT, KIND,
-        number("to_v", "Voltage of the source.", 0.0, 60.0), FOR] },
+        Key::required("to_v", "Voltage of the source.", 0.0, 60.0), FOR] },
     Table { name: "taxel_stuck", about: "A taxel reads one code.", keys: &[AT, KIND, ROW,
         whole("column", "Column of the array.", 0, COLUMNS as i64 - 1), CODE, FOR] },
     Table { name: "row_stuck", about: "All taxels of a row read one code.", keys: &[AT, KIND, ROW, CODE, FOR] },
     Table { name: "gain_change", about: "All taxels change their gain: what pressure adds to a code is multiplied.", keys: &[AT, KIND,
-        number("factor", "Factor of the gain.", 0.0, 10.0), FOR] },
+        Key::required("factor", "Factor of the gain.", 0.0, 10.0), FOR] },
     Table { name: "array_blank", about: "The array reads as it did without contact, before the scene began.", keys: &[AT, KIND, FOR] },
     Table { name: "array_frozen", about: "The array repeats its last codes.", keys: &[AT, KIND, FOR] },
     Table { name: "interference", about: "All codes are random.", keys: &[AT, KIND, FOR] },
@@ -76,7 +71,7 @@ pub const KINDS: [Table; 15] = [
 ];
 const FIRST_DEFECT: usize = 6;
 
-/// The keys of a kind behind `at_s` and `kind`, which every event has.
+/// Returns the keys of a kind after `at_s` and `kind`, which every event has.
 pub fn own_keys(kind: &Table) -> &'static [Key] {
     &kind.keys[EVENT.keys.len()..]
 }
@@ -86,15 +81,15 @@ pub fn own_keys(kind: &Table) -> &'static [Key] {
 pub struct Event {
     /// Start of the event, from the scene's start.
     pub at_s: f64,
-    /// End of what it does.
+    /// End of the event.
     pub until_s: f64,
-    /// Its values as the scene gives them.
+    /// Values as the scene gives them.
     pub values: Values,
     defect: bool,
     what: What,
 }
 
-/// What an event does.
+/// Action of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum What {
     Move { by_mm: f64 },
@@ -109,7 +104,7 @@ enum What {
     Silent,
 }
 
-/// What an event does to the array's codes.
+/// Action of an event on the codes of the array.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Defect {
     Stuck { row: usize, column: Option<usize>, code: u16 },
@@ -120,7 +115,7 @@ enum Defect {
 }
 
 impl Event {
-    /// An event of a kind with the checked values of its table.
+    /// Creates an event of a kind from the checked values of its table.
     pub fn new(kind: &Table, values: Values) -> Self {
         let (at_s, number) = (values.number("at_s"), |name: &str| values.number(name));
         let stuck = |column| Defect::Stuck { row: number("row") as usize, column, code: number("to_codes") as u16 };
@@ -160,12 +155,12 @@ impl Event {
     }
 }
 
-/// The world as its events leave it at a time.
+/// State of the world after its events.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Happened {
-    /// Place of an object that stands fast, along the first finger's motion.
+pub(crate) struct Happened {
+    /// Place of a fixed object, along the motion of the first finger.
     pub object_mm: f64,
-    /// Its speed.
+    /// Speed of the object.
     pub object_mm_per_s: f64,
     /// True while the object is taken away.
     pub object_gone: bool,
@@ -180,7 +175,7 @@ pub struct Happened {
 }
 
 impl Happened {
-    /// What a scene's events have done to the world by a time.
+    /// Returns the effect of the events of a scene up to a time.
     pub fn at(events: &[Event], time_s: f64) -> Self {
         let mut now = Self::default();
         for event in events.iter().take_while(|event| event.at_s <= time_s) {
@@ -209,9 +204,9 @@ impl Happened {
     }
 }
 
-/// Defects of one finger's array. It keeps the codes that some of them repeat.
+/// Defects of the array of one finger, with the codes that some of them repeat.
 #[derive(Clone, Debug)]
-pub struct ArrayEvents {
+pub(crate) struct ArrayEvents {
     events: Vec<Event>,
     untouched: [[u16; COLUMNS]; SLOTS],
     last: [[u16; COLUMNS]; SLOTS],
@@ -219,7 +214,7 @@ pub struct ArrayEvents {
 }
 
 impl ArrayEvents {
-    /// Those of a scene; `None` where it names none.
+    /// Returns the defects of a scene; `None` if it has none.
     pub fn of(scene: &Scene, finger: usize) -> Option<Box<Self>> {
         let events = scene.events.iter().filter(|event| matches!(event.what, What::Array(_)));
         let events: Vec<Event> = events.cloned().collect();
@@ -267,7 +262,7 @@ pub enum Request {
 }
 
 impl Request {
-    /// Requests that a scene's events make, sorted by time.
+    /// Returns the requests of the events of a scene, sorted by time.
     pub fn all(events: &[Event]) -> Vec<(f64, Self)> {
         let asked = |at_s: f64, after_s: [f64; 3], request: Self| {
             let requests = [Self::Torque(false), request, Self::Torque(true)];
@@ -288,7 +283,7 @@ impl Request {
         all
     }
 
-    /// Puts the request into a command.
+    /// Applies the request to a command.
     pub fn apply(self, command: &mut Command) {
         match self {
             Self::Torque(on) => command.torque = on,
@@ -298,7 +293,7 @@ impl Request {
     }
 }
 
-/// The times in which the host sends nothing.
+/// Returns the times in which the host sends nothing.
 pub fn silences(events: &[Event]) -> Vec<[f64; 2]> {
     let silent = events.iter().filter(|event| event.what == What::Silent);
     silent.map(|event| [event.at_s, event.until_s]).collect()

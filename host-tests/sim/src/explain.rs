@@ -1,15 +1,14 @@
-//! What a scene computes, what it may name, and the page of it all.
+//! Descriptions of a scene, of all keys, and the reference page.
 
 use crate::effects::{Build, Part};
 use crate::events::{EVENT, KINDS, own_keys};
-use crate::key::{Key, Values};
 use crate::metrics;
-use crate::registry::{self, Description, Family};
-use crate::scene::tables::{EXPECT, ROOT, SCRIPT, TABLES, Table};
+use crate::registry::{self, CONTACT, DRIVE, Description, LINK, SENSOR};
+use crate::scene::tables::{EXPECT, Key, ROOT, SCRIPT, TABLES, Table, Values};
 use crate::scene::{Scene, library, read};
 use std::fmt::Write as _;
 
-/// The effects that a scene names, with the equations and the state that each adds.
+/// Describes the effects of a scene, with the equations and the state of each.
 pub fn scene(scene: &Scene) -> String {
     let mut text = format!("{}: {}\n", scene.name, scene.about);
     let _ = writeln!(
@@ -25,8 +24,8 @@ pub fn scene(scene: &Scene) -> String {
         text += "\nIt names no effect: a motor without friction presses an ideal tip on a rigid plane, read without error.\n";
     }
     for named in &scene.effects {
-        let Description { name, family, about, equations, state, reference, .. } = named.effect;
-        let _ = writeln!(text, "\n{name} ({})\n  {about}", family.name());
+        let Description { name, about, equations, state, reference, .. } = named.effect;
+        let _ = writeln!(text, "\n{name} ({})\n  {about}", registry::family_of(named.effect));
         equations.iter().for_each(|line| text += &format!("    {line}\n"));
         let _ = writeln!(text, "  state: {state}\n  source: {reference}");
         for (name, value) in named.values.iter() {
@@ -36,10 +35,10 @@ pub fn scene(scene: &Scene) -> String {
     text
 }
 
-/// The library's scenes, each with what it shows.
+/// Lists the scenes of the library, each with its description.
 ///
 /// # Errors
-/// The library cannot be read, or a scene of it is broken.
+/// The library cannot be read, or a scene of it has a mistake.
 pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
     let names = library::names()?;
     let width = names.iter().map(String::len).max().unwrap_or(0);
@@ -52,7 +51,7 @@ pub fn list() -> Result<String, Box<dyn std::error::Error + Send + Sync>> {
     Ok(text)
 }
 
-/// Every key, for a terminal.
+/// Lists every key, for a terminal.
 pub fn keys() -> String {
     let mut text = String::new();
     for table in [&ROOT].into_iter().chain(TABLES).chain([&SCRIPT, &EVENT, &EXPECT]) {
@@ -76,10 +75,10 @@ fn keys_of(text: &mut String, title: &str, about: &str, keys: &[Key]) {
     text.push('\n');
 }
 
-/// How the page is made anew.
+/// Command that generates the page.
 pub const COMMAND: &str = "cargo xtask docs";
 
-/// The reference page, `docs/scenes.md`.
+/// Returns the reference page, `docs/scenes.md`.
 pub fn page() -> String {
     let mut page = format!(
         "# Scenes\n\nGenerated from `host-tests/sim/src` by `{COMMAND}`: do not edit.\n\n{}\n",
@@ -103,9 +102,9 @@ pub fn page() -> String {
         }
     }
     page.push_str("\n## Effects\n\nThey act in this order within a stage, whatever the order in the scene.\n");
-    for family in [Family::Contact, Family::Drive, Family::Sensor, Family::Link] {
-        let _ = write!(page, "\n### {}\n", family.title());
-        for effect in registry::all().filter(|effect| effect.family == family) {
+    for family in [CONTACT, DRIVE, SENSOR, LINK] {
+        let _ = write!(page, "\n### {}\n", family.title);
+        for effect in family.effects {
             effect_of(&mut page, effect);
         }
     }
@@ -117,7 +116,7 @@ pub fn page() -> String {
     page
 }
 
-/// The library's scenes; none where this runs far from its sources.
+/// Adds the scenes of the library; none without the sources.
 fn library_of(page: &mut String) {
     page.push_str(
         "\n## The library\n\nEach scene of `host-tests/sim/scenes` explains itself; a test runs them all and holds their bounds.\n\n",
@@ -130,7 +129,7 @@ fn library_of(page: &mut String) {
     }
 }
 
-/// From pressure to codes, stage by stage, with the effects as they are built.
+/// Adds the stages from pressure to codes, with the effects at each.
 fn stages(page: &mut String) {
     page.push_str(
         "\n## From pressure to codes\n\nWithout effects the readout is ideal: equal taxels, a perfect row switch, a perfect virtual ground, \
@@ -150,7 +149,7 @@ fn stages(page: &mut String) {
     }
 }
 
-/// At which stage of the readout an effect acts.
+/// Returns the stage of the readout at which an effect acts.
 fn stage_of(effect: &Description) -> Option<&'static str> {
     let values = Values::defaults(effect.keys);
     match (effect.build)(&Build { values: &values, seed: 0 }) {

@@ -1,14 +1,13 @@
-//! Scenes: simulate only the effects a scene calls for.
+//! Scenes: simulate only the effects that a scene names.
 //!
-//! A scene is a text file (TOML). It says what the finger is made of, what it touches, which forces are asked for and
-//! which effects are there. An effect that the scene does not name is not there: it has no state, is never called, and
-//! costs nothing.
+//! A scene is a text file (TOML) with the finger, the object, the requested forces and the effects. An effect that the
+//! scene does not name has no state, is never called, and costs nothing.
 //!
-//! One run goes like this: [`scene`] reads the file; [`registry`] knows every effect by its name and builds those that
-//! are named; the world moves the finger and fills the frames; the core's `Pipeline::step` answers each with a duty;
-//! everything that wants to see the run watches it step by step ([`watch`]): metrics, ledger, recording, report.
+//! The steps of a run: [`scene`] reads the file; [`registry`] builds the named effects; the world moves the finger and
+//! fills the frames; the core's `Pipeline::step` answers each frame with a duty; watchers ([`watch`]) see the run step
+//! by step: metrics, ledger, recording, report.
 //!
-//! All of it is simulated; nothing here has touched silicon.
+//! Everything is simulated; nothing here was measured on hardware.
 
 pub mod agreement;
 pub mod bridge;
@@ -21,14 +20,12 @@ pub mod events;
 #[cfg(feature = "files")]
 pub mod explain;
 pub mod host;
-pub mod key;
-pub mod ledger;
 pub mod mechanics;
 pub mod metrics;
 pub mod native;
 pub mod optimal;
 #[cfg(feature = "files")]
-pub mod part;
+mod part;
 pub mod plant;
 #[cfg(feature = "files")]
 pub mod population;
@@ -39,8 +36,6 @@ pub mod registry;
 pub mod report;
 pub mod run;
 pub mod scene;
-#[cfg(feature = "files")]
-pub mod session;
 pub mod setup;
 #[cfg(feature = "files")]
 pub mod sweep;
@@ -49,7 +44,7 @@ pub mod world;
 
 pub use native::{SimError, simulate};
 
-/// A record's bytes as they are written to flash.
+/// Returns the bytes of a record as they are written to flash.
 pub fn encode<const ROWS: usize, const COLUMNS: usize>(
     record: &fingertip::store::Record<ROWS, COLUMNS>,
     sequence: u32,

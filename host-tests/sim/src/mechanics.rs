@@ -1,19 +1,28 @@
-//! The moving world: fingers, what they touch, and the step that moves them together.
+//! Mechanics of the fingers and of what they touch.
 //!
-//! Everything that stores energy is asked for its mean slope over the step's way (a discrete gradient), so the step's
-//! energy balance holds to rounding at any length: friction and the winding take what they take, and nothing appears
-//! from nowhere.
+//! Everything that stores energy returns its mean slope over a step (a discrete gradient), so the energy balance of the
+//! step holds to rounding at any length: only friction and the winding remove energy, and none is created.
 
-mod acting;
-pub mod body;
-pub mod cells;
 pub mod contact;
-pub mod decay;
-pub mod dynamics;
-pub mod elastic;
-pub mod finger;
-pub mod normal;
+pub(crate) mod finger;
+mod normal;
 pub mod pressures;
 pub mod rotor;
-pub mod shape;
-pub mod tip;
+mod shape;
+
+/// exp(-x) for x of 0 or more, from the four operations alone, so that every machine gives the same bits.
+///
+/// The diagonal Pade approximant of order 3 at x/1024, squared ten times: relative error below 1e-12 up to x = 12,
+/// below 1e-11 up to x = 40; 0 above.
+pub fn decay(x: f64) -> f64 {
+    if x > 40.0 {
+        return 0.0;
+    }
+    let y = x.max(0.0) / 1024.0;
+    let (even, odd) = (1.0 + y * y / 10.0, y / 2.0 + y * y * y / 120.0);
+    let mut power = (even - odd) / (even + odd);
+    for _ in 0..10 {
+        power *= power;
+    }
+    power
+}

@@ -1,64 +1,61 @@
-//! What is measured in a run, and what a scene may ask of it.
+//! Metrics of a run, on which a scene may set bounds.
 //!
-//! [`METRICS`] is the one table of them: the reader checks `[[expect]]` by it, the results are named by it, and the
-//! reference page shows it. All figures are of what is simulated; times before 0, when the finger is tared, do not
-//! count.
+//! [`METRICS`] is their only table: the reader, the results and the reference page use it. All values are simulated;
+//! times before 0, when the finger is tared, do not count.
 
 mod conduct;
 mod finger;
 mod response;
-mod slips;
-mod table;
 
-pub use conduct::Hold;
-pub use finger::Finger;
-pub use finger::newtons;
-pub use response::AtGoal;
-pub use table::{BY_GOAL, METRICS};
+pub use crate::metrics::conduct::Hold;
+pub use crate::metrics::finger::{Finger, duty, newtons};
+pub use crate::metrics::response::AtGoal;
 
+use crate::metrics::finger::{DROPPED_MM, LIMITS};
 use crate::scene::Bound;
 use crate::watch::{Controller, Step, Watch};
+use Worst::{FirstFault, Largest, Least, Sum};
 use std::sync::LazyLock;
 
-/// Fingers that a scene has at most.
+/// Most fingers of a scene.
 const FINGERS: usize = 2;
 
-/// Something measured.
+/// Metric of a run.
 #[derive(Clone, Copy)]
 pub struct Metric {
-    /// Its name, with its unit last.
+    /// Name, with its unit last.
     pub name: &'static str,
-    /// What it is, and how it is worked out.
+    /// Definition.
     pub about: &'static str,
-    /// Which of several fingers' values is the scene's.
+    /// Value that counts if a scene has several fingers.
     pub of_several: Worst,
-    /// Its value for a finger; none where the run has none.
+    /// Value for a finger; none if the run has none.
     pub value: fn(&Finger) -> Option<f64>,
 }
 
 /// A metric that has a value for each goal.
 #[derive(Clone, Copy)]
 pub struct ByGoal {
-    /// The metric's name.
+    /// Name of the metric.
     pub name: &'static str,
-    /// Its values, in the metric's unit.
+    /// Values in the unit of the metric.
     pub values: fn(&Finger) -> Vec<AtGoal>,
 }
 
-/// Which of several values counts.
+/// Selection of one of several values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Worst {
-    /// The largest.
+    /// Largest value.
     Largest,
-    /// The least.
+    /// Least value.
     Least,
-    /// All of them together.
+    /// Sum of the values.
     Sum,
-    /// That of the finger whose first fault came first.
+    /// Value of the finger with the earliest fault.
     FirstFault,
 }
 
-/// Every name that `[[expect]]` may ask for: `peak_force_n` of the scene, `finger0.peak_force_n` of one finger.
+/// Returns every name that `[[expect]]` may use: `peak_force_n` of the scene, `finger0.peak_force_n` of one finger.
 pub fn names() -> Vec<&'static str> {
     static OF_FINGERS: LazyLock<Vec<String>> = LazyLock::new(|| {
         (0..FINGERS).flat_map(|n| METRICS.iter().map(move |metric| format!("finger{n}.{}", metric.name))).collect()
@@ -66,12 +63,12 @@ pub fn names() -> Vec<&'static str> {
     METRICS.iter().map(|metric| metric.name).chain(OF_FINGERS.iter().map(String::as_str)).collect()
 }
 
-/// Measures a run.
+/// Measures a run, step by step.
 #[derive(Clone, Debug, Default)]
 pub struct Meter(Vec<Finger>);
 
 impl Meter {
-    /// The results, after the run.
+    /// Returns the results after the run.
     pub fn measured(&self) -> Measured {
         let scene = METRICS.iter().map(|metric| (metric.name.to_owned(), self.scene(metric)));
         let several = if self.0.len() > 1 { &self.0[..] } else { &[] };
@@ -81,7 +78,7 @@ impl Meter {
         Measured(scene.chain(fingers).collect())
     }
 
-    /// Whether each bound is held.
+    /// Compares each bound with the results.
     pub fn verdicts(&self, bounds: &[Bound]) -> Vec<Verdict> {
         let measured = self.measured();
         bounds.iter().map(|bound| self.verdict(&measured, bound)).collect()
@@ -91,7 +88,7 @@ impl Meter {
         let (mut value, mut max) = (measured.get(&bound.metric), bound.max);
         // A finger without a value leaves the scene without one.
         if let (Some(_), Some(base), Some(share)) = (value, bound.max, bound.max_per_goal_n) {
-            // That of the goal at which it is farthest beyond what it may be, as a share of that.
+            // The value at the goal with the largest share of its limit.
             let allowed = |at: &AtGoal| base + share * at.goal_n;
             let used = |at: &AtGoal| if allowed(at) > 0.0 { at.value / allowed(at) } else { at.value - allowed(at) };
             let worst = self.by_goal(&bound.metric).into_iter().max_by(|a, b| used(a).total_cmp(&used(b)));
@@ -114,12 +111,12 @@ impl Meter {
         known.map_or(Vec::new(), |known| fingers.iter().flat_map(known.values).collect())
     }
 
-    /// The forces that were held.
+    /// Returns the forces that were held.
     pub fn holds(&self) -> Vec<Hold> {
         self.0.iter().flat_map(|finger| finger.conduct.ended().holds).collect()
     }
 
-    /// None where a finger has none: a finger that never settles is not made up for by one that does.
+    /// Returns none if a finger has none: a finger that never settles is not compensated by one that does.
     fn scene(&self, metric: &Metric) -> Option<f64> {
         let values: Option<Vec<f64>> = self.0.iter().map(metric.value).collect();
         let fold: fn(f64, f64) -> f64 = match metric.of_several {
@@ -149,32 +146,32 @@ impl Watch for Meter {
     }
 }
 
-/// The results of a run: each metric, in the order of the table; with several fingers, each finger's after them.
+/// Results of a run: each metric, in the order of the table, then those of each of several fingers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Measured(pub Vec<(String, Option<f64>)>);
 
 impl Measured {
-    /// A result by its name; `finger0.` may stand before it with a single finger too.
+    /// Returns a result by its name. The prefix `finger0.` is allowed with a single finger too.
     pub fn get(&self, name: &str) -> Option<f64> {
         let of = |name: &str| self.0.iter().find(|(known, _)| known == name).map(|(_, value)| *value);
         of(name).or_else(|| of(name.strip_prefix("finger0.")?)).flatten()
     }
 }
 
-/// What became of a bound.
+/// Comparison of a result with its bound.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
-    /// What was asked.
+    /// Bound of the scene.
     pub bound: Bound,
-    /// What was measured; a metric that the run does not have holds no bound.
+    /// Result. A metric without a value breaks its bound.
     pub value: Option<f64>,
-    /// The largest that was allowed, where what is allowed grows with the goal; else that of the bound.
+    /// Largest allowed value: for a bound that grows with the goal, that of the worst goal.
     pub max: Option<f64>,
-    /// Whether it is held.
+    /// True if the bound is held.
     pub held: bool,
 }
 
-/// The table as Markdown.
+/// Returns the table as Markdown.
 pub fn page() -> String {
     let mut page =
         String::from("| metric | what it is, and how it is worked out | of several fingers |\n| --- | --- | --- |\n");
@@ -190,11 +187,117 @@ pub fn page() -> String {
     page
 }
 
-/// A value for people: at most six digits that count, and a word where there is none.
+/// Formats a value for people: at most six significant digits, and a word if there is none.
 pub fn shown(value: Option<f64>) -> String {
     let Some(value) = value else { return "none".into() };
     let whole_digits = if value == 0.0 { 1 } else { value.abs().log10().floor() as i32 + 1 };
     let places = (5 - whole_digits).clamp(0, 9) as usize;
     let text = format!("{value:.places$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+const fn metric(
+    name: &'static str,
+    of_several: Worst,
+    about: &'static str,
+    value: fn(&Finger) -> Option<f64>,
+) -> Metric {
+    Metric { name, about, of_several, value }
+}
+
+const fn flag(is: bool) -> Option<f64> {
+    Some(if is { 1.0 } else { 0.0 })
+}
+
+/// Share of the time in which a limit (by its bit) held the controller back, percent.
+fn limited<const BIT: usize>(finger: &Finger) -> Option<f64> {
+    const { assert!(LIMITS[BIT].1 == 1 << BIT) }
+    (finger.time_s > 0.0).then(|| 100.0 * finger.limits_s[BIT] / finger.time_s)
+}
+
+/// Every metric, in the order of the output.
+#[rustfmt::skip]
+pub const METRICS: &[Metric] = &[
+    metric("peak_force_n", Largest, "largest true normal force", |f| Some(f.peak_n)),
+    metric("overshoot_percent", Largest, "largest true force beyond a goal, of the goal or of the step to it, whichever is smaller; the worst of all goals", |f| f.answers().overshoot().map(|share| 100.0 * share)),
+    metric("rise_ms", Largest, "time from 10 % to 90 % of the step to a goal; the worst of all goals, none if one is not reached", |f| f.answers().rise_s().map(|s| 1e3 * s)),
+    metric("settling_ms", Largest, "from the goal's change, or from the touch, until the true force stays within 2 % of the goal or of the step, whichever is smaller; the worst of all goals, none where one never settles", |f| f.answers().settling_s().map(|s| 1e3 * s)),
+    metric("steady_error_max_mn", Largest, "largest error of the true force against the goal, from 100 ms after the goal's change or the touch", |f| f.answers().steady_max_n().map(|n| 1e3 * n)),
+    metric("steady_error_rms_mn", Largest, "root mean square of that error", |f| f.answers().steady_rms_n().map(|n| 1e3 * n)),
+    metric("touch_ms", Largest, "from the start to the first contact", |f| f.touch_s.map(|s| 1e3 * s)),
+    metric("approach_mm_per_s", Largest, "mean speed of the tip over the last 10 ms before the first contact", |f| f.approach_mm_per_s),
+    metric("travel_max_mm", Largest, "largest travel of the tip", |f| Some(f.travel_max_mm)),
+    metric("travel_min_mm", Least, "least travel of the tip, negative behind its start", |f| Some(f.conduct.travel_min_mm)),
+    metric("indentation_max_mm", Largest, "largest indentation of the tip", |f| Some(f.indentation_max_mm)),
+    metric("faults_count", Sum, "faults that stopped the motor, without those that come while a defect of the events acts or within a second after it", |f| Some(f64::from(f.faults))),
+    metric("fault_number", FirstFault, "number of the first fault, as on the bus; 0 without", |f| Some(f.first_fault.map_or(0.0, |(fault, _)| f64::from(fault as u8)))),
+    metric("fault_ms", FirstFault, "from the start to the first fault", |f| f.first_fault.map(|(_, s)| 1e3 * s)),
+    metric("limit_voltage_percent", Largest, "share of the time in which the voltage or the supply was used up", limited::<0>),
+    metric("limit_current_percent", Largest, "share of the time in which the current limit held back", limited::<1>),
+    metric("limit_speed_percent", Largest, "share of the time at the speed limit", limited::<2>),
+    metric("limit_goal_percent", Largest, "share of the time in which the goal was moved to the largest or the least force", limited::<3>),
+    metric("limit_travel_percent", Largest, "share of the time at the travel's end", limited::<4>),
+    metric("limit_taxels_percent", Largest, "share of the time in which taxels were left out", limited::<5>),
+    metric("limit_slew_percent", Largest, "share of the time in which the voltage's slew limit held back", limited::<8>),
+    metric("missed_frames_count", Sum, "frames that the controller missed", |f| Some(f64::from(f.missed))),
+    metric("duty_rms_percent", Largest, "root mean square of the duty", |f| f.duty.rms().map(|share| 100.0 * share)),
+    metric("force_error_max_mn", Largest, "largest difference of the sensed from the true force", |f| Some(1e3 * f.force_error_n.max)),
+    metric("force_error_rms_mn", Largest, "root mean square of that difference, over the whole run", |f| f.force_error_n.rms().map(|n| 1e3 * n)),
+    metric("centre_error_max_mm", Largest, "largest distance of the sensed from the true centre of the contact, above 0.1 N", |f| f.centre_error_mm),
+    metric("confidence_min_percent", Least, "least confidence that the contact is a tip on a plane, from 100 ms after the goal's change or the touch", |f| f.confidence_min.map(|c| f64::from(c) / 2.55)),
+    metric("slip_mm", Largest, "distance that the contact slipped", |f| Some(f.slip_mm)),
+    metric("slips_count", Sum, "slips of more than 1 um; a slip is over when the contact has stuck for 10 ms", |f| Some(f64::from(f.slips.count))),
+    metric("slips_unnoticed_count", Sum, "slips that were over before the goal rose", |f| Some(f64::from(f.slips.unnoticed()))),
+    metric("slip_noticed_ms", Largest, "longest time from the onset of a slip to a higher goal", |f| f.slips.noticed_after_s.map(|s| 1e3 * s)),
+    metric("object_lift_mm", Least, "how much higher than at the start the object is at the end", |f| Some(f.object_lift_mm)),
+    metric("object_fall_mm", Largest, "farthest that the object came below its highest place before", |f| Some(f.object_fall_mm)),
+    metric("object_dropped", Largest, "1 where it fell more than 5 mm", |f| flag(f.object_fall_mm > DROPPED_MM)),
+    metric("object_broken", Largest, "1 where the object broke", |f| flag(f.broken)),
+    metric("energy_j", Sum, "electrical energy that the bridge took from the supply, less what the motor gave back", |f| Some(f.energy_j)),
+    metric("current_rms_a", Largest, "root mean square of the winding's current", |f| f.current_a.rms()),
+    metric("current_max_a", Largest, "largest current in the winding", |f| Some(f.current_a.max)),
+    metric("winding_max_c", Largest, "highest temperature of the winding", |f| f.winding_max_c),
+    metric("runaway_mm", Largest, "largest distance of the tip behind the first touch, beyond the largest indentation and the clearance (before a touch: behind the start, beyond the clearance), or beyond the end of the travel", |f| Some(f.conduct.runaway_mm)),
+    metric("air_speed_percent", Largest, "largest speed of the tip without a contact, from 20 ms after one ended, of the approach speed", |f| Some(100.0 * f.conduct.air_share())),
+    metric("over_force_mn", Largest, "largest true force beyond the goal; a goal that is reduced counts for 200 ms more, and during a fault or torque off; the push of an object on a finger without a motor does not count", |f| largest(&over_force(f)).or(Some(0.0))),
+    metric("over_force_defective_mn", Largest, "the same while a defect of the events acts and for a second after it; `over_force_mn` leaves that time out", |f| largest(&over_force_defective(f)).or(Some(0.0))),
+    metric("stop_force_mn", Largest, "largest true force later than 0.5 s after a stop (goal 0, or torque off) while it lasts, without faults, and until the object comes nearer or is put back; with torque off less what dry friction and the gear hold", |f| Some(1e3 * f.conduct.stop_force_n)),
+    metric("rest_travel_um", Largest, "from the least to the farthest travel in the last 200 ms of a goal of 0 that lasted for 400 ms; the worst of all", |f| f.conduct.ended().rest_mm.map(|mm| 1e3 * mm).or(unjudged(f))),
+    metric("rest_duty_percent", Largest, "deviation of the duty in the last 200 ms of a goal, 0 or not, that lasted for 400 ms; the worst of all", |f| f.conduct.ended().duty.map(|share| 100.0 * share).or(unjudged(f))),
+    metric("hold_swing_mn", Largest, "from the least to the largest true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all", |f| largest(&swings(f)).or(unjudged(f))),
+    metric("hold_error_mn", Largest, "error of the mean of the true force in the last 200 ms of a goal that lasted for 400 ms; the worst of all, without those that a fault ended", |f| largest(&errors(f)).or(f.first_fault.map(|_| 0.0)).or(unjudged(f))),
+    metric("touches_missed_count", Sum, "goals of at least 400 ms without a fault in whose last 200 ms nothing was touched", |f| Some(f.conduct.ended().missed() as f64)),
+];
+
+/// Metrics that have a value for each goal.
+pub const BY_GOAL: &[ByGoal] = &[
+    ByGoal { name: "over_force_mn", values: over_force },
+    ByGoal { name: "over_force_defective_mn", values: over_force_defective },
+    ByGoal { name: "hold_swing_mn", values: swings },
+    ByGoal { name: "hold_error_mn", values: errors },
+];
+
+fn over_force(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.over_force().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn over_force_defective(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.over_force_defective().iter().map(|at| at.times(1e3)).collect()
+}
+
+/// Returns 0 if events left nothing to judge.
+fn unjudged(finger: &Finger) -> Option<f64> {
+    finger.conduct.disturbed.then_some(0.0)
+}
+
+fn swings(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.ended().swings().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn errors(finger: &Finger) -> Vec<AtGoal> {
+    finger.conduct.ended().errors().iter().map(|at| at.times(1e3)).collect()
+}
+
+fn largest(values: &[AtGoal]) -> Option<f64> {
+    values.iter().map(|at| at.value).reduce(f64::max)
 }

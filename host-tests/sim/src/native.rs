@@ -1,40 +1,35 @@
-//! The native board: the same core on the host, closed over the world.
+//! Native board: the core on the host in a closed loop with the world.
 //!
-//! A frame has [`SLOTS`] slots; each row is sampled at its own instant while the world moves on, and the duty that came
-//! of a frame acts three slots after its end. Time is counted exactly, so a run is the same at any hour of the day.
+//! A frame has [`SLOTS`] slots. Each row is sampled at its own time while the world moves, and the duty of a frame acts
+//! three slots after its end. Virtual time is exact, so a run is the same at any time of the day.
 
 pub mod bench;
 #[cfg(feature = "calibrated")]
 pub mod calibrated;
-mod digest;
-mod scan;
 pub mod served;
 
-pub use scan::Clock;
-pub use scan::DUTY_DELAY_SLOTS;
-
 use crate::bridge::Bridge;
+use crate::effects::link::Stages as _;
 use crate::effects::sensor::{Readout, Stages as _};
-use crate::effects::set::{Named, Parts, Set};
-use crate::host::Host;
-use crate::host::grip::Reading;
-use crate::ledger;
-use crate::mechanics::body::Surroundings;
-use crate::run::RunError;
+use crate::effects::{Named, Parts, Set};
+use crate::host::{Host, Reading};
+use crate::mechanics::contact::Place;
+use crate::run::{RunError, by_effect};
 use crate::scene::Scene;
-use crate::scene::controller;
 use crate::setup::Setup;
 use crate::watch::{self, Controller, Cost, Step, Summary, Watch};
-use crate::world::{World, WorldError};
-use digest::Digest;
+use crate::world::{Surroundings, World, WorldError};
+use core::ops::Range;
 use fingertip::command::Command;
 use fingertip::config::{ConfigError, newtons};
 use fingertip::frame::Sense;
-use fingertip::shipped::{Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
-use fingertip::units::Celsius;
+use fingertip::pipeline::Status;
+use fingertip::shipped::{COLUMNS, Calibration, Config, Frame, Pipeline, ROWS, SLOTS, TARE_FRAMES};
+use fingertip::units::{Celsius, Duty};
 use std::time::Instant;
+use twox_hash::xxhash3_128::Hasher;
 
-/// Why a scene does not run.
+/// Reason why a scene does not run.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SimError {
     /// The controller refuses its parameters.
@@ -55,12 +50,12 @@ pub fn simulate(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimErro
     simulate_with::<Named>(scene, watch)
 }
 
-/// The same with a set of effects: `()` has none compiled in, whatever the scene names.
+/// Runs a scene with a set of effects: `()` has none compiled in, whatever the scene names.
 pub fn simulate_with<E: Set>(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     simulate_from::<E>(scene, Begun::default(), watch)
 }
 
-/// [`simulate`] with gains of the first finger's taxels, Q14.
+/// Runs a scene as [`simulate`], with gains of the taxels of the first finger, Q14.
 pub fn simulate_calibrated(
     scene: &Scene,
     gains: &fingertip::shipped::Gains,
@@ -72,22 +67,22 @@ pub fn simulate_calibrated(
     board.whole(scene, Instant::now(), watch)
 }
 
-/// Where time stands when a run begins.
+/// Time at the start of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Begun {
-    /// The board's clock; it changes nothing.
+    /// Clock of the board. It changes no result.
     pub clock_s: f64,
-    /// The scene's time once the fingers are tared: what it holds before is left out.
+    /// Time of the scene once the fingers are tared: everything before it is left out.
     pub scene_s: f64,
 }
 
-/// The same with time begun elsewhere.
+/// Runs a scene from another time on.
 pub fn simulate_from<E: Set>(scene: &Scene, begun: Begun, watch: &mut dyn Watch) -> Result<Summary, SimError> {
     let started = Instant::now();
     Board::<E>::new(scene, begun)?.whole(scene, started, watch)
 }
 
-/// A finger's controller and what lies between it and the world.
+/// Controller of a finger, and everything between it and the world.
 struct Unit<E: Set> {
     pipeline: Pipeline,
     readout: Readout,
@@ -105,7 +100,6 @@ struct Board<E: Set> {
     bridges: Vec<Bridge>,
     params: fingertip::params::Params,
     clock: Clock,
-    /// The scene's start.
     start: Clock,
     begun: Begun,
     slot_s: f64,
@@ -113,23 +107,23 @@ struct Board<E: Set> {
     digest: Digest,
     /// True once the finger is tared: from then on the host sends.
     runs: bool,
-    /// What the first finger was given beside its parameters.
+    /// Gains and mask of the taxels of the first finger.
     calibration: Option<watch::Gains>,
 }
 
-/// A temperature as the controller has it.
+/// Temperature in the type of the controller.
 fn celsius(degrees: f64) -> Celsius {
     Celsius::from_bits((degrees * 65_536.0).floor() as i32)
 }
 
 impl<E: Set> Board<E> {
     fn new(scene: &Scene, begun: Begun) -> Result<Self, SimError> {
-        let config = Config::shipped(&controller::params(scene)).map_err(SimError::Controller)?;
+        let config = Config::shipped(&scene.params()).map_err(SimError::Controller)?;
         let fingers = 0..scene.table("hand").whole("fingers") as usize;
-        Self::of(scene, begun, &config, &controller::setup(scene), fingers.map(|finger| E::of(scene, finger)))
+        Self::of(scene, begun, &config, &scene.setup(), fingers.map(|finger| E::of(scene, finger)))
     }
 
-    /// Of these parts, a finger for each.
+    /// Builds the board from these parts, a finger for each.
     fn of(
         scene: &Scene,
         begun: Begun,
@@ -215,7 +209,7 @@ impl<E: Set> Board<E> {
         }
     }
 
-    /// From the scene's start; below 0 while the fingers are tared.
+    /// Time from the start of the scene; negative while the fingers are tared.
     fn time_s(&self) -> f64 {
         self.clock.since(self.start)
     }
@@ -228,7 +222,7 @@ impl<E: Set> Board<E> {
         }
     }
 
-    /// What a finger's control step learns beside the frame.
+    /// Returns what the control step of a finger receives beside the frame.
     fn sense(&mut self, finger: usize, silent_ms: u16) -> Sense {
         let chip = self.units[finger].sensor.chip_c(self.time_s()).map(celsius);
         Sense { chip, ..self.world.sense(finger, silent_ms) }
@@ -260,12 +254,224 @@ impl<E: Set> Board<E> {
         watch.step(&Step { finger, time_s, frame, sense, command, status, truth: &truth });
     }
 
-    /// By effect in the scene's order, all fingers and stages together.
+    /// Returns the cost of each effect in the order of the scene, over all fingers and stages.
     fn costs(&self, scene: &Scene) -> Vec<Cost> {
         let mut all = Vec::new();
         for (unit, finger) in self.units.iter().zip(self.world.fingers()) {
             all.extend(E::costs(&unit.sensor, &finger.contact.effects, &finger.drive, &unit.link));
         }
-        ledger::by_effect(scene, &all)
+        by_effect(scene, &all)
+    }
+}
+
+/// Slots between the end of a frame and the effect of its duty: the time of the step on the microcontroller, rounded
+/// up.
+pub const DUTY_DELAY_SLOTS: usize = 3;
+
+impl<E: Set> Board<E> {
+    /// Scans one frame of each finger while the world moves on.
+    fn scan(&mut self) {
+        let time_s = self.time_s();
+        let second_s = self.units[0].link.second_s(time_s);
+        let slot_s = self.slot_s * second_s;
+        for slot in [0..DUTY_DELAY_SLOTS, DUTY_DELAY_SLOTS..SLOTS] {
+            if slot.start == DUTY_DELAY_SLOTS {
+                for (bridge, unit) in self.bridges.iter_mut().zip(&self.units) {
+                    *bridge = unit.next;
+                }
+            }
+            self.slots(slot, slot_s);
+        }
+    }
+
+    /// Moves the world through slots of constant duty, and samples each at its end.
+    fn slots(&mut self, slots: Range<usize>, slot_s: f64) {
+        let at_once = (self.longest_s / slot_s).max(1.0) as usize;
+        let parts = (slot_s / self.longest_s).ceil().max(1.0);
+        let mut from = slots.start;
+        while from < slots.end {
+            let count = if parts > 1.0 { 1 } else { at_once.min(slots.end - from) };
+            let (begun_s, part_s) = (self.time_s(), slot_s * count as f64 / parts);
+            for part in 0..parts as usize {
+                self.world.advance(begun_s + part as f64 * part_s, part_s, &self.bridges);
+            }
+            self.sample(from..from + count, slot_s);
+            from += count;
+        }
+    }
+
+    /// Samples the slots of the last step of the world, each at its end.
+    fn sample(&mut self, slots: Range<usize>, slot_s: f64) {
+        let begun = self.clock;
+        for (finger, unit) in self.units.iter_mut().enumerate() {
+            let mut places = [Place::NOWHERE; ROWS];
+            for (slot, place) in places.iter_mut().enumerate().take(slots.end).skip(slots.start) {
+                let gone = slot + 1 - slots.start;
+                let since_s = if gone == slots.len() { f64::INFINITY } else { slot_s * gone as f64 };
+                *place = self.world.place(finger, since_s);
+            }
+            self.clock = begun;
+            for slot in slots.clone() {
+                self.clock.go_on(slot_s);
+                let kpa = places.get(slot).map_or([0.0; COLUMNS], |place| self.world.placed_kpa(finger, place, slot));
+                let time_s = self.clock.since(self.start);
+                let codes = unit.readout.codes(&mut unit.sensor, slot, time_s, &kpa);
+                for (column, code) in codes.into_iter().enumerate() {
+                    unit.frame.set_code(slot, column, code);
+                }
+            }
+        }
+    }
+}
+
+// Virtual time is exact: whole 21sts of a femtosecond, of which a tick of the timer (168 MHz) has 125 million. So no sum
+// of ticks is rounded.
+
+/// Units in a second.
+const UNITS: i128 = 21_000_000_000_000_000;
+
+/// Instant of virtual time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Clock(i128);
+
+impl Clock {
+    /// Returns the instant at a time after the start of the clock.
+    pub fn from_start(seconds: f64) -> Self {
+        Self(seconds.trunc() as i128 * UNITS + units(seconds.fract()))
+    }
+
+    /// Advances by a time.
+    pub fn go_on(&mut self, seconds: f64) {
+        self.0 += units(seconds);
+    }
+
+    /// Goes back by a time.
+    pub fn go_back(&mut self, seconds: f64) {
+        self.0 -= Self::from_start(seconds).0;
+    }
+
+    /// Returns the time from another instant to this one; negative if this one is earlier.
+    pub fn since(self, other: Self) -> f64 {
+        let units = self.0 - other.0;
+        // Both ways give the same number. The short one is much faster, and covers seven minutes.
+        i64::try_from(units).map_or_else(|_| long(units), |units| units as f64) / UNITS as f64
+    }
+
+    /// Returns the time since the start of the clock.
+    pub fn time_s(self) -> f64 {
+        self.since(Self(0))
+    }
+}
+
+/// Out of line, as it is rarely called.
+#[cold]
+#[inline(never)]
+fn long(units: i128) -> f64 {
+    units as f64
+}
+
+fn units(seconds: f64) -> i128 {
+    let units = seconds * UNITS as f64 + 0.5;
+    // Both ways give the same number.
+    if units.abs() < i64::MAX as f64 { i128::from(units as i64) } else { long_units(units) }
+}
+
+#[cold]
+#[inline(never)]
+fn long_units(units: f64) -> i128 {
+    units as i128
+}
+
+/// The 128 bits of XXH3 over the inputs and outputs of every control step, in order: equal if two runs are equal to the
+/// bit. It detects accidental differences, not intended ones.
+struct Digest(Hasher);
+
+/// Number of digest fields of the inputs beside the codes.
+const TAKEN: usize = 13;
+
+impl Digest {
+    pub fn new() -> Self {
+        Self(Hasher::new())
+    }
+
+    /// Adds a control step.
+    pub fn add(&mut self, frame: &Frame, sense: &Sense, command: &Command, duty: Duty, status: &Status) {
+        self.0.write(frame.codes.rows.map(|codes| codes.map(u16::to_le_bytes)).as_flattened().as_flattened());
+        self.0.write(frame.codes.undriven.map(u16::to_le_bytes).as_flattened());
+        self.0.write(taken(frame.sequence, sense, command).map(u32::to_le_bytes).as_flattened());
+        // The effect of the temperature is in the other fields.
+        Status { chip: None, ..*status }.words(duty, |word| self.0.write(&word.to_le_bytes()));
+    }
+
+    /// Returns the digest in hexadecimal.
+    pub fn hex(&self) -> String {
+        format!("{:032x}", self.0.finish_128())
+    }
+}
+
+/// Returns the inputs of a step beside the codes. The command is complete but for whether a tare is forced: the outputs
+/// show the result.
+fn taken(sequence: u32, sense: &Sense, command: &Command) -> [u32; TAKEN] {
+    let Sense { encoder, supply_mv, bus_silent_ms, bridge_fault, answer, chip: _ } = *sense;
+    let Command { torque, goal, bus_watchdog_ms, fit_level, tare_request, clear_request, measure_request, .. } =
+        *command;
+    [
+        sequence,
+        encoder as u32,
+        supply_mv.into(),
+        bus_silent_ms.into(),
+        bridge_fault.into(),
+        answer.0,
+        torque.into(),
+        goal.to_bits() as u32,
+        bus_watchdog_ms.into(),
+        fit_level as u32,
+        tare_request.into(),
+        clear_request.into(),
+        measure_request.into(),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fingertip::units::CoreCycles;
+    use fingertip::units::Newtons;
+
+    /// Inputs and outputs of a step.
+    type Step = (Frame, Sense, Command, Duty, Status);
+
+    fn of(change: impl Fn(&mut Step)) -> String {
+        let mut step = (Frame::EMPTY, Sense::default(), Command::default(), Duty(0), Status::default());
+        change(&mut step);
+        let mut digest = Digest::new();
+        digest.add(&step.0, &step.1, &step.2, step.3, &step.4);
+        digest.hex()
+    }
+
+    #[test]
+    fn whatever_a_step_takes_or_gives_counts() {
+        let mut all = vec![
+            of(|_| ()),
+            of(|step| step.0.set_code(0, 0, 1)),
+            of(|step| step.0.set_code(10, 9, 1)),
+            of(|step| step.0.sequence = 1),
+            of(|step| step.1.encoder = 1),
+            of(|step| step.1.answer = CoreCycles(1)),
+            of(|step| step.2.torque = !step.2.torque),
+            of(|step| step.2.goal = Newtons::from_bits(1)),
+            of(|step| step.2.measure_request = 1),
+            of(|step| step.3 = Duty(1)),
+            of(|step| step.4.sequence = 1),
+            of(|step| step.4.contact.bad_taxels = 1),
+            of(|step| step.4.duty = Duty(1)),
+            of(|step| step.4.tare = fingertip::pipeline::Taring::Running),
+            of(|step| step.4.taken.clear = 1),
+        ];
+        let steps = all.len();
+        all.sort();
+        all.dedup();
+        assert_eq!(all.len(), steps);
+        assert_eq!(all[0].len(), 32);
     }
 }

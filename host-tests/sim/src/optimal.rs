@@ -1,48 +1,47 @@
-//! The least time in which the motor can move the tip from rest to rest: the bound that a force step is judged by.
+//! Shortest time in which the motor can move the tip from rest to rest, with which force steps are compared.
 //!
-//! The drive gives the most that voltage and current limits allow, then brakes with the most, and switches once. For a
-//! shaft with friction against a load that depends on the place that is the time-optimal profile. The switch instant is
-//! found by bisection (shooting) on the plant's own equations of motion, [`crate::mechanics::dynamics`].
+//! The drive uses the limits of voltage and current, then brakes with them, and switches once: the time-optimal profile
+//! for a shaft with friction against a load that depends on the place. Bisection (shooting) on the equations of motion
+//! of the plant, [`crate::mechanics::rotor::Dynamics`], finds the switch time.
 
-use crate::mechanics::dynamics::Dynamics;
-use crate::mechanics::rotor::{Shaft, Source};
+use crate::mechanics::rotor::{Dynamics, Shaft, Source};
 use crate::setup::Setup;
 
-/// Step of the shooting; its error is of second order.
+/// Step of the shooting. Its error is of second order.
 const STEP_S: f64 = 20e-6;
-/// A motion that takes longer counts as impossible.
+/// Duration from which on a motion counts as impossible.
 const LONGEST_S: f64 = 10.0;
-/// Halvings of the interval of switch instants: it ends 10^12 times narrower, far below a step.
+/// Halvings of the interval of switch times: its end is 10^12 times narrower, far below a step.
 const HALVINGS: usize = 40;
-/// The motion ends this close to its target; farther off, no switch instant makes it stop there.
+/// Largest distance of the end from the target. Beyond it no switch time makes the motion stop there.
 const END_MM: f64 = 1e-6;
 
 /// The time-optimal profile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// When full drive turns into full brake.
+    /// Time of the change from full drive to full brake.
     pub switch_s: f64,
-    /// When the tip is at rest.
+    /// Time at which the tip is at rest.
     pub total_s: f64,
-    /// Where it then is.
+    /// Place of the tip at rest.
     pub end_mm: f64,
 }
 
-/// The motor cannot get there within its limits.
+/// Motion that the motor cannot make within its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unreachable {
-    /// Where it would start.
+    /// Start of the motion.
     pub from_mm: f64,
-    /// Where it was to go.
+    /// Target of the motion.
     pub to_mm: f64,
-    /// What keeps it.
+    /// Cause.
     pub reason: Reason,
 }
 
-/// What keeps the motor from a place.
+/// Reason why the motor cannot reach a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// Full drive comes to rest, or creeps for more than 10 s, before it: allow more voltage or current.
+    /// Full drive stops, or creeps for more than 10 s, before the target: allow more voltage or current.
     TooWeak,
     /// Full brake does not stop the motion.
     RunsAway,
@@ -60,7 +59,7 @@ impl core::fmt::Display for Unreachable {
 
 impl core::error::Error for Unreachable {}
 
-/// Least time from rest at one indentation to rest at another; see [`profile`].
+/// Shortest time from rest at one indentation to rest at another; see [`profile`].
 pub fn minimum_time_s(
     setup: &Setup,
     d_from_mm: f64,

@@ -1,7 +1,7 @@
-//! What a long piece of work has done so far, a line each, so that it can go on where it was stopped.
+//! Progress of a long piece of work, one line each, so that it can continue after a stop.
 //!
-//! A line is `<CRC-64 of the text, 16 hexadecimal digits> <text>`. The first says what work it is. A line that was cut
-//! off, or that is damaged otherwise, is not taken up: what it stood for is done again.
+//! A line is `<CRC-64 of the text, 16 hexadecimal digits> <text>`. The first line names the work. A line that was cut
+//! off or is damaged is ignored, and its work is done again.
 
 use crate::run::RunError;
 use output::kept::{self, Lock};
@@ -11,17 +11,17 @@ use std::path::{Path, PathBuf};
 
 const CRC: crc::Crc<u64> = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
 
-/// The lines so far of what becomes a file NAME: they stand in NAME.part, and NAME is this process's to write.
+/// Lines of a future file NAME so far. They are in NAME.part, and only this process writes NAME.
 #[derive(Debug)]
 pub struct Part {
     lock: Lock,
     path: PathBuf,
     file: File,
-    /// Up to the end of the last whole line.
+    /// Length up to the end of the last whole line.
     length: u64,
 }
 
-/// Whose lines a file has.
+/// Contents of a file of lines.
 enum Found {
     Nothing,
     Lines(Vec<String>),
@@ -29,15 +29,15 @@ enum Found {
 }
 
 impl Part {
-    /// Takes up the lines that an earlier try of the same work left, or begins. The folder is made.
+    /// Resumes from the lines of an earlier try of the same work, or begins. Creates the folder.
     ///
     /// # Errors
-    /// Another process is at it, other work left its lines there, or the file cannot be written.
+    /// Another process does this work, the file has lines of other work, or it cannot be written.
     pub fn open(of: &Path, head: &str) -> Result<(Self, Vec<String>), RunError> {
         if let Some(folder) = of.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-            fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))?;
+            make_folder(folder)?;
         }
-        // What stands behind a link is written, and not the link.
+        // Replaces the target of a link, not the link.
         let of = &fs::canonicalize(of).unwrap_or(of.into());
         let lock = Lock::take(of).map_err(|error| cannot_write(of, &error))?;
         let path = kept::beside(of, "part");
@@ -52,7 +52,7 @@ impl Part {
                 .into());
             }
         };
-        // Written anew, so that nothing stands there but whole lines.
+        // Rewrites the file, so that it has only whole lines.
         let whole: String = std::iter::once(head).chain(lines.iter().map(String::as_str)).map(line).collect();
         let failed = |error: io::Error| cannot_write(&path, &error);
         if fs::read(&path).ok().as_deref() != Some(whole.as_bytes()) {
@@ -73,7 +73,7 @@ impl Part {
         Ok(())
     }
 
-    /// Writes the file itself, whole.
+    /// Writes the final file.
     pub fn write(&self, bytes: impl AsRef<[u8]>) -> Result<(), RunError> {
         let told = |error| {
             format!("{}; all that was done is kept in {}", cannot_write(self.lock.path(), &error), self.path.display())
@@ -81,21 +81,26 @@ impl Part {
         Ok(self.lock.write(bytes).map_err(told)?)
     }
 
-    /// The lock, under which all that is made of the lines is written.
+    /// Lock under which everything made of the lines is written.
     pub fn lock(&self) -> &Lock {
         &self.lock
     }
 
-    /// Removes the lines, once all that was made of them is written.
+    /// Removes the lines once everything made of them is written.
     pub fn done(self) -> Result<(), RunError> {
         Ok(fs::remove_file(&self.path).map_err(|error| format!("cannot remove {}: {error}", self.path.display()))?)
     }
 }
 
-/// For people: a file that cannot be written, and what to do.
+/// Makes a folder and those above it.
+pub fn make_folder(folder: &Path) -> Result<(), String> {
+    fs::create_dir_all(folder).map_err(|error| format!("cannot make {}: {error}", folder.display()))
+}
+
+/// Explains to people that a file cannot be written, and what to do.
 pub fn cannot_write(path: &Path, error: &io::Error) -> String {
     let advice = match error.kind() {
-        // The lock says who writes it.
+        // The error of the lock names the other process.
         ErrorKind::WouldBlock => return error.to_string(),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
             ": make room and give the same command again"
@@ -105,7 +110,7 @@ pub fn cannot_write(path: &Path, error: &io::Error) -> String {
     format!("cannot write {}: {error}{advice}", path.display())
 }
 
-/// A text's check word: CRC-64 in 16 hexadecimal digits.
+/// Check word of a text: CRC-64 in 16 hexadecimal digits.
 pub fn check(text: &str) -> String {
     format!("{:016x}", CRC.checksum(text.as_bytes()))
 }
@@ -120,7 +125,7 @@ fn found(path: &Path, head: &str) -> io::Result<Found> {
         bytes => bytes?,
     };
     if line(head).as_bytes().starts_with(&bytes) {
-        // No more than its own head, or the beginning of that.
+        // The file has at most the head.
         return Ok(Found::Nothing);
     }
     let mut lines = bytes.split_inclusive(|byte| *byte == b'\n').map(whole);
@@ -131,7 +136,7 @@ fn found(path: &Path, head: &str) -> io::Result<Found> {
     })
 }
 
-/// A line's text; none where it is cut off or damaged.
+/// Text of a line; none if it is cut off or damaged.
 fn whole(line: &[u8]) -> Option<&str> {
     let text = str::from_utf8(line.strip_suffix(b"\n")?).ok()?;
     let (found, text) = text.split_once(' ')?;

@@ -1,7 +1,7 @@
-//! The plant: the reference finger of `docs/board.md` with its array, moved by hand.
+//! Plant: the reference finger of `docs/board.md` with its array, moved step by step.
 //!
-//! It is a scene's finger and the same world, but what a scene names by its effects is part of it ([`Setup`]), it can
-//! be broken while it runs ([`Faults`]), its rows are driven pin by pin, and a snapshot by serde restores every bit.
+//! The plant is a finger in the world of scenes, with these differences: its effects are part of its [`Setup`], it can
+//! be broken during a run ([`Faults`]), its rows are driven pin by pin, and a snapshot by serde restores every bit.
 //!
 //! ```
 //! use sim::bridge::Bridge;
@@ -14,23 +14,25 @@
 //! assert!(plant.pressure_kpa(5, 5) > 0.0);
 //! ```
 
-mod parts;
-
 pub use crate::setup::Setup;
-pub use parts::{Drive, Reference, Sensor};
 
 use crate::bridge::Bridge;
-use crate::effects::sensor::Readout;
-use crate::mechanics::body::Surroundings;
-use crate::mechanics::decay::decay;
+use crate::effects::drive::{self, Circuit, Friction};
+use crate::effects::sensor::effects::Settling;
+use crate::effects::sensor::{self, Readout};
+use crate::effects::{Parts, Set};
+use crate::mechanics::decay;
 use crate::mechanics::finger::{Finger, Motion};
 use crate::mechanics::rotor::Shaft;
-use crate::world::World;
+use crate::scene::Scene;
+use crate::setup::Array;
+use crate::watch::Cost;
+use crate::world::{Surroundings, World};
 use fingertip::frame::Sense;
 use fingertip::shipped::{COLUMNS, Frame, ROWS, SLOTS};
 use serde::{Deserialize, Serialize};
 
-/// The finger and its array at one instant.
+/// Finger and its array at one instant.
 #[derive(Serialize, Deserialize)]
 #[serde(from = "Kept", into = "Kept")]
 pub struct Plant {
@@ -41,7 +43,7 @@ pub struct Plant {
     readout: Readout,
 }
 
-/// What a snapshot keeps: all else follows from it.
+/// Contents of a snapshot. Everything else follows from them.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     setup: Setup,
@@ -51,7 +53,7 @@ struct Kept {
 }
 
 impl Plant {
-    /// At rest at travel 0, the bridge open.
+    /// Creates a plant at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup) -> Self {
         let world = World::new(setup, &Surroundings::default(), vec![(Drive::new(setup), ())]);
         let (sensor, readout) = (Sensor::new(&setup.array), Readout::new(&setup.array));
@@ -66,7 +68,7 @@ impl Plant {
         &mut self.world.fingers_mut()[0]
     }
 
-    /// What it is made of.
+    /// Setup of the finger.
     pub fn setup(&self) -> &Setup {
         self.finger().setup()
     }
@@ -76,15 +78,15 @@ impl Plant {
         self.finger_mut().place_object(distance_mm);
     }
 
-    /// One step with the bridge held; 10 us is the step that the tests vouch for.
+    /// Advances by one step with a constant bridge. The tests cover steps of 10 us.
     pub fn advance(&mut self, dt_s: f64, bridge: Bridge) {
         self.finger_mut().drive.faults = self.faults;
         self.world.advance(0.0, dt_s, &[bridge]);
-        // A count that is frozen stands as it was read last.
+        // A frozen count keeps the value of its last read.
         self.finger_mut().count_ahead(0.0);
     }
 
-    /// Puts the tip at rest at a travel, as if carried there.
+    /// Puts the tip at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
         self.finger_mut().place(travel_mm);
         self.advance(0.0, Bridge::Coast);
@@ -95,7 +97,7 @@ impl Plant {
         self.finger().shaft()
     }
 
-    /// How far the tip has come.
+    /// Travel of the tip.
     pub fn travel_mm(&self) -> f64 {
         self.finger().tip_mm()
     }
@@ -110,7 +112,7 @@ impl Plant {
         (self.travel_mm() - self.setup().wall.distance_mm).max(0.0)
     }
 
-    /// The true contact force.
+    /// True contact force.
     pub fn force_n(&self) -> f64 {
         self.world.force_n(0)
     }
@@ -120,17 +122,17 @@ impl Plant {
         self.finger().current_a()
     }
 
-    /// The supply at the bridge.
+    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.finger().supply_v()
     }
 
-    /// What the timer in encoder mode has counted, unwrapped.
+    /// Count of the timer in encoder mode, unwrapped.
     pub fn encoder_counts(&self) -> i32 {
         self.finger().drive.counts
     }
 
-    /// What the control step learns beside the frame.
+    /// Returns what the control step receives beside the frame.
     pub fn sense(&mut self, bus_silent_ms: u16) -> Sense {
         self.world.sense(0, bus_silent_ms)
     }
@@ -138,12 +140,13 @@ impl Plant {
     /// Mean pressure on a taxel.
     ///
     /// # Panics
-    /// On a row or column beyond the array, as everything below that takes one.
+    /// The row or the column is beyond the array, as in all methods below.
     pub fn pressure_kpa(&mut self, row: usize, column: usize) -> f64 {
         self.world.row_kpa(0, f64::INFINITY, row)[column]
     }
 
-    /// All columns' voltages at a time after the rows changed from `previous`, settled until then, to `driven`.
+    /// Voltages of all columns at a time after the driven rows changed from `previous`, settled until then, to
+    /// `driven`.
     pub fn settling_volts(
         &mut self,
         driven: &[bool; ROWS],
@@ -159,7 +162,7 @@ impl Plant {
         core::array::from_fn(|column| end[column] + left * (start[column] - end[column]))
     }
 
-    /// All columns' voltages long after these rows were driven.
+    /// Settled voltages of all columns while these rows are driven.
     pub fn settled_volts(&mut self, driven: &[bool; ROWS]) -> [f64; COLUMNS] {
         let (array, faults) = (self.setup().array, self.faults.array);
         if faults.saturated {
@@ -174,7 +177,7 @@ impl Plant {
         volts.map(|v| v.min(array.reference_v))
     }
 
-    /// The whole frame at this instant; counts its sequence number on.
+    /// Fills a frame with the codes of this instant and increments its sequence number.
     pub fn fill_frame(&mut self, frame: &mut Frame) {
         for slot in 0..SLOTS {
             for (column, code) in self.slot_codes(slot).into_iter().enumerate() {
@@ -184,7 +187,7 @@ impl Plant {
         frame.sequence = frame.sequence.wrapping_add(1);
     }
 
-    /// The codes of a slot's columns, sampled [`crate::setup::Array::sample_after_s`] after the slot's edge.
+    /// Codes of a slot, sampled [`crate::setup::Array::sample_after_s`] after its edge.
     pub fn slot_codes(&mut self, slot: usize) -> [u16; COLUMNS] {
         let array = self.setup().array;
         let previous = driven_in((slot + SLOTS - 1) % SLOTS);
@@ -192,7 +195,7 @@ impl Plant {
     }
 }
 
-/// The rows driven in a slot of the scan: one, or none in the last.
+/// Rows that are driven in a slot of the scan: one, or none in the last slot.
 fn driven_in(slot: usize) -> [bool; ROWS] {
     core::array::from_fn(|row| row == slot)
 }
@@ -238,10 +241,10 @@ impl core::fmt::Debug for Plant {
     }
 }
 
-/// What can be wrong with a taxel.
+/// State of a taxel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Taxel {
-    /// Nothing.
+    /// No defect.
     #[default]
     Sound,
     /// An open circuit: no preload, no pressure.
@@ -250,10 +253,10 @@ pub enum Taxel {
     Shorted,
 }
 
-/// What can be wrong with a row's switch.
+/// State of the switch of a row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Row {
-    /// Nothing.
+    /// No defect.
     #[default]
     Sound,
     /// Stuck in the driven state (its pin high).
@@ -262,19 +265,19 @@ pub enum Row {
     StuckLow,
 }
 
-/// The array's defects.
+/// Defects of the array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArrayFaults {
     /// `taxels[row][column]`.
     pub taxels: [[Taxel; COLUMNS]; ROWS],
-    /// The row switches.
+    /// Row switches.
     pub rows: [Row; ROWS],
-    /// All amplifiers at their upper rail.
+    /// True if all amplifiers are at their upper rail.
     pub saturated: bool,
 }
 
 impl ArrayFaults {
-    /// Which rows are driven in fact when these are asked for.
+    /// Returns the rows that are actually driven for these requests.
     fn driven(&self, asked: &[bool; ROWS]) -> [bool; ROWS] {
         core::array::from_fn(|row| match self.rows[row] {
             Row::Sound => asked[row],
@@ -284,19 +287,156 @@ impl ArrayFaults {
     }
 }
 
-/// What is wrong with the board.
+/// Defects of the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Faults {
-    /// The array's defects.
+    /// Defects of the array.
     pub array: ArrayFaults,
-    /// The encoder's count stands still.
+    /// True if the count of the encoder is frozen.
     pub encoder_frozen: bool,
-    /// The encoder's channels are swapped: it counts down as the tip presses in.
+    /// True if the channels of the encoder are swapped: it counts down as the tip presses.
     pub encoder_reversed: bool,
-    /// The motor's leads are swapped: a positive duty draws the tip back.
+    /// True if the leads of the motor are swapped: a positive duty moves the tip back.
     pub leads_swapped: bool,
-    /// Travels at which the finger meets an end stop, rear and front.
+    /// Travels at the end stops of the finger, rear and front.
     pub end_stops_mm: Option<[f64; 2]>,
-    /// Taken from the source's voltage.
+    /// Voltage by which the source drops.
     pub supply_drop_v: f64,
+}
+
+/// Effects of the reference finger, which may break during a run.
+pub struct Reference;
+
+impl Reference {
+    /// Effects for a setup.
+    pub fn parts(setup: &Setup) -> Parts<Self> {
+        Parts { sensor: Sensor::new(&setup.array), contact: (), drive: Drive::new(setup), link: () }
+    }
+}
+
+impl Set for Reference {
+    type Sensor = Sensor;
+    type Contact = ();
+    type Drive = Drive;
+    type Link = ();
+
+    fn of(scene: &Scene, _finger: usize) -> Parts<Self> {
+        Self::parts(&scene.setup())
+    }
+
+    fn costs(_sensor: &Sensor, _contact: &(), _drive: &Drive, _link: &()) -> Vec<Cost> {
+        Vec::new()
+    }
+}
+
+/// Friction, gear and supply.
+pub struct Drive {
+    /// Defects.
+    pub faults: Faults,
+    /// Count of the encoder at the last read.
+    pub counts: i32,
+    friction_nm: f64,
+    load_share: f64,
+    source_ohm: f64,
+}
+
+impl Drive {
+    /// Drive without defects.
+    pub fn new(setup: &Setup) -> Self {
+        Self {
+            faults: Faults::default(),
+            counts: 0,
+            friction_nm: setup.motor.friction_nm,
+            load_share: 1.0 / setup.transmission.efficiency - 1.0,
+            source_ohm: setup.supply.source_ohm,
+        }
+    }
+}
+
+impl drive::Stages for Drive {
+    fn none(&self) -> bool {
+        false
+    }
+
+    fn circuit(&mut self, circuit: &mut Circuit) {
+        circuit.source_v -= self.faults.supply_drop_v;
+        circuit.source_ohm = self.source_ohm;
+        if self.faults.leads_swapped {
+            circuit.duty = -circuit.duty;
+        }
+    }
+
+    fn friction(&mut self, _speed_rad_per_s: f64, friction: &mut Friction) {
+        let Self { friction_nm, load_share, .. } = *self;
+        *friction = Friction { sliding_nm: friction_nm, holding_nm: friction_nm, load_share, viscous_nm_s: 0.0 };
+    }
+
+    fn end_stops_mm(&self) -> Option<[f64; 2]> {
+        self.faults.end_stops_mm
+    }
+
+    fn count(&mut self, count: i32) -> i32 {
+        if !self.faults.encoder_frozen {
+            self.counts = if self.faults.encoder_reversed { -count } else { count };
+        }
+        self.counts
+    }
+}
+
+/// Characteristic of the taxels, row switches and settling.
+pub struct Sensor {
+    /// Defects.
+    pub faults: ArrayFaults,
+    array: Array,
+    settling: Settling,
+    /// Voltage that each row adds to the columns while it is driven.
+    rows: [sensor::Row; ROWS],
+}
+
+impl Sensor {
+    /// Sensor without defects.
+    pub fn new(array: &Array) -> Self {
+        Self {
+            faults: ArrayFaults::default(),
+            array: *array,
+            settling: Settling::new(array.settle_tau_s, array.sample_after_s),
+            rows: [[0.0; COLUMNS]; ROWS],
+        }
+    }
+}
+
+impl sensor::Stages for Sensor {
+    fn none(&self) -> bool {
+        false
+    }
+
+    fn conductance(&mut self, row: usize, _time_s: f64, siemens: &mut sensor::Row) {
+        for (siemens, taxel) in siemens.iter_mut().zip(self.faults.taxels[row]) {
+            *siemens = match taxel {
+                Taxel::Sound => self.array.loaded(*siemens),
+                Taxel::Dead => 0.0,
+                Taxel::Shorted => self.array.short_siemens,
+            };
+        }
+    }
+
+    fn network(&mut self, row: usize, _array: &[sensor::Row; ROWS], seen: &mut sensor::Row) {
+        let left = 1.0 + self.array.row_ohm * seen.iter().sum::<f64>();
+        seen.iter_mut().for_each(|siemens| *siemens /= left);
+        self.rows[row] = seen.map(|siemens| siemens * self.array.feedback_ohm * self.array.drive_v);
+    }
+
+    fn volts(&mut self, slot: usize, time_s: f64, volts: &mut sensor::Row) {
+        for (row, (state, added)) in self.faults.rows.iter().zip(&self.rows).enumerate() {
+            let sign = match state {
+                Row::StuckHigh if row != slot => 1.0,
+                Row::StuckLow if row == slot => -1.0,
+                _ => continue,
+            };
+            volts.iter_mut().zip(added).for_each(|(volts, added)| *volts += sign * added);
+        }
+        let reference_v = self.array.reference_v;
+        *volts = volts.map(|volts| if self.faults.saturated { reference_v } else { volts.min(reference_v) });
+        self.settling.sample(time_s, volts);
+    }
 }

@@ -1,25 +1,22 @@
-//! Populations: what the fingers are like that a usual build brings about, and how the controller does on them.
+//! Populations: typical variations of the fingers of a usual build, and the results of the controller on them.
 //!
-//! A population's file is a scene whose values may be drawn, each finger anew. Its bounds are the envelope: what each
-//! finger promises. A finger is a scene like any other, so what is found can be run again by itself.
+//! The file of a population is a scene whose values may be drawn for each finger. Its bounds are the envelope that each
+//! finger promises to keep. A finger is an ordinary scene, so a bad finger can be run again alone.
 
 pub mod budget;
 pub mod cli;
 mod draw;
-mod expression;
-mod parts;
 mod read;
 pub mod report;
 
 pub use draw::Drawn;
-pub use parts::read;
-pub use read::{folder, load};
+pub use read::{folder, load, read};
 pub use report::Report;
 
 use crate::effects::stream;
-use crate::part::cannot_write;
-use crate::population::read::judged;
+use crate::part::{cannot_write, make_folder};
 use crate::population::report::Ran;
+use crate::population::report::judged;
 use crate::run::{Run, RunError, run};
 use crate::scene::text::set;
 use crate::scene::{self, Scene, SceneErrors};
@@ -30,38 +27,37 @@ use fastrand::Rng;
 use output::kept;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
-use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// A population.
+/// Population of fingers.
 #[derive(Clone, Debug)]
 pub struct Population {
     /// The file's name without its ending.
     pub name: String,
-    /// As errors name it.
+    /// File as errors name it.
     pub file: String,
-    /// What it is, in a line.
+    /// Description in one line.
     pub about: String,
-    /// The whole text, what it extends included.
+    /// Whole text, with that of the population it extends.
     pub text: String,
     variables: Vec<(String, Draw)>,
     places: Vec<Place>,
     events: Option<Events>,
-    /// What is counted beside the envelope.
+    /// Counts beside the envelope.
     pub counted: Vec<Counted>,
 }
 
-/// A place in the text, and what stands there in a finger's scene: a drawn value, or nothing.
+/// Place in the text of a population, and the value there in the scene of a finger.
 #[derive(Clone, Debug)]
 struct Place {
-    /// In the population's text.
+    /// Range in the text.
     at: Range<usize>,
     /// `table.key`.
     key: String,
-    /// Whether it takes whole numbers only.
+    /// True if only whole numbers are allowed.
     whole: bool,
-    /// How it is drawn; none where the scene has nothing.
+    /// Draw of the value; none if the scene has nothing there.
     draw: Option<Draw>,
 }
 
@@ -71,31 +67,31 @@ struct Events {
     count: Place,
     at_s: Place,
     kind: Place,
-    /// The keys of each kind.
+    /// Keys of each kind.
     keys: Vec<(&'static str, Place)>,
 }
 
-/// Fingers whose metric is above something are counted.
+/// Count of the fingers whose metric is above a value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Counted {
     /// The metric.
     pub metric: String,
-    /// Above this.
+    /// Value above which a finger counts.
     pub above: f64,
 }
 
-/// A finger that was drawn.
+/// Drawn finger.
 #[derive(Clone, Debug)]
 pub struct Finger {
-    /// Each variable and each drawn key, with its value.
+    /// Value of each variable and of each drawn key.
     pub drawn: Vec<(String, Drawn)>,
-    /// Its scene.
+    /// Scene of the finger.
     pub scene: Scene,
 }
 
 impl Population {
-    /// Draws a finger, from 0. Each value has a stream of random numbers of its own, so one more leaves the others as
-    /// they are.
+    /// Draws a finger; numbers count from 0. Each value has its own stream of random numbers, so one more draw does not
+    /// change the others.
     pub fn finger(&self, seed: u64, number: usize) -> Result<Finger, SceneErrors> {
         let mut drawn: Vec<(String, Drawn)> = Vec::new();
         let draw = |name: &str, draw: &Draw, whole: bool, drawn: &[(String, Drawn)]| {
@@ -118,7 +114,7 @@ impl Population {
                     text += &written(&value, *whole);
                     drawn.push((key.clone(), value));
                 }
-                // Lines stay lines, so that errors name the right ones.
+                // Line breaks remain, so that errors name the right lines.
                 None => text.extend(self.text[at.clone()].chars().filter(|c| *c == '\n')),
             }
             from = at.end;
@@ -159,7 +155,7 @@ impl Population {
     }
 }
 
-/// A value as a scene's text has it.
+/// Formats a value for the text of a scene.
 fn written(value: &Drawn, whole: bool) -> String {
     match value {
         Drawn::Number(number) if whole => format!("{number:.0}"),
@@ -208,7 +204,7 @@ pub fn write_worst(
     count: usize,
     out: &Path,
 ) -> Result<Vec<PathBuf>, RunError> {
-    fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
+    make_folder(out)?;
     let mut paths = Vec::new();
     for ran in report.worst().into_iter().take(count) {
         let scene = population.finger(report.seed, ran.finger - 1)?.scene;
@@ -220,7 +216,7 @@ pub fn write_worst(
             judged(ran)
         );
         let mut text = set(&scene.text, "seed", &scene.seed.to_string())?;
-        // What was drawn left empty lines behind.
+        // Removed draws leave empty lines.
         while text.contains("\n\n\n") {
             text = text.replace("\n\n\n", "\n\n");
         }

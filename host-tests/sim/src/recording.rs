@@ -1,39 +1,46 @@
 //! Recordings: MCAP files that Foxglove and PlotJuggler open without a plugin, and that replay to the bit.
 //!
-//! | topic | schema | when | what |
+//! | topic | schema | rate | contents |
 //! | --- | --- | --- | --- |
-//! | `/finger0/scalars` | `fingertip.Scalars` | each `every`-th step | sensed and true values, each a number of its own, the unit in its name |
-//! | `/finger0/frame` | `fingertip.Frame` | 100 times a second | the frame's codes, `[slot][column]` |
-//! | `/finger0/image` | `foxglove.RawImage` | 100 times a second | the same as a grey picture |
-//! | `/finger0/core` | `fingertip.Core` | each step | all that the core was given, byte for byte, and a digest of all that it answered |
+//! | `/finger0/scalars` | `fingertip.Scalars` | each `every`-th step | sensed and true values, each with its unit in its name |
+//! | `/finger0/frame` | `fingertip.Frame` | 100 per second | codes of the frame, `[slot][column]` |
+//! | `/finger0/image` | `foxglove.RawImage` | 100 per second | the same codes as a grey image |
+//! | `/finger0/core` | `fingertip.Core` | each step | inputs of the core, byte for byte, and a digest of its outputs |
 //!
-//! The scene's text is attached, the controllers' parameters are metadata: a replay needs no other file. A recording of
-//! the emulated board holds what is seen of it from outside, a step each millisecond: it cannot be replayed, and says
-//! so.
+//! The text of the scene is attached, and the parameters of the controllers are metadata: a replay needs no other file.
+//! A recording of the emulated board shows it from outside, with a step each millisecond: it cannot be replayed and
+//! says so.
 
-mod replay;
 mod write;
 
-pub use replay::{Difference, Replay, replay};
-pub use write::Recorder;
+pub use crate::recording::write::Recorder;
 
+use crate::metrics::duty;
 use crate::run::RunError;
-use crate::watch::Controller;
+use crate::watch::{Controller, Step};
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::params::Params;
-use mcap::MAGIC;
+use fingertip::shipped::{Calibration, Config, Pipeline};
+use images::record::{Digest, Record};
+use mcap::read::Options;
+use mcap::records::Metadata;
+use mcap::{Attachment, MAGIC, McapResult, MessageStream};
+use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::path::Path;
+use std::{fmt, fs};
 use twox_hash::xxhash3_128::Hasher;
 
-/// The metadata record that holds the scene and the controllers.
+/// Metadata record of the scene and the controllers.
 const SETUP: &str = "fingertip.setup";
-/// The metadata record that closes a whole recording.
+/// Metadata record at the end of a complete recording.
 const END: &str = "fingertip.end";
 
-/// Its entry that says whether a replay is possible.
+/// Entry that states if a replay is possible.
 const WHOLE: &str = "whole";
 
-/// Entries of what closes it: digests of the record that holds the controllers, and of the scene's text.
+/// Entries of the last record: digests of the record of the controllers, and of the text of the scene.
 const OF_SETUP: &str = "setup";
 const OF_SCENE: &str = "scene";
 
@@ -48,7 +55,7 @@ fn controller_json(controller: &Controller) -> Value {
     json!({ "params": params, "calibration": controller.calibration })
 }
 
-/// The inverse; none where something is missing or of another kind.
+/// Inverse of [`controller_json`]; none if a value is missing or of another type.
 fn controller_of(value: &Value) -> Option<Controller> {
     let mut values = [0; Params::COUNT];
     for ((name, ..), place) in Params::RANGES.iter().zip(&mut values) {
@@ -58,7 +65,7 @@ fn controller_of(value: &Value) -> Option<Controller> {
     Some(Controller { params: Params::from_array(&values), calibration })
 }
 
-/// A topic's last part, its schema's name, and the schema.
+/// Last part of each topic, name of its schema, and schema.
 pub fn schemas() -> [(&'static str, &'static str, String); 4] {
     let [frame, image] = [
         include_str!("../../../tool/src/messages/frame.json"),
@@ -72,34 +79,38 @@ pub fn schemas() -> [(&'static str, &'static str, String); 4] {
     ]
 }
 
-/// The scalars: names in the order in which they are written, with what they are.
-pub const SCALARS: [(&str, &str); 20] = [
-    ("time_s", "Virtual time from the scene's start"),
-    ("goal_n", "The force asked for"),
-    ("sensed_force_n", "Normal force as the controller senses it"),
-    ("true_force_n", "Normal force between tip and object"),
-    ("indentation_mm", "Indentation of the tip"),
-    ("travel_mm", "Way of the tip from its start"),
-    ("speed_mm_per_s", "Speed of the tip"),
-    ("duty_percent", "Share of the supply at the motor; positive presses"),
-    ("current_a", "Winding current"),
-    ("supply_v", "Supply at the bridge"),
-    ("winding_c", "Temperature of the winding"),
-    ("centre_x_mm", "Sensed centre of the contact along the columns"),
-    ("centre_y_mm", "Sensed centre of the contact along the rows"),
-    ("confidence_percent", "Confidence that the contact is a tip on a plane"),
-    ("mode", "Mode, by its number on the bus"),
-    ("fault", "Fault, by its number on the bus; 0 is none"),
-    ("limits", "Limits, a bit each as on the bus"),
-    ("tangential_n", "Tangential force on the object, upwards"),
-    ("slip_mm", "Way that the contact has slipped"),
-    ("object_height_mm", "Height of the object"),
+/// Scalars in the order in which they are written: name, description and value.
+pub const SCALARS: [(&str, &str, fn(&Step) -> f64); 20] = [
+    ("time_s", "Virtual time from the scene's start", |s| s.time_s),
+    ("goal_n", "Requested force", |s| s.command.goal.0.to_num()),
+    ("sensed_force_n", "Normal force as the controller senses it", |s| s.status.contact.force.0.to_num()),
+    ("true_force_n", "Normal force between tip and object", |s| s.truth.force_n),
+    ("indentation_mm", "Indentation of the tip", |s| s.truth.indentation_mm),
+    ("travel_mm", "Travel of the tip from its start", |s| s.truth.travel_mm),
+    ("speed_mm_per_s", "Speed of the tip", |s| s.truth.speed_mm_per_s),
+    ("duty_percent", "Share of the supply at the motor; positive presses", |s| 100.0 * duty(s.status.duty)),
+    ("current_a", "Winding current", |s| s.truth.current_a),
+    ("supply_v", "Supply at the bridge", |s| s.truth.supply_v),
+    ("winding_c", "Temperature of the winding", |s| s.truth.winding_c),
+    ("centre_x_mm", "Sensed centre of the contact along the columns", |s| s.status.contact.centre_x.0.to_num()),
+    ("centre_y_mm", "Sensed centre of the contact along the rows", |s| s.status.contact.centre_y.0.to_num()),
+    ("confidence_percent", "Confidence that the contact is a tip on a plane", |s| {
+        f64::from(s.status.contact.confidence) / 2.55
+    }),
+    ("mode", "Mode, by its number on the bus", |s| f64::from(s.status.mode as u8)),
+    ("fault", "Fault, by its number on the bus; 0 without one", |s| {
+        f64::from(s.status.fault.map_or(0, |fault| fault as u8))
+    }),
+    ("limits", "Limits, a bit each as on the bus", |s| f64::from(s.status.limits.0)),
+    ("tangential_n", "Tangential force on the object, upwards", |s| s.truth.tangential_n),
+    ("slip_mm", "Distance that the contact has slipped", |s| s.truth.slip_mm),
+    ("object_height_mm", "Height of the object", |s| s.truth.object_mm[1]),
 ];
 
 fn scalars() -> Value {
     let properties: serde_json::Map<_, _> = SCALARS
         .iter()
-        .map(|(name, about)| ((*name).to_owned(), json!({ "type": "number", "description": about })))
+        .map(|(name, about, _)| ((*name).to_owned(), json!({ "type": "number", "description": about })))
         .collect();
     json!({ "title": "fingertip.Scalars", "type": "object", "properties": properties })
 }
@@ -118,26 +129,26 @@ fn core() -> Value {
     })
 }
 
-// Whether a recording is as it was written: every byte of the file stands under a checksum, and all are looked at.
+// A recording is intact if all checksums are right: every byte of the file is covered by one.
 //
-// MCAP has one over all in front of the record `DataEnd` and one over the summary behind it, footer included. What
-// these do not cover (the checksums themselves, both ends' magic, the head of `DataEnd`) can only be one thing.
+// MCAP has one checksum for everything before the record `DataEnd` and one for the summary after it with the footer. The
+// rest (the checksums, the magic at both ends, the head of `DataEnd`) has fixed contents.
 
 const CRC: crc::Crc<u32, crc::Table<16>> = crc::Crc::<u32, crc::Table<16>>::new(&crc::CRC_32_ISO_HDLC);
 
-/// The records' numbers.
+/// Types of records.
 const FOOTER: u8 = 2;
 const DATA_END: u8 = 15;
-/// A record's number and length.
+/// Length of the type and the length of a record.
 const HEAD: usize = 9;
-/// `DataEnd` and `Footer`, whole.
+/// Lengths of `DataEnd` and `Footer`.
 const DATA_END_BYTES: usize = HEAD + 4;
 const FOOTER_BYTES: usize = HEAD + 20;
 
 /// Checks a file.
 ///
 /// # Errors
-/// It is cut off or changed; the text says in which part.
+/// It is cut off or changed. The text names the part.
 pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     if !bytes.starts_with(MAGIC) {
         return Err("this is no MCAP file: it does not begin as one".into());
@@ -152,28 +163,29 @@ pub fn check(bytes: &[u8]) -> Result<(), RunError> {
     }
     let data_end = data_end.unwrap_or(0);
     if word(footer, FOOTER_BYTES - 4) != CRC.checksum(&bytes[start..end + FOOTER_BYTES - 4]) {
-        return Err("the recording is damaged in its summary, behind its messages: the CRC is another".into());
+        return Err("the recording is damaged in its summary, behind its messages: the CRC differs".into());
     }
     let (data, end) = bytes.split_at(data_end);
     if !is_head(end, DATA_END, 4) {
         return Err("the recording is damaged at the end of its messages".into());
     }
     if word(end, HEAD) == 0 {
-        return Err("the recording has no checksum over its data: another program wrote it anew. Replay the one that it was made from".into());
+        return Err(
+            "the recording has no checksum over its data: another program rewrote it. Replay the original".into()
+        );
     }
     if word(end, HEAD) != CRC.checksum(data) {
-        return Err("the recording is damaged in its messages, its metadata or the attached scene: the CRC is another. Copy it anew, or record the scene again".into());
+        return Err("the recording is damaged in its messages, its metadata or the attached scene: the CRC differs. Copy it or record the scene again".into());
     }
     Ok(())
 }
 
-/// Of a metadata record's entries: says whether they are the ones that were written, also after another program wrote
-/// the file anew.
+/// Digest of the entries of a metadata record. It remains the same if another program rewrites the file.
 pub fn digest(entries: &BTreeMap<String, String>) -> String {
     texts(entries.iter().flat_map(|(name, value)| [name.as_bytes(), value.as_bytes()]))
 }
 
-/// The same of texts.
+/// Digest of texts.
 pub fn texts<'a>(texts: impl IntoIterator<Item = &'a [u8]>) -> String {
     let mut digest = Hasher::new();
     for text in texts {
@@ -193,4 +205,142 @@ fn number(bytes: &[u8], at: usize) -> u64 {
 
 fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(core::array::from_fn(|n| bytes[at + n]))
+}
+
+/// Result of a replay.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Replay {
+    /// Steps of all fingers, up to the first difference.
+    pub steps: u64,
+    /// First answer of the core that differs.
+    pub difference: Option<Difference>,
+}
+
+/// First difference between a replay and its recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Difference {
+    /// Number of the finger, from 0.
+    pub finger: usize,
+    /// Frame of the finger, from 0.
+    pub frame: u64,
+    /// Nanoseconds after the recording's first step.
+    pub time_ns: u64,
+    /// Recorded duty and digest.
+    pub recorded: (i16, String),
+    /// Duty and digest of the replay.
+    pub replayed: (i16, String),
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { finger, frame, time_ns, recorded, replayed } = self;
+        let ms = *time_ns as f64 * 1e-6;
+        write!(f, "finger {finger} differs first at frame {frame}, {ms:.3} ms in: ")?;
+        write!(f, "recorded duty {} and digest {}, ", recorded.0, recorded.1)?;
+        write!(f, "replayed duty {} and digest {}", replayed.0, replayed.1)
+    }
+}
+
+/// A message of the topic `core`.
+#[derive(Deserialize)]
+struct Core {
+    record: String,
+    duty: i16,
+    digest: String,
+}
+
+/// Replays a file.
+///
+/// # Errors
+/// The file cannot be read, is damaged, or is not a complete recording of this project.
+pub fn replay(path: &Path) -> Result<Replay, RunError> {
+    let bytes = fs::read(path).map_err(|error| format!("cannot read {}: {error}", path.display()))?;
+    replay_bytes(&bytes).map_err(|error| format!("{}: {error}", path.display()).into())
+}
+
+fn replay_bytes(bytes: &[u8]) -> Result<Replay, RunError> {
+    check(bytes)?;
+    let setup = metadata(bytes, SETUP)?;
+    if setup.metadata.get(WHOLE).is_some_and(|whole| whole == "false") {
+        return Err(
+            "a recording of the emulated board: what its core was given is not all in it, so it cannot be fed \
+                    through the core again"
+                .into(),
+        );
+    }
+    let end = metadata(bytes, END)?;
+    let field = |of: &Metadata, name: &str| {
+        of.metadata
+            .get(name)
+            .cloned()
+            .ok_or_else(|| format!("{} has no {name}: not a recording of this version", of.name))
+    };
+    // The file is intact, but another program may have rewritten it with other contents.
+    if field(&end, OF_SETUP)? != digest(&setup.metadata) {
+        return Err(format!("its {SETUP}, how the controllers were set, was changed after the run").into());
+    }
+    if field(&end, OF_SCENE)? != texts(scene(bytes)?.iter().map(|scene| &scene.data[..])) {
+        return Err("the attached scene was changed after the run, or is missing".into());
+    }
+    let fingers: usize = field(&setup, "fingers")?.parse()?;
+    let mut cores = Vec::new();
+    for number in 0..fingers {
+        let text = field(&setup, &format!("finger{number}"))?;
+        let controller = controller_of(&serde_json::from_str(&text)?)
+            .ok_or_else(|| format!("the parameters of finger {number} are not those of this version"))?;
+        let config = Config::shipped(&controller.params).map_err(|error| format!("finger {number}: {error}"))?;
+        let mut pipeline = Pipeline::new(&config);
+        if let Some(gains) = &controller.calibration {
+            pipeline.calibrate(&Calibration::new(&gains.gains_q14, &gains.masks)?);
+        }
+        cores.push((topic(number, "core"), pipeline, 0));
+    }
+    let mut steps = 0;
+    for message in messages(bytes)? {
+        let message = message?;
+        let found = cores.iter_mut().enumerate().find(|(_, (topic, ..))| *topic == message.channel.topic);
+        let Some((finger, (_, pipeline, frame))) = found else { continue };
+        let core: Core = serde_json::from_slice(&message.data)?;
+        let record = BASE64_STANDARD.decode(&core.record)?;
+        let record: [u8; Record::BYTES] =
+            record.try_into().map_err(|_| format!("finger {finger}, frame {frame}: a record of another length"))?;
+        let Record { frame: codes, sense, command } = Record::from_bytes(&record);
+        let (duty, status) = pipeline.step(&codes, &sense, &command);
+        let mut digest = Digest::new();
+        digest.add(duty, status);
+        let (recorded, replayed) = ((core.duty, core.digest), (duty.0, format!("{:016x}", digest.value())));
+        if recorded != replayed {
+            let difference = Difference { finger, frame: *frame, time_ns: message.log_time, recorded, replayed };
+            return Ok(Replay { steps, difference: Some(difference) });
+        }
+        *frame += 1;
+        steps += 1;
+    }
+    for (number, (_, _, frames)) in cores.iter().enumerate() {
+        let promised = field(&end, &format!("finger{number}.steps"))?;
+        if promised != frames.to_string() {
+            return Err(format!("finger {number} has {frames} frames where {promised} were recorded").into());
+        }
+    }
+    Ok(Replay { steps, difference: None })
+}
+
+fn messages(bytes: &[u8]) -> McapResult<MessageStream<'_>> {
+    MessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())
+}
+
+fn scene(bytes: &[u8]) -> Result<Vec<Attachment<'_>>, RunError> {
+    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary")?;
+    Ok(summary
+        .attachment_indexes
+        .iter()
+        .map(|index| mcap::read::attachment(bytes, index))
+        .collect::<McapResult<_>>()?)
+}
+
+fn metadata(bytes: &[u8], name: &str) -> Result<Metadata, RunError> {
+    let summary = mcap::Summary::read(bytes)?.ok_or("the file has no summary: the recording was cut off")?;
+    let index = summary.metadata_indexes.iter().find(|index| index.name == name);
+    let index = index.ok_or_else(|| format!("no {name} in the file: not a whole recording of this project"))?;
+    Ok(mcap::read::metadata(bytes, index)?)
 }

@@ -1,80 +1,73 @@
-//! Every effect by its name. A scene is read, explained and documented by this table, and built from it.
+//! All effects by name. The reader, the descriptions, the documentation and the board use this table.
 
 use crate::effects::{Build, Part, contact, drive, link, sensor, stream};
-use crate::key::{Key, Values};
+use crate::scene::tables::{Key, Values};
 
-/// An effect as the table knows it. Each stands in the file that holds its equations, as a
-/// `pub const EFFECT: Description`.
+/// Description of an effect. It is next to the equations in the table of its family.
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
-    /// Its name in a scene: `[effects.NAME]`.
+    /// Name in a scene: `[effects.NAME]`.
     pub name: &'static str,
-    /// Where it acts.
-    pub family: Family,
-    /// What it is, in a line.
+    /// Description in one line.
     pub about: &'static str,
-    /// Its equations, a line each, in plain text.
+    /// Equations in plain text, one per line.
     pub equations: &'static [&'static str],
-    /// The state that it adds; "none" where it has none.
+    /// Additional state; "none" without one.
     pub state: &'static str,
-    /// Where equations and magnitudes come from.
+    /// Source of equations and magnitudes.
     pub reference: &'static str,
-    /// Its keys.
+    /// Keys of the effect.
     pub keys: &'static [Key],
-    /// What its keys must be for it to change nothing; keys not listed may be anything.
+    /// Values of keys at which the effect changes nothing. Other keys may have any value.
     pub zero: &'static [(&'static str, f64)],
-    /// Builds it for one finger.
+    /// Builds the effect for one finger.
     pub build: fn(&Build) -> Part,
 }
 
-/// Where an effect acts. Each family has a folder, and for each of its stages a trait or a function's type: what its
-/// effects may touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Family {
-    /// From the taxels' pressure to the frame's codes.
-    Sensor,
-    /// Between tip and object.
-    Contact,
-    /// From the duty to the tip's way.
-    Drive,
-    /// Clocks, electronics, bus and host.
-    Link,
+/// A family of effects, by the place at which they act.
+#[derive(Clone, Copy, Debug)]
+pub struct Family {
+    /// Name in one word.
+    pub name: &'static str,
+    /// Heading on the reference page.
+    pub title: &'static str,
+    /// Effects, in the order in which they act within a stage.
+    pub effects: &'static [Description],
 }
 
-impl Family {
-    /// In a word.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sensor => "sensor",
-            Self::Contact => "contact",
-            Self::Drive => "drive",
-            Self::Link => "link",
-        }
-    }
+/// Effects between tip and object.
+pub const CONTACT: Family =
+    Family { name: "contact", title: "Contact: between tip and object", effects: contact::EFFECTS };
+/// Effects from the duty to the travel of the tip.
+pub const DRIVE: Family =
+    Family { name: "drive", title: "Drive: from the duty to the tip's way", effects: drive::EFFECTS };
+/// Effects from the pressure on the taxels to the codes of the frame.
+pub const SENSOR: Family = Family { name: "sensor", title: "Sensor: from pressure to codes", effects: sensor::EFFECTS };
+/// Effects on clocks, electronics, bus and host.
+pub const LINK: Family =
+    Family { name: "link", title: "Link: clocks, electronics, bus and host", effects: link::EFFECTS };
 
-    /// As a heading.
-    pub const fn title(self) -> &'static str {
-        match self {
-            Self::Sensor => "Sensor: from pressure to codes",
-            Self::Contact => "Contact: between tip and object",
-            Self::Drive => "Drive: from the duty to the tip's way",
-            Self::Link => "Link: clocks, electronics, bus and host",
-        }
-    }
-}
+/// All families, in the order in which their effects act within a stage: interference comes before the converter.
+const FAMILIES: [Family; 4] = [LINK, SENSOR, CONTACT, DRIVE];
 
-/// An effect that a scene names.
+/// Effect of a scene.
 #[derive(Clone, Debug)]
 pub struct Named {
-    /// What it is.
+    /// Description of the effect.
     pub effect: &'static Description,
-    /// Its values.
+    /// Values of its keys.
     pub values: Values,
 }
 
-/// Every effect, in the order in which they act within a stage: interference comes before the converter.
+/// Returns every effect, in the order in which they act within a stage.
 pub fn all() -> impl Iterator<Item = &'static Description> {
-    [link::EFFECTS, sensor::EFFECTS, contact::EFFECTS, drive::EFFECTS].into_iter().flatten().copied()
+    FAMILIES.iter().flat_map(|family| family.effects)
+}
+
+/// Returns the name of the family of an effect.
+pub fn family_of(effect: &Description) -> &'static str {
+    let family = FAMILIES.iter().find(|family| family.effects.iter().any(|known| known.name == effect.name));
+    family.map_or("", |family| family.name)
 }
 
 /// Builds the named effects of a finger, each with its name.

@@ -1,36 +1,364 @@
-//! A run as one page of HTML: no network, no other file, light and dark, for a screen and a phone.
+//! Run as one page of HTML without other files or a network, light and dark, for a screen and a phone.
 
 mod data;
-mod page;
 mod plots;
-mod states;
 mod trace;
 
-pub use page::page;
-pub use plots::around;
-pub use trace::{Instant, Kept, Trace, Track, Tracks};
+pub use crate::report::plots::around;
+pub use crate::report::trace::{Instant, Kept, Trace, Track, Tracks};
 
-use crate::ledger::Without;
-use crate::run::Outcome;
+use crate::metrics::{METRICS, Metric, Verdict, shown};
+use crate::report::data::BEGIN;
+use crate::report::plots::Plot;
+use crate::run::{Outcome, RunError, Without, asked, difference, differences, ledger_rows};
 use crate::scene::Scene;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use output::plot::PlotError;
 
-/// What a page is made from.
+/// Contents of a page.
 #[derive(Clone, Copy)]
 pub struct Report<'a> {
-    /// What was run.
+    /// Scene that was run.
     pub scene: &'a Scene,
-    /// On which board.
+    /// Name of the board.
     pub board: &'a str,
-    /// How it went.
+    /// Result of the run.
     pub outcome: &'a Outcome,
-    /// What it looked like.
+    /// Trace of the run.
     pub trace: &'a Trace,
-    /// What each effect was worth, where that was asked for.
+    /// Metrics without each effect, if requested.
     pub ablated: &'a [Without],
     /// Another run, drawn over this one.
     pub over: Option<&'a Over>,
 }
 
-/// The run in another report.
+/// Run of another report.
 #[derive(Clone, Debug)]
 pub struct Over(serde_json::Value);
+
+/// Allows nothing that is not in the page.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+/// Library as published, with its licence.
+const LIBRARY: &str = include_str!("report/uplot/uPlot.iife.min.js");
+const LIBRARY_STYLE: &str = include_str!("report/uplot/uPlot.min.css");
+const LICENSE: &str = include_str!("report/uplot/LICENSE");
+/// Scripts of the page, in order.
+const SCRIPTS: [&str; 5] = [
+    include_str!("report/script/view.js"),
+    include_str!("report/script/plots.js"),
+    include_str!("report/script/maps.js"),
+    include_str!("report/script/over.js"),
+    include_str!("report/script/main.js"),
+];
+
+/// Returns the page.
+pub fn page(report: &Report) -> Result<String, RunError> {
+    let Report { scene, board, outcome, trace, over, .. } = report;
+    let summary = &outcome.summary;
+    let fingers: Result<Vec<Markup>, PlotError> =
+        trace.fingers.iter().enumerate().map(|(n, tracks)| finger(n, tracks, trace.fingers.len() > 1)).collect();
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (scene.name) ": simulated run" }
+                style { (PreEscaped(LIBRARY_STYLE)) (PreEscaped(include_str!("report/style.css"))) }
+            }
+            body {
+                header {
+                    h1 { (scene.about) }
+                    p.note {
+                        "Scene " code { (scene.name) } ", seed " (scene.seed) ", board " (board)
+                        @for set in &scene.set { ", " code { (set) } }
+                        ". "
+                        strong { "Simulated: nothing here was measured on hardware." }
+                    }
+                    p { (verdict_line(&outcome.verdicts)) }
+                }
+                main {
+                    section id="bounds" { h2 { "What must hold" } (bounds(&outcome.verdicts)) }
+                    section id="plots" {
+                        h2 { "Over time" }
+                        (player())
+                        @for finger in fingers? { (finger) }
+                    }
+                    section id="metrics" { h2 { "Metrics" } (metrics(report)) }
+                    section id="ledger" {
+                        h2 { "What each effect cost" }
+                        (ledger(report))
+                        p.note {
+                            (shown(Some(summary.virtual_s))) " s simulated in " (shown(Some(summary.wall_s)))
+                            " s, behind " (shown(Some(summary.set_up_s))) " s to power up and tare. Digest "
+                            code { (summary.digest) }
+                        }
+                    }
+                    @if !report.ablated.is_empty() {
+                        section id="ablation" { h2 { "What each effect changes" } (ablation(report)) }
+                    }
+                    section id="scene" { h2 { "The scene" } pre tabindex="0" { code { (scene.text) } } }
+                }
+                (PreEscaped(BEGIN)) (PreEscaped(data::embedded(&data::data(report)))) (PreEscaped("</script>"))
+                @if let Some(over) = over {
+                    script type="application/json" id="over" { (PreEscaped(data::embedded(&over.0))) }
+                }
+                script { (PreEscaped(format!("/*\n{LICENSE}*/\n{LIBRARY}"))) }
+                script { (PreEscaped(format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.concat()))) }
+            }
+        }
+    };
+    Ok(page.into_string())
+}
+
+/// Controls of the script. The page has none without it.
+fn player() -> Markup {
+    html! {
+        div id="player" hidden {
+            div.controls {
+                button id="play" type="button" { "Play" }
+                input id="time" type="range" min="0" max="1000" value="0" step="1" aria-label="Time";
+                output id="now" for="time" {}
+                button id="whole" type="button" disabled { "Whole run" }
+            }
+        }
+        div id="choose" hidden {
+            p.note {
+                "Drag across a plot to zoom all of them, double-click for the whole run. "
+                "A play takes ten seconds, however long what is shown is."
+            }
+            p {
+                label for="other" { "Lay the run of another report over this one: " }
+                input id="other" type="file" accept=".html,text/html";
+                button id="alone" type="button" hidden { "Take it away" }
+            }
+            p id="over-note" role="status" {}
+        }
+    }
+}
+
+fn verdict_line(verdicts: &[Verdict]) -> Markup {
+    let broken = verdicts.iter().filter(|verdict| !verdict.held).count();
+    html! {
+        @match (broken, verdicts.len()) {
+            (_, 0) => span { "The scene asks for nothing." },
+            (0, 1) => span.held { "The bound is held." },
+            (0, all) => span.held { "All " (all) " bounds are held." },
+            (broken, all) => span.broken { (broken) " of " (all) " bounds broken." },
+        }
+    }
+}
+
+/// Lists the broken bounds, then the held ones, which are folded if a bound is broken.
+fn bounds(verdicts: &[Verdict]) -> Markup {
+    let (held, broken): (Vec<_>, Vec<_>) = verdicts.iter().partition(|verdict| verdict.held);
+    html! {
+        @if verdicts.is_empty() { p { "Nothing: the scene has no bounds." } }
+        @if !broken.is_empty() { (table_of_bounds(&broken)) }
+        @if !held.is_empty() {
+            details open[broken.is_empty()] {
+                summary { (held.len()) " held" }
+                (table_of_bounds(&held))
+            }
+        }
+    }
+}
+
+fn table_of_bounds(verdicts: &[&Verdict]) -> Markup {
+    html! {
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "metric" } th scope="col" { "asked" }
+                th.number scope="col" { "measured" } th scope="col" { "" }
+            } }
+            tbody { @for verdict in verdicts { tr {
+                td { code { (verdict.bound.metric) } }
+                td.asked { (asked(verdict.bound.min, verdict.max)) }
+                td.number { (shown(verdict.value)) }
+                td { @if verdict.held { span.held { "held" } } @else { span.broken { "broken" } } }
+            } } }
+        } }
+    }
+}
+
+/// Draws the plots without the script, which replaces them, and the array.
+fn finger(number: usize, tracks: &Tracks, several: bool) -> Result<Markup, PlotError> {
+    let times = tracks.time.means();
+    let drawn: Result<Vec<_>, PlotError> =
+        plots::all(tracks).into_iter().map(|plot| plots::drawn(&plot, &times).map(|svg| (plot, svg))).collect();
+    Ok(html! {
+        div.finger data-finger=(number) {
+            @if several { h3 { "Finger " (number) } }
+            div.plots {
+                @for (Plot { title, about, .. }, svg) in &drawn? {
+                    figure.plot data-title=(title) {
+                        div.still role="img" aria-label=(about) { (PreEscaped(svg)) }
+                        figcaption { (about) }
+                    }
+                }
+                figure.plot data-title="strip" {
+                    h3 { "Mode, faults and limits" }
+                    (plots::strip(&tracks.strip(), &times))
+                    figcaption { "What occurred, however short, is as wide as a nine-hundredth of the run." }
+                }
+            }
+            div.array {
+                h3 { "Pressure on the array" }
+                (plots::pressures(tracks))
+            }
+        }
+    })
+}
+
+/// Lists the metrics by group. Groups with a broken bound are first and open.
+fn metrics(report: &Report) -> Markup {
+    let verdicts = &report.outcome.verdicts;
+    html! {
+        @for Group { title, metrics, broken } in groups(verdicts) {
+            details.group open[broken > 0] {
+                summary {
+                    (title)
+                    @if broken > 0 { " " span.broken { (broken) " broken" } }
+                }
+                (table_of(report, &metrics))
+            }
+        }
+    }
+}
+
+fn table_of(report: &Report, metrics: &[&Metric]) -> Markup {
+    let measured = &report.outcome.measured;
+    let fingers = report.trace.fingers.len();
+    let columns = if fingers > 1 { 0..fingers } else { 0..0 };
+    let is_broken =
+        |name: &str| report.outcome.verdicts.iter().any(|verdict| verdict.bound.metric == name && !verdict.held);
+    let value = |name: &str| {
+        html! {
+            @if is_broken(name) { span.broken { (shown(measured.get(name))) } } @else { (shown(measured.get(name))) }
+        }
+    };
+    html! {
+        div.scroll tabindex="0" { table.metrics[columns.is_empty()] {
+            thead { tr {
+                th scope="col" { "metric" } th.number scope="col" { "value" }
+                @for finger in columns.clone() { th.number scope="col" { "finger " (finger) } }
+                th.about scope="col" { "what it is" }
+            } }
+            tbody { @for metric in metrics { tr data-metric=(metric.name) {
+                td { code { (metric.name) } }
+                td.number { (value(metric.name)) }
+                @for finger in columns.clone() {
+                    td.number { (value(&format!("finger{finger}.{}", metric.name))) }
+                }
+                td.about { (metric.about) }
+            } } }
+        } }
+    }
+}
+
+/// Lists the cost of each effect.
+fn ledger(report: &Report) -> Markup {
+    html! {
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "effect" } th.number scope="col" { "evaluations" }
+                th.number scope="col" { "time, s" } th.number scope="col" { "share, %" }
+            } }
+            tbody { @for (effect, evaluations, seconds, percent) in ledger_rows(&report.outcome.summary) { tr {
+                td { (effect) }
+                td.number { @if let Some(evaluations) = evaluations { (evaluations) } }
+                td.number { (format!("{seconds:.4}")) }
+                td.number { (format!("{percent:.1}")) }
+            } } }
+        } }
+    }
+}
+
+/// Lists the changes by each effect.
+fn ablation(report: &Report) -> Markup {
+    html! {
+        p.note { "What each effect adds to a metric: the run as it is, less a run without the effect." }
+        div.scroll tabindex="0" { table {
+            thead { tr {
+                th scope="col" { "metric" } th.number scope="col" { "all effects" }
+                @for without in report.ablated { th.number scope="col" { (without.effect) } }
+            } }
+            tbody { @for (name, value, others) in differences(&report.outcome.measured, report.ablated) { tr {
+                td { code { (name) } }
+                td.number { (shown(value)) }
+                @for other in others { td.number { (difference(value, other)) } }
+            } } }
+        } }
+    }
+}
+
+/// Title of a group, and the first letters of the names of its metrics.
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("Force", &["peak_force", "overshoot", "rise", "settling", "steady_error", "over_force", "stop_force", "hold_"]),
+    ("Motion and touch", &["touch", "approach", "travel", "indentation", "runaway", "air_speed", "rest_travel"]),
+    ("Faults and limits", &["fault", "limit_", "missed_frames"]),
+    ("Sensing", &["force_error", "centre_error", "confidence"]),
+    ("Slip and object", &["slip", "object_"]),
+    ("Motor and energy", &["duty", "rest_duty", "energy", "current", "winding"]),
+];
+/// Title for the other metrics.
+const REST: &str = "More";
+
+/// Metrics under a title.
+struct Group {
+    pub title: &'static str,
+    /// Metrics in the order of the table.
+    pub metrics: Vec<&'static Metric>,
+    /// Number of broken bounds.
+    pub broken: usize,
+}
+
+/// Returns all metrics. Groups with a broken bound are first.
+fn groups(verdicts: &[Verdict]) -> Vec<Group> {
+    let titles = GROUPS.iter().map(|(title, _)| *title).chain([REST]);
+    let group = |title| {
+        let metrics: Vec<&Metric> = METRICS.iter().filter(|metric| title_of(metric.name) == title).collect();
+        let of_it = |verdict: &&Verdict| title_of(short(&verdict.bound.metric)) == title;
+        let broken = verdicts.iter().filter(of_it).filter(|verdict| !verdict.held).count();
+        Group { title, metrics, broken }
+    };
+    let mut groups: Vec<Group> = titles.map(group).filter(|group| !group.metrics.is_empty()).collect();
+    groups.sort_by_key(|group| group.broken == 0);
+    groups
+}
+
+fn title_of(metric: &str) -> &'static str {
+    let of = |(_, begins): &&(&str, &[&str])| begins.iter().any(|begin| metric.starts_with(begin));
+    GROUPS.iter().find(of).map_or(REST, |(title, _)| title)
+}
+
+/// Name of a metric without its finger.
+fn short(metric: &str) -> &str {
+    metric.split_once('.').map_or(metric, |(_, name)| name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Bound;
+
+    fn bound(metric: &str, held: bool) -> Verdict {
+        let bound = Bound { metric: metric.into(), min: None, max: Some(1.0), max_per_goal_n: None };
+        Verdict { bound, value: Some(2.0), max: Some(1.0), held }
+    }
+
+    #[test]
+    fn each_metric_is_in_one_group_and_broken_ones_come_first() {
+        let verdicts = [bound("peak_force_n", true), bound("finger1.energy_j", false), bound("energy_j", false)];
+        let groups = groups(&verdicts);
+        let mut names: Vec<_> = groups.iter().flat_map(|group| &group.metrics).map(|metric| metric.name).collect();
+        assert_eq!(names.len(), METRICS.len());
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), METRICS.len());
+        assert_eq!((groups[0].title, groups[0].broken), ("Motor and energy", 2));
+        assert!(groups[1..].iter().all(|group| group.broken == 0));
+        assert_eq!(groups[1].title, "Force");
+    }
+}

@@ -1,34 +1,33 @@
-//! A run with everything that watches it, and what it leaves behind.
+//! Run of a scene with its watchers, its results, and the cost and benefit of each effect.
 
-use crate::ledger;
 use crate::metrics::{Hold, Measured, Meter, Verdict, shown};
 use crate::scene::Scene;
-use crate::watch::{Controller, Step, Summary, Watch};
+use crate::watch::{Controller, Cost, Step, Summary, Watch};
 #[cfg(feature = "files")]
 use serde_json::{Map, Value, json};
 use std::error::Error;
 use std::fmt::Write as _;
 
-/// Why a run, or what is made of it, failed.
+/// Reason why a run, or something made from it, failed.
 pub type RunError = Box<dyn Error + Send + Sync>;
 
-/// What runs a scene: a board.
+/// Board that runs a scene.
 pub type Run<'a> = &'a (dyn Fn(&Scene, &mut dyn Watch) -> Result<Summary, RunError> + Sync);
 
-/// How a scene went.
+/// Result of a run.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What was measured.
+    /// Results of the metrics.
     pub measured: Measured,
-    /// Whether it held what the scene asks for.
+    /// Comparison of the results with the bounds.
     pub verdicts: Vec<Verdict>,
-    /// The forces that were held.
+    /// Forces that were held.
     pub holds: Vec<Hold>,
     /// Times, costs and digest.
     pub summary: Summary,
 }
 
-/// Runs a scene, measured, and watched by these too.
+/// Runs a scene, measures it, and passes it to these watchers too.
 pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result<Outcome, RunError> {
     let mut meter = Meter::default();
     let summary = board(scene, &mut All { meter: &mut meter, others: watchers })?;
@@ -37,14 +36,15 @@ pub fn run(scene: &Scene, board: Run, watchers: &mut [&mut dyn Watch]) -> Result
 }
 
 impl Outcome {
-    /// Whether every bound is held.
+    /// True if every bound is held.
     pub fn passed(&self) -> bool {
         self.verdicts.iter().all(|verdict| verdict.held)
     }
 
-    /// For scripts. The keys are stable; `null` is a metric that the run does not have, or a side that is not bounded.
+    /// Returns the result for scripts. The keys are stable; `null` is a metric without a value, or a side without a
+    /// bound.
     #[cfg(feature = "files")]
-    pub fn json(&self, scene: &Scene, board: &str, ablated: &[ledger::Without]) -> Value {
+    pub fn json(&self, scene: &Scene, board: &str, ablated: &[Without]) -> Value {
         let values = |measured: &Measured| -> Map<String, Value> {
             measured.0.iter().map(|(name, value)| (name.clone(), json!(value))).collect()
         };
@@ -70,21 +70,20 @@ impl Outcome {
             "passed": self.passed(),
             "metrics": values(&self.measured),
             "bounds": self.verdicts.iter().map(bound).collect::<Vec<_>>(),
-            "ledger": ledger::json(&self.summary),
+            "ledger": ledger_json(&self.summary),
             "without": ablated.collect::<Vec<_>>(),
         })
     }
 
-    /// For people: the bounds, every metric, the ledger.
+    /// Returns the result for people: bounds, metrics, ledger.
     pub fn text(&self) -> String {
         let Summary { virtual_s, set_up_s, wall_s, digest, .. } = &self.summary;
         let mut text = String::new();
         let width = self.measured.0.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         for (name, value) in &self.measured.0 {
-            // Writing to a string does not fail.
             let _ = writeln!(text, "  {name:width$}  {:>10}{}", shown(*value), self.bound_of(name));
         }
-        let _ = writeln!(text, "\n{}", ledger::text(&self.summary));
+        let _ = writeln!(text, "\n{}", ledger_text(&self.summary));
         let ratio = if *wall_s > 0.0 { virtual_s / wall_s } else { f64::INFINITY };
         let _ = writeln!(
             text,
@@ -110,7 +109,7 @@ impl Outcome {
     }
 }
 
-/// What a bound asks for, for people.
+/// Formats the limits of a bound for people.
 pub fn asked(min: Option<f64>, max: Option<f64>) -> String {
     let [least, most] = [min, max].map(shown);
     match (min, max) {
@@ -121,7 +120,7 @@ pub fn asked(min: Option<f64>, max: Option<f64>) -> String {
     }
 }
 
-/// The meter and whoever else watches.
+/// Meter and other watchers.
 struct All<'a, 'b> {
     meter: &'a mut Meter,
     others: &'a mut [&'b mut dyn Watch],
@@ -134,7 +133,7 @@ impl Watch for All<'_, '_> {
     }
 
     fn wants_pressures(&mut self, finger: usize, time_s: f64) -> bool {
-        // All are asked: who wants them may count what it asked for.
+        // All watchers are called, as they may count their requests.
         self.others.iter_mut().fold(false, |wanted, watch| watch.wants_pressures(finger, time_s) | wanted)
     }
 
@@ -145,5 +144,111 @@ impl Watch for All<'_, '_> {
     fn step(&mut self, step: &Step) {
         self.meter.step(step);
         self.others.iter_mut().for_each(|watch| watch.step(step));
+    }
+}
+
+/// Formats evaluations, time and share of the run, one effect per line.
+pub fn ledger_text(summary: &Summary) -> String {
+    let mut text = format!("  {:24} {:>12} {:>10} {:>8}\n", "effect", "evaluations", "time, s", "share");
+    for (effect, evaluations, seconds, percent) in ledger_rows(summary) {
+        let evaluations = evaluations.map_or(String::new(), |count| count.to_string());
+        let _ = writeln!(text, "  {effect:24} {evaluations:>12} {seconds:>10.4} {percent:>6.1} %");
+    }
+    text
+}
+
+/// Returns the cost of each effect in the order of the scene, over all fingers and stages.
+pub fn by_effect(scene: &Scene, all: &[Cost]) -> Vec<Cost> {
+    let of = |effect| {
+        let mut sum = Cost { effect, evaluations: 0, seconds: 0.0 };
+        for cost in all.iter().filter(|cost| cost.effect == effect) {
+            sum.evaluations += cost.evaluations;
+            sum.seconds += cost.seconds;
+        }
+        sum
+    };
+    scene.effects.iter().map(|named| of(named.effect.name)).collect()
+}
+
+/// Returns each effect with its calls, its time and its share of the run in percent, then the rest of the run.
+pub fn ledger_rows(summary: &Summary) -> Vec<(&'static str, Option<u64>, f64, f64)> {
+    let percent = |seconds: f64| if summary.wall_s > 0.0 { 100.0 * seconds / summary.wall_s } else { 0.0 };
+    let effects = summary.ledger.iter();
+    let effects = effects.map(|cost| (cost.effect, Some(cost.evaluations), cost.seconds, percent(cost.seconds)));
+    let rest_s = (summary.wall_s - summary.ledger.iter().map(|cost| cost.seconds).sum::<f64>()).max(0.0);
+    effects.chain([("everything else", None, rest_s, percent(rest_s))]).collect()
+}
+
+/// Returns the ledger for scripts, without the rest of the run.
+#[cfg(feature = "files")]
+pub fn ledger_json(summary: &Summary) -> Value {
+    let row = |(effect, evaluations, wall_s, share_percent): (_, Option<u64>, _, _)| {
+        Some(json!({ "effect": effect, "evaluations": evaluations?, "wall_s": wall_s, "share_percent": share_percent }))
+    };
+    ledger_rows(summary).into_iter().filter_map(row).collect()
+}
+
+/// Metrics without an effect.
+#[derive(Clone, Debug)]
+pub struct Without {
+    /// Effect that was left out.
+    pub effect: &'static str,
+    /// Metrics of that run.
+    pub measured: Measured,
+}
+
+/// Runs the scene once without each of its effects.
+pub fn ablate(scene: &Scene, board: Run) -> Result<Vec<Without>, RunError> {
+    let without = |left_out: usize| {
+        let mut fewer = scene.clone();
+        let effect = fewer.effects.remove(left_out).effect.name;
+        let measured = run(&fewer, board, &mut []).map_err(|error| format!("without {effect}: {error}"))?.measured;
+        Ok(Without { effect, measured })
+    };
+    (0..scene.effects.len()).map(without).collect()
+}
+
+/// Name of a metric, its value with all effects, and without each of them.
+pub type Difference<'a> = (&'a str, Option<f64>, Vec<Option<f64>>);
+
+/// Returns the metrics that an effect changes.
+pub fn differences<'a>(whole: &'a Measured, ablated: &[Without]) -> Vec<Difference<'a>> {
+    let rows = whole.0.iter().map(|(name, value)| {
+        (name.as_str(), *value, ablated.iter().map(|without| without.measured.get(name)).collect::<Vec<_>>())
+    });
+    rows.filter(|(_, value, without)| without.iter().any(|other| other != value)).collect()
+}
+
+/// Formats the changes by each effect: one metric per line, one effect per column.
+pub fn ablation_text(whole: &Measured, ablated: &[Without]) -> String {
+    let rows = differences(whole, ablated);
+    let width = rows.iter().map(|(name, ..)| name.len()).max().unwrap_or(0).max("metric".len());
+    let columns: Vec<usize> = ablated.iter().map(|without| without.effect.len().max(10)).collect();
+    let mut text = format!("  {:width$} {:>10}", "metric", "all");
+    for (without, column) in ablated.iter().zip(&columns) {
+        let _ = write!(text, "  {:>column$}", without.effect);
+    }
+    text.push('\n');
+    for (name, value, others) in rows {
+        let _ = write!(text, "  {name:width$} {:>10}", shown(value));
+        for (other, column) in others.iter().zip(&columns) {
+            let _ = write!(text, "  {:>column$}", difference(value, *other));
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Formats the change of a metric by an effect.
+pub fn difference(with: Option<f64>, without: Option<f64>) -> String {
+    match (with, without) {
+        (Some(with), Some(without)) if with == without => "0".into(),
+        (Some(with), Some(without)) => {
+            let sign = if with > without { "+" } else { "" };
+            format!("{sign}{}", shown(Some(with - without)))
+        }
+        (None, None) => "0".into(),
+        (Some(_), None) => "none without".into(),
+        (None, Some(_)) => "none with".into(),
     }
 }

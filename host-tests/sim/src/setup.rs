@@ -1,21 +1,21 @@
-//! What the simulated board is made of: plain data, in the units that the names end with.
+//! Components of the simulated board: plain data in the units of their names.
 
 use serde::{Deserialize, Serialize};
 
 /// Everything around the microcontroller. The defaults are the reference finger of `docs/board.md`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
-    /// The soft fingertip.
+    /// Soft fingertip.
     pub tip: Tip,
-    /// Where the object is.
+    /// Place of the object.
     pub wall: Wall,
-    /// The tactile array and its amplifiers.
+    /// Tactile array and its amplifiers.
     pub array: Array,
-    /// The motor.
+    /// Motor with its encoder.
     pub motor: Motor,
-    /// From the motor's shaft to the tip.
+    /// Transmission from the shaft of the motor to the tip.
     pub transmission: Transmission,
-    /// What feeds the bridge.
+    /// Supply of the bridge.
     pub supply: Supply,
 }
 
@@ -34,7 +34,7 @@ impl Default for Tip {
     }
 }
 
-/// A rigid plane in the tip's way, and where the tip meets the array.
+/// Rigid plane in front of the tip, and the place of the contact on the array.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wall {
     /// Travel at which the tip touches.
@@ -60,7 +60,7 @@ pub struct Array {
     pub preload_siemens: f64,
     /// Conductance that a kPa adds, alpha.
     pub siemens_per_kpa: f64,
-    /// How much more pressure a code means at the converter's full range than at none; 0 is a line.
+    /// Increase of the pressure per code from none to the full range of the converter; 0 is linear.
     pub growth: f64,
     /// Conductance of a shorted taxel.
     pub short_siemens: f64,
@@ -68,35 +68,35 @@ pub struct Array {
     pub row_ohm: f64,
     /// Feedback resistor of the column amplifiers, R_f.
     pub feedback_ohm: f64,
-    /// The columns' virtual ground, V_g; rows that are not driven sit there too.
+    /// Virtual ground of the columns, V_g, and voltage of the rows that are not driven.
     pub ground_v: f64,
-    /// How far below it a driven row sits, V_drive.
+    /// Voltage of a driven row below the virtual ground, V_drive.
     pub drive_v: f64,
     /// Highest voltage of an amplifier and reference of the converter.
     pub reference_v: f64,
-    /// Time constant with which a column settles after a row's edge.
+    /// Time constant of the settling of a column.
     pub settle_tau_s: f64,
-    /// From the edge to the sample, for whole frames taken at one instant.
+    /// Time from the edge to the sample, for whole frames taken at one instant.
     pub sample_after_s: f64,
 }
 
 impl Array {
-    /// Codes of a 12-bit converter.
+    /// Number of codes of the 12-bit converter.
     pub const CODES: f64 = 4096.0;
     /// K = R_f V_drive 4096 / V_ref of the reference finger, codes Ohm.
     const CODES_OHM: f64 = 1.8e7;
 
-    /// The conductance where one on the line would be so large: a parabola through it, solved.
+    /// Returns the conductance for that of the linear characteristic, by solving a parabola.
     pub fn loaded(&self, line: f64) -> f64 {
         if self.growth == 0.0 {
             return line;
         }
-        // As a share of the converter's full range.
+        // Conductance at the full range of the converter.
         let range = self.reference_v / (self.feedback_ohm * self.drive_v);
         2.0 * line / (1.0 + (1.0 + 4.0 * self.growth * line / range).sqrt())
     }
 
-    /// The code of a voltage: rounded down, as a successive-approximation converter does.
+    /// Returns the code of a voltage, rounded down, as a successive-approximation converter does.
     pub fn code(&self, volts: f64) -> u16 {
         (volts / self.reference_v * Self::CODES).floor().clamp(0.0, Self::CODES - 1.0) as u16
     }
@@ -178,8 +178,8 @@ pub struct Supply {
 }
 
 impl Supply {
-    /// Resistance of a motor's whole circuit at a duty: the source gives the share u of the current at the share u of
-    /// the time, so the motor sees u^2 of its resistance.
+    /// Resistance of the whole circuit of a motor at a duty. The source gives the share u of the current for the share
+    /// u of the time, so the motor sees u^2 of the resistance of the source.
     pub fn circuit_ohm(&self, motor: &Motor, duty: f64) -> f64 {
         motor.resistance_ohm + self.bridge_ohm + duty * duty * self.source_ohm
     }

@@ -1,7 +1,7 @@
-//! Many runs of a scene: over values of its keys, over seeds, over all cores and over machines.
+//! Runs of a scene over values of its keys, over seeds, on all cores and on several machines.
 //!
-//! Runs are numbered point by point and, within a point, seed by seed. A shard takes every n-th of them; what is merged
-//! from shards is the same, byte for byte, as one whole sweep.
+//! Runs are numbered by point, and within a point by seed. A shard takes each n-th run. Merged shards give the same
+//! files, byte for byte, as a whole sweep.
 
 pub mod files;
 mod summary;
@@ -20,30 +20,29 @@ use indicatif::{ProgressBar, ProgressStyle};
 use output::say;
 use std::path::{Path, PathBuf};
 
-/// What is asked for.
+/// Plan of a sweep.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// A scene's path, or its name in the library.
+    /// Path of a scene, or its name in the library.
     pub scene: String,
-    /// `TABLE.KEY=VALUE`, for all runs.
+    /// `TABLE.KEY=VALUE` for all runs.
     pub set: Vec<String>,
-    /// The keys that vary.
+    /// Keys that vary.
     pub vary: Vec<Vary>,
-    /// Seeds at each point, counted on from the scene's.
+    /// Number of seeds at each point, counted from the seed of the scene.
     pub seeds: u64,
-    /// Which of the runs.
+    /// Shard of the runs.
     pub shard: Shard,
-    /// Where the results go; none: a folder of its own in [`FOLDER`].
+    /// Folder of the results; none for its own folder in [`FOLDER`].
     pub out: Option<PathBuf>,
 }
 
-/// Where sweeps lie that are not told where to go, each in a folder named by its scene and a digest of all that makes
-/// it what it is.
+/// Folder of the sweeps without another one. Each sweep has a folder named by its scene and a digest of the plan.
 pub const FOLDER: &str = "target/sweep";
-/// More points or runs than this are a slip of the keyboard: they would take weeks, and more memory than there is.
+/// Most points or runs: more would take weeks and too much memory, so they are probably a typing error.
 const MOST: usize = 1_000_000;
 
-/// A run of the sweep.
+/// Run of the sweep.
 struct Task<'a> {
     number: usize,
     values: &'a [String],
@@ -51,11 +50,10 @@ struct Task<'a> {
     seed: u64,
 }
 
-/// Runs the sweep, or the shard, and writes its files; also tells their folder. A sweep that was stopped goes on where
-/// it stood.
+/// Runs the sweep or the shard and writes its files. Returns their folder too. A sweep that was stopped continues.
 ///
 /// # Errors
-/// The scene is none at a point, a run fails, a file cannot be written, or another process writes it.
+/// The scene has a mistake at a point, a run fails, a file cannot be written, or another process writes it.
 pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     let seeds = usize::try_from(plan.seeds).unwrap_or(usize::MAX);
     let mut counts = plan.vary.iter().map(|vary| vary.values.len());
@@ -94,26 +92,26 @@ pub fn sweep(plan: &Plan, board: Run) -> Result<(Table, PathBuf), RunError> {
     Ok((rows.finish(plan, &out)?, out))
 }
 
-/// A bar on the terminal.
+/// Progress bar on the terminal.
 pub fn progress(all: usize, things: &str) -> Result<ProgressBar, RunError> {
     let template = format!("{{bar:40}} {{pos}} of {{len}} {things}, {{eta}} to go");
     Ok(ProgressBar::new(all as u64).with_style(ProgressStyle::with_template(&template)?))
 }
 
-/// What a run writes after its number: values, seed, verdict, digest and metrics.
+/// Row of a run after its number: values, seed, verdict, digest and metrics.
 fn row(task: &Task, board: Run) -> Result<Vec<String>, RunError> {
     let scene = Scene { seed: task.seed, ..task.scene.clone() };
     let outcome = run(&scene, board, &mut [])
         .map_err(|error| format!("run {} (seed {}, {:?}): {error}", task.number + 1, task.seed, task.values))?;
     let mut row = task.values.to_vec();
     row.extend([task.seed.to_string(), u8::from(outcome.passed()).to_string(), outcome.summary.digest.clone()]);
-    // As in JSON, what is no number is left out.
+    // Infinite values are left out, as in JSON.
     let value = |name| outcome.measured.get(name).filter(|value| value.is_finite());
     row.extend(METRICS.iter().map(|metric| value(metric.name).map_or(String::new(), |value| value.to_string())));
     Ok(row)
 }
 
-/// Every combination of the varied keys' values, the last key the quickest, with its scene.
+/// Returns every combination of the values of the varied keys with its scene. The last key varies fastest.
 fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     let mut combinations = vec![Vec::new()];
     for vary in &plan.vary {
@@ -131,27 +129,26 @@ fn points(plan: &Plan) -> Result<Vec<(Vec<String>, Scene)>, RunError> {
     combinations.into_iter().map(point).collect()
 }
 
-/// A key and its values, as a scene's text has them.
+/// Key and its values as TOML.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Vary {
     /// `table.key`.
     pub key: String,
-    /// From the first to the last.
+    /// Values from the first to the last.
     pub values: Vec<String>,
 }
 
-/// Values where none are asked for.
+/// Number of values if none is given.
 const VALUES: usize = 5;
-/// More are a slip of the keyboard.
+/// Most values: more are probably a typing error.
 const MOST_VALUES: usize = 100_000;
 
 impl std::str::FromStr for Vary {
     type Err = String;
 
-    /// Reads `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole where they come out
-    /// so.
+    /// Parses `table.key=lo..hi` or `table.key=lo..hi:n`. Between whole ends the values are whole if possible.
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("--vary {text}: table.key=lo..hi or table.key=lo..hi:n is asked for");
+        let wrong = || format!("--vary {text}: needs table.key=lo..hi or table.key=lo..hi:n");
         let (key, range) = text.split_once('=').ok_or_else(wrong)?;
         let (range, count) = match range.split_once(':') {
             Some((range, count)) => (range, count.trim().parse().map_err(|_| wrong())?),
@@ -170,7 +167,7 @@ impl std::str::FromStr for Vary {
         let value = |n: usize| {
             let share = if count > 1 { n as f64 / (count - 1) as f64 } else { 0.0 };
             let value = low_end + (high_end - low_end) * share;
-            // Sums of tenths and the like come out as they are meant.
+            // Removes the rounding error of sums of decimal fractions.
             let value = format!("{value:.12e}").parse().unwrap_or(value);
             if whole && value.fract() == 0.0 { format!("{value}") } else { format!("{value:?}") }
         };
@@ -178,16 +175,16 @@ impl std::str::FromStr for Vary {
     }
 }
 
-/// The effects that draw random numbers.
+/// Effects that draw random numbers.
 pub const EFFECTS: [&str; 8] =
     ["noise", "offset", "gain_spread", "tangential", "host_jitter", "lost_packets", "corrupted_packets", "burst"];
 
-/// Whether another seed may give another run.
+/// True if another seed may give another run.
 pub fn is(scene: &Scene) -> bool {
     scene.effects.iter().any(draws)
 }
 
-/// Whether an effect draws, and not by a deviation of nothing.
+/// True if an effect draws with a deviation other than 0.
 fn draws(named: &Named) -> bool {
     let Named { effect, values } = named;
     let idle = |keys: &[(&str, f64)]| keys.iter().all(|(key, zero)| values.number(key) == *zero);
@@ -204,17 +201,17 @@ mod tests {
     use crate::registry;
     use std::fs;
 
-    /// What an effect takes its random numbers from.
+    /// Source of the random numbers of an effect.
     const DRAWN_FROM: &str = "build.seed";
 
     #[test]
     fn those_that_draw_are_listed() {
+        let folder = format!("{}/host-tests/sim/src/effects", env!("FINGERTIP_ROOT"));
+        let files = ["contact.rs", "drive.rs", "link.rs", "sensor/effects.rs"];
+        let text = files.map(|file| fs::read_to_string(format!("{folder}/{file}")).unwrap()).concat();
         for effect in registry::all() {
-            let folder = format!("{}/host-tests/sim/src/effects/{}", env!("FINGERTIP_ROOT"), effect.family.name());
-            let files = fs::read_dir(&folder).unwrap_or_else(|error| panic!("{folder}: {error}"));
-            let text: String = files.map(|file| fs::read_to_string(file.unwrap().path()).unwrap()).collect();
-            let (_, text) = text.split_once(&format!("const {}: Description", effect.name.to_uppercase())).unwrap();
-            let text = text.split(": Description").next().unwrap();
+            let (_, text) = text.split_once(&format!("name: \"{}\"", effect.name)).unwrap();
+            let text = text.split("Description {").next().unwrap();
             assert_eq!(text.contains(DRAWN_FROM), EFFECTS.contains(&effect.name), "{}", effect.name);
         }
     }

@@ -1,24 +1,24 @@
-//! The world of a scene: its fingers and what they touch, moved on by steps.
+//! World of a scene: fingers and their object, moved by steps, with weight, floor, shaking and the lifting hand.
 
 use crate::bridge::Bridge;
+use crate::effects::Set;
 use crate::effects::contact::Stages as _;
 use crate::effects::drive::Stages as _;
-use crate::effects::set::Set;
-use crate::events::Happened;
-use crate::mechanics::body::{Body, Surroundings, overlap_s};
+use crate::events::{Event, Happened};
 use crate::mechanics::contact::{Contact, Place};
 use crate::mechanics::finger::Finger;
+use crate::scene::Scene;
 use crate::setup::{Setup, Tip};
 use crate::watch::Truth;
 use fingertip::frame::Sense;
 use fingertip::shipped::COLUMNS;
 use fingertip::units::CoreCycles;
 
-/// A step times the fastest oscillation's angular frequency is at most this: its solution then gains a factor of 16 a
-/// round or more.
+/// Largest product of a step and the angular frequency of the fastest oscillation. Each iteration of the solution then
+/// gains a factor of 16 or more.
 const STEP_RAD: f64 = 0.5;
 
-/// Why a world cannot be simulated.
+/// Reason why a world cannot be simulated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WorldError {
     /// The step is too long for what moves.
@@ -26,18 +26,18 @@ pub enum WorldError {
         "step_us of {step_us}: at most {allowed_us:.1} are allowed for a contact of {n_per_mm:.1} N/mm on {mass_g:.3} g"
     )]
     Step {
-        /// What was asked for.
+        /// Requested step.
         step_us: f64,
-        /// What is allowed.
+        /// Largest allowed step.
         allowed_us: f64,
-        /// The steepest contact.
+        /// Slope of the steepest contact.
         n_per_mm: f64,
-        /// The mass that moves against it.
+        /// Mass that moves against it.
         mass_g: f64,
     },
 }
 
-/// Rounds of the solution of fingers and object together at most, and the way below whose change they end.
+/// Most iterations of the common solution of fingers and object, and the displacement below whose change they end.
 const ROUNDS: usize = 60;
 const ALIKE_MM: f64 = 1e-15;
 
@@ -46,27 +46,27 @@ const GONE_MM: f64 = 1e3;
 /// Speed at which an object is put back from where the tip stood in its way, mm/s.
 const PUT_BACK_MM_PER_S: f64 = 20.0;
 
-/// Fingers and the object between or before them.
+/// Fingers and their object.
 pub struct World<E: Set> {
     fingers: Vec<Finger<E::Drive, E::Contact>>,
     around: Surroundings,
-    /// None where the object stands fast.
+    /// Mass of the object; none if it is fixed.
     mass_kg: Option<f64>,
     body: Body,
     body_before: Body,
     dt_s: f64,
     happened: Happened,
-    /// Whether no contact holds an effect: then a step does without what only effects change.
+    /// True if no contact has an effect: a step then skips what only effects change.
     bare: bool,
 }
 
-/// Which way a finger pushes.
+/// Direction in which a finger pushes.
 fn side(finger: usize) -> f64 {
     if finger == 0 { 1.0 } else { -1.0 }
 }
 
 impl<E: Set> World<E> {
-    /// Of one finger or two.
+    /// Creates a world of one finger or two.
     pub fn new(setup: &Setup, around: &Surroundings, effects: Vec<(E::Drive, E::Contact)>) -> Self {
         let mut fingers: Vec<Finger<E::Drive, E::Contact>> =
             effects.into_iter().map(|(drive, contact)| Finger::new(setup, drive, contact)).collect();
@@ -101,22 +101,22 @@ impl<E: Set> World<E> {
         Ok(())
     }
 
-    /// The fingers.
+    /// Fingers.
     pub fn fingers(&self) -> &[Finger<E::Drive, E::Contact>] {
         &self.fingers
     }
 
-    /// The fingers, to place or launch them.
+    /// Fingers, to place or launch them.
     pub fn fingers_mut(&mut self) -> &mut [Finger<E::Drive, E::Contact>] {
         &mut self.fingers
     }
 
-    /// The object.
+    /// Object.
     pub fn body(&self) -> &Body {
         &self.body
     }
 
-    /// One step from a time on with the bridges held, a bridge for each finger.
+    /// Advances by one step from a time with constant bridges, one for each finger.
     pub fn advance(&mut self, time_s: f64, dt_s: f64, bridges: &[Bridge]) {
         self.dt_s = dt_s;
         self.body_before = self.body;
@@ -138,8 +138,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Lets the events act that the scene has by a time. An object that is put back begins in front
-    /// of the tips.
+    /// Applies the events of the scene up to a time. An object that is put back begins in front of the tips.
     #[inline(never)]
     fn happen(&mut self, time_s: f64) {
         let mut now = Happened::at(&self.around.events, time_s);
@@ -163,7 +162,7 @@ impl<E: Set> World<E> {
         self.happened = now;
     }
 
-    /// Lets the tips forget for half a step, and where it ends there, the object bear what it came to.
+    /// Lets the tips relax for half a step. At the end of the step the object is then loaded.
     #[inline(never)]
     fn relax(&mut self, ends: bool) {
         for index in 0..self.fingers.len() {
@@ -175,7 +174,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Each against an object that stands fast.
+    /// Advances each finger against a fixed object.
     fn advance_fingers(&mut self, time_s: f64) {
         for (index, finger) in self.fingers.iter_mut().enumerate() {
             let [from, to] = [&self.body_before, &self.body].map(|body| surface_mm(finger.setup(), index, body));
@@ -188,7 +187,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Moves the object by along the surfaces, as the scene does where it stands fast.
+    /// Moves a fixed object along the surfaces, as the scene requests.
     #[inline(never)]
     fn draw(&mut self, time_s: f64) {
         let until_s = time_s + self.dt_s;
@@ -204,8 +203,8 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// Fingers and object, round by round: mean forces from the ends, ends from the mean forces. Where they agree, what
-    /// one gains the others lose, in momentum and in energy.
+    /// Solves for fingers and object together: mean forces from the ends, ends from the mean forces, until both agree.
+    /// Then momentum and energy are conserved between them.
     #[inline(never)]
     fn advance_together(&mut self, mass_kg: f64, time_s: f64) {
         let (dt_s, body) = (self.dt_s, self.body);
@@ -261,7 +260,7 @@ impl<E: Set> World<E> {
         finger.flank_mm() - surface_mm(finger.setup(), index, &self.body)
     }
 
-    /// Energy of a finger's contact, mJ: elastic and along the surface.
+    /// Energy of the contact of a finger, mJ: elastic and along the surface.
     pub fn contact_mj(&self, index: usize) -> f64 {
         self.fingers[index].contact.law().energy_mj(self.overlap_mm(index))
     }
@@ -271,7 +270,7 @@ impl<E: Set> World<E> {
         self.fingers[finger].contact.law().force_n(self.overlap_mm(finger))
     }
 
-    /// What a finger's control step learns beside the frame.
+    /// Returns what the control step of a finger receives beside the frame.
     pub fn sense(&mut self, finger: usize, bus_silent_ms: u16) -> Sense {
         let finger = &mut self.fingers[finger];
         let supply_mv = (finger.supply_v() * 1e3 + 0.5).clamp(0.0, f64::from(u16::MAX)) as u16;
@@ -285,7 +284,7 @@ impl<E: Set> World<E> {
         }
     }
 
-    /// What is true of a finger, with the pressures if they are wanted.
+    /// Returns the true state of a finger, with the pressures if requested.
     pub fn truth(&mut self, index: usize, pressures: bool) -> Truth {
         let force_n = self.force_n(index);
         let finger = &self.fingers[index];
@@ -321,14 +320,14 @@ impl<E: Set> World<E> {
     }
 }
 
-/// The travel at which a finger's tip meets the object's surface.
+/// Travel at which the tip of a finger meets the surface of the object.
 fn surface_mm(setup: &Setup, finger: usize, body: &Body) -> f64 {
     setup.wall.distance_mm + side(finger) * body.place_mm[0] + body.away_mm
 }
 
 impl<E: Set> World<E> {
-    /// How a finger touches at a time within the last step. Several may be asked for before their rows: one then need
-    /// not wait for another to be worked out.
+    /// Returns the contact of a finger at a time within the last step. It is separate from the rows, so that several
+    /// places can be computed in parallel.
     #[inline]
     pub fn place(&self, index: usize, since_s: f64) -> Place {
         let mut body = self.body;
@@ -342,19 +341,20 @@ impl<E: Set> World<E> {
         finger.contact.place(finger.flank_within_mm(since_s) - surface_mm(finger.setup(), index, &body))
     }
 
-    /// Mean pressures on a row's taxels where a finger touches like this.
+    /// Mean pressures on a row for a contact.
     #[inline]
     pub fn placed_kpa(&mut self, index: usize, place: &Place, row: usize) -> [f64; COLUMNS] {
         self.fingers[index].contact.row_kpa(place, row)
     }
 
-    /// The same at a time within the last step.
+    /// Mean pressures on a row at a time within the last step.
     pub fn row_kpa(&mut self, index: usize, since_s: f64, row: usize) -> [f64; COLUMNS] {
         let place = self.place(index, since_s);
         self.placed_kpa(index, &place, row)
     }
 
-    /// The same at a time before the last step's end, below 0, or behind it: then all goes on as it did in it.
+    /// Mean pressures on a row at a time before the end of the last step (negative) or after it, at constant
+    /// acceleration.
     pub fn row_off_kpa(&mut self, index: usize, off_s: f64, row: usize) -> [f64; COLUMNS] {
         if off_s < 0.0 {
             return self.row_kpa(index, (self.dt_s + off_s).max(0.0), row);
@@ -367,5 +367,90 @@ impl<E: Set> World<E> {
         let finger = &self.fingers[index];
         let place = finger.contact.place(finger.flank_ahead_mm(off_s) - surface_mm(finger.setup(), index, &body));
         self.placed_kpa(index, &place, row)
+    }
+}
+
+/// Standard gravity, mm/s^2.
+const GRAVITY_MM_PER_S2: f64 = 9806.65;
+
+/// Place and speed of an object, along the motion of the first finger and upwards.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Body {
+    /// Place from the start, mm.
+    pub place_mm: [f64; 2],
+    /// Speed, mm/s.
+    pub speed_mm_per_s: [f64; 2],
+    /// Distance by which events have moved the object's surface away from every finger, mm.
+    pub away_mm: f64,
+}
+
+/// Motions of the object and the hand in a scene.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Surroundings {
+    /// Time until which a floor carries the object.
+    pub floor_until_s: f64,
+    /// Acceleration of the shaking, downwards, in g.
+    pub shake_g: f64,
+    /// Start and end of the shaking.
+    pub shake_s: [f64; 2],
+    /// Height to which the hand lifts.
+    pub lift_mm: f64,
+    /// Start and end of the lift.
+    pub lift_s: [f64; 2],
+    /// Events, in order of time.
+    pub events: Vec<Event>,
+}
+
+impl Surroundings {
+    /// Surroundings of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let (object, hand) = (scene.table("object"), scene.table("hand"));
+        let (shake_s, lift_s) = (object.number("shake_at_s"), hand.number("lift_at_s"));
+        Self {
+            floor_until_s: object.number("floor_until_s"),
+            shake_g: object.number("shake_g"),
+            shake_s: [shake_s, shake_s + object.number("shake_ms") * 1e-3],
+            lift_mm: hand.number("lift_mm"),
+            lift_s: [lift_s, lift_s + hand.number("lift_s")],
+            events: scene.events.clone(),
+        }
+    }
+
+    /// Height of the hand: from rest to rest with the least jerk, 10 t^3 - 15 t^4 + 6 t^5.
+    pub fn hand_mm(&self, time_s: f64) -> f64 {
+        let [from_s, to_s] = self.lift_s;
+        let t = ((time_s - from_s) / (to_s - from_s)).clamp(0.0, 1.0);
+        self.lift_mm * t * t * t * (10.0 - t * (15.0 - 6.0 * t))
+    }
+
+    /// Mean acceleration downwards over a step.
+    fn down_mm_per_s2(&self, time_s: f64, dt_s: f64) -> f64 {
+        let shaken_s = overlap_s([time_s, time_s + dt_s], self.shake_s);
+        let share = if dt_s > 0.0 { shaken_s / dt_s } else { 0.0 };
+        GRAVITY_MM_PER_S2 * (1.0 + self.shake_g * share)
+    }
+}
+
+/// Common duration of two spans of time.
+pub fn overlap_s(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[1].min(b[1]) - a[0].max(b[0])).max(0.0)
+}
+
+impl Body {
+    /// Returns the object after a step under mean forces of the fingers, N.
+    pub fn moved(&self, mass_kg: f64, force_n: [f64; 2], around: &Surroundings, time_s: f64, dt_s: f64) -> Self {
+        let mut next = *self;
+        let down = around.down_mm_per_s2(time_s, dt_s);
+        let mm_per_s2 = [force_n[0] / mass_kg * 1e3, force_n[1] / mass_kg * 1e3 - down];
+        for (axis, mm_per_s2) in mm_per_s2.into_iter().enumerate() {
+            let change = dt_s * mm_per_s2;
+            next.place_mm[axis] += dt_s * (self.speed_mm_per_s[axis] + 0.5 * change);
+            next.speed_mm_per_s[axis] += change;
+        }
+        if time_s < around.floor_until_s && next.place_mm[1] < 0.0 {
+            next.place_mm[1] = 0.0;
+            next.speed_mm_per_s[1] = 0.0;
+        }
+        next
     }
 }

@@ -1,7 +1,8 @@
 //! The demonstration on the native board: its figures, its maps and its pictures.
 
 use output::plot;
-use sim::demo::{self, Forces, Run, Taxels, Trace, figures::missed, pictures, table};
+use sim::demo::figures::{draw, missed, table};
+use sim::demo::{self, Forces, Run, Taxels, Trace};
 use sim::simulate;
 use sim::watch::{Step, Watch};
 
@@ -14,7 +15,7 @@ fn run() -> Run {
 
 fn drawn(run: &Run) -> Vec<(String, String)> {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("demo");
-    let paths = pictures::draw(run, &Forces::of(run).unwrap(), &folder).unwrap();
+    let paths = draw(run, &Forces::of(run).unwrap(), &folder).unwrap();
     let name = |path: &std::path::Path| path.file_name().unwrap().to_string_lossy().into_owned();
     paths.iter().map(|path| (name(path), std::fs::read_to_string(path).unwrap())).collect()
 }
@@ -23,7 +24,7 @@ fn drawn(run: &Run) -> Vec<(String, String)> {
 fn every_bound_holds() {
     let forces = Forces::of(&run()).unwrap();
     let checks = forces.checks();
-    assert_eq!((missed(&checks), checks.len()), (0, 26), "\n{}", table::table(&checks, &forces));
+    assert_eq!((missed(&checks), checks.len()), (0, 26), "\n{}", table(&checks, &forces));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Events: each kind does what it says, alike each time, and one without magnitude changes no bit.
+//! Events: each kind has its described effect, repeatably, and one without magnitude changes no bit.
 
 use fingertip::command::Command;
 use fingertip::frame::Sense;
@@ -40,7 +40,7 @@ impl All {
     }
 }
 
-/// A finger that holds 1 N from 0.1 s on, with these events and whatever else stands behind them.
+/// Runs a finger that holds 1 N from 0.1 s on, with events and other tables.
 fn run_with(events: &str) -> (Outcome, All) {
     let head =
         "duration_s = 1.0\n[object]\ndistance_mm = 2\n[effects.dry_friction]\n[[script]]\nat_s = 0\ngoal_n = 1\n";
@@ -181,7 +181,7 @@ fn an_event_restarts_the_judgement_of_a_hold_and_a_missing_object_is_not_missed(
     let value = |measured: &Measured, metric: &str| measured.get(metric).unwrap();
     let away = run_with(&event("object_removed", "for_s = 0.6")).0.measured;
     assert_eq!(["touches_missed_count", "hold_error_mn"].map(|metric| value(&away, metric)), [0.0; 2]);
-    // A gain that is half of what it was doubles the force: that is the defect's, and has a bound of its own.
+    // Half the gain doubles the force, which counts as a defect with its own bound.
     let (outcome, _) = run_with(&event("gain_change", "factor = 0.5, for_s = 0.6"));
     assert!(value(&outcome.measured, "over_force_defective_mn") > 50.0);
     assert!(value(&outcome.measured, "over_force_mn") < 100.0);

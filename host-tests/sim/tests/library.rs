@@ -1,5 +1,5 @@
-//! The library of scenes: each is read, runs on the native board, and holds what it promises. The forces and pressures
-//! of the paper's compression test come out of its scene.
+//! The library of scenes: each runs on the native board within its bounds. The scene of the paper's compression test
+//! reproduces its forces and pressures.
 
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
 use sim::cores;

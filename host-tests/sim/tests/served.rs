@@ -1,11 +1,11 @@
-//! A scene's fingers on the bus: the same bytes as the firmware's, in virtual time.
+//! Bus of a scene's fingers: the same bytes as the firmware's, in virtual time.
 
 use fingertip::link::Reply;
 use fingertip::link::packet::instruction::{READ, REBOOT, SYNC_READ, WRITE};
 use fingertip::link::packet::{Event, Receiver, Sender};
 use fingertip::shipped::address;
 use fingertip::state::{Fault, Mode};
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::native::served::Bus;
 
 const MODE: u16 = address::PRESENT_MODE;

@@ -1,5 +1,4 @@
-//! An hour in the hot: how true a held force is with the temperature term, and with coefficients and a proxy that are
-//! wrong.
+//! Error of a force that is held for an hour at high temperature, with right and wrong coefficients and proxy.
 
 use sim::native;
 use sim::run::run;

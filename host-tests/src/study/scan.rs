@@ -8,7 +8,7 @@ use crate::prove::reference::{Real, real};
 use fingertip::params::Params;
 use fingertip::scan::ScanTiming;
 use fingertip::shipped::{CLOCKS, COLUMNS, Config, Frame, ROWS, TAXELS};
-use sim::mechanics::decay::decay;
+use sim::mechanics::decay;
 use sim::setup::{Array, Setup};
 use std::fmt::Write as _;
 

@@ -5,7 +5,7 @@ use super::page::figure;
 use core::f64::consts::TAU;
 use fingertip::shipped::{COLUMNS, ROWS};
 use sim::bridge::Bridge;
-use sim::mechanics::cells::Cell;
+use sim::mechanics::pressures::Cell;
 use sim::plant::{Plant, Setup};
 use std::fmt::Write as _;
 use std::time::Instant;

@@ -5,7 +5,7 @@ use crate::measure::PinEdge;
 use crate::surroundings::Surroundings;
 use fingertip::shipped::COLUMNS;
 use serde::{Deserialize, Serialize};
-use sim::mechanics::decay::decay;
+use sim::mechanics::decay;
 use sim::plant::Plant;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

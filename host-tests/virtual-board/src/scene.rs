@@ -30,9 +30,9 @@ use host::{Host, Shown};
 use rigless::soc::Width;
 use sim::SimError;
 use sim::effects::link::{self, Stages as _};
-use sim::effects::set::{Named, Set as _};
+use sim::effects::{Named, Set as _};
 use sim::encode;
-use sim::scene::{Scene, controller};
+use sim::scene::Scene;
 use sim::watch::{Controller, Summary, Watch};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -82,7 +82,7 @@ impl Boards {
     /// As [`simulate`].
     pub fn power_on(image: &Path, scene: &Scene) -> Result<Self, Error> {
         let begun = Instant::now();
-        let params = controller::params(scene);
+        let params = scene.params();
         let config = Config::shipped(&params).map_err(SimError::Controller)?;
         let frame_ns = u64::from(config.timing.frame_ns);
         let tare_ns = u64::from(TARE_FRAMES + 2) * frame_ns;
@@ -156,7 +156,7 @@ impl Boards {
             virtual_s: scene.duration_s,
             set_up_s: self.set_up.as_secs_f64(),
             wall_s: begun.elapsed().as_secs_f64(),
-            ledger: sim::ledger::by_effect(scene, &costs),
+            ledger: sim::run::by_effect(scene, &costs),
             digest: digests.join(" "),
         })
     }

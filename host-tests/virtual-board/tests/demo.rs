@@ -3,13 +3,13 @@
 //! `FINGERTIP_IMAGE` names the image; `cargo xtask test` builds it and sets it.
 
 use crate::common::{image, scratch};
-use sim::demo::{figures::missed, pictures, table};
+use sim::demo::figures::{draw, missed, table};
 use virtual_board::demo::{self, Plan};
 
 #[test]
 fn every_bound_holds_and_the_pictures_are_drawn() {
     let (figures, run) = demo::run(&Plan { image: image(), quick: true }).expect("the demonstration runs");
-    assert_eq!(missed(&figures.checks), 0, "\n{}", table::table(&figures.checks, &figures.forces));
+    assert_eq!(missed(&figures.checks), 0, "\n{}", table(&figures.checks, &figures.forces));
     assert_eq!(figures.forces.steps.len(), 4);
     assert_eq!(run.pictures.iter().map(|picture| picture.goal_n).collect::<Vec<_>>(), [1.0, 2.0, 5.0]);
 
@@ -23,7 +23,7 @@ fn every_bound_holds_and_the_pictures_are_drawn() {
     }
 
     let folder = scratch("pictures");
-    let drawn = pictures::draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
+    let drawn = draw(&run, &figures.forces, &folder).expect("the pictures are drawn");
     for path in &drawn {
         let svg = std::fs::read_to_string(path).expect("it was written");
         assert!(svg.starts_with("<svg") && !svg.contains("NaN"), "{}", path.display());

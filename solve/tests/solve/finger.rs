@@ -4,9 +4,9 @@
 use fingertip::params::Params;
 use sim::effects::contact;
 use sim::effects::sensor::{self, Readout};
-use sim::effects::set::{Named, Set};
+use sim::effects::{Named, Set};
 use sim::mechanics::contact::Contact;
-use sim::scene::{Scene, controller, read};
+use sim::scene::{Scene, read};
 use sim::setup::Setup;
 use solve::press::{Array, Branch, Press, Reading, Step, Tip};
 use solve::record;
@@ -153,7 +153,7 @@ impl Finger {
     pub fn new(draw: &Draw) -> Self {
         let scene = draw.scene(&Place::default());
         let parts = Named::of(&scene, 0);
-        let setup = controller::setup(&scene);
+        let setup = scene.setup();
         let (readout, contact) = (Readout::new(&setup.array), Contact::new(&setup, parts.contact));
         let tare = [[0.0; COLUMNS]; ROWS];
         Self {
@@ -173,7 +173,7 @@ impl Finger {
     /// Puts the finger before the plate at another place.
     pub fn go(&mut self, place: &Place) {
         let scene = self.draw.scene(place);
-        self.setup = controller::setup(&scene);
+        self.setup = scene.setup();
         self.contact = Contact::new(&self.setup, Named::of(&scene, 0).contact);
         self.travel_mm = self.setup.wall.distance_mm - 0.5;
     }

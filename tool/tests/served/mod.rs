@@ -7,7 +7,7 @@ use fingertip::link::packet::{self, BROADCAST};
 use rustix::process::Signal;
 use serve::native::Native;
 use serve::{Place, Port, Stop};
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::native::served::Bus;
 use std::cell::RefCell;
 use std::path::PathBuf;

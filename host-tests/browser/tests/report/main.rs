@@ -9,7 +9,7 @@ use browser::{Browser, Look, complaints};
 use sim::report::{Report, Trace, page};
 use sim::run::{Outcome, run};
 use sim::scene::Scene;
-use sim::{cli, ledger, native};
+use sim::{cli, native, run};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -65,7 +65,7 @@ fn nothing_is_wrong(name: &str) {
     for verdict in &mut outcome.verdicts {
         verdict.bound.metric = "over_force_defective_mn".into();
     }
-    let ablated = ledger::ablate(&scene, &native::board).unwrap();
+    let ablated = run::ablate(&scene, &native::board).unwrap();
     let report =
         Report { scene: &scene, board: "native", outcome: &outcome, trace: &trace, ablated: &ablated, over: None };
     let path = folder.join("report.html");

@@ -1,4 +1,4 @@
-//! `budget`: what makes the force wrong, by fingers without one cause at a time.
+//! `budget`: causes of the error of the force, by fingers without one cause at a time.
 
 use clap::Parser;
 use output::say;

@@ -1,9 +1,10 @@
-//! The demonstration on the native board: `demo [--quick] [--out DIR]`.
+//! Demonstration on the native board: `demo [--quick] [--out DIR]`.
 //!
-//! The same scene and figures as on the flash image, without a microcontroller in between.
+//! It has the same scene and figures as on the flash image, without a microcontroller.
 
 use output::say;
-use sim::demo::{self, DemoError, Forces, Trace, figures::missed, pictures, table};
+use sim::demo::figures::{draw, missed, table};
+use sim::demo::{self, DemoError, Forces, Trace};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -47,8 +48,8 @@ fn run(quick: bool, out: &Path) -> Result<usize, DemoError> {
     let run = trace.finish()?;
     let forces = Forces::of(&run)?;
     let checks = forces.checks();
-    let drawn = pictures::draw(&run, &forces, out);
-    say::text(table::table(&checks, &forces));
+    let drawn = draw(&run, &forces, out);
+    say::text(table(&checks, &forces));
     drawn?.iter().for_each(|path| say::line(format_args!("picture  {}", path.display())));
     Ok(missed(&checks))
 }

@@ -3,7 +3,7 @@
 use clap::Parser;
 use output::say;
 use sim::native;
-use sim::native::calibrated::unlike;
+use sim::native::calibrated;
 use sim::population::cli::{self, Args, Board};
 use std::process::ExitCode;
 
@@ -24,9 +24,9 @@ fn main() -> ExitCode {
 
 /// Prints the error of the force before and after calibration.
 fn errors(args: &Args) -> ExitCode {
-    match unlike::fingers(args.seed, args.fingers as usize) {
+    match calibrated::fingers(args.seed, args.fingers as usize) {
         Ok(fingers) => {
-            say::text(unlike::text(&fingers));
+            say::text(calibrated::errors_text(&fingers));
             ExitCode::SUCCESS
         }
         Err(why) => {

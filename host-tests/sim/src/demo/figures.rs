@@ -1,29 +1,32 @@
-//! The figures of a run, each against its bound.
+//! Figures of a run against their bounds, as a table and as pictures.
 
-use super::{Asked, DemoError, Run};
+use crate::demo::{Asked, DemoError, Picture, Run};
 use crate::optimal::minimum_time_s;
 use crate::setup::Setup;
 use fingertip::params::Params;
-use output::plot::Sample;
+use output::plot;
+use output::plot::{Map, Panel, Sample};
 use serde::Serialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 
 /// Figures of the true force.
 #[derive(Clone, Debug, Serialize)]
 pub struct Forces {
-    /// The first touch.
+    /// First touch of the object.
     pub touch: Touch,
     /// The force steps.
     pub steps: Vec<Step>,
-    /// Letting go.
+    /// Release of the object.
     pub release: Release,
 }
 
 /// The first touch of an object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Touch {
-    /// The force asked for.
+    /// Requested force.
     pub goal_n: f64,
-    /// From the goal to the touch.
+    /// Time from the goal to the touch.
     pub touched_after_ms: f64,
     /// Speed just before the touch.
     pub approach_mm_per_s: Option<f64>,
@@ -31,11 +34,11 @@ pub struct Touch {
     pub distance_mm: f64,
     /// Largest force.
     pub peak_n: f64,
-    /// How far that is above the goal.
+    /// Peak above the goal, as a share of the goal.
     pub peak_above_goal_percent: f64,
-    /// From the touch until the force stays within 2 % of the goal; none where it does not.
+    /// Time from the touch until the force stays within 2 % of the goal; none if it never does.
     pub settled_after_touch_ms: Option<f64>,
-    /// Largest error from 100 ms after the touch on.
+    /// Largest error later than 100 ms after the touch.
     pub steady_error_mn: Option<f64>,
 }
 
@@ -44,50 +47,50 @@ pub struct Touch {
 pub struct Step {
     /// True force when the goal changed.
     pub from_n: f64,
-    /// The force asked for.
+    /// Requested force.
     pub to_n: f64,
-    /// From 10 % to 90 % of the step; none where the force does not get there.
+    /// Time from 10 % to 90 % of the step; none if the force does not reach 90 %.
     pub rise_ms: Option<f64>,
-    /// Beyond the goal, of the goal or of the step, whichever is smaller.
+    /// Largest force beyond the goal, as a share of the goal or of the step, whichever is smaller.
     pub overshoot_percent: Option<f64>,
-    /// Until the force stays within 2 % of the goal or of the step, whichever is smaller; none where it does not.
+    /// Time until the force stays within 2 % of the goal or of the step, whichever is smaller; none if it never does.
     pub settling_ms: Option<f64>,
-    /// Largest error from 100 ms after the goal changed on.
+    /// Largest error later than 100 ms after the change of the goal.
     pub steady_error_mn: Option<f64>,
-    /// The least time in which the motor can do it from rest to rest.
+    /// Shortest time in which the motor can do the step from rest to rest.
     pub time_optimal_ms: f64,
-    /// Settling over that.
+    /// Settling time over the shortest possible time.
     pub settling_to_optimal_ratio: Option<f64>,
 }
 
-/// Letting go.
+/// Release of the object.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Release {
-    /// From the goal of 0 until nothing is touched for good; none where something still is.
+    /// Time from the goal of 0 to the end of the last contact; none while something is touched.
     pub clear_after_ms: Option<f64>,
-    /// How far from the object the tip ends.
+    /// Distance of the tip from the object at the end.
     pub clearance_mm: f64,
 }
 
-/// A figure against its bound.
+/// Figure and its bounds.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// What is measured.
+    /// Name of the figure.
     pub name: String,
-    /// The figure; none where there is none, which fails.
+    /// Measured value; none if the run has none, which fails.
     pub measured: Option<f64>,
-    /// Its unit.
+    /// Unit of the figure.
     pub unit: &'static str,
-    /// It must not be less; a figure too good to be true fails too.
+    /// Lower bound: a figure too good to be true fails too.
     pub at_least: Option<f64>,
-    /// It must not be more.
+    /// Upper bound.
     pub at_most: Option<f64>,
-    /// Whether it is so.
+    /// True if the figure lies within its bounds.
     pub pass: bool,
 }
 
 impl Check {
-    /// Measures a figure against its bounds, at least and at most.
+    /// Compares a figure with its bounds, lower and upper.
     pub fn new(name: impl Into<String>, measured: Option<f64>, unit: &'static str, bounds: [Option<f64>; 2]) -> Self {
         let [at_least, at_most] = bounds;
         let inside =
@@ -96,7 +99,7 @@ impl Check {
     }
 }
 
-/// How many bounds are missed.
+/// Returns the number of missed bounds.
 pub fn missed(checks: &[Check]) -> usize {
     checks.iter().filter(|check| !check.pass).count()
 }
@@ -105,7 +108,7 @@ impl Forces {
     /// Takes the figures of a run.
     ///
     /// # Errors
-    /// The run was not what the script asked for: nothing was touched, or a force never reached.
+    /// Nothing was touched, or a force was never reached.
     pub fn of(run: &Run) -> Result<Self, DemoError> {
         let (mut touch, mut steps, mut release) = (None, Vec::new(), None);
         for (place, asked) in run.goals.iter().enumerate() {
@@ -123,7 +126,7 @@ impl Forces {
         Ok(Self { touch, steps, release })
     }
 
-    /// Each figure against its bound.
+    /// Compares each figure with its bounds.
     pub fn checks(&self) -> Vec<Check> {
         let at_most = |most: f64| [None, Some(most)];
         let within = |least: f64, most: f64| [Some(least), Some(most)];
@@ -152,7 +155,7 @@ impl Forces {
 }
 
 impl Touch {
-    /// None where nothing is touched.
+    /// Returns none if nothing was touched.
     fn of(asked: &Asked, samples: &[Sample]) -> Option<Self> {
         let measured = asked.meter.measured();
         let touched = samples.iter().find(|sample| sample.true_force_n > 0.0)?;
@@ -201,7 +204,88 @@ impl Release {
     }
 }
 
-/// The steady error allowed: 0.5 % and 5 mN.
+/// Allowed steady error: 0.5 % and 5 mN.
 fn steady_mn(goal_n: f64) -> f64 {
     goal_n * 5.0 + 5.0
+}
+
+/// Returns all checks as a table, and the time of each step over the shortest possible one.
+pub fn table(checks: &[Check], forces: &Forces) -> String {
+    let mut text = format!("{:<44} {:>12} {:<5} {:>16}\n", "", "measured", "", "bound");
+    for check in checks {
+        let measured = check.measured.map_or_else(|| "never".to_owned(), number);
+        let verdict = if check.pass { "pass" } else { "FAIL" };
+        let _ = writeln!(text, "{:<44} {measured:>12} {:<5} {:>16}  {verdict}", check.name, check.unit, bound(check));
+    }
+    let _ = writeln!(text);
+    for step in &forces.steps {
+        let _ = writeln!(
+            text,
+            "{:.1} to {:.1} N: the motor at its limits needs {:.1} ms; the loop took {} times as long",
+            step.from_n,
+            step.to_n,
+            step.time_optimal_ms,
+            step.settling_to_optimal_ratio.map_or_else(|| "for ever, not".to_owned(), |ratio| format!("{ratio:.2}")),
+        );
+    }
+    text
+}
+
+fn bound(check: &Check) -> String {
+    match (check.at_least, check.at_most) {
+        (Some(least), Some(most)) => format!("{} to {}", number(least), number(most)),
+        (Some(least), None) => format!("at least {}", number(least)),
+        (None, Some(most)) => format!("at most {}", number(most)),
+        (None, None) => String::new(),
+    }
+}
+
+/// Rounds to three decimals.
+fn number(value: f64) -> String {
+    let rounded = (value * 1e3).round() / 1e3 + 0.0;
+    format!("{rounded}")
+}
+
+/// Time shown before and after the goal of a step.
+const BEFORE_MS: f64 = 5.0;
+const AFTER_MS: f64 = 60.0;
+
+/// Draws the pictures into a folder and returns their paths.
+pub fn draw(run: &Run, forces: &Forces, folder: &Path) -> Result<Vec<PathBuf>, DemoError> {
+    let touched_s = run.goals.first().map_or(0.0, |asked| asked.at_s) + forces.touch.touched_after_ms * 1e-3;
+    let window = |zero_s: f64| run.between(zero_s - 1e-3 * BEFORE_MS, zero_s + 1e-3 * AFTER_MS);
+    let panel = |title, zero_s, time_optimal_ms| Panel {
+        title,
+        samples: window(zero_s),
+        zero_s,
+        shown_ms: [BEFORE_MS, AFTER_MS],
+        time_optimal_ms,
+    };
+    let mut panels = vec![panel(format!("First touch, goal {} N", forces.touch.goal_n), touched_s, None)];
+    for (step, asked) in forces.steps.iter().zip(run.goals.iter().skip(1)) {
+        let title = format!("{:.1} to {:.1} N", step.from_n, step.to_n);
+        panels.push(panel(title, asked.at_s, Some(step.time_optimal_ms)));
+    }
+    let map = |picture: &Picture| Map {
+        title: format!("{} N", picture.goal_n),
+        pressures_kpa: picture.pressures_kpa,
+        centre_mm: picture.centre_mm,
+        radius_mm: picture.radius_mm,
+    };
+    let mut maps: Vec<_> = run.pictures.iter().collect();
+    maps.sort_by(|a, b| a.goal_n.total_cmp(&b.goal_n));
+    let maps: Vec<_> = maps.into_iter().map(map).collect();
+    let pictures = [
+        ("run.svg", plot::overview(&run.trace)?),
+        ("steps.svg", plot::steps(&panels)?),
+        ("maps.svg", plot::maps(&maps, Setup::default().array.pitch_mm)?),
+    ];
+
+    std::fs::create_dir_all(folder).map_err(|source| DemoError::Write { path: folder.into(), source })?;
+    let write = |(name, svg): (&str, String)| {
+        let path = folder.join(name);
+        std::fs::write(&path, svg).map_err(|source| DemoError::Write { path: path.clone(), source })?;
+        Ok(path)
+    };
+    pictures.into_iter().map(write).collect()
 }

@@ -1,127 +1,114 @@
-//! Between tip and object.
+//! Contact between tip and object.
 //!
-//! Where tip and object overlap by x, the tip is indented by d and pushes back with F. The stages in order: the
-//! object's surface (shape), the force that the tip has forgotten (memory), the object's own yielding (series), what is
-//! left of it (strength), and the motion along the surface (tangent). Without effects the object is a rigid plane
-//! without friction: d = x, F = pi Y d^2. All forces of a step come from one energy, which is asked for its mean slope,
-//! so a step creates none.
+//! Where tip and object overlap by x, the tip is indented by d and pushes back with F. The stages in order: the surface
+//! of the object (shape), the relaxation of the tip (memory), the compliance of the object (series), the share of the
+//! force that remains (strength), and the motion along the surface (tangent). Without effects the object is a rigid
+//! plane without friction: d = x, F = pi Y d^2. All forces of a step are the mean slope of one energy, so a step
+//! creates no energy.
 
-mod surface;
-mod tip_and_object;
-
-use super::{Metered, Part};
+use crate::effects::{Build, Metered, Part, normal_within_3};
+use crate::mechanics::decay;
 use crate::registry::Description;
+use crate::scene::tables::Key;
 use crate::watch::{Cost, Truth};
+use fastrand::Rng;
 
-/// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[
-    &surface::TILTED_PLANE,
-    &surface::SPHERE,
-    &surface::CYLINDER,
-    &surface::EDGE,
-    &tip_and_object::RELAXATION,
-    &tip_and_object::OBJECT_STIFFNESS,
-    &tip_and_object::BREAKABLE_OBJECT,
-    &tip_and_object::TANGENTIAL,
-    &tip_and_object::OBJECT_MASS,
-];
-
-/// Acts on the object's surface.
+/// Effect on the surface of the object.
 pub trait Shape: Send {
-    /// How far the surface stands out towards the tip beyond the plane at which indentations count from 0; below where
-    /// it falls away. `x` goes along the array's columns, `y` along its rows, from the tip's axis; the tip's radius is
-    /// that.
+    /// Height of the surface towards the tip above the plane from which indentations count; negative where the surface
+    /// falls away. `x` runs along the columns of the array and `y` along its rows, from the axis of a tip of this
+    /// radius.
     fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64;
 
-    /// Whether the height is 0 wherever a tip reaches: then the plane's closed forms hold.
+    /// True if the height is 0 within reach of a tip, so that the closed forms of the plane hold.
     fn plain(&self) -> bool;
 }
 
-/// Where an object ends: farther away than any tip reaches.
+/// Height beyond the end of an object: no tip reaches it.
 const NOTHING_MM: f64 = -1e3;
 
-/// A round surface's height at the square of a distance from its highest point or line.
+/// Height of a round surface at the square of a distance from its highest point or line.
 fn round(per_mm: f64, distance2_mm2: f64) -> f64 {
     let turned = per_mm * per_mm * distance2_mm2;
-    // R - sqrt(R^2 - s^2) without its cancellation for a large R.
+    // R - sqrt(R^2 - s^2) without cancellation for a large R.
     if turned < 1.0 { -per_mm * distance2_mm2 / (1.0 + (1.0 - turned).sqrt()) } else { NOTHING_MM }
 }
 
-/// A force that the tip has forgotten.
+/// Effect by which the tip relaxes.
 pub trait Memory: Send {
-    /// It is taken from the elastic force.
+    /// Returns the force to subtract from the elastic force.
     fn forgotten_n(&mut self) -> f64;
 
-    /// Time goes on at a held elastic force; at none where the tip, not yet back in shape, touches nothing.
+    /// Advances in time at a constant elastic force; none while the tip touches nothing.
     fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>);
 }
 
-/// The object yields like a spring behind its surface: how far, mm, for each N. Asked for once.
+/// Compliance of the object behind its surface, mm/N. Called once.
 pub type Series = dyn FnMut() -> f64 + Send;
 
-/// What an object bears.
+/// Effect that limits the force on the object.
 pub trait Strength: Send {
-    /// The share of the force that is left after it bore this one.
+    /// Returns the share of a force that remains after the object was loaded by it.
     fn left(&mut self, force_n: f64) -> f64;
 
-    /// Says what it knows.
+    /// Adds the state to the truth.
     fn tell(&self, truth: &mut Truth);
 }
 
-/// Friction along the surface, with the tip's give.
+/// Friction along the surface, and compliance of the patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// Stiffness of the patch along the surface.
     pub n_per_mm: f64,
-    /// Damping beside the stiffness.
+    /// Damping of the patch along the surface.
     pub n_s_per_mm: f64,
-    /// Share of the normal force at which it begins to slip.
+    /// Friction coefficient at which the patch begins to slip.
     pub still: f64,
-    /// Share of the normal force while it slips.
+    /// Friction coefficient while it slips.
     pub slipping: f64,
-    /// How fast the object goes by, where the scene moves it.
+    /// Speed of an object that the scene moves.
     pub drift_mm_per_s: f64,
-    /// From when.
+    /// Start of that motion.
     pub drift_from_s: f64,
 }
 
-/// Acts along the surface. Asked for once a step.
+/// Effect along the surface. Called once a step.
 pub type Tangent = dyn FnMut() -> Grip + Send;
 
-/// The object can move: its mass, kg. Asked for once.
+/// Mass of an object that can move, kg. Called once.
 pub type Body = dyn FnMut() -> f64 + Send;
 
-/// The stages as the contact calls them: of the named effects, or `()`, in which none is compiled.
+/// Stages as the contact calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
-    /// Whether none of the stages holds an effect: a step of the contact then asks for none.
+    /// True if no stage has an effect: a step of the contact then calls none.
     fn none(&self) -> bool;
-    /// Whether the surface is other than a plane.
+    /// True if the surface is not a plane.
     fn shaped(&self) -> bool {
         false
     }
-    /// The sum of [`Shape::height_mm`].
+    /// Sum of [`Shape::height_mm`].
     fn height_mm(&self, _x_mm: f64, _y_mm: f64, _radius_mm: f64) -> f64 {
         0.0
     }
-    /// Counts the building of the shape's tables as a call of its effects.
+    /// Counts the construction of the tables of the shape as a call of its effects.
     fn shape_built(&mut self) {}
-    /// Whether there is a [`Memory`]: without one, none is asked.
+    /// True if there is a [`Memory`].
     fn forgets(&self) -> bool;
-    /// The sum of [`Memory::forgotten_n`].
+    /// Sum of [`Memory::forgotten_n`].
     fn forgotten_n(&mut self) -> f64 {
         0.0
     }
     /// See [`Memory::relax`].
     fn relax(&mut self, _dt_s: f64, _elastic_n: Option<f64>) {}
-    /// Takes over the tip's memory from the effects of another scene.
+    /// Moves the memory of the tip here from the effects of another scene.
     fn remember(&mut self, _before: &mut Self) {}
-    /// The sum of [`Series`].
+    /// Sum of [`Series`].
     fn mm_per_n(&mut self) -> f64 {
         0.0
     }
-    /// Whether there is a [`Strength`]: without one, none is asked.
+    /// True if there is a [`Strength`].
     fn breaks(&self) -> bool;
-    /// The product of [`Strength::left`].
+    /// Product of [`Strength::left`].
     fn left(&mut self, _force_n: f64) -> f64 {
         1.0
     }
@@ -129,11 +116,11 @@ pub trait Stages {
     fn grip(&mut self) -> Option<Grip> {
         None
     }
-    /// The sum of [`Body`]; none where the object stands fast.
+    /// Sum of [`Body`]; none if the object is fixed.
     fn mass_kg(&mut self) -> Option<f64> {
         None
     }
-    /// Says what the effects know.
+    /// Adds the state of the effects to the truth.
     fn tell(&self, _truth: &mut Truth) {}
 }
 
@@ -216,5 +203,253 @@ impl Stages for Named {
     #[inline]
     fn tell(&self, truth: &mut Truth) {
         self.strength.iter().for_each(|effect| effect.part().tell(truth));
+    }
+}
+
+/// Effects of this family, in the order in which they act within a stage.
+pub const EFFECTS: &[Description] = &[
+    Description {
+        name: "tilted_plane",
+        about: "A plane that is tilted against the array.",
+        equations: &[
+            "h = x tan(along_columns_deg) + y tan(along_rows_deg), less the offset that puts the first point of contact at d = 0",
+            "force by the integral of p = Y dL / L over the tip",
+        ],
+        state: "none",
+        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        keys: &[
+            Key::number("along_columns_deg", "Tilt along the columns; positive presses higher ones.", -45.0, 45.0, 5.0),
+            Key::number("along_rows_deg", "Tilt along the rows.", -45.0, 45.0, 0.0),
+        ],
+        zero: &[("along_columns_deg", 0.0), ("along_rows_deg", 0.0)],
+        build: |build: &Build| {
+            let slope = |name| {
+                let angle = build.number(name) * (core::f64::consts::PI / 180.0);
+                libm::tan(angle)
+            };
+            let (x, y) = (slope("along_columns_deg"), slope("along_rows_deg"));
+            // Additional reach of a slope into the tip, as a share of its radius.
+            let over = (1.0 + x * x + y * y).sqrt() - 1.0;
+            Surface::part(x == 0.0 && y == 0.0, move |x_mm, y_mm, radius_mm| x * x_mm + y * y_mm - over * radius_mm)
+        },
+    },
+    Description {
+        name: "sphere",
+        about: "A ball instead of the plane.",
+        equations: &["h = -(R - sqrt(R^2 - r^2)); nothing beyond R"],
+        state: "none",
+        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h; Hertz compares with a radius 1 / (1/a + 1/R)",
+        keys: &[Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.05)],
+        zero: &[("curvature_per_mm", 0.0)],
+        build: |build: &Build| {
+            let per_mm = build.number("curvature_per_mm");
+            Surface::part(per_mm == 0.0, move |x_mm, y_mm, _| round(per_mm, x_mm * x_mm + y_mm * y_mm))
+        },
+    },
+    Description {
+        name: "cylinder",
+        about: "A cylinder instead of the plane, at any angle.",
+        equations: &["h = -(R - sqrt(R^2 - s^2)), s the distance from the axis; nothing beyond R"],
+        state: "none",
+        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        keys: &[
+            Key::number("curvature_per_mm", "1 / R; 0 is a plane.", 0.0, 1.0, 0.1),
+            Key::number("axis_deg", "Angle from the columns to the axis.", -180.0, 180.0, 90.0),
+        ],
+        zero: &[("curvature_per_mm", 0.0)],
+        build: |build: &Build| {
+            let angle = build.number("axis_deg") * (core::f64::consts::PI / 180.0);
+            let (across, per_mm) = ([-libm::sin(angle), libm::cos(angle)], build.number("curvature_per_mm"));
+            Surface::part(per_mm == 0.0, move |x_mm, y_mm, _| {
+                let across_mm = across[0] * x_mm + across[1] * y_mm;
+                round(per_mm, across_mm * across_mm)
+            })
+        },
+    },
+    Description {
+        name: "edge",
+        about: "A plane that ends at an edge.",
+        equations: &["h = 0 where x cos(t) + y sin(t) <= offset_mm, else nothing touches"],
+        state: "none",
+        reference: "the compression of Park, Kim, Hirai 2003, eq. 13, with the surface's height added: dL = sqrt(a^2 - r^2) - (a - d) + h",
+        keys: &[
+            Key::number("offset_mm", "Distance from the centre of the contact to the edge.", -20.0, 20.0, 0.0),
+            Key::number("towards_deg", "Direction: 0 along the columns, 90 along the rows.", -180.0, 180.0, 0.0),
+        ],
+        zero: &[("offset_mm", 20.0)],
+        build: |build: &Build| {
+            let angle = build.number("towards_deg") * (core::f64::consts::PI / 180.0);
+            let (towards, offset_mm) = ([libm::cos(angle), libm::sin(angle)], build.number("offset_mm"));
+            Surface::part(offset_mm >= LARGEST_TIP_MM, move |x_mm, y_mm, _| {
+                if towards[0] * x_mm + towards[1] * y_mm > offset_mm { NOTHING_MM } else { 0.0 }
+            })
+        },
+    },
+    Description {
+        name: "relaxation",
+        about: "Relaxation of the soft tip: it loses a share of its force while it is held.",
+        equations: &[
+            "F = F_e - share q, at least 0;  tau_s dq/dt = F_e - q  (quasi-linear, one term)",
+            "over a step: q goes to F_e exponentially, half a step before and half a step after the motion",
+            "where F_e < share q the tip has not recovered its shape and does not touch; then tau_s dq/dt = (share - 1) q",
+        ],
+        state: "relaxed force, N",
+        reference: "Fung, Biomechanics, 1993, 7.6; Park, Kim, Hirai 2003 leave it out; in fixed point it is paper::Relaxation",
+        keys: &[
+            Key::number("share", "Share of the force that is lost in the end.", 0.0, 0.95, 0.15),
+            Key::number("tau_s", "Time constant.", 0.0001, 10000.0, 0.5),
+        ],
+        zero: &[("share", 0.0)],
+        build: |build: &Build| {
+            let (share, tau_s) = (build.number("share"), build.number("tau_s"));
+            Part::Memory(Box::new(Relaxation { share, tau_s, remembered_n: 0.0, last_s: 0.0, left: [1.0; 2] }))
+        },
+    },
+    Description {
+        name: "object_stiffness",
+        about: "An object that yields like a spring.",
+        equations: &["x = d + yield_mm_per_n F: tip and object in series", "E = E_tip(d) + yield_mm_per_n F^2 / 2"],
+        state: "none",
+        reference: "two springs in series; a soft ball 0.1 to 2 mm/N",
+        keys: &[Key::number("yield_mm_per_n", "Compliance; 0 is rigid.", 0.0, 1000.0, 0.5)],
+        zero: &[("yield_mm_per_n", 0.0)],
+        build: |build: &Build| {
+            let mm_per_n = build.number("yield_mm_per_n");
+            Part::Series(Box::new(move || mm_per_n))
+        },
+    },
+    Description {
+        name: "breakable_object",
+        about: "An object that breaks under too much force and then yields.",
+        equations: &["once F > force_n: F and its energy fall to the share `left` for the rest of the run"],
+        state: "broken or not",
+        reference: "a raspberry is crushed by 1 to 2 N",
+        keys: &[
+            Key::number("force_n", "Force at which it breaks.", 0.0, 1000000.0, 1.5),
+            Key::number("left", "Share of the force that remains afterwards.", 0.001, 1.0, 0.2),
+        ],
+        zero: &[("force_n", 1000000.0)],
+        build: |build: &Build| {
+            let (force_n, left) = (build.number("force_n"), build.number("left"));
+            Part::Strength(Box::new(BreakableObject { force_n, left, broken: false }))
+        },
+    },
+    Description {
+        name: "tangential",
+        about: "Friction along the surface: the patch is elastic, sticks, and slips.",
+        equations: &[
+            "T = n_per_mm s + damping_n_s_per_mm ds/dt, s the displacement of the object against the tip since they stick",
+            "it slips where T > still N; while it slips T = slipping N, and it sticks again once the motion reverses",
+            "the patch's centre on the array moves by s",
+            "both coefficients times 1 + spread_percent / 100 g, g normal within 3 deviations, drawn once",
+        ],
+        state: "stretch of the patch, distance slipped (mm), and direction of the slip",
+        reference: "Coulomb friction behind a spring (Dahl; Mindlin's full stick): silicone on skin-like surfaces 0.5 to 1",
+        keys: &[
+            Key::number("n_per_mm", "Stiffness of the patch along the surface.", 0.001, 1000.0, 1.0),
+            Key::number("damping_n_s_per_mm", "Damping of the patch along the surface.", 0.0, 10.0, 0.001),
+            Key::number("still", "Friction coefficient at which it begins to slip.", 0.0, 10.0, 0.8),
+            Key::number("slipping", "Friction coefficient while it slips, at most `still`.", 0.0, 10.0, 0.7),
+            Key::number("spread_percent", "Deviation of both coefficients between fingers and seeds.", 0.0, 30.0, 0.0),
+            Key::number("drift_mm_per_s", "Speed of a fixed object along the surface.", -1000.0, 1000.0, 0.0),
+            Key::number("drift_from_s", "Start of that motion.", 0.0, 1000000.0, 0.0),
+        ],
+        zero: &[("drift_mm_per_s", 0.0)],
+        build: |build: &Build| {
+            let values = build.values;
+            let spread = values.number("spread_percent") / 100.0;
+            let drawn = 1.0 + spread * normal_within_3(&mut Rng::with_seed(build.seed));
+            let grip = Grip {
+                n_per_mm: values.number("n_per_mm"),
+                n_s_per_mm: values.number("damping_n_s_per_mm"),
+                still: drawn * values.number("still"),
+                slipping: drawn * values.number("slipping").min(values.number("still")),
+                drift_mm_per_s: values.number("drift_mm_per_s"),
+                drift_from_s: values.number("drift_from_s"),
+            };
+            Part::Tangent(Box::new(move || grip))
+        },
+    },
+    Description {
+        name: "object_mass",
+        about: "An object that can move and has a weight.",
+        equations: &[
+            "m dX/dt^2 = N_1 - N_2 between the fingers, m dY/dt^2 = T_1 + T_2 - m g + floor, upwards",
+            "the floor stops it without a bounce",
+        ],
+        state: "place and speed of the object along the fingers' motion and upwards",
+        reference: "Newton; g = 9.80665 m/s^2",
+        keys: &[Key::number("mass_g", "Mass; 0 is a fixed object.", 0.0, 10000.0, 20.0)],
+        zero: &[("mass_g", 0.0)],
+        build: |build: &Build| {
+            let kg = build.number("mass_g") * 1e-3;
+            Part::Body(Box::new(move || kg))
+        },
+    },
+];
+
+/// Largest radius of a tip (`[tip]`, `radius_mm`).
+const LARGEST_TIP_MM: f64 = 16.0;
+
+/// Surface by [`Shape::plain`] and by its height at a place, for a radius of the tip.
+struct Surface<F>(bool, F);
+
+impl<F: Fn(f64, f64, f64) -> f64 + Send + 'static> Surface<F> {
+    fn part(plain: bool, height_mm: F) -> Part {
+        Part::Shape(Box::new(Self(plain, height_mm)))
+    }
+}
+
+impl<F: Fn(f64, f64, f64) -> f64 + Send> Shape for Surface<F> {
+    fn height_mm(&self, x_mm: f64, y_mm: f64, radius_mm: f64) -> f64 {
+        (self.1)(x_mm, y_mm, radius_mm)
+    }
+
+    fn plain(&self) -> bool {
+        self.0
+    }
+}
+
+struct Relaxation {
+    share: f64,
+    tau_s: f64,
+    remembered_n: f64,
+    /// Last time step, and the share of a difference that remains after it: in contact, and free.
+    last_s: f64,
+    left: [f64; 2],
+}
+
+impl Memory for Relaxation {
+    fn forgotten_n(&mut self) -> f64 {
+        self.share * self.remembered_n
+    }
+
+    fn relax(&mut self, dt_s: f64, elastic_n: Option<f64>) {
+        if dt_s != self.last_s {
+            self.last_s = dt_s;
+            self.left = [1.0, 1.0 - self.share].map(|rate| decay(dt_s / self.tau_s * rate));
+        }
+        let [held, free] = self.left;
+        self.remembered_n = match elastic_n {
+            Some(elastic_n) => elastic_n + (self.remembered_n - elastic_n) * held,
+            None => self.remembered_n * free,
+        };
+    }
+}
+
+struct BreakableObject {
+    force_n: f64,
+    left: f64,
+    broken: bool,
+}
+
+impl Strength for BreakableObject {
+    fn left(&mut self, force_n: f64) -> f64 {
+        self.broken |= force_n > self.force_n;
+        if self.broken { self.left } else { 1.0 }
+    }
+
+    fn tell(&self, truth: &mut Truth) {
+        truth.broken |= self.broken;
     }
 }

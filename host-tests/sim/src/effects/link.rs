@@ -1,30 +1,27 @@
-//! Clocks, electronics, bus and host.
+//! Effects on the clock of the controller, interference, and packets of the host.
 
-mod named;
-
-use super::{Metered, Part};
+use crate::effects::{Build, Metered, Part, normal, waiting_s};
 use crate::registry::Description;
+use crate::scene::tables::{Key, Kind};
 use crate::watch::Cost;
+use fastrand::Rng;
+use fingertip::link::packet::{CRC_START, HEADER, instruction, update_crc};
 
-/// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] =
-    &[&named::CLOCK_TOLERANCE, &named::BURST, &named::HOST_JITTER, &named::LOST_PACKETS, &named::CORRUPTED_PACKETS];
-
-/// Acts on the controller's clock: how long a second of it lasts in the world, s, from this time on, s.
+/// Effect on the clock of the controller: duration of one of its seconds in the world from a time on, s.
 pub type Clock = dyn FnMut(f64) -> f64 + Send;
 
-/// Acts on the packets from the host to the controller: when one sent at a time arrives, both in s; none where it does
-/// not.
+/// Effect on packets from the host to the controller: time of arrival for a time of sending, s; none if the packet is
+/// lost.
 pub type Packets = dyn FnMut(f64) -> Option<f64> + Send;
 
-/// The stages as the board and the host call them: of the named effects, or `()`, in which none is compiled.
+/// Stages as the board and the host call them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
-    /// How long a second of the controller lasts in the world.
+    /// Duration of a second of the controller in the world.
     fn second_s(&mut self, _time_s: f64) -> f64 {
         1.0
     }
 
-    /// When a packet sent at a time arrives; none where it does not.
+    /// Time of arrival of a packet; none if it is lost.
     fn pass(&mut self, sent_s: f64) -> Option<f64> {
         Some(sent_s)
     }
@@ -47,3 +44,123 @@ impl Stages for Named {
         self.packets.iter_mut().try_fold(sent_s, |sent_s, effect| effect.call(|part| part(sent_s)))
     }
 }
+
+/// Effects of this family, in the order in which they act within a stage.
+pub const EFFECTS: &[Description] = &[
+    Description {
+        name: "clock_tolerance",
+        about: "A fast or slow clock of the controller.",
+        equations: &["a second of the controller lasts 1 / (1 + fast_ppm 10^-6) s"],
+        state: "none",
+        reference: "STM32F446 data sheet: internal oscillator +-1 % at 25 C; crystals some 50 ppm",
+        keys: &[Key::number("fast_ppm", "Deviation of the clock; negative is slow.", -50_000.0, 50_000.0, 50.0)],
+        zero: &[("fast_ppm", 0.0)],
+        build: |build: &Build| {
+            let second_s = 1.0 / (1.0 + build.number("fast_ppm") * 1e-6);
+            Part::Clock(Box::new(move |_| second_s))
+        },
+    },
+    Description {
+        name: "burst",
+        about: "Bursts of interference on the conversions.",
+        equations: &[
+            "bursts begin as a Poisson process of rate_per_s and last length_us",
+            "within one: code' = code + amplitude_codes u, u uniform in -1 to 1, drawn for each conversion",
+        ],
+        state: "begin and end of bursts, random numbers (8 bytes)",
+        reference: "the bursts of IEC 61000-4-4 as a conversion sees them: repeated, short, of any sign",
+        keys: &[
+            Key::number("rate_per_s", "Bursts in a second, on average.", 0.0, 10_000.0, 10.0),
+            Key::number("length_us", "Duration of each.", 1.0, 1e6, 300.0),
+            Key::number("amplitude_codes", "Largest deviation, 12-bit codes.", 0.0, 4096.0, 100.0),
+        ],
+        zero: &[("amplitude_codes", 0.0)],
+        build: |build: &Build| {
+            let [rate_per_s, length_us, amplitude_codes] =
+                ["rate_per_s", "length_us", "amplitude_codes"].map(|name| build.number(name));
+            let length_s = length_us * 1e-6;
+            let mut rng = Rng::with_seed(build.seed);
+            let (mut next_s, mut until_s) = (None, f64::NEG_INFINITY);
+            Part::Codes(Box::new(move |_, time_s, codes| {
+                let mut begin_s = next_s.unwrap_or_else(|| time_s + waiting_s(&mut rng, rate_per_s));
+                while begin_s <= time_s {
+                    until_s = begin_s + length_s;
+                    begin_s += waiting_s(&mut rng, rate_per_s);
+                }
+                next_s = Some(begin_s);
+                if time_s < until_s {
+                    codes.iter_mut().for_each(|code| *code += amplitude_codes * (2.0 * rng.f64() - 1.0));
+                }
+            }))
+        },
+    },
+    Description {
+        name: "host_jitter",
+        about: "Delays of the packets of the host. Packets do not overtake one another.",
+        equations: &["uniform: late by delay_ms u, u in 0 to 1", "normal: late by delay_ms |g|, g normal"],
+        state: "random numbers (8 bytes)",
+        reference: "wake-up latency of a host without a real-time kernel, 0.1 to 10 ms; USB serial adapters add up to 16 ms",
+        keys: &[
+            Key::number("delay_ms", "Largest delay (uniform) or its deviation (normal).", 0.0, 1000.0, 2.0),
+            Key {
+                name: "distribution",
+                about: "Distribution of the delays.",
+                kind: Kind::Word { words: SPREADS, default: Some("uniform") },
+            },
+        ],
+        zero: &[("delay_ms", 0.0)],
+        build: |build: &Build| {
+            let delay_s = build.number("delay_ms") * 1e-3;
+            let is_normal = build.values.word("distribution") == "normal";
+            let mut rng = Rng::with_seed(build.seed);
+            Part::Packets(Box::new(move |sent_s| {
+                let draw = if is_normal { normal(&mut rng).abs() } else { rng.f64() };
+                Some(sent_s + delay_s * draw)
+            }))
+        },
+    },
+    Description {
+        name: "lost_packets",
+        about: "Lost packets of the host. Their contents arrive with the next repetition (period_ms of [host]).",
+        equations: &["each packet is lost with the probability lost_percent / 100, independent of the others"],
+        state: "random numbers (8 bytes)",
+        reference: "a Bernoulli channel",
+        keys: &[Key::number("lost_percent", "Share of the packets that are lost.", 0.0, 100.0, 1.0)],
+        zero: &[("lost_percent", 0.0)],
+        build: |build: &Build| {
+            let lost = build.number("lost_percent") / 100.0;
+            let mut rng = Rng::with_seed(build.seed);
+            Part::Packets(Box::new(move |sent_s| (rng.f64() >= lost).then_some(sent_s)))
+        },
+    },
+    Description {
+        name: "corrupted_packets",
+        about: "Bit errors on the bus. The CRC of the firmware rejects the packet, and the next repetition (period_ms of [host]) replaces it.",
+        equations: &[
+            "each of the 128 bits of a packet flips with the probability bit_error_ppm 10^-6: a share 1 - (1 - p)^128 is hit",
+            "the packet counts if the CRC-16 of the firmware accepts it",
+        ],
+        state: "random numbers (8 bytes)",
+        reference: "DYNAMIXEL Protocol 2.0, CRC-16/BUYPASS; a binary symmetric channel",
+        keys: &[Key::number("bit_error_ppm", "Probability per bit.", 0.0, 1e6, 100.0)],
+        zero: &[("bit_error_ppm", 0.0)],
+        build: |build: &Build| {
+            let flips = build.number("bit_error_ppm") * 1e-6;
+            let mut rng = Rng::with_seed(build.seed);
+            Part::Packets(Box::new(move |sent_s| {
+                let mut flipped = || (0..8).fold(0u8, |mask, bit| mask | u8::from(rng.f64() < flips) << bit);
+                let body = BODY.map(|byte| byte ^ flipped());
+                let sum = update_crc(CRC_START, &BODY) ^ u16::from_le_bytes([flipped(), flipped()]);
+                (update_crc(CRC_START, &body) == sum).then_some(sent_s)
+            }))
+        },
+    },
+];
+
+const SPREADS: &[&str] = &["uniform", "normal"];
+
+/// Header, ID, length, instruction, address and goal of a packet, without its CRC.
+const BODY: [u8; 14] = {
+    let [a, b, c, d] = HEADER;
+    [a, b, c, d, 1, 9, 0, instruction::WRITE, 0, 0, 0, 0, 0, 0]
+};

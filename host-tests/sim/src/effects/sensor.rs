@@ -1,45 +1,29 @@
-//! From the taxels' pressure to the frame's codes.
+//! Readout from the pressures on the taxels to the codes of the frame.
 //!
-//! The stages in order: pressure (kPa a row), conductance (S a row), network (what a column sees of the driven row),
-//! volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is ideal:
-//! every taxel alike, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
+//! The stages in order: pressure (kPa, by row), conductance (S, by row), network (what a column sees of the driven
+//! row), volts (at the column amplifiers), codes (before the converter rounds down). Without effects the readout is
+//! ideal: equal taxels, a perfect row switch, a perfect virtual ground, settled at once, 12 bits.
 
-pub(crate) mod readout;
-mod taxels;
+pub(crate) mod effects;
+
+pub use effects::EFFECTS;
 
 use super::{Metered, Part};
 use crate::events::ArrayEvents;
-use crate::registry::Description;
 use crate::scene::Scene;
 use crate::setup::Array;
 use crate::watch::Cost;
 use fingertip::shipped::{COLUMNS, ROWS};
 
-/// The effects of this family, in the order in which they act within a stage.
-pub const EFFECTS: &[&Description] = &[
-    &taxels::HYSTERESIS,
-    &taxels::CREEP,
-    &taxels::GAIN_SPREAD,
-    &taxels::TEMPERATURE_DRIFT,
-    &taxels::BROKEN_TAXELS,
-    &readout::GHOSTING,
-    &readout::ROW_SAG,
-    &readout::SETTLING,
-    &readout::SATURATION,
-    &readout::NOISE,
-    &readout::OFFSET,
-    &readout::CONVERTER,
-];
-
-/// A row's or a slot's worth of numbers, a column each.
+/// A number for each column.
 pub type Row = [f64; COLUMNS];
 
-/// Acts on what a row's taxels feel, kPa.
+/// Effect on the pressures on the taxels of a row, kPa.
 pub trait Pressure: Send {
-    /// The row is sampled at this time; times never fall.
+    /// Changes the pressures of a row that is sampled at this time. Times never fall.
     fn apply(&mut self, row: usize, time_s: f64, kpa: &mut Row);
 
-    /// The microcontroller's temperature, degrees Celsius, where the effect has one.
+    /// Temperature of the microcontroller, degrees Celsius, if the effect has one.
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
     }
@@ -51,28 +35,28 @@ impl<F: FnMut(usize, f64, &mut Row) + Send> Pressure for F {
     }
 }
 
-/// Acts on the conductance of a row's taxels, S: row, time and conductance as in [`Pressure::apply`].
+/// Effect on the conductances of the taxels of a row, S: row, time and conductances as in [`Pressure::apply`].
 pub type Conductance = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Acts on the conductance that each column sees of the driven row, S: the row, every taxel's conductance as of its row's
-/// last sample, and what the columns see.
+/// Effect on the conductances that the columns see of the driven row, S: row, conductances of all taxels at the last
+/// sample of their row, and conductances seen.
 pub type Network = dyn FnMut(usize, &[Row; ROWS], &mut Row) + Send;
 
-/// Acts on the amplifiers' voltages: the slot, which is a row, or [`ROWS`] where none is driven, its time, and the voltages.
+/// Effect on the voltages of the amplifiers: slot (a row, or [`ROWS`] without one), time and voltages.
 pub type Volts = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// Acts on the converter's codes, not yet rounded: slot, time and codes as in [`Volts`].
+/// Effect on the codes of the converter before rounding: slot, time and codes as in [`Volts`].
 pub type Codes = dyn FnMut(usize, f64, &mut Row) + Send;
 
-/// The stages as the readout calls them: of the named effects, or `()`, in which none is compiled.
+/// Stages as the readout calls them: of the named effects, or of `()`, which has none compiled in.
 pub trait Stages {
-    /// Whether none of the stages holds an effect: the readout is then ideal, and asks for no stage.
+    /// True if no stage has an effect: the readout is then ideal and calls none.
     fn none(&self) -> bool;
-    /// The microcontroller's temperature, degrees Celsius, where an effect has one.
+    /// Temperature of the microcontroller, degrees Celsius, if an effect has one.
     fn chip_c(&self, _time_s: f64) -> Option<f64> {
         None
     }
-    /// All effects of the stage, in order.
+    /// Calls the effects of the stage, in order.
     fn pressure(&mut self, _row: usize, _time_s: f64, _kpa: &mut Row) {}
     /// As [`Stages::pressure`].
     fn conductance(&mut self, _row: usize, _time_s: f64, _siemens: &mut Row) {}
@@ -128,7 +112,7 @@ impl Stages for Named {
     }
 }
 
-/// The readout of one finger's array.
+/// Readout of the array of one finger.
 pub struct Readout {
     array: Array,
     volts_per_siemens: f64,
@@ -138,7 +122,7 @@ pub struct Readout {
 }
 
 impl Readout {
-    /// Of an array whose row switches are perfect; what its `row_ohm` and `settle_tau_s` say is the effects' to say.
+    /// Readout with perfect row switches. Effects decide on `row_ohm` and `settle_tau_s` of the array.
     pub fn new(array: &Array) -> Self {
         let volts_per_siemens = array.feedback_ohm * array.drive_v;
         let codes_per_volt = Array::CODES / array.reference_v;
@@ -146,15 +130,15 @@ impl Readout {
         Self { array: *array, volts_per_siemens, codes_per_volt, siemens, events: None }
     }
 
-    /// The same with the events of a scene that change a finger's codes.
+    /// Adds the events of a scene that change the codes of a finger.
     pub fn with_events(self, scene: &Scene, finger: usize) -> Self {
         Self { events: ArrayEvents::of(scene, finger), ..self }
     }
 
-    /// The codes of a slot sampled at a time, its row under these pressures (not looked at where no row is driven).
+    /// Returns the codes of a slot sampled at a time, for the pressures on its row (unused where no row is driven).
     #[inline]
     pub fn codes(&mut self, stages: &mut impl Stages, slot: usize, time_s: f64, kpa: &Row) -> [u16; COLUMNS] {
-        // A row that no effect may look at between the stages stays in registers all the way.
+        // Without effects a row stays in registers through all stages.
         let mut codes = if stages.none() {
             self.through(&mut (), slot, time_s, kpa)
         } else {
@@ -175,11 +159,11 @@ impl Readout {
         stages.volts(slot, time_s, &mut volts);
         let mut codes = volts.map(|volts| volts * self.codes_per_volt);
         stages.codes(slot, time_s, &mut codes);
-        // What becomes an integer is cut: rounded down, and 0 below it.
+        // The conversion to an integer rounds down, and negative values become 0.
         codes.map(|code| (code as u16).min(Array::CODES as u16 - 1))
     }
 
-    /// Adds what a driven row under these pressures gives to the columns' voltages.
+    /// Adds the voltages of a driven row under these pressures.
     #[inline(always)]
     pub fn add_row(&mut self, stages: &mut impl Stages, row: usize, time_s: f64, kpa: &Row, volts: &mut Row) {
         let (array, mut kpa) = (&self.array, *kpa);

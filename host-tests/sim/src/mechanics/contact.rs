@@ -1,21 +1,20 @@
-//! One finger's contact: its normal force, what it feels on the taxels, and the friction along the surface.
+//! Contact of one finger: normal force, pressures on the taxels, and friction along the surface.
 
-use super::elastic::Elastic;
-use super::normal::Law;
-use super::pressures::{Between, Pressures};
-use super::shape;
 use crate::effects::contact::{Grip, Stages};
+use crate::mechanics::normal::{Elastic, Law};
+use crate::mechanics::pressures::{Between, Pressures};
+use crate::mechanics::shape;
 use crate::setup::Setup;
 use fingertip::shipped::COLUMNS;
 
-/// A contact and its effects.
+/// Contact of one finger, with its effects.
 pub struct Contact<C> {
-    /// The effects that act on it.
+    /// Effects on the contact.
     pub effects: C,
-    /// Its state along the surface.
+    /// State along the surface.
     pub along: Along,
     elastic: Elastic,
-    /// Indentation, and where the centre of pressure then is; none on a plane.
+    /// Indentations, each with the centre of pressure; empty on a plane.
     centres: Vec<[f64; 3]>,
     pressures: Pressures,
     mm_per_n: f64,
@@ -25,32 +24,32 @@ pub struct Contact<C> {
     left: f64,
 }
 
-/// How a contact touches: all that its rows have in common.
+/// Contact at an instant: what its rows have in common.
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     between: Between,
-    /// Of the pressures that the indentation alone gives.
+    /// Share of the pressures of the indentation alone.
     share: f64,
 }
 
 impl Place {
-    /// Nowhere.
+    /// No contact.
     pub const NOWHERE: Self = Self { between: Between::NOTHING, share: 1.0 };
 }
 
-/// How the patch is stretched along the surface, and how far it slipped.
+/// Stretch of the patch along the surface, and its slip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Along {
-    /// The object's displacement against the tip since they stick, mm.
+    /// Displacement of the object against the tip since they stick, mm.
     pub stretch_mm: f64,
-    /// Way slipped, either way, mm.
+    /// Distance slipped, in both directions, mm.
     pub slip_mm: f64,
-    /// Whether it slips, and which way.
+    /// Direction of the slip; 0 while it sticks.
     pub slipping: f64,
 }
 
 impl<C: Stages> Contact<C> {
-    /// Of a finger.
+    /// Contact of a finger.
     pub fn new(setup: &Setup, mut effects: C) -> Self {
         effects.shape_built();
         let (elastic, centres) = if effects.shaped() {
@@ -75,12 +74,12 @@ impl<C: Stages> Contact<C> {
         }
     }
 
-    /// What holds through the next step.
+    /// Returns the law of the force for the next step.
     pub fn law(&self) -> Law<'_> {
         Law { elastic: &self.elastic, forgotten_n: self.forgotten_n, mm_per_n: self.mm_per_n, left: self.left }
     }
 
-    /// Lets the tip forget for a while at an overlap.
+    /// Lets the tip relax for a time at an overlap.
     pub fn relax(&mut self, dt_s: f64, x_mm: f64) {
         if !self.effects.forgets() {
             return;
@@ -90,7 +89,7 @@ impl<C: Stages> Contact<C> {
         self.forgotten_n = self.effects.forgotten_n();
     }
 
-    /// Lets the object bear the force of an overlap.
+    /// Loads the object with the force of an overlap.
     pub fn bear(&mut self, x_mm: f64) {
         if self.effects.breaks() {
             let force_n = self.law().force_n(x_mm);
@@ -98,7 +97,7 @@ impl<C: Stages> Contact<C> {
         }
     }
 
-    /// How it touches at an overlap.
+    /// Returns the contact at an overlap.
     #[inline]
     pub fn place(&self, x_mm: f64) -> Place {
         if x_mm <= 0.0 {
@@ -115,14 +114,14 @@ impl<C: Stages> Contact<C> {
         Place { between, share: if elastic_n > 0.0 { law.of_depth_n(d_mm) / elastic_n } else { law.left } }
     }
 
-    /// Means of a row's taxels where it touches like this.
+    /// Returns the mean pressures on the taxels of a row.
     #[inline]
     pub fn row_kpa(&mut self, place: &Place, row: usize) -> [f64; COLUMNS] {
         let kpa = self.pressures.row_kpa(&self.effects, &place.between, row);
         if place.share == 1.0 { kpa } else { kpa.map(|kpa| kpa * place.share) }
     }
 
-    /// Where the centre of pressure is at an indentation, from where the tip's axis meets the surface.
+    /// Returns the centre of pressure at an indentation, from where the axis of the tip meets the surface.
     pub fn centre_mm(&self, d_mm: f64) -> [f64; 2] {
         let above = self.centres.partition_point(|[knot_mm, ..]| *knot_mm < d_mm);
         let [x, y] = match self.centres.get(above.min(self.centres.len().saturating_sub(1))) {
@@ -132,8 +131,7 @@ impl<C: Stages> Contact<C> {
         [x, y + self.along.stretch_mm]
     }
 
-    /// How steep force against overlap can become: at the deepest indentation, the object's yielding left out where it
-    /// has none.
+    /// Returns the largest slope of force against overlap, at the deepest indentation.
     pub fn steepest_n_per_mm(&self, deepest_mm: f64) -> f64 {
         let tip = self.elastic.n_per_mm(deepest_mm);
         tip / (1.0 + self.mm_per_n * tip)
@@ -141,14 +139,14 @@ impl<C: Stages> Contact<C> {
 }
 
 impl Along {
-    /// The mean force on the object along the surface over a step in which it moves so far against the tip, and the
-    /// state behind it.
+    /// Returns the mean force on the object along the surface over a step with this displacement against the tip, and
+    /// the state after it.
     pub fn moved(&self, grip: &Grip, normal_n: f64, way_mm: f64, dt_s: f64) -> (f64, Self) {
         let mut next = *self;
         let damping = if dt_s > 0.0 { grip.n_s_per_mm / dt_s } else { 0.0 };
         let trial_mm = self.stretch_mm + way_mm;
         let trial_n = grip.n_per_mm * trial_mm + damping * way_mm;
-        // It sticks again once the motion turns against the slip.
+        // It sticks again once the motion reverses.
         let slips = self.slipping != 0.0 && way_mm * self.slipping > 0.0;
         let limit_n = if slips { grip.slipping } else { grip.still } * normal_n;
         if trial_n.abs() > limit_n {

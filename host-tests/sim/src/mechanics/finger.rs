@@ -1,23 +1,23 @@
-//! One finger: shaft, winding, gear, tip and its contact.
+//! One finger: shaft, winding, gear, tip and contact.
 
-use super::acting::{Acts, resistive};
-use super::contact::Contact;
-use crate::effects::drive::{Circuit, Friction};
-use crate::effects::{contact, drive};
-use crate::mechanics::rotor::{Rotor, Shaft};
-use crate::{bridge::Bridge, setup::Setup};
+use crate::bridge::Bridge;
+use crate::effects::contact;
+use crate::effects::drive::{self, Circuit, Friction};
+use crate::mechanics::contact::Contact;
+use crate::mechanics::rotor::{Acts, Rotor, Shaft, resistive};
+use crate::setup::Setup;
 use core::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
-/// Rounds of a step's solution at most, and the share of the speed at which they end.
+/// Most iterations of the solution of a step, and the share of the speed at which they end.
 const ROUNDS: usize = 40;
 const TOLERANCE: f64 = 1e-15;
 
-/// A finger and the effects on its drive.
+/// Finger with the effects on its drive.
 pub struct Finger<D, C> {
-    /// What it touches.
+    /// Contact with the object.
     pub contact: Contact<C>,
-    /// The effects that act on its drive.
+    /// Effects on the drive.
     pub drive: D,
     setup: Setup,
     rotor: Rotor,
@@ -35,7 +35,7 @@ pub struct Finger<D, C> {
     fallen_v: Option<f64>,
 }
 
-/// What moves, with what holds through the last step: set up alike, a finger goes on from it to the bit.
+/// State of the motion. A finger of the same setup continues from it to the bit.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Motion {
     shafts: [Shaft; 2],
@@ -47,17 +47,17 @@ pub struct Motion {
     dt_s: f64,
 }
 
-/// Where a step ends.
+/// End of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct End {
-    /// Angle and speed.
+    /// Angle and speed at the end.
     pub shaft: Shaft,
     winding_a: f64,
     square_a2_s: f64,
 }
 
 impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
-    /// At rest at travel 0, the bridge open.
+    /// Creates a finger at rest at travel 0, with the bridge open.
     pub fn new(setup: &Setup, mut drive: D, contact: C) -> Self {
         let mm_per_rad = setup.transmission.drum_radius_mm / setup.transmission.ratio;
         let rotor = Rotor {
@@ -88,12 +88,11 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         }
     }
 
-    /// What it is made of.
     pub fn setup(&self) -> &Setup {
         &self.setup
     }
 
-    /// Inertia at the shaft over the square of the tip's way for each angle: the mass that the tip feels like.
+    /// Effective mass of the finger at the tip.
     pub fn mass_kg(&self) -> f64 {
         self.rotor.inertia_kg_m2 / (self.mm_per_rad * 1e-3) / (self.mm_per_rad * 1e-3)
     }
@@ -103,7 +102,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.inertia_kg_m2
     }
 
-    /// Asks the effects what holds through the next step.
+    /// Sets what holds during the next step.
     pub fn prepare(&mut self, dt_s: f64, bridge: Bridge) {
         self.before = self.shaft;
         self.dt_s = dt_s;
@@ -123,8 +122,8 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.torque_nm_per_a = self.circuit.torque_nm_per_a;
     }
 
-    /// Where the step prepared ends against a load: its mean force between two places of the pressing flank. Changes
-    /// nothing.
+    /// Returns the end of the prepared step against a load: the mean force between two places of the pressing flank.
+    /// Changes no state.
     pub fn solve(&mut self, load_n: impl Fn(&Contact<C>, f64, f64) -> f64) -> End {
         let mut acting = Acts {
             alone: self.drive.none(),
@@ -142,7 +141,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         End { shaft, winding_a: acting.winding_a, square_a2_s: acting.square_a2_s }
     }
 
-    /// Goes to the step's end; the object's surface then stands at this travel.
+    /// Moves to the end of the step, where the surface of the object is at this travel.
     pub fn finish(&mut self, end: &End, surface_mm: f64) {
         self.shaft = end.shaft;
         self.winding_a = end.winding_a;
@@ -159,7 +158,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         }
     }
 
-    /// Holds it where it meets an end.
+    /// Stops the finger at its end stops.
     fn stop_at_ends(&mut self) {
         let Some([rear_mm, front_mm]) = self.drive.end_stops_mm() else { return };
         let held_mm = self.flank_mm().clamp(rear_mm, front_mm);
@@ -168,13 +167,13 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         }
     }
 
-    /// What moves.
+    /// Returns the state of the motion.
     pub fn motion(&self) -> Motion {
         let Self { before, shaft, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s, .. } = *self;
         Motion { shafts: [before, shaft], rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s }
     }
 
-    /// Goes on from there.
+    /// Continues from a state of the motion.
     pub fn resume(&mut self, motion: &Motion) {
         let Motion { shafts, rad_per_s2, winding_a, tip_mm, bridge, circuit, dt_s } = *motion;
         [self.before, self.shaft] = shafts;
@@ -182,18 +181,18 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         (self.bridge, self.circuit) = (bridge, circuit);
     }
 
-    /// Puts it at rest at a travel, as if carried there.
+    /// Puts the finger at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
         self.shaft = Shaft { angle_rad: travel_mm / self.mm_per_rad, speed_rad_per_s: 0.0 };
         (self.before, self.rad_per_s2, self.winding_a, self.tip_mm) = (self.shaft, 0.0, 0.0, travel_mm);
     }
 
-    /// Puts the object's surface where the tip meets it at this travel.
+    /// Puts the surface of the object where the tip meets it at this travel.
     pub fn place_object(&mut self, distance_mm: f64) {
         self.setup.wall.distance_mm = distance_mm;
     }
 
-    /// Sets the effect of events: counts that the encoder has slipped by, and the voltage to which the supply has dropped.
+    /// Sets the counts by which the encoder has slipped, and the voltage to which the supply has dropped.
     pub fn happen(&mut self, slipped_counts: i32, fallen_v: Option<f64>) {
         (self.slipped_counts, self.fallen_v) = (slipped_counts, fallen_v);
     }
@@ -204,22 +203,22 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         if load_share < 1.0 { holding_nm / (self.mm_per_rad * 1e-3 * (1.0 - load_share)) } else { f64::INFINITY }
     }
 
-    /// Sets its speed.
+    /// Sets the speed of the tip.
     pub fn launch(&mut self, mm_per_s: f64) {
         self.shaft.speed_rad_per_s = mm_per_s / self.mm_per_rad;
     }
 
-    /// Travel of the gear's pressing flank, which is the tip's where it presses.
+    /// Travel of the pressing flank of the gear; that of the tip while it presses.
     pub fn flank_mm(&self) -> f64 {
         self.shaft.angle_rad * self.mm_per_rad
     }
 
-    /// The same for the angle of an end.
+    /// Travel of the pressing flank at the end of a step.
     pub fn flank_at_mm(&self, end: &End) -> f64 {
         end.shaft.angle_rad * self.mm_per_rad
     }
 
-    /// The same at a time within the last step.
+    /// Travel of the pressing flank at a time within the last step.
     pub fn flank_within_mm(&self, since_s: f64) -> f64 {
         if since_s >= self.dt_s {
             return self.flank_mm();
@@ -233,12 +232,12 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.shaft.angle_rad + ahead_s * (self.shaft.speed_rad_per_s + 0.5 * self.rad_per_s2 * ahead_s)
     }
 
-    /// Travel of the pressing flank a while behind the last step, where all goes on as it did in it.
+    /// Travel of the pressing flank at a time after the last step, at constant acceleration.
     pub fn flank_ahead_mm(&self, ahead_s: f64) -> f64 {
         self.angle_ahead_rad(ahead_s) * self.mm_per_rad
     }
 
-    /// What the encoder reads a while behind the last step; now, at 0.
+    /// Count of the encoder at a time after the last step, at constant acceleration.
     pub fn count_ahead(&mut self, ahead_s: f64) -> i32 {
         let turns = self.angle_ahead_rad(ahead_s) / TAU;
         let count = (turns * self.setup.motor.encoder_counts_per_turn).floor() as i32;
@@ -256,7 +255,7 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.shaft
     }
 
-    /// Speed of the tip where the gear drives it.
+    /// Speed of the tip while the gear drives it.
     pub fn speed_mm_per_s(&self) -> f64 {
         self.shaft.speed_rad_per_s * self.mm_per_rad
     }
@@ -270,17 +269,17 @@ impl<D: drive::Stages, C: contact::Stages> Finger<D, C> {
         self.rotor.current_a(&source, self.shaft.speed_rad_per_s)
     }
 
-    /// The supply at the bridge.
+    /// Voltage of the supply at the bridge.
     pub fn supply_v(&self) -> f64 {
         self.circuit.source_v - self.circuit.source_ohm * self.circuit.duty * self.current_a()
     }
 
-    /// The share of the supply that the bridge gave in the last step.
+    /// Share of the supply at the motor in the last step.
     pub fn duty(&self) -> f64 {
         self.circuit.duty
     }
 
-    /// Kinetic energy and that of the effects on the drive, mJ.
+    /// Kinetic energy, and energy of the effects on the drive, mJ.
     pub fn energy_mj(&self) -> f64 {
         let speed = self.shaft.speed_rad_per_s;
         let winding_j = 0.5 * self.circuit.henry * self.winding_a * self.winding_a;

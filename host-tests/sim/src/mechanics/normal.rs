@@ -1,39 +1,36 @@
-//! The normal force between tip and object over a step: elastic, less what is forgotten, in series with the object's
-//! own yielding.
+//! Normal force between tip and object during a step: elastic, less the relaxed force, in series with the object.
 //!
-//! With the elastic force F_e, a forgotten force S, the object's compliance c and the share k that is left of it all:
+//! With the elastic force F_e, a relaxed force S, the compliance c of the object and the share k of the force that
+//! remains:
 //!
 //! ```text
 //! N(d) = max(0, F_e(d) - S)      x = d + c N(d)      F = k N      E = k (integral of N over d + c N^2 / 2)
 //! ```
 //!
-//! so F = dE/dx. Below the indentation at which F_e = S the tip, not yet back in shape, does not touch.
+//! so F = dE/dx. Below the indentation at which F_e = S the tip does not touch, as its shape has not recovered. The
+//! elastic force is a closed form on a plane and a table on other surfaces.
 
-use super::elastic::Elastic;
+use crate::mechanics::rotor::mean_square;
 
-/// What holds through a step.
+/// Law of the normal force during a step. The fields are F_e, S, c and k above.
 #[derive(Clone, Copy, Debug)]
 pub struct Law<'a> {
-    /// F_e.
     pub elastic: &'a Elastic,
-    /// S.
     pub forgotten_n: f64,
-    /// c.
     pub mm_per_n: f64,
-    /// k.
     pub left: f64,
 }
 
 impl Law<'_> {
-    /// The tip's indentation at an overlap; negative where there is none.
+    /// Indentation of the tip at an overlap; negative without contact.
     #[inline]
     pub fn depth_mm(&self, x_mm: f64) -> f64 {
         if self.mm_per_n == 0.0 || x_mm <= 0.0 { x_mm } else { self.yielding_mm(x_mm) }
     }
 
     fn yielding_mm(&self, x_mm: f64) -> f64 {
-        // Between these two d + c N(d) - x changes its sign; it rises and bends upwards, so Newton from above never
-        // leaves.
+        // d + c N(d) - x changes its sign between these two. It rises and is convex, so Newton's method from above stays
+        // between them.
         let free_mm = self.elastic.depth_mm(self.forgotten_n);
         if x_mm <= free_mm {
             return x_mm;
@@ -84,7 +81,7 @@ impl Law<'_> {
         self.left * (tip + 0.5 * self.mm_per_n * net_n * net_n)
     }
 
-    /// Mean force between two overlaps: the difference in energy over the way.
+    /// Mean force between two overlaps: the difference in energy over the distance.
     #[inline]
     pub fn mean_n(&self, x0: f64, x1: f64) -> f64 {
         if x0 <= 0.0 && x1 <= 0.0 {
@@ -116,5 +113,131 @@ impl Law<'_> {
         let (from, to) = (d0.max(free_mm), d1.max(free_mm));
         let share = if d0 == d1 { f64::from(d0 > free_mm) } else { (to - from) / (d1 - d0) };
         (self.elastic.mean_n(from, to) - self.forgotten_n).max(0.0) * share
+    }
+}
+
+/// Elastic force of an indentation. Beyond the table the force continues in a straight line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Elastic {
+    /// A rigid plane: F = c d^2.
+    Plane {
+        /// c = pi Y, N/mm^2.
+        n_per_mm2: f64,
+    },
+    /// Straight lines between knots; the energy is their integral, so force = dE/dd holds by construction.
+    Table(Table),
+}
+
+/// Knots of a force that never falls, from 0 at 0.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Indentation, mm; rising.
+    d_mm: Vec<f64>,
+    force_n: Vec<f64>,
+    energy_mj: Vec<f64>,
+}
+
+impl Table {
+    /// Creates a table of knots from d = 0 on: at least two, d rising, force not falling.
+    pub fn new(d_mm: Vec<f64>, force_n: Vec<f64>) -> Self {
+        let mut energy_mj = vec![0.0; d_mm.len()];
+        for knot in 1..d_mm.len() {
+            let mean = 0.5 * (force_n[knot] + force_n[knot - 1]);
+            energy_mj[knot] = energy_mj[knot - 1] + mean * (d_mm[knot] - d_mm[knot - 1]);
+        }
+        Self { d_mm, force_n, energy_mj }
+    }
+
+    /// Returns the segment of a value, by its lower knot.
+    fn below(&self, knots: &[f64], value: f64) -> usize {
+        knots.partition_point(|knot| *knot <= value).clamp(1, knots.len() - 1) - 1
+    }
+
+    fn slope(&self, line: usize) -> f64 {
+        (self.force_n[line + 1] - self.force_n[line]) / (self.d_mm[line + 1] - self.d_mm[line])
+    }
+
+    fn on_line(&self, line: usize, d_mm: f64) -> f64 {
+        self.force_n[line] + (d_mm - self.d_mm[line]) * self.slope(line)
+    }
+
+    fn force_n(&self, d_mm: f64) -> f64 {
+        if d_mm <= 0.0 { 0.0 } else { self.on_line(self.below(&self.d_mm, d_mm), d_mm) }
+    }
+
+    fn energy_mj(&self, d_mm: f64) -> f64 {
+        if d_mm <= 0.0 {
+            return 0.0;
+        }
+        let line = self.below(&self.d_mm, d_mm);
+        let over = d_mm - self.d_mm[line];
+        self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.slope(line))
+    }
+
+    /// Mean force between two indentations. Within a segment it is the mean of the ends, exact at any distance.
+    fn mean_n(&self, d0: f64, d1: f64) -> f64 {
+        if d0 == d1 {
+            return self.force_n(d0);
+        }
+        let (low, high) = (d0.min(d1), d0.max(d1));
+        let (first, last) = (self.below(&self.d_mm, low), self.below(&self.d_mm, high));
+        let part = |line: usize, from: f64, to: f64| {
+            let (from, to) = (from.max(0.0), to.max(0.0));
+            0.5 * (self.on_line(line, from) + self.on_line(line, to)) * (to - from)
+        };
+        if first == last {
+            return part(first, low, high) / (high - low);
+        }
+        let inner = self.energy_mj[last] - self.energy_mj[first + 1];
+        (part(first, low, self.d_mm[first + 1]) + inner + part(last, self.d_mm[last], high)) / (high - low)
+    }
+
+    fn depth_mm(&self, force_n: f64) -> f64 {
+        if force_n <= 0.0 {
+            return 0.0;
+        }
+        let line = self.below(&self.force_n, force_n);
+        self.d_mm[line] + (force_n - self.force_n[line]) / self.slope(line)
+    }
+}
+
+impl Elastic {
+    pub fn force_n(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => n_per_mm2 * d_mm.max(0.0) * d_mm.max(0.0),
+            Self::Table(table) => table.force_n(d_mm),
+        }
+    }
+
+    /// Indentation of a force, the inverse of [`Elastic::force_n`]; 0 without a force.
+    pub fn depth_mm(&self, force_n: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => (force_n.max(0.0) / n_per_mm2).sqrt(),
+            Self::Table(table) => table.depth_mm(force_n),
+        }
+    }
+
+    pub fn energy_mj(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => n_per_mm2 / 3.0 * d_mm.max(0.0).powi(3),
+            Self::Table(table) => table.energy_mj(d_mm),
+        }
+    }
+
+    /// Mean force between two indentations: the difference in energy over the distance.
+    #[inline]
+    pub fn mean_n(&self, d0: f64, d1: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => mean_square(*n_per_mm2, d0, d1),
+            Self::Table(table) => table.mean_n(d0, d1),
+        }
+    }
+
+    /// Slope of the force.
+    pub fn n_per_mm(&self, d_mm: f64) -> f64 {
+        match self {
+            Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),
+            Self::Table(table) => table.slope(table.below(&table.d_mm, d_mm)),
+        }
     }
 }

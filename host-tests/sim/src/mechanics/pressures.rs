@@ -1,42 +1,49 @@
-//! What each taxel feels of a contact, quick: its mean pressure depends only on the indentation and on where the
-//! contact's centre is.
+//! Mean pressures on the taxels, fast: they depend only on the indentation and on the centre of the contact.
 //!
-//! Means are worked out at the knots of a grid, once each and only where a contact comes by, and interpolated between
-//! them. The grid runs in the square root of the indentation, in which the rim moves evenly, and holds the means as
-//! shares of the peak Y d / a, which vary slowly. Cubic lines through four knots, with equal slopes where they meet
-//! (Catmull and Rom).
+//! The means are computed at the knots of a grid, once each and only where a contact needs them, and interpolated
+//! between them. The grid runs in the square root of the indentation, in which the rim moves evenly, and holds the
+//! means as shares of the peak Y d / a, which vary slowly. Cubic lines through four knots have equal slopes where they
+//! meet (Catmull and Rom).
+//!
+//! The mean over the square of a taxel: inside the contact the pressure is smooth, so 3 x 3 Gauss points are enough.
+//! The rim bends the pressure. A square that the rim crosses is cut into strips along y at every place where the rim
+//! meets a side or turns, and each strip into chords that end on the rim. Along a chord the pressure is smooth; across,
+//! it ends like (r_c - y)^1.5, which takes 5 points.
+//!
+//! The tip on a rigid plane is that of Park, Kim and Hirai, "Development of a Soft-fingertip and Its Modeling Based on
+//! Force Distribution", ICRA 2003.
 
-use super::shape;
 use crate::effects::contact::Stages;
-use crate::mechanics::cells::Cell;
-use crate::setup::Tip;
+use crate::mechanics::shape;
+use crate::setup::{Setup, Tip};
+use core::f64::consts::PI;
 use fingertip::shipped::{COLUMNS, ROWS};
 
-/// A row's taxels.
+/// Pressures on the taxels of a row.
 type Row = [f64; COLUMNS];
-/// Distance of knots in the square root of the indentation, sqrt(mm): the rim moves 0.07 mm from one to the next.
+/// Distance of knots in the square root of the indentation, sqrt(mm): the rim moves 0.07 mm per knot.
 const ROOT: f64 = 1.0 / 64.0;
-/// Distance of knots in the centre's place, mm.
+/// Distance of knots in the place of the centre, mm.
 const PLACE_MM: f64 = 0.125;
-/// Knots on either side of the centre's place at rest.
+/// Knots on either side of the place of the centre at rest.
 const PLACES: usize = 64;
 
-/// The means of one finger's taxels.
+/// Mean pressures on the taxels of one finger.
 pub struct Pressures {
     tip: Tip,
     pitch_mm: f64,
     centre_mm: [f64; 2],
     deepest_mm: f64,
     peak_per_mm: f64,
-    /// For each place of the centre by the root, beginning with the knot before the first: the shares are even in the
-    /// root.
+    /// Knots by place of the centre and root of the indentation. The first root is the knot before 0: the shares are
+    /// even in the root.
     knots: Vec<Vec<Knot>>,
 }
 
-/// All taxels' means as shares of the peak, once they are worked out.
+/// Mean pressures on all taxels as shares of the peak, once they are computed.
 type Knot = Option<Box<[Row; ROWS]>>;
 
-/// Where between the knots a contact is: what its rows have in common.
+/// Place of a contact between the knots: what its rows have in common.
 #[derive(Clone, Copy, Debug)]
 pub struct Between {
     root: usize,
@@ -50,14 +57,14 @@ impl Between {
     pub const NOTHING: Self = Self { root: 0, weights: [0.0; 4], peak_kpa: 0.0, shift_mm: 0.0 };
 }
 
-/// The four knots around a root.
+/// Four knots around a root.
 struct Around {
     place: usize,
     root: usize,
 }
 
 impl Pressures {
-    /// Of a tip over an array whose middle is so far from the contact's centre.
+    /// Pressures of a tip on an array whose middle has this distance from the centre of the contact.
     pub fn new(tip: Tip, pitch_mm: f64, centre_mm: [f64; 2]) -> Self {
         let deepest_mm = Tip::DEEPEST * tip.radius_mm;
         let roots = (deepest_mm.sqrt() / ROOT) as usize + 4;
@@ -66,7 +73,7 @@ impl Pressures {
         Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots }
     }
 
-    /// Where an indentation is, with the centre shifted along the rows.
+    /// Returns the place of an indentation, with the centre shifted along the rows.
     #[inline]
     pub fn between(&self, d_mm: f64, shift_mm: f64) -> Between {
         if d_mm <= 0.0 {
@@ -77,7 +84,7 @@ impl Pressures {
         Between { root, weights, peak_kpa: self.peak_per_mm * d_mm, shift_mm }
     }
 
-    /// Means of one row.
+    /// Returns the mean pressures on a row.
     #[inline]
     pub fn row_kpa(&mut self, stages: &impl Stages, between: &Between, row: usize) -> Row {
         let mut kpa = [0.0; COLUMNS];
@@ -89,11 +96,11 @@ impl Pressures {
         kpa
     }
 
-    /// Sets the means, or says which knots are not worked out yet.
+    /// Sets the mean pressures, or returns the knots that are not computed yet.
     fn sum(&self, between: &Between, row: usize, kpa: &mut Row) -> Result<(), Around> {
         let Between { root, weights, peak_kpa, shift_mm } = *between;
         if shift_mm == 0.0 {
-            // At a knot, as where nothing moves along the surface, it alone counts.
+            // Without a shift along the surface the place is a knot.
             let [a, b, c, d] = self.around(PLACES, root, row)?;
             let [wa, wb, wc, wd] = weights.map(|weight| weight * peak_kpa);
             *kpa = core::array::from_fn(|n| positive(wa * a[n] + wb * b[n] + wc * c[n] + wd * d[n]));
@@ -112,7 +119,7 @@ impl Pressures {
         Ok(())
     }
 
-    /// A row at the four knots around a root.
+    /// Returns a row at the four knots around a root.
     #[inline(always)]
     fn around(&self, place: usize, root: usize, row: usize) -> Result<[&Row; 4], Around> {
         match &self.knots[place][root..root + 4] {
@@ -121,7 +128,7 @@ impl Pressures {
         }
     }
 
-    /// Where a contact comes by for the first time: not to be in the way of what is done for each row.
+    /// Computes the knots around a root at the first contact there. Cold, so that the work for each row stays fast.
     #[cold]
     fn work_out(&mut self, stages: &impl Stages, around: Around) {
         let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
@@ -133,7 +140,7 @@ impl Pressures {
     }
 }
 
-/// The means as shares of the peak.
+/// Mean pressures as shares of the peak.
 fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d_mm: f64) -> [Row; ROWS] {
     if d_mm == 0.0 {
         return [[0.0; COLUMNS]; ROWS];
@@ -150,12 +157,12 @@ fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d
     })
 }
 
-/// What is above 0, and 0 else: the lines overshoot where a taxel begins to feel the rim.
+/// Cuts negative values: the interpolation overshoots where a taxel first touches the rim.
 fn positive(kpa: f64) -> f64 {
     if kpa > 0.0 { kpa } else { 0.0 }
 }
 
-/// The lower knot and the weights of the four around a place.
+/// Lower knot of a place, and the weights of the four knots around it.
 fn weigh(place: f64) -> (usize, [f64; 4]) {
     let knot = place as i32;
     let t = place - f64::from(knot);
@@ -167,4 +174,159 @@ fn weigh(place: f64) -> (usize, [f64; 4]) {
         0.5 * (t3 - t2),
     ];
     (knot as usize, weights)
+}
+
+/// Gauss-Legendre nodes and weights on -1..1, 3 points: 0 and sqrt(3/5); 5/9, 8/9, 5/9.
+const GAUSS3: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+    (0.0, 0.888_888_888_888_888_8),
+    (0.774_596_669_241_483_4, 0.555_555_555_555_555_6),
+];
+
+/// Gauss-Legendre nodes and weights on -1..1, 5 points.
+const GAUSS5: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_08),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_47),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_08),
+];
+
+/// Rectangle, from the centre of the contact, mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Left and right side.
+    pub x_mm: [f64; 2],
+    /// Lower and upper side.
+    pub y_mm: [f64; 2],
+}
+
+impl Cell {
+    /// Square of a taxel.
+    pub fn of(setup: &Setup, row: usize, column: usize) -> Self {
+        Self::at(setup.array.pitch_mm, [setup.wall.centre_x_mm, setup.wall.centre_y_mm], row, column)
+    }
+
+    /// Square of a taxel of an array with this pitch, under a contact with this centre.
+    pub fn at(pitch_mm: f64, centre_mm: [f64; 2], row: usize, column: usize) -> Self {
+        let left = (column as f64 - 0.5 * COLUMNS as f64) * pitch_mm - centre_mm[0];
+        let low = (row as f64 - 0.5 * ROWS as f64) * pitch_mm - centre_mm[1];
+        Self { x_mm: [left, left + pitch_mm], y_mm: [low, low + pitch_mm] }
+    }
+
+    /// Mean pressure on the rectangle.
+    pub fn mean_kpa(&self, tip: &Flattened) -> f64 {
+        let rim2 = tip.contact_radius2_mm2();
+        let near2 = square(nearest(self.x_mm)) + square(nearest(self.y_mm));
+        if near2 >= rim2 {
+            return 0.0;
+        }
+        let far2 = square(farthest(self.x_mm)) + square(farthest(self.y_mm));
+        let integral = if far2 <= rim2 {
+            gauss(&GAUSS3, self.y_mm, |y| gauss(&GAUSS3, self.x_mm, |x| tip.pressure_kpa(x * x + y * y)))
+        } else {
+            self.cut_by_rim(tip, rim2)
+        };
+        integral / ((self.x_mm[1] - self.x_mm[0]) * (self.y_mm[1] - self.y_mm[0]))
+    }
+
+    fn cut_by_rim(&self, tip: &Flattened, rim2: f64) -> f64 {
+        let rim = rim2.sqrt();
+        let chord = |y: f64| {
+            let half = (rim2 - y * y).max(0.0).sqrt();
+            let ends = [self.x_mm[0].max(-half), self.x_mm[1].min(half)];
+            if ends[0] < ends[1] { gauss(&GAUSS3, ends, |x| tip.pressure_kpa(x * x + y * y)) } else { 0.0 }
+        };
+        let meets = self.x_mm.map(|x| (rim2 - x * x).max(0.0).sqrt());
+        let (low, high) = (meets[0].min(meets[1]), meets[0].max(meets[1]));
+        let mut cuts = [self.y_mm[0], -rim, -high, -low, low, high, rim, self.y_mm[1]];
+        for cut in &mut cuts {
+            *cut = cut.clamp(self.y_mm[0], self.y_mm[1]);
+        }
+        cuts.windows(2)
+            .map(|strip| if strip[0] < strip[1] { gauss(&GAUSS5, [strip[0], strip[1]], chord) } else { 0.0 })
+            .sum()
+    }
+}
+
+/// Integrates over an interval.
+fn gauss(rule: &[(f64, f64)], over: [f64; 2], f: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = (0.5 * (over[0] + over[1]), 0.5 * (over[1] - over[0]));
+    half * rule.iter().map(|(node, weight)| weight * f(middle + half * node)).sum::<f64>()
+}
+
+/// Value of an interval that is nearest to 0.
+fn nearest(over: [f64; 2]) -> f64 {
+    over[0].max(0.0) + over[1].min(0.0)
+}
+
+/// Largest distance from 0 within an interval.
+fn farthest(over: [f64; 2]) -> f64 {
+    over[1].max(-over[0])
+}
+
+fn square(x: f64) -> f64 {
+    x * x
+}
+
+/// Tip flattened by an indentation d: the terms that do not depend on the place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Flattened {
+    modulus_kpa: f64,
+    radius2_mm2: f64,
+    remaining_mm: f64,
+    contact_radius2_mm2: f64,
+}
+
+impl Tip {
+    /// Deepest indentation with defined pressures, as a share of the radius: beyond it lies the bone.
+    pub const DEEPEST: f64 = 0.999;
+
+    /// pi Y, so that F = pi Y d^2 (eq. 14), N/mm^2.
+    pub fn force_per_mm2(&self) -> f64 {
+        PI * self.modulus_kpa * 1e-3
+    }
+
+    /// Total normal force of an indentation (eq. 14); 0 without contact.
+    pub fn force_n(&self, indentation_mm: f64) -> f64 {
+        let d = indentation_mm.max(0.0);
+        self.force_per_mm2() * d * d
+    }
+
+    /// Indentation of a force, the inverse of [`Tip::force_n`].
+    pub fn indentation_mm(&self, force_n: f64) -> f64 {
+        (force_n.max(0.0) / self.force_per_mm2()).sqrt()
+    }
+
+    /// The tip flattened by an indentation.
+    pub fn flattened(&self, indentation_mm: f64) -> Flattened {
+        let a = self.radius_mm;
+        let d = indentation_mm.clamp(0.0, Self::DEEPEST * a);
+        Flattened {
+            modulus_kpa: self.modulus_kpa,
+            radius2_mm2: a * a,
+            remaining_mm: a - d,
+            contact_radius2_mm2: d * (2.0 * a - d),
+        }
+    }
+}
+
+impl Flattened {
+    /// Square of the contact radius (eq. 5, 6).
+    pub fn contact_radius2_mm2(&self) -> f64 {
+        self.contact_radius2_mm2
+    }
+
+    /// Pressure at a distance from the contact's centre (eq. 13, 15, 16); 0 outside of the contact.
+    ///
+    /// p = Y dL/L with L = sqrt(a^2 - r^2) and dL = (r_c^2 - r^2) / (L + a - d), which equals L - (a - d) but
+    /// cancels nothing at the rim.
+    pub fn pressure_kpa(&self, distance2_mm2: f64) -> f64 {
+        let inside = self.contact_radius2_mm2 - distance2_mm2;
+        if inside <= 0.0 {
+            return 0.0;
+        }
+        let length = (self.radius2_mm2 - distance2_mm2).sqrt();
+        self.modulus_kpa * inside / ((length + self.remaining_mm) * length)
+    }
 }

@@ -1,31 +1,34 @@
-//! The motor's shaft: one degree of freedom with friction that sticks.
+//! Shaft of the motor: one degree of freedom with friction that sticks.
 //!
-//! The step is the trapezoidal rule with the contact force replaced by its mean over the step's way (a discrete
-//! gradient of the contact's energy). It is of second order, and the energy balance holds exactly whatever the step:
-//! what friction and the winding take is taken, and nothing appears from nowhere. Where the shaft comes to rest inside
-//! a step, the step is cut there; from rest it moves only if what drives it exceeds friction.
+//! The step is the trapezoidal rule with the contact force replaced by its mean over the step (a discrete gradient of
+//! the energy of the contact). It is of second order, and the energy balance is exact at any length of the step: only
+//! friction and the winding remove energy. If the shaft comes to rest inside a step, the step is cut there. From rest
+//! it moves only if the drive exceeds friction.
 
+use crate::effects::drive::{Circuit, Friction, Stages};
+use crate::mechanics::decay;
+use crate::setup::Setup;
 use serde::{Deserialize, Serialize};
 
 /// Angle and speed of the motor's shaft.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shaft {
-    /// From where the tip is at travel 0.
+    /// Angle, 0 at travel 0 of the tip.
     pub angle_rad: f64,
-    /// Positive presses the tip into the object.
+    /// Speed; positive presses the tip into the object.
     pub speed_rad_per_s: f64,
 }
 
-/// What the winding is connected to: a voltage behind the whole circuit's resistance, with a limit to the current.
+/// Supply of the winding: a voltage behind the resistance of the whole circuit, with a limit to the current.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Source {
     /// Voltage without current.
     pub volts: f64,
-    /// Winding and everything before it.
+    /// Resistance of the whole circuit.
     pub ohms: f64,
-    /// Largest current either way.
+    /// Largest current in either direction.
     pub limit_a: f64,
-    /// Mean current beside what voltage and resistance give: what an inductance keeps up; 0 without one.
+    /// Mean current that an inductance maintains; 0 without one.
     pub kept_a: f64,
 }
 
@@ -34,58 +37,55 @@ impl Source {
     pub const OPEN: Self = Self { volts: 0.0, ohms: f64::INFINITY, limit_a: f64::INFINITY, kept_a: 0.0 };
 }
 
-/// What resists the shaft over a way.
+/// Torques that resist the shaft over a distance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Resistance {
-    /// Mean torque of all that stores energy: its difference in energy over the way.
+pub(crate) struct Resistance {
+    /// Mean torque of everything that stores energy: the difference in energy over the distance.
     pub load_nm: f64,
-    /// Friction while it slides; it takes the sign of the motion.
+    /// Friction while it slides, against the motion.
     pub sliding_nm: f64,
-    /// Friction that has to be exceeded from rest.
+    /// Friction to be exceeded from rest.
     pub holding_nm: f64,
 }
 
-/// What acts on the shaft. It holds through a step.
-pub trait Acting {
-    /// Between two angles; at one where they are equal.
+/// Torques and supply of a shaft during a step.
+pub(crate) trait Acting {
+    /// Resistance between two angles.
     fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance;
 
-    /// What feeds the winding, on average over so long.
+    /// Mean supply of the winding over a time.
     fn source(&self, dt_s: f64) -> Source;
 
-    /// Friction torque for each speed, N m s.
+    /// Viscous friction, N m s.
     fn viscous_nm_s(&self) -> f64 {
         0.0
     }
 
-    /// A part of the step is done: so long, at this mean speed.
+    /// Ends a part of the step with its length and mean speed.
     fn took(&mut self, _dt_s: f64, _mean_rad_per_s: f64) {}
 }
 
-/// What turns: inertia and torque constant, and how its step is solved.
+/// Rotor, and how its step is solved.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rotor {
-    /// Inertia at the shaft.
+pub(crate) struct Rotor {
     pub inertia_kg_m2: f64,
-    /// Torque constant; also the back-EMF constant in V s/rad.
     pub torque_nm_per_a: f64,
-    /// Rounds of the fixed point at most: each gains a factor of (step x contact frequency)^2 / 4.
+    /// Most iterations of the fixed point. Each gains a factor of (step x contact frequency)^2 / 4.
     pub rounds: usize,
-    /// Share of the mean speed below whose change the rounds end.
+    /// Share of the mean speed below whose change the iterations end.
     pub tolerance: f64,
 }
 
-/// Rests inside one step after which it counts as at rest until the step's end.
+/// Rests within one step after which the shaft stays at rest until the end of the step.
 const RESTS_MAX: usize = 8;
 
 impl Rotor {
-    /// Current at a speed.
     pub fn current_a(&self, source: &Source, speed_rad_per_s: f64) -> f64 {
         let back_emf = self.torque_nm_per_a * speed_rad_per_s;
         ((source.volts - back_emf) / source.ohms + source.kept_a).clamp(-source.limit_a, source.limit_a)
     }
 
-    /// One step.
+    /// Advances by one step.
     pub fn advance(&self, mut shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> Shaft {
         let mut left_s = dt_s;
         for _ in 0..RESTS_MAX {
@@ -104,7 +104,7 @@ impl Rotor {
         Shaft { speed_rad_per_s: 0.0, ..shaft }
     }
 
-    /// As [`Rotor::advance`] while the shaft moves; the time taken is less than `dt_s` where it comes to rest.
+    /// Advances as [`Rotor::advance`] while the shaft moves. The time taken is less than `dt_s` if it comes to rest.
     pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, acting: &mut impl Acting) -> (Shaft, f64) {
         let Some(direction) = self.direction(&shaft, dt_s, acting) else { return (shaft, 0.0) };
         let (next, _) = self.slide(&shaft, dt_s, direction, acting);
@@ -115,7 +115,7 @@ impl Rotor {
         }
     }
 
-    /// Where the shaft moves or starts to move; none while friction holds it.
+    /// Direction in which the shaft moves or starts to move; none while friction holds it.
     pub fn direction(&self, shaft: &Shaft, dt_s: f64, acting: &mut impl Acting) -> Option<f64> {
         if shaft.speed_rad_per_s != 0.0 {
             return Some(shaft.speed_rad_per_s.signum());
@@ -153,7 +153,7 @@ impl Rotor {
         (next, mean_speed)
     }
 
-    /// The same step with its length such that it ends at rest.
+    /// Solves for the length of the step that ends at rest.
     fn come_to_rest(&self, from: &Shaft, at_most_s: f64, direction: f64, acting: &mut impl Acting) -> (Shaft, f64) {
         let mean_speed = 0.5 * from.speed_rad_per_s;
         let mut taken_s = 0.0;
@@ -176,9 +176,179 @@ fn against_nm(resistance: &Resistance, direction: f64) -> f64 {
     resistance.load_nm + direction * resistance.sliding_nm
 }
 
-/// The mean of `factor` max(x, 0)^2 between two places, to rounding at any distance between them.
-pub fn mean_square(factor: f64, x0: f64, x1: f64) -> f64 {
+/// Mean of `factor` max(x, 0)^2 between two places, exact to rounding at any distance.
+pub(crate) fn mean_square(factor: f64, x0: f64, x1: f64) -> f64 {
     let (d0, d1) = (x0.max(0.0), x1.max(0.0));
     let share = if (x0 > 0.0) == (x1 > 0.0) { 1.0 } else { (d1 - d0) / (x1 - x0) };
     factor * (d0 * d0 + d0 * d1 + d1 * d1) / 3.0 * share
+}
+
+/// Motion against a rigid wall, in SI units at the shaft of the motor and mm at the tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dynamics {
+    rotor: Rotor,
+    friction_nm: f64,
+    friction_share: f64,
+    mm_per_rad: f64,
+    nm_per_n: f64,
+    wall_mm: f64,
+    force_per_mm2: f64,
+}
+
+/// Iterations of a step. At 10 us each gains a factor of 1e-7.
+const ROUNDS: usize = 3;
+
+impl Dynamics {
+    /// Motion of a setup.
+    pub fn new(setup: &Setup) -> Self {
+        let gear = &setup.transmission;
+        let mm_per_rad = gear.drum_radius_mm / gear.ratio;
+        Self {
+            rotor: Rotor {
+                inertia_kg_m2: setup.motor.inertia_kg_m2,
+                torque_nm_per_a: setup.motor.torque_nm_per_a,
+                rounds: ROUNDS,
+                tolerance: 0.0,
+            },
+            friction_nm: setup.motor.friction_nm,
+            friction_share: 1.0 / gear.efficiency - 1.0,
+            mm_per_rad,
+            nm_per_n: mm_per_rad * 1e-3,
+            wall_mm: setup.wall.distance_mm,
+            force_per_mm2: setup.tip.force_per_mm2(),
+        }
+    }
+
+    /// Travel of the tip at an angle of the shaft.
+    pub fn travel_mm(&self, angle_rad: f64) -> f64 {
+        angle_rad * self.mm_per_rad
+    }
+
+    /// Angle of the shaft at a travel of the tip.
+    pub fn angle_rad(&self, travel_mm: f64) -> f64 {
+        travel_mm / self.mm_per_rad
+    }
+
+    /// Current at a speed.
+    pub fn current_a(&self, source: &Source, speed_rad_per_s: f64) -> f64 {
+        self.rotor.current_a(source, speed_rad_per_s)
+    }
+
+    /// Advances by one step with a constant source.
+    pub fn advance(&self, shaft: Shaft, dt_s: f64, source: &Source) -> Shaft {
+        self.rotor.advance(shaft, dt_s, &mut Against { dynamics: self, source })
+    }
+
+    /// Advances as [`Dynamics::advance`] while the shaft moves. The time taken is less than `dt_s` if it comes to rest.
+    pub fn advance_to_rest(&self, shaft: Shaft, dt_s: f64, source: &Source) -> (Shaft, f64) {
+        self.rotor.advance_to_rest(shaft, dt_s, &mut Against { dynamics: self, source })
+    }
+}
+
+/// Wall, friction and source.
+struct Against<'a> {
+    dynamics: &'a Dynamics,
+    source: &'a Source,
+}
+
+impl Acting for Against<'_> {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
+        let Dynamics { friction_nm, friction_share, wall_mm, force_per_mm2, nm_per_n, .. } = *self.dynamics;
+        let from_mm = self.dynamics.travel_mm(from_rad) - wall_mm;
+        let to_mm = self.dynamics.travel_mm(to_rad) - wall_mm;
+        let load_nm = mean_square(nm_per_n * force_per_mm2, from_mm, to_mm);
+        let friction = friction_nm + friction_share * load_nm;
+        Resistance { load_nm, sliding_nm: friction, holding_nm: friction }
+    }
+
+    fn source(&self, _dt_s: f64) -> Source {
+        *self.source
+    }
+}
+
+/// Returns the source without the effect of an inductance.
+pub(crate) fn resistive(circuit: &Circuit, open: bool) -> Source {
+    if open {
+        return Source::OPEN;
+    }
+    let ohms = circuit.winding_ohm + circuit.bridge_ohm + circuit.duty * circuit.duty * circuit.source_ohm;
+    Source { volts: circuit.duty * circuit.source_v, ohms, ..Source::OPEN }
+}
+
+/// Everything that acts on the shaft of a finger.
+pub(crate) struct Acts<'a, D, L> {
+    pub drive: &'a mut D,
+    /// True if the drive has no effects.
+    pub alone: bool,
+    pub circuit: &'a Circuit,
+    pub open: bool,
+    pub friction: &'a Friction,
+    /// Travel of the tip per angle.
+    pub mm_per_rad: f64,
+    /// Load of the tip: its mean between two places of the pressing flank.
+    pub load_n: L,
+    pub torque_nm_per_a: f64,
+    /// Current in the winding, at the start and then at the end of the step.
+    pub winding_a: f64,
+    /// Integral of the square of the current over the step.
+    pub square_a2_s: f64,
+}
+
+impl<D, L> Acts<'_, D, L> {
+    /// exp(-x) and its mean from 0 to x, x the time in units of L / R.
+    fn kept(&self, dt_s: f64, ohms: f64) -> [f64; 2] {
+        let x = dt_s * ohms / self.circuit.henry;
+        let end = decay(x);
+        let mean = if x < 0.01 {
+            1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))
+        } else {
+            (1.0 - end) / x
+        };
+        [end, mean]
+    }
+}
+
+impl<D: Stages, L: Fn(f64, f64) -> f64> Acting for Acts<'_, D, L> {
+    fn resistance(&mut self, from_rad: f64, to_rad: f64) -> Resistance {
+        let load_n = (self.load_n)(from_rad * self.mm_per_rad, to_rad * self.mm_per_rad);
+        let load_nm = self.mm_per_rad * 1e-3 * load_n;
+        let shared = self.friction.load_share * load_nm;
+        let potential_nm = if self.alone { 0.0 } else { self.drive.potential_nm(from_rad, to_rad) };
+        Resistance {
+            load_nm: load_nm + potential_nm,
+            sliding_nm: self.friction.sliding_nm + shared,
+            holding_nm: self.friction.holding_nm + shared,
+        }
+    }
+
+    fn source(&self, dt_s: f64) -> Source {
+        let source = resistive(self.circuit, self.open);
+        if self.circuit.henry == 0.0 || self.open {
+            return source;
+        }
+        // Exact at a constant speed: i = i_end + (i_0 - i_end) exp(-t R / L).
+        let [_, mean] = self.kept(dt_s, source.ohms);
+        let given = 1.0 - mean;
+        Source { ohms: source.ohms / given, kept_a: mean * self.winding_a, ..source }
+    }
+
+    fn viscous_nm_s(&self) -> f64 {
+        self.friction.viscous_nm_s
+    }
+
+    fn took(&mut self, dt_s: f64, mean_rad_per_s: f64) {
+        let source = resistive(self.circuit, self.open);
+        let end_a = (source.volts - self.torque_nm_per_a * mean_rad_per_s) / source.ohms;
+        if self.circuit.henry == 0.0 || self.open {
+            self.winding_a = end_a;
+            self.square_a2_s += end_a * end_a * dt_s;
+            return;
+        }
+        let [end, mean] = self.kept(dt_s, source.ohms);
+        let over_a = self.winding_a - end_a;
+        self.winding_a = end_a + over_a * end;
+        // Mean of the square: the transient's own mean square is mean (1 + end) / 2.
+        let square = end_a * (end_a + 2.0 * over_a * mean) + over_a * over_a * mean * 0.5 * (1.0 + end);
+        self.square_a2_s += square * dt_s;
+    }
 }

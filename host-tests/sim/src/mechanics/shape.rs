@@ -1,21 +1,21 @@
-//! The tip on a surface that is no plane: force, centre and the taxels' means from the surface's height.
+//! Tip on a surface that is not a plane: force, centre and mean pressures from the height of the surface.
 //!
-//! The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`,
-//! `L = sqrt(a^2 - r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL`
-//! over `L` and the angle: sample by sample, a ramp that begins at the sample's clearance `a - L - h`.
+//! The local compression is `dL = sqrt(a^2 - r^2) - (a - d) + h(x, y)` and the pressure `Y dL / L`, `L = sqrt(a^2 -
+//! r^2)`, so with polar coordinates, as `r dr = -L dL`, the force is `Y` times the integral of `dL` over `L` and the
+//! angle: sample by sample, a ramp that begins at the clearance `a - L - h` of the sample.
 
-use super::elastic::{Elastic, Table};
 use crate::effects::contact::Stages;
-use crate::mechanics::cells::Cell;
+use crate::mechanics::normal::{Elastic, Table};
+use crate::mechanics::pressures::Cell;
 use crate::setup::Tip;
 use core::f64::consts::TAU;
 
-/// Samples around, and from the apex to the tip's rim.
+/// Samples around the axis, and from the apex to the rim of the tip.
 const AROUND: usize = 64;
 const OUTWARDS: usize = 256;
-/// Knots of the force, even in the square root of the indentation.
+/// Knots of the force, evenly spaced in the square root of the indentation.
 const KNOTS: usize = 2048;
-/// Samples along a taxel's side.
+/// Samples along the side of a taxel.
 const ALONG: usize = 16;
 
 /// Force and centre of pressure against indentation.
@@ -24,7 +24,7 @@ pub fn tables(stages: &impl Stages, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
     samples.sort_by(|a, b| a.clearance_mm.total_cmp(&b.clearance_mm));
     let deepest_mm = Tip::DEEPEST * tip.radius_mm;
     let (mut d_mm, mut force_n, mut centres) = (Vec::new(), Vec::new(), Vec::new());
-    // Sums over the samples that touch: of weight, weight times clearance, and both times the place.
+    // Sums over the touching samples of weight and weight times clearance, alone and times the place.
     let mut sums = [[0.0; 2]; 3];
     let mut reached = samples.iter().peekable();
     for knot in 0..=KNOTS {
@@ -46,7 +46,7 @@ pub fn tables(stages: &impl Stages, tip: &Tip) -> (Elastic, Vec<[f64; 3]>) {
     (Elastic::Table(Table::new(d_mm, force_n)), centres)
 }
 
-/// A place on the tip: the indentation at which it touches, and its share of the integral.
+/// Place on the tip: the indentation at which it touches, and its weight in the integral.
 struct Sample {
     clearance_mm: f64,
     weight: f64,
@@ -80,7 +80,7 @@ pub fn mean_kpa(stages: &impl Stages, tip: &Tip, d_mm: f64, cell: &Cell) -> f64 
     for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
         let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
         let length2_mm2 = tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm;
-        // At the tip's own rim there is nothing left to compress.
+        // At the rim of the tip nothing is left to compress.
         if length2_mm2 <= 0.0 {
             continue;
         }

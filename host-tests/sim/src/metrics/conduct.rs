@@ -1,5 +1,5 @@
-//! How a finger behaved: what it must never do, and what it was like once a goal had had its time. All of it is judged
-//! by what is true of the finger, never by what the controller reports.
+//! Conduct of a finger: what it must never do, and its holds and rests. Only the true state of the finger counts, never
+//! what the controller reports.
 
 use super::finger::{duty, newtons, trimmed};
 use super::response::{AtGoal, note};
@@ -8,21 +8,21 @@ use fingertip::params::Params;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
-/// A contact that ended may still drive the tip for this long.
+/// Time after the end of a contact in which the contact may still drive the tip.
 const PUSHED_S: f64 = 0.02;
-/// A goal that is taken back counts for this long: so long may the tip need to come out of a thing that yields.
+/// Time for which a goal that is taken back still counts: the tip needs it to leave an object that yields.
 const TAKEN_BACK_S: f64 = 0.2;
 /// Time within which the force must be gone after a stop, where the motor can move, s.
 const STOP_S: f64 = 0.5;
-/// Way of the object between two steps, mm, that counts as a motion.
+/// Displacement of the object between two steps, mm, that counts as a motion.
 const MOVES_MM: f64 = 1e-5;
-/// The last part of a goal's time, and the time from which on a goal has one to judge: since it was asked for, and since
-/// it first touched, as an approach is no hold.
+/// Last part of the time of a goal, and the time from which on a goal is judged: since it was requested, and since the
+/// first touch, as an approach is not a hold.
 const LAST_S: f64 = 0.2;
 const JUDGED_S: f64 = 0.4;
 const JUDGED_TOUCH_S: f64 = 0.22;
 
-/// What is true at a step.
+/// True state at a step.
 #[derive(Clone, Copy, Debug)]
 struct Sample {
     time_s: f64,
@@ -31,22 +31,22 @@ struct Sample {
     duty: f64,
 }
 
-/// A force that was held: the last part of its time.
+/// Last part of a force that was held.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hold {
-    /// What was asked for.
+    /// Requested force.
     pub goal_n: f64,
     /// Mean of the true force.
     pub mean_n: f64,
-    /// From the least to the largest true force.
+    /// Range of the true force.
     pub swing_n: f64,
-    /// Whether nothing was touched.
+    /// True if nothing was touched.
     pub missed: bool,
-    /// Whether a fault had stopped the motor.
+    /// True if a fault had stopped the motor.
     pub faulty: bool,
 }
 
-/// What the controller's parameters allow.
+/// Limits by the parameters of the controller.
 #[derive(Clone, Copy, Debug)]
 struct Allowed {
     approach_mm_per_s: f64,
@@ -54,30 +54,30 @@ struct Allowed {
     travel_mm: f64,
 }
 
-/// One finger's conduct so far.
+/// Conduct of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Conduct {
     allowed: Allowed,
     goal_n: f64,
     /// Time since which the goal and an active motor are unchanged.
     since_s: f64,
-    /// Time since which the goal is unchanged and no event disturbed the finger, and that of the first touch since then.
+    /// Time since which the goal is unchanged and no event disturbed the finger, and the first touch since then.
     quiet_s: f64,
     touched_s: Option<f64>,
     torque_off: bool,
-    /// The goal that the true force is held against.
+    /// Goal with which the true force is compared.
     counted_n: f64,
-    /// Until then a contact that ended may drive the tip.
+    /// Time until which a contact that ended may drive the tip.
     thrown_s: f64,
-    /// Travel at the first touch, less the object's place.
+    /// Travel at the first touch, less the place of the object.
     touch_mm: Option<f64>,
     place_mm: f64,
     nearest_mm: f64,
-    /// Until then the object's push on a finger without a motor is not the controller's.
+    /// Time until which the object may push a finger without a motor.
     pushed_s: f64,
-    /// Until then a defect may be what presses.
+    /// Time until which a defect may press.
     defective_s: f64,
-    /// Time of the last stop; none before the first one, and once the object came nearer.
+    /// Time of the last stop; none before the first one, and after the object came nearer.
     stop_s: Option<f64>,
     indentation_max_mm: f64,
     last: VecDeque<Sample>,
@@ -92,14 +92,14 @@ pub struct Conduct {
     pub(super) disturbed: bool,
 }
 
-/// The goals that are over.
+/// Goals that are over.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ended {
-    /// Those that asked for a force.
+    /// Holds of a force.
     pub holds: Vec<Hold>,
-    /// From the farthest to the nearest place of the tip at rest after letting go.
+    /// Range of the tip at rest after a release.
     pub rest_mm: Option<f64>,
-    /// Deviation of the duty, of a hold or after letting go.
+    /// Deviation of the duty, during a hold or after a release.
     pub duty: Option<f64>,
 }
 
@@ -118,12 +118,12 @@ impl Allowed {
 }
 
 impl Conduct {
-    /// With the limits that the controller is given.
+    /// Conduct under the limits of these parameters.
     pub fn of(params: &Params) -> Self {
         Self { allowed: Allowed::of(params), ..Self::default() }
     }
 
-    /// A control step, from the scene's start on.
+    /// Adds a control step after the start of the scene.
     pub(super) fn step(&mut self, step: &Step) {
         let Step { time_s, truth, command, status, .. } = *step;
         let goal_n = newtons(command.goal);
@@ -162,8 +162,8 @@ impl Conduct {
         }
     }
 
-    /// The true force after a stop: what is left of it though the motor could move, or though friction alone does not
-    /// hold it. A fault is a reason; an object that comes nearer ends the stop.
+    /// Measures the true force after a stop that remains although the motor could move, or beyond what friction holds.
+    /// A fault is a reason; an object that comes nearer ends the stop.
     fn stop(&mut self, step: &Step, came: bool) {
         let Step { time_s, truth, command, status, .. } = *step;
         let acts_again = status.fault.is_some() || command.torque && self.torque_off;
@@ -179,8 +179,8 @@ impl Conduct {
         }
     }
 
-    /// The true force against the goal. A fault leaves the goal that counted: what was pressed need not be let go
-    /// without a motor. What the object does to a finger without a motor does not count.
+    /// Compares the true force with the goal. After a fault the goal still counts: the finger cannot release without a
+    /// motor. The push of the object on a finger without a motor does not count.
     fn press(&mut self, step: &Step, passive: bool, came: bool) {
         let Step { time_s, truth, .. } = *step;
         if passive && (came || time_s < self.pushed_s) {
@@ -217,7 +217,7 @@ impl Conduct {
         self.runaway_mm = self.runaway_mm.max(beyond_mm);
     }
 
-    /// All goals, the one under way included where it had its time.
+    /// Returns all goals, with the current one if it had its time.
     pub(super) fn ended(&self) -> Ended {
         let mut ended = self.ended.clone();
         let touched_s = self.touched_s.filter(|_| self.goal_n > 0.0).unwrap_or(self.quiet_s);
@@ -243,41 +243,40 @@ impl Conduct {
         ended
     }
 
-    /// Largest true force beyond each goal, where no lesser goal has a larger one.
+    /// Returns the largest true force beyond each goal, except where a smaller goal has a larger one.
     pub(super) fn over_force(&self) -> &[AtGoal] {
         &self.over_force
     }
 
-    /// The same while a defect acts.
     pub(super) fn over_force_defective(&self) -> &[AtGoal] {
         &self.over_force_defective
     }
 
-    /// Largest speed without a contact, of the approach speed.
+    /// Returns the largest speed without a contact, as a share of the approach speed.
     pub(super) fn air_share(&self) -> f64 {
         self.air_mm_per_s / self.allowed.approach_mm_per_s
     }
 }
 
 impl Ended {
-    /// What holds were off by; a fault's hold is not judged.
+    /// Returns the errors of the holds, without those of a fault.
     pub fn errors(&self) -> Vec<AtGoal> {
         let judged = self.holds.iter().filter(|hold| !hold.faulty);
         judged.map(|hold| AtGoal { goal_n: hold.goal_n, value: (hold.mean_n - hold.goal_n).abs() }).collect()
     }
 
-    /// How far the force swung in holds.
+    /// Returns the ranges of the force in holds.
     pub fn swings(&self) -> Vec<AtGoal> {
         self.holds.iter().map(|hold| AtGoal { goal_n: hold.goal_n, value: hold.swing_n }).collect()
     }
 
-    /// Holds that touched nothing.
+    /// Returns the number of holds that touched nothing.
     pub fn missed(&self) -> usize {
         self.holds.iter().filter(|hold| hold.missed && !hold.faulty).count()
     }
 }
 
-/// Mean, deviation from it, and from the least to the largest.
+/// Mean, deviation from it, and range.
 struct Spread {
     mean: f64,
     deviation: f64,

@@ -1,29 +1,28 @@
-//! What is gathered of one finger, step by step; no trace is kept, so an hour costs what a second does.
+//! Measurements of one finger, step by step. No trace is kept, so memory does not grow with the run.
 
-use super::conduct::Conduct;
-use super::response::Response;
-use super::slips::Slips;
+use crate::metrics::conduct::Conduct;
+use crate::metrics::response::{Response, Slips};
 use crate::watch::{Controller, Step};
 use fingertip::pipeline::Status;
 use fingertip::state::{Fault, Limits, Mode};
 use fingertip::units::{Duty, Millimetres, Newtons};
 
-/// Errors of the centre count from this force on: below it there is next to nothing to see.
+/// Force from which on errors of the centre count: below it the array sees next to nothing.
 const SEEN_N: f64 = 0.1;
-/// The approach speed is the mean over this last stretch before the touch.
+/// Time before the touch over which the approach speed is averaged.
 const APPROACH_S: f64 = 0.01;
-/// A goal that changes by less is no step to judge: a force that is trimmed.
+/// Change of a goal below which the goal is only trimmed: not a step to judge.
 const STEP_N: f64 = 0.02;
-/// An object that fell this far below its highest place was dropped.
+/// Distance below its highest place from which on an object counts as dropped.
 pub(super) const DROPPED_MM: f64 = 5.0;
 
-/// What the controller takes the force for: the reading, and while a force is held less what of it is creep and warmth.
+/// Force as the controller estimates it: the reading, less creep and temperature compensation while a force is held.
 fn sensed_n(status: &Status) -> f64 {
     let beside_n = if status.mode == Mode::Force { newtons(status.creep) + newtons(status.drift) } else { 0.0 };
     newtons(status.contact.force) - beside_n
 }
 
-/// A sum of squares over time.
+/// Integral of a square over time.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Squares {
     sum: f64,
@@ -39,13 +38,13 @@ impl Squares {
         self.max = self.max.max(value.abs());
     }
 
-    /// None where nothing was added.
+    /// Root mean square; none if nothing was added.
     pub fn rms(&self) -> Option<f64> {
         (self.time_s > 0.0).then(|| (self.sum / self.time_s).sqrt())
     }
 }
 
-/// The answers to all goals that are over: the worst of each.
+/// Worst responses to the goals that are over.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Answers {
     count: u32,
@@ -93,14 +92,14 @@ impl Answers {
     }
 }
 
-/// One finger's run so far.
+/// Measurements of one finger.
 #[derive(Clone, Debug, Default)]
 pub struct Finger {
     last_s: Option<f64>,
     goal_n: f64,
     answers: Answers,
     response: Option<Response>,
-    /// Where the tip was, over the last stretch before the touch.
+    /// Times and travels shortly before the touch.
     approach: Vec<[f64; 2]>,
     missed_before: u32,
     fault: Option<Fault>,
@@ -132,7 +131,7 @@ pub struct Finger {
 }
 
 impl Finger {
-    /// With what its controller is given.
+    /// Measurements of a finger with this controller.
     pub(super) fn of(controller: &Controller) -> Self {
         Self { conduct: Conduct::of(&controller.params), ..Self::default() }
     }
@@ -153,7 +152,7 @@ impl Finger {
         self.conduct.step(step);
     }
 
-    /// All goals' answers, the one under way included.
+    /// Returns the responses to all goals, with the current one.
     pub(super) fn answers(&self) -> Answers {
         let mut answers = self.answers;
         self.response.iter().for_each(|response| answers.add(response));
@@ -251,22 +250,22 @@ impl Finger {
     }
 }
 
-/// Whether a goal that changes is no step to judge.
+/// True if a change of the goal is not a step to judge.
 pub(super) fn trimmed(from_n: f64, to_n: f64) -> bool {
     from_n > 0.0 && to_n > 0.0 && (to_n - from_n).abs() < STEP_N
 }
 
-/// As a share of the supply.
-pub(super) fn duty(duty: Duty) -> f64 {
+/// Duty as a share of the supply.
+pub fn duty(duty: Duty) -> f64 {
     f64::from(duty.0) / f64::from(Duty::FULL)
 }
 
-/// A force as a number.
+/// Force as a number.
 pub fn newtons(force: Newtons) -> f64 {
     force.0.to_num()
 }
 
-/// The limits' names, by bit.
+/// Names of the limits, by bit.
 pub(super) const LIMITS: [(&str, u16); 9] = [
     ("voltage", Limits::VOLTAGE),
     ("current", Limits::CURRENT),

@@ -1,13 +1,13 @@
-//! A finger on a bench, frame by frame: its command is somebody's to give, what its controller is given may be changed
-//! on the way, and the scene around it is exchanged while its controller stays, as a user moves finger and plate
-//! between two presses. The plant's finger ([`crate::plant`]) can also be broken and moved by hand.
+//! Finger on a bench, frame by frame, under the command of a test. The inputs of its controller can be changed, and the
+//! scene around it can be exchanged while its controller stays, as a user moves finger and plate between two presses.
+//! The finger of the plant ([`crate::plant`]) can also be broken and moved.
 
-use super::{Begun, Board, SimError, Unit};
 use crate::bridge::Bridge;
+use crate::effects::Set;
 use crate::effects::contact::Stages as _;
 use crate::effects::sensor::Stages as _;
-use crate::effects::set::Set;
 use crate::mechanics::finger::Finger;
+use crate::native::{Begun, Board, SimError, Unit};
 use crate::plant::{Faults, Reference};
 use crate::scene::{Scene, read};
 use crate::setup::Setup;
@@ -19,20 +19,20 @@ use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Capture, Config, Frame, Pipeline, ROWS, TARE_FRAMES};
 use images::record::Record;
 
-/// The first finger of a scene, or the plant's.
+/// First finger of a scene, or the finger of the plant.
 pub struct Bench<E: Set = Reference> {
     board: Board<E>,
     sense: Sense,
     capture: Box<Capture>,
 }
 
-/// Frames within which every motion that measures ends: 30 s.
+/// Frames within which every measuring motion ends: 30 s.
 const MEASURE_FRAMES: usize = 300_000;
 /// Time between two frames of a rest.
 const REST_STEP_S: f64 = 0.02;
 
 impl<E: Set> Bench<E> {
-    /// At rest, torque off, not tared.
+    /// Creates the bench at rest, torque off, not tared.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         Ok(Self::around(Board::new(&scene.without_events(), Begun::default())?))
     }
@@ -82,27 +82,27 @@ impl<E: Set> Bench<E> {
         &mut self.board.world.fingers_mut()[0]
     }
 
-    /// What the host asks.
+    /// Command of the host.
     pub fn command(&mut self) -> &mut Command {
         &mut self.board.units[0].command
     }
 
-    /// The controller.
+    /// Controller of the finger.
     pub fn pipeline(&mut self) -> &mut Pipeline {
         &mut self.board.units[0].pipeline
     }
 
-    /// What the controller reports.
+    /// Status of the controller.
     pub fn status(&self) -> &Status {
         self.unit().pipeline.status()
     }
 
-    /// The last frame scanned, what was sensed beside it, and what is asked.
+    /// Returns the last frame, the sensed values and the command.
     pub fn record(&self) -> Record {
         Record { frame: self.unit().frame, sense: self.sense, command: self.unit().command }
     }
 
-    /// The last frame scanned.
+    /// Last frame.
     pub fn frame(&self) -> &Frame {
         &self.unit().frame
     }
@@ -112,7 +112,7 @@ impl<E: Set> Bench<E> {
         self.step_with(|_| {})
     }
 
-    /// The same, where somebody changes what the controller is given.
+    /// Steps as [`Bench::step`], with a change to the inputs of the controller.
     pub fn step_with(&mut self, change: impl FnOnce(&mut Record)) -> Status {
         self.board.scan();
         self.sense = self.board.sense(0, 0);
@@ -127,7 +127,7 @@ impl<E: Set> Bench<E> {
         *self.status()
     }
 
-    /// Steps for so long; the largest true force on the way, N.
+    /// Steps for a time. Returns the largest true force, N.
     pub fn run(&mut self, seconds: f64) -> f64 {
         let until_s = self.time_s() + seconds;
         let mut largest_n: f64 = 0.0;
@@ -138,8 +138,8 @@ impl<E: Set> Bench<E> {
         largest_n
     }
 
-    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the array's temperature
-    /// changes. Torque must be off.
+    /// Lets time pass over a finger that touches nothing, with few frames: tip and array recover, the temperature of
+    /// the array changes. Torque must be off.
     pub fn rest(&mut self, seconds: f64) {
         for _ in 0..(seconds / REST_STEP_S).ceil() as usize {
             self.finger_mut().contact.effects.relax(REST_STEP_S, None);
@@ -148,7 +148,7 @@ impl<E: Set> Bench<E> {
         }
     }
 
-    /// Makes a motion that measures and calls `each` after every frame; returns how the motion ended.
+    /// Makes a measuring motion and calls `each` after every frame. Returns how the motion ended.
     ///
     /// # Panics
     /// The motion does not end within 30 s.
@@ -165,18 +165,18 @@ impl<E: Set> Bench<E> {
         panic!("{task:?} does not end: {:?}", self.status().measure);
     }
 
-    /// The record of the last motion that measured, as it is read over the bus.
+    /// Record of the last measuring motion, as it is read over the bus.
     pub fn kept(&self) -> &[u8] {
         self.capture.data()
     }
 
-    /// Requests a motion that measures, or its end.
+    /// Requests a measuring motion, or its end.
     pub fn request(&mut self, task: Task) {
         let command = self.command();
         command.measure_request = task.after(command.measure_request);
     }
 
-    /// Torque off, a tare, torque on; nothing may touch.
+    /// Tares: torque off, a tare, torque on. Nothing may touch.
     pub fn tare(&mut self) {
         let command = self.command();
         command.torque = false;
@@ -192,12 +192,12 @@ impl<E: Set> Bench<E> {
         self.board.time_s()
     }
 
-    /// What is true of the finger.
+    /// Returns the true state of the finger.
     pub fn truth(&mut self) -> Truth {
         self.board.world.truth(0, false)
     }
 
-    /// Puts the tip at rest at a travel, as if carried there.
+    /// Puts the tip at rest at a travel.
     pub fn place(&mut self, travel_mm: f64) {
         self.finger_mut().place(travel_mm);
     }
@@ -207,7 +207,7 @@ impl<E: Set> Bench<E> {
         self.finger_mut().place_object(distance_mm);
     }
 
-    /// Moves the object's surface at a constant speed, and calls `each` after every frame.
+    /// Moves the surface of the object at a constant speed and calls `each` after every frame.
     pub fn carry_object(&mut self, from_mm: f64, to_mm: f64, mm_per_s: f64, mut each: impl FnMut(&mut Self)) {
         let (begun_s, duration_s) = (self.time_s(), (to_mm - from_mm).abs() / mm_per_s);
         while self.time_s() < begun_s + duration_s {
@@ -219,7 +219,7 @@ impl<E: Set> Bench<E> {
         self.place_object(to_mm);
     }
 
-    /// What each taxel makes of 100 kPa, as a share of it: its own gain, where no effect remembers what was before.
+    /// Returns the reading of each taxel under 100 kPa, as a share of it: its gain, if no effect has a memory.
     pub fn sensitivities(&mut self) -> [[f64; COLUMNS]; ROWS] {
         let unit = &mut self.board.units[0];
         core::array::from_fn(|row| {
@@ -237,14 +237,14 @@ impl Default for Bench {
     }
 }
 
-/// Whoever simulates the plant steps it once a slot.
+/// Step of the plant: once a slot.
 const SCENE: &str = "about = \"the plant\"\nduration_s = 1.0\n[world]\nstep_us = 10.0\n";
 
 impl Bench {
-    /// The plant's finger under a controller: at rest, torque off, not tared.
+    /// Creates the finger of the plant under a controller: at rest, torque off, not tared.
     ///
     /// # Panics
-    /// On a contact too stiff for steps of 10 us.
+    /// The contact is too stiff for steps of 10 us.
     pub fn of(setup: &Setup, config: &Config) -> Self {
         let scene = read("plant", SCENE, &[]).expect("the plant's scene is one");
         let parts = core::iter::once(Reference::parts(setup));
@@ -252,7 +252,7 @@ impl Bench {
         Self::around(board.unwrap_or_else(|error| panic!("{error}")))
     }
 
-    /// Breaks something or mends it.
+    /// Sets or clears defects.
     pub fn harm(&mut self, change: impl FnOnce(&mut Faults)) {
         let faults = &mut self.board.world.fingers_mut()[0].drive.faults;
         change(faults);

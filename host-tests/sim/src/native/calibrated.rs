@@ -1,16 +1,20 @@
-//! A finger calibrated by the host, as a user does it: presses at three places of a plate that is not quite level, the
-//! modulus and the taxels' gains solved from their records, and the scale from three forces on a kitchen scale. All
-//! effects of the finger act meanwhile, and tip and array remember one press in the next.
+//! Finger that the host calibrates as a user does: presses at three places of a plate that is not quite level, from
+//! whose records modulus and gains of the taxels are solved, and three forces on a kitchen scale. All effects of the
+//! finger act meanwhile, and tip and array remember one press in the next.
+//!
+//! [`fingers`] compares the errors of the force before and after, for fingers far from their parameters
+//! (`populations/unlike.toml`).
 
-pub mod unlike;
-
-use super::bench::Bench;
-use super::simulate_calibrated;
-use crate::effects::set::Named;
+use crate::cores;
+use crate::effects::Named;
+use crate::native::bench::Bench;
+use crate::native::simulate_calibrated;
+use crate::population::load;
 use crate::run::RunError;
 use crate::scene::text::{set, write};
-use crate::scene::{Scene, controller, read};
+use crate::scene::{Scene, read};
 use crate::watch::{Summary, Watch};
+use fastrand::Rng;
 use fingertip::config::newtons;
 use fingertip::measure::{State, Task};
 use fingertip::params::Params;
@@ -22,6 +26,8 @@ use solve::gains::Condition;
 use solve::modulus::Modulus;
 use solve::record;
 use solve::scale::Held;
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
 
 /// A place on the plate: centre of the contact from the array's middle, mm, and inclination of the plate, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,12 +92,12 @@ pub fn board(scene: &Scene, watch: &mut dyn Watch) -> Result<Summary, RunError> 
     Ok(simulate_calibrated(&calibrated.scene(scene)?, &calibrated.gains, watch)?)
 }
 
-/// Calibrates a finger that stands before the plate of its scene; the finger has the result in the end.
+/// Calibrates a finger in front of the plate of its scene. The finger has the result in the end.
 ///
 /// # Errors
 /// The scene cannot be simulated, or the parameters found are not valid.
 pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, RunError> {
-    let mut params = controller::params(scene);
+    let mut params = scene.params();
     let (mut presses, mut refused) = (Vec::new(), Vec::new());
     for place in PLACES {
         bench.exchange(&plate(scene, place)?)?;
@@ -162,7 +168,7 @@ pub fn plate(scene: &Scene, place: Place) -> Result<Scene, RunError> {
     )
 }
 
-/// A scene with other values.
+/// Returns a scene with other values.
 fn changed(scene: &Scene, changes: &[(&str, String)]) -> Result<Scene, RunError> {
     let bare = Scene { bounds: Vec::new(), ..scene.clone() };
     let text = changes.iter().try_fold(write(&bare), |text, (path, value)| set(&text, path, value))?;
@@ -175,7 +181,7 @@ struct Hold {
     read_n: f64,
 }
 
-/// Holds a force, from whatever is held.
+/// Holds a force, starting from any state.
 fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
     bench.command().goal = newtons((goal_n * 1e3) as i32);
     bench.run(seconds - READ_S);
@@ -208,4 +214,96 @@ fn gains_of(found: &Modulus, curve_permille: i32) -> Gains {
         }
     }
     gains
+}
+
+/// Distance of the contact off the centre, mm.
+const OFF_MM: f64 = 3.5;
+/// Duration of a hold, s.
+const TEST_HOLD_S: f64 = 1.5;
+/// Tests: name, goal in N, whether it is off the centre.
+const TESTS: [(&str, f64, bool); 3] =
+    [("1 N", 1.0, false), ("5 N, centred", 5.0, false), ("5 N, off the centre", 5.0, true)];
+
+/// Finger before and after its calibration.
+#[derive(Clone, Debug)]
+pub struct Unlike {
+    /// Result of the calibration.
+    pub calibrated: Calibrated,
+    /// Errors of the true force in the order of the tests, as shares of the goal: before and after calibration.
+    pub errors: [[f64; 3]; 2],
+}
+
+/// Draws a finger, holds forces, calibrates it and holds them again.
+fn finger(seed: u64, number: usize) -> Result<Unlike, RunError> {
+    let drawn = load("unlike")?.finger(seed, number)?;
+    let mut rng = Rng::with_seed(seed ^ (number as u64) << 32);
+    let mut taxels: Vec<[usize; 2]> = (0..36).map(|taxel| [2 + taxel / 6, 2 + taxel % 6]).collect();
+    rng.shuffle(&mut taxels);
+    taxels.truncate(rng.usize(1..=3));
+    let angle = TAU * rng.f64();
+    let off = Place { centre_mm: [OFF_MM * angle.cos(), OFF_MM * angle.sin()], ..Place::default() };
+    let scene = changed(&drawn.scene, &[("effects.broken_taxels.dead", format!("{taxels:?}"))])?;
+    let mut bench = Bench::<Named>::new(&scene)?;
+    let errors = |bench: &mut Bench<Named>| -> Result<[f64; 3], RunError> {
+        let mut errors = [0.0; 3];
+        for (error, (_, goal_n, is_off)) in errors.iter_mut().zip(TESTS) {
+            bench.exchange(&plate(&scene, if is_off { off } else { Place::default() })?)?;
+            bench.tare();
+            *error = hold(bench, goal_n, TEST_HOLD_S).true_n / goal_n - 1.0;
+            release(bench);
+            bench.rest(PAUSE_S);
+        }
+        Ok(errors)
+    };
+    let before = errors(&mut bench)?;
+    let calibrated = calibrate(&mut bench, &scene)?;
+    let after = errors(&mut bench)?;
+    Ok(Unlike { calibrated, errors: [before, after] })
+}
+
+/// Median and 95th percentile of the absolute errors of each test in percent: before and after calibration.
+pub fn percentiles(fingers: &[Unlike]) -> [[[f64; 2]; 3]; 2] {
+    [0, 1].map(|when| {
+        [0, 1, 2].map(|test| {
+            let mut all: Vec<f64> = fingers.iter().map(|finger| 100.0 * finger.errors[when][test].abs()).collect();
+            all.sort_by(f64::total_cmp);
+            [0.5, 0.95].map(|share| all[((all.len() - 1) as f64 * share).round() as usize])
+        })
+    })
+}
+
+/// Draws and calibrates fingers on all cores.
+pub fn fingers(seed: u64, count: usize) -> Result<Vec<Unlike>, RunError> {
+    cores::map(0..count, |number| finger(seed, number).map_err(|error| error.to_string()))
+        .into_iter()
+        .map(|finger| Ok(finger?))
+        .collect()
+}
+
+/// The errors as a text: worst fingers first, then percentiles.
+pub fn errors_text(fingers: &[Unlike]) -> String {
+    let mut text = String::new();
+    let worst = |finger: &Unlike| finger.errors[1].iter().fold(0.0_f64, |worst, error| worst.max(error.abs()));
+    let mut order: Vec<usize> = (0..fingers.len()).collect();
+    order.sort_by(|a, b| worst(&fingers[*b]).total_cmp(&worst(&fingers[*a])));
+    for number in order {
+        let [before, after] = fingers[number].errors.map(|errors| errors.map(|error| format!("{:+.1}", 100.0 * error)));
+        let refused = fingers[number].calibrated.refused.join("; ");
+        let _ = writeln!(
+            text,
+            "finger {}: {} % before, {} % after  {refused}",
+            number + 1,
+            before.join(", "),
+            after.join(", ")
+        );
+    }
+    let [before, after] = percentiles(fingers);
+    for ((name, ..), (before, after)) in TESTS.into_iter().zip(before.into_iter().zip(after)) {
+        let _ = writeln!(
+            text,
+            "{name}: error of the true force, median {:.1} % and 95 % at {:.1} % before, {:.1} % and {:.1} % after",
+            before[0], before[1], after[0], after[1]
+        );
+    }
+    text
 }

@@ -1,36 +1,35 @@
-//! The native board with the bus in place of a scene's host: each finger is a device, their IDs count from 1.
+//! Native board with the bus in place of the host of a scene: each finger is a device, and IDs count from 1.
 //!
-//! The bytes are those of the firmware: the same core and the same [`Server`]. What the firmware's tasks do around them
-//! is done here: a request is passed on with the next frame, a reply leaves after its delay, parameters that change make
-//! a new configuration, those that are saved outlive a reboot. What lies outside is not simulated: the time that bytes
-//! take on the line, the time that the microcontroller takes to start, to save and to answer (loop times read 0).
+//! The bytes are those of the firmware: the same core and the same [`Server`]. This module does what the tasks of the
+//! firmware do around them: a request is passed on with the next frame, a reply leaves after its delay, changed
+//! parameters make a new configuration, and saved ones survive a reboot. Not simulated are the time of bytes on the
+//! line, and the time in which the microcontroller starts, saves and answers (loop times read 0).
 
-mod broken;
-mod object;
-
-pub use broken::Kind;
-
-use super::{Begun, Board, SimError};
 use crate::bridge::Bridge;
-use crate::effects::set::Set;
+use crate::effects::Set;
+use crate::native::{Begun, Board, SimError};
 use crate::scene::Scene;
 use crate::watch::Truth;
-use broken::Broken;
+use crate::world::World;
 use fingertip::capture::Ended;
+use fingertip::frame::Sense;
 use fingertip::link::{Captured, Crash, Health, Reply, ResetCause};
+use fingertip::params::Params;
 use fingertip::pipeline::Status;
-use fingertip::shipped::{CLOCKS, Calibration, Capture, Config, Pipeline, ROWS, Record, SLOTS, Server, Snapshot};
+use fingertip::shipped::{
+    CLOCKS, COLUMNS, Calibration, Capture, Config, Frame, Pipeline, ROWS, Record, SLOTS, Server, Snapshot,
+};
 use fingertip::state::{Fault, Mode};
 use fingertip::store::settle;
-use object::Object;
 use std::collections::VecDeque;
+use std::str::FromStr;
 
-/// Bytes for the host, and when they are due.
+/// Bytes for the host.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// Virtual time.
+    /// Virtual time at which they are due.
     pub due_s: f64,
-    /// A whole packet, or a device's part of one.
+    /// Whole packet, or the part of a device.
     pub bytes: Vec<u8>,
 }
 
@@ -42,26 +41,26 @@ pub struct Bus<E: Set> {
     answers: VecDeque<Answer>,
 }
 
-/// What a finger's firmware keeps beside its pipeline.
+/// Firmware of a finger beside its pipeline.
 struct Device {
     server: Server,
-    /// What its flash holds.
+    /// Contents of the flash.
     flash: Record,
     started_s: f64,
     reset: ResetCause,
-    /// The encoder counts from where it started.
+    /// Count of the encoder at the start.
     encoder_start: i32,
-    /// How many good packets there were, and when that last changed.
+    /// Number of good packets, and the time of its last change.
     packets: (u32, f64),
     broken: Option<Broken>,
-    /// As the controller sensed it last.
+    /// Supply voltage that the controller sensed last.
     supply_mv: u16,
     reboot_s: Option<f64>,
     capture: Box<Capture>,
 }
 
 impl<E: Set> Bus<E> {
-    /// At power-on: torque off, not tared, nothing stored but what the scene says.
+    /// Powers the fingers on: torque off, not tared, nothing stored but the values of the scene.
     pub fn new(scene: &Scene) -> Result<Self, SimError> {
         let board = Board::<E>::new(&scene.without_events(), Begun::default())?;
         let device = |finger: usize| {
@@ -78,24 +77,24 @@ impl<E: Set> Bus<E> {
         self.board.time_s()
     }
 
-    /// How long a frame takes.
+    /// Duration of a frame.
     pub fn frame_s(&self) -> f64 {
         self.board.slot_s * SLOTS as f64
     }
 
-    /// The bus speed that the devices listen at: the first one's.
+    /// Bus speed of the first device.
     pub fn baud(&self) -> u32 {
         self.devices[0].server.settings().baud()
     }
 
-    /// What is true of each finger, and what its controller reports.
+    /// Returns the true state and the status of each finger.
     pub fn truths(&mut self) -> Vec<(Truth, Status)> {
         let board = &mut self.board;
         let truths = board.units.iter().enumerate();
         truths.map(|(finger, unit)| (board.world.truth(finger, false), *unit.pipeline.status())).collect()
     }
 
-    /// One frame of each finger, and its control step.
+    /// Scans one frame of each finger and takes its control step.
     pub fn frame(&mut self) {
         let frame_s = self.frame_s();
         self.object.approach(&mut self.board.world, frame_s);
@@ -136,13 +135,13 @@ impl<E: Set> Bus<E> {
         }
     }
 
-    /// Takes what the host sends.
+    /// Receives bytes of the host.
     pub fn hear(&mut self, bytes: &[u8]) {
         let now_s = self.now_s();
         let mut said: VecDeque<(usize, Answer)> = (0..self.devices.len())
             .flat_map(|finger| self.feed(finger, bytes, now_s).into_iter().map(move |answer| (finger, answer)))
             .collect();
-        // A device hears the others, and may have waited for one of them.
+        // A device also receives the answers of the others, and may wait for one of them.
         while let Some((from, answer)) = said.pop_front() {
             for finger in (0..self.devices.len()).filter(|finger| *finger != from) {
                 let heard = self.feed(finger, &answer.bytes, answer.due_s);
@@ -153,17 +152,17 @@ impl<E: Set> Bus<E> {
         }
     }
 
-    /// When the next answer is due.
+    /// Time at which the next answer is due.
     pub fn due_s(&self) -> Option<f64> {
         self.answers.front().map(|answer| answer.due_s)
     }
 
-    /// The next answer that is due by a time.
+    /// Returns the next answer that is due by a time.
     pub fn answer(&mut self, by_s: f64) -> Option<Answer> {
         self.answers.pop_front_if(|answer| answer.due_s <= by_s)
     }
 
-    /// Has a device hear bytes at a time; what it answers.
+    /// Passes bytes to a device and returns its answers.
     fn feed(&mut self, finger: usize, mut bytes: &[u8], at_s: f64) -> Vec<Answer> {
         let (mut answers, mut reply) = (Vec::new(), Reply::new());
         while !bytes.is_empty() {
@@ -181,7 +180,6 @@ impl<E: Set> Bus<E> {
                 loop_time_max_us: 0,
                 reset_cause: device.reset,
                 crash: Crash::default(),
-                // There is no board.
                 health: Health::default(),
                 frame: &unit.frame,
                 taxels: &pipeline.array().picture().taxels,
@@ -224,7 +222,7 @@ impl Device {
         Self::new(self.flash, ResetCause::Software, now_s)
     }
 
-    /// As the firmware makes it of what is stored.
+    /// Builds the pipeline from the stored values, as the firmware does.
     fn pipeline(&self) -> Pipeline {
         let (mut params, mut sound) = (self.flash.params, true);
         let config = settle(&mut params, Config::shipped, |_| sound = false);
@@ -236,7 +234,7 @@ impl Device {
         pipeline
     }
 
-    /// Since the last good packet.
+    /// Time since the last good packet, ms.
     fn silent_ms(&mut self, now_s: f64) -> u16 {
         let packets = self.server.good_packets();
         if packets != self.packets.0 {
@@ -245,7 +243,7 @@ impl Device {
         ((now_s - self.packets.1) * 1e3) as u16
     }
 
-    /// What the server asks of the firmware. The new time of a slot, where the scan changed.
+    /// Carries out the actions of the server. Returns the time of a slot if the scan changed.
     fn carry_out(&mut self, pipeline: &mut Pipeline, replied_s: f64) -> Option<f64> {
         let actions = self.server.take_actions();
         let record = self.server.settings().record;
@@ -284,7 +282,7 @@ impl Device {
     }
 }
 
-/// What is true of a finger, beside what its controller reports.
+/// Describes the true state of a finger beside its status.
 pub fn line(truth: &Truth, status: &Status) -> String {
     let sensed_n = f64::from(status.contact.force.0);
     let fault = status.fault.map_or(String::new(), |fault| format!(", fault {} ({fault:?})", fault as u32));
@@ -292,4 +290,247 @@ pub fn line(truth: &Truth, status: &Status) -> String {
         "{:?}{fault}: travel {:.3} mm, true force {:.3} N, sensed {sensed_n:.3} N",
         status.mode, truth.travel_mm, truth.force_n
     )
+}
+
+/// Distance of an object out of reach.
+const AWAY_MM: f64 = 1e3;
+/// Speed of the object without another one given.
+const MM_PER_S: f64 = 20.0;
+/// Largest speed of the object: its surface moves in steps of a frame.
+const MM_PER_S_MAX: f64 = 500.0;
+/// Gap between an object that is put in place and a tip beyond that place.
+const GAP_MM: f64 = 0.2;
+
+/// Place and goal of the object.
+struct Object {
+    /// Place in the scene.
+    scene_mm: f64,
+    now_mm: f64,
+    goal_mm: f64,
+    mm_per_s: f64,
+}
+
+impl Object {
+    fn new<E: Set>(world: &World<E>) -> Self {
+        let scene_mm = world.fingers()[0].setup().wall.distance_mm;
+        Self { scene_mm, now_mm: scene_mm, goal_mm: scene_mm, mm_per_s: MM_PER_S }
+    }
+
+    /// Advances towards the goal.
+    fn approach<E: Set>(&mut self, world: &mut World<E>, dt_s: f64) {
+        if self.now_mm != self.goal_mm {
+            let most_mm = self.mm_per_s * dt_s;
+            self.now_mm += (self.goal_mm - self.now_mm).clamp(-most_mm, most_mm);
+            self.place(world);
+        }
+    }
+
+    fn jump<E: Set>(&mut self, world: &mut World<E>, to_mm: f64) {
+        (self.now_mm, self.goal_mm) = (to_mm, to_mm);
+        self.place(world);
+    }
+
+    fn place<E: Set>(&self, world: &mut World<E>) {
+        world.fingers_mut().iter_mut().for_each(|finger| finger.place_object(self.now_mm));
+    }
+}
+
+/// Commands of [`Bus::command`].
+pub const HELP: &str = "\
+remove               takes the object away
+put                  puts it back where the scene has it, or in front of a tip that is beyond
+move MM [MM_PER_S]   moves its surface to where the tip meets it at this travel, at 20 mm/s or as said
+fault KIND [FINGER]  breaks something until it is mended; without KIND, says what can be broken
+mend                 mends all that is broken; the controller's fault stands until the host clears it
+state                says what is true of each finger
+help                 says this
+";
+
+impl<E: Set> Bus<E> {
+    /// Carries out a line of text and returns what was done.
+    ///
+    /// # Errors
+    /// The line is not a command or cannot be carried out. The text is for people.
+    pub fn command(&mut self, text: &str) -> Result<String, String> {
+        let words: Vec<&str> = text.split_whitespace().collect();
+        match words[..] {
+            [] => Ok(String::new()),
+            ["help"] => Ok(HELP.trim_end().into()),
+            ["state"] => Ok(self.state()),
+            ["remove"] => {
+                self.object.jump(&mut self.board.world, AWAY_MM);
+                Ok("the object is taken away".into())
+            }
+            ["put"] => {
+                let tip_mm = self.board.world.fingers().iter().map(|finger| finger.tip_mm()).fold(f64::MIN, f64::max);
+                let to_mm =
+                    self.object.scene_mm.max(if tip_mm > self.object.scene_mm { tip_mm + GAP_MM } else { tip_mm });
+                self.object.jump(&mut self.board.world, to_mm);
+                Ok(format!("the object is at {to_mm:.2} mm"))
+            }
+            ["move", to_mm] => self.move_object(to_mm, None),
+            ["move", to_mm, mm_per_s] => self.move_object(to_mm, Some(mm_per_s)),
+            ["fault"] => Ok(format!("what can be broken: {}", Kind::names())),
+            ["fault", kind] => self.break_one(kind, "1"),
+            ["fault", kind, finger] => self.break_one(kind, finger),
+            ["mend"] => {
+                self.devices.iter_mut().for_each(|device| device.broken = None);
+                Ok("all is mended".into())
+            }
+            _ => Err(format!("`{text}` is no command; those that are:\n{}", HELP.trim_end())),
+        }
+    }
+
+    fn state(&mut self) -> String {
+        let object = &self.object;
+        let object = match object.now_mm {
+            AWAY_MM.. => "the object is away".into(),
+            mm if mm == object.goal_mm => format!("the object is at {mm:.2} mm"),
+            mm => format!("the object is at {mm:.2} mm on its way to {:.2} mm", object.goal_mm),
+        };
+        let fingers = self.truths();
+        let lines =
+            fingers.iter().enumerate().map(|(n, (truth, status))| format!("finger {}: {}", n + 1, line(truth, status)));
+        lines.chain([object]).collect::<Vec<_>>().join("\n")
+    }
+
+    fn move_object(&mut self, to_mm: &str, mm_per_s: Option<&str>) -> Result<String, String> {
+        if self.devices.len() > 1 {
+            return Err("the object lies between two fingers: it cannot be moved towards one".into());
+        }
+        let to_mm = number(to_mm, "MM", -100.0, 100.0)?;
+        let mm_per_s = mm_per_s.map_or(Ok(MM_PER_S), |text| number(text, "MM_PER_S", 0.001, MM_PER_S_MAX))?;
+        // An object that was away starts where it cannot touch.
+        if self.object.now_mm == AWAY_MM {
+            let tip_mm = self.board.world.fingers()[0].tip_mm();
+            self.object.jump(&mut self.board.world, to_mm.max(tip_mm + GAP_MM));
+        }
+        (self.object.goal_mm, self.object.mm_per_s) = (to_mm, mm_per_s);
+        Ok(format!("the object moves to {to_mm:.2} mm at {mm_per_s:.3} mm/s"))
+    }
+
+    fn break_one(&mut self, kind: &str, finger: &str) -> Result<String, String> {
+        let count = self.devices.len();
+        let broken = Broken::new(kind.parse()?);
+        let device = finger.parse::<usize>().ok().and_then(|finger| self.devices.get_mut(finger.wrapping_sub(1)));
+        let device = device.ok_or_else(|| format!("no finger `{finger}`: 1 to {count} are there"))?;
+        device.broken = Some(broken);
+        Ok(format!("finger {finger}: {kind} from now on; `mend` ends it"))
+    }
+}
+
+fn number(text: &str, name: &str, least: f64, most: f64) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (least..=most).contains(number));
+    number.ok_or_else(|| format!("{name} of `{text}`: needs a number from {least} to {most}"))
+}
+
+/// Defect of a finger.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// No frame arrives: fault 1.
+    LostFrames,
+    /// The first row of the array is disconnected: fault 2.
+    ArrayBroken,
+    /// A row remains driven: fault 3.
+    RowStuck,
+    /// The array repeats its last codes: fault 4, once the tip moves.
+    ArrayFrozen,
+    /// The count of the encoder is frozen: fault 5, once the motor is driven.
+    EncoderFrozen,
+    /// The supply is below its limit: fault 9.
+    SupplyLow,
+    /// The supply is above its limit: fault 10.
+    SupplyHigh,
+    /// The bridge's driver reports a fault: fault 11.
+    Bridge,
+    /// The encoder counts backwards, its channels are swapped: fault 15, once the motor is driven.
+    EncoderReversed,
+    /// The motor's leads are swapped: fault 15, once the motor is driven.
+    LeadsSwapped,
+}
+
+impl Kind {
+    /// All defects with their names.
+    pub const ALL: [(&'static str, Self); 10] = [
+        ("lost-frames", Self::LostFrames),
+        ("array-broken", Self::ArrayBroken),
+        ("row-stuck", Self::RowStuck),
+        ("array-frozen", Self::ArrayFrozen),
+        ("encoder-frozen", Self::EncoderFrozen),
+        ("supply-low", Self::SupplyLow),
+        ("supply-high", Self::SupplyHigh),
+        ("bridge", Self::Bridge),
+        ("encoder-reversed", Self::EncoderReversed),
+        ("leads-swapped", Self::LeadsSwapped),
+    ];
+
+    /// Lists the names for people.
+    pub fn names() -> String {
+        Self::ALL.map(|(name, _)| name).join(", ")
+    }
+}
+
+impl FromStr for Kind {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|(known, _)| *known == name);
+        found.map(|(_, kind)| *kind).ok_or_else(|| format!("no fault `{name}`: there are {}", Self::names()))
+    }
+}
+
+/// A defect that lasts until it is mended.
+struct Broken {
+    kind: Kind,
+    /// Frame and encoder count when it broke.
+    then: Option<(Frame, i32)>,
+}
+
+/// Codes that a row adds to each slot while it remains driven.
+const STUCK_CODES: u16 = 1_000;
+/// Distance of the supply from its allowed range, mV.
+const BEYOND_MV: i32 = 500;
+
+impl Broken {
+    fn new(kind: Kind) -> Self {
+        Self { kind, then: None }
+    }
+
+    /// Returns the state of the bridge at the motor.
+    fn at_motor(&self, bridge: Bridge) -> Bridge {
+        match (self.kind, bridge) {
+            (Kind::LeadsSwapped, Bridge::Driven { duty }) => Bridge::Driven { duty: -duty },
+            _ => bridge,
+        }
+    }
+
+    /// Changes the inputs of the controller. Returns false if no frame arrives.
+    fn change(&mut self, frame: &mut Frame, sense: &mut Sense, params: &Params) -> bool {
+        let (frozen, encoder) = self.then.get_or_insert((*frame, sense.encoder));
+        match self.kind {
+            Kind::LostFrames => return false,
+            Kind::ArrayBroken => {
+                (0..COLUMNS).for_each(|column| frame.set_code(0, column, frame.code(SLOTS - 1, column)))
+            }
+            Kind::RowStuck => {
+                for slot in 0..=ROWS {
+                    for column in 0..COLUMNS {
+                        frame.set_code(slot, column, (frame.code(slot, column) + STUCK_CODES).min(4_095));
+                    }
+                }
+            }
+            Kind::ArrayFrozen => frame.codes = frozen.codes,
+            Kind::EncoderFrozen => sense.encoder = *encoder,
+            Kind::EncoderReversed => sense.encoder = encoder.wrapping_mul(2).wrapping_sub(sense.encoder),
+            Kind::SupplyLow => sense.supply_mv = millivolts(params.supply_min_mv - BEYOND_MV),
+            Kind::SupplyHigh => sense.supply_mv = millivolts(params.supply_max_mv + BEYOND_MV),
+            Kind::Bridge => sense.bridge_fault = true,
+            Kind::LeadsSwapped => {}
+        }
+        true
+    }
+}
+
+fn millivolts(value: i32) -> u16 {
+    value.clamp(0, i32::from(u16::MAX)) as u16
 }

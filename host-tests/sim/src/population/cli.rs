@@ -1,7 +1,6 @@
-//! The command line of `population`, the same for both boards.
+//! Command line of `population`, the same for both boards.
 
-use super::read::{judged, text};
-use super::report::{self, Ran, Report};
+use super::report::{self, Ran, Report, judged, text};
 use super::{go_on, load, write_worst};
 use crate::cli::verdict;
 use crate::part::Part;
@@ -60,13 +59,13 @@ pub struct Args {
 }
 
 impl Args {
-    /// The population as it was named.
+    /// Returns the name of the population as it was given.
     pub fn name(&self) -> Option<&str> {
         self.population.as_deref()
     }
 }
 
-/// What runs the controller.
+/// Board that runs the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Board {
     /// The same core on the host.
@@ -91,7 +90,7 @@ enum Merge {
     },
 }
 
-/// Does what is asked for. Exit code 0: every finger kept within the envelope; 1: one did not; 2: it could not be done.
+/// Carries out the arguments. Exit code 0: every finger kept within the envelope; 1: one did not; 2: not done.
 pub fn answer(args: &Args, board: Run) -> ExitCode {
     verdict(match &args.merge {
         Some(Merge::Merge { files, json }) => Report::merge(files).and_then(|report| {
@@ -114,7 +113,7 @@ fn population(args: &Args, board: Run) -> Result<bool, RunError> {
     };
     let all = args.fingers as usize;
     let numbers = (0..all).filter(|number| shard.has(*number));
-    // A file that is to come has what is done so far beside it; into a terminal or a pipe all goes at the end.
+    // A regular file has its progress beside it. Terminals and pipes receive the whole at the end.
     let into_file = |path: &&PathBuf| fs::metadata(path).is_ok_and(|known| known.is_file()) || !path.exists();
     let mut part = None;
     let mut done = Vec::new();

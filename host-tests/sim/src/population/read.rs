@@ -1,40 +1,37 @@
-//! A draw from its text: `{ uniform = [1, 10] }`, and the like.
+//! Reader of populations and of their draws, such as `{ uniform = [1, 10] }`.
 
-use super::draw::{Draw, Drawn};
-use super::expression::Expression;
-use super::{Counted, Population, read};
-use crate::metrics::shown;
-use crate::population::draw::Spread;
-use crate::population::report::{Promise, Ran, Report};
-use crate::run::asked;
-use crate::scene::error::alike;
+use crate::events::{EVENT, KINDS, own_keys};
+use crate::metrics;
+use crate::population::draw::{Draw, Drawn, Expression};
+use crate::population::{Counted, Events, Place, Population};
+use crate::registry;
 use crate::scene::library;
-use crate::scene::tables::{EXPECT, SCRIPT};
-use std::fmt::Write as _;
+use crate::scene::reader::{SceneError, SceneErrors, did_you_mean, item_span, key_span};
+use crate::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value};
+use toml_edit::{ArrayOfTables, Document, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
-/// What is wrong, where, and what is allowed.
+/// Place and text of a mistake, and what is allowed.
 pub type Wrong = (Range<usize>, String, String);
 
-/// The ways to draw.
+/// Names of the draws.
 pub const WAYS: [&str; 6] = ["uniform", "log_uniform", "normal", "choice", "is", "by"];
 const EXAMPLES: &str = "{ uniform = [1, 10] }, { log_uniform = [0.3, 3] }, { normal = [0, 0.05] } (mean, deviation), \
     { choice = [256, 512], weights = [1, 2] }, { is = \"1000 * modulus_kpa\" }, { by = \"thing\", ball = 0.05, otherwise = 0 }; \
     with follows = \"magnitude\" or \"1 / magnitude\"";
 
-/// Reads draws: at one magnitude, with the variables that were read before.
+/// Reader of draws: at one magnitude, with the variables that were read before.
 pub struct DrawReader<'a> {
-    /// What `follows` multiplies or divides by.
+    /// Number by which `follows` multiplies or divides.
     pub magnitude: f64,
     /// Variables that may be used.
     pub variables: &'a [(String, Draw)],
 }
 
 impl DrawReader<'_> {
-    /// What a value says: a draw, or always the same.
+    /// Reads a draw or a constant.
     pub fn draw(&self, value: &Value) -> Result<Draw, Wrong> {
         let number = number(value).map(Drawn::Number);
         match (value.as_inline_table(), number.or_else(|| value.as_str().map(|word| Drawn::Word(word.into())))) {
@@ -48,8 +45,8 @@ impl DrawReader<'_> {
         let mut ways = WAYS.iter().filter_map(|way| Some((*way, table.get(way)?)));
         let (Some((way, value)), None) = (ways.next(), ways.next()) else {
             let given: Vec<&str> = table.iter().map(|(name, _)| name).collect();
-            let meant = given.iter().find_map(|name| alike(name, WAYS));
-            let meant = meant.map_or(String::new(), |way| format!("; did you mean `{way}`?"));
+            let meant = given.iter().map(|name| did_you_mean(name, WAYS)).find(|meant| !meant.is_empty());
+            let meant = meant.unwrap_or_default();
             return Err((place, format!("a draw has one way to be drawn{meant}"), EXAMPLES.into()));
         };
         let draw = match way {
@@ -82,9 +79,7 @@ impl DrawReader<'_> {
 
     fn pair(&self, value: &Value) -> Result<[f64; 2], Wrong> {
         let numbers: Option<Vec<f64>> = value.as_array().map(|array| array.iter().filter_map(number).collect());
-        numbers
-            .and_then(|numbers| numbers.try_into().ok())
-            .ok_or_else(|| wrong(value, "two numbers are asked for", EXAMPLES))
+        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(|| wrong(value, "needs two numbers", EXAMPLES))
     }
 
     fn ends(&self, value: &Value) -> Result<[f64; 2], Wrong> {
@@ -177,14 +172,13 @@ impl DrawReader<'_> {
         let found = self.variables.iter().find(|(known, _)| known == name).map(|(_, draw)| draw);
         found.ok_or_else(|| {
             let names: Vec<&str> = self.variables.iter().map(|(name, _)| name.as_str()).collect();
-            let meant = alike(name, names.iter().copied());
-            let meant = meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
-            wrong(value, &format!("no variable `{name}` stands in [draw] before{meant}"), &names.join(", "))
+            let meant = did_you_mean(name, names.iter().copied());
+            wrong(value, &format!("no earlier variable `{name}` in [draw]{meant}"), &names.join(", "))
         })
     }
 }
 
-/// A number that is finite.
+/// Reads a finite number.
 pub fn number(value: &Value) -> Option<f64> {
     value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64)).filter(|number| number.is_finite())
 }
@@ -197,15 +191,15 @@ fn wrong(value: &Value, message: &str, allowed: &str) -> Wrong {
     (at(value), message.into(), allowed.into())
 }
 
-/// Where the populations lie that come with the project.
+/// Folder of the populations of the project.
 pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/populations")
 }
 
-/// A population by its path or by its name among those that come with the project.
+/// Loads a population by its path, or by its name in the project.
 ///
 /// # Errors
-/// There is none, or it is not one; the text is for people.
+/// There is none, or it has mistakes. The text is for people.
 pub fn load(name: &str) -> Result<Population, String> {
     let (path, text) = library::find(&folder(), "population", name)?;
     let file = path.to_string_lossy();
@@ -222,7 +216,7 @@ pub fn load(name: &str) -> Result<Population, String> {
     if whole.as_ref().is_ok_and(|whole| whole.contains_key("extends")) {
         return Err(told(format!("{base} extends another itself; extend that one, or none")));
     }
-    // What is wrong in it is told as it stands there.
+    // Reports mistakes of the base at their place in its file.
     let known = read(&found.to_string_lossy(), &text).map_err(|errors| told(errors.to_string()))?;
     let mut whole = whole.map_err(|error| told(error.to_string()))?;
     overlay(whole.as_table_mut(), over.as_table());
@@ -231,8 +225,8 @@ pub fn load(name: &str) -> Result<Population, String> {
     Ok(Population { name: stem(&file), ..population })
 }
 
-/// Puts what a file says over what it extends: value by value, bounds by their metric, a script as a whole. What is
-/// counted is added.
+/// Puts the contents of a file over those of the file it extends: value by value, bounds by their metric, a script as a
+/// whole. Counts are added.
 fn overlay(base: &mut Table, over: &Table) {
     for (name, item) in over.iter().filter(|(name, _)| *name != "extends") {
         match (base.get_mut(name), item) {
@@ -267,66 +261,282 @@ pub fn stem(file: &str) -> String {
     Path::new(file).file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into_owned())
 }
 
-/// Fingers that are named each.
-const NAMED: usize = 30;
+/// Keys of a population that a scene does not have, beside `extends`.
+const OWN: [&str; 4] = ["magnitude", "draw", "events", "count"];
 
-/// The table of promises, the forces' errors, and who broke what.
-pub fn text(report: &Report) -> String {
-    let Report { population, board, seed, of_fingers, fingers, .. } = report;
-    let count = fingers.len();
-    let percent = |part: usize| 100.0 * part as f64 / count.max(1) as f64;
-    let mut text = format!("{population}: {}\n", report.about);
-    // Writing to a string does not fail.
-    let _ = writeln!(text, "{count} of {of_fingers} fingers, seed {seed}, board {board}; simulated\n");
-    let promises = report.promises();
-    let width = promises.iter().map(|row| row.metric.len()).max().unwrap_or(0);
-    let _ = writeln!(
-        text,
-        "  {:width$} {:>8} {:>8} {:>10} {:>10} {:>10}",
-        "promise", "broken", "%", "median", "95 %", "worst"
-    );
-    for row in &promises {
-        let [median, most, worst] = values(&row.spread);
-        let (broken, share) = (row.broken, percent(row.broken));
-        let _ = writeln!(text, "  {:width$} {broken:>8} {share:>8.1} {median:>10} {most:>10} {worst:>10}", row.metric);
+/// Reads the text of a population without `extends`.
+pub fn read(file: &str, text: &str) -> Result<Population, SceneErrors> {
+    let error = |(at, message, allowed): Wrong| SceneError::new(file, text, at, message, allowed);
+    let document = Document::parse(text).map_err(|failure| {
+        let message = format!("this is not TOML: {}", failure.message().trim().replace('\n', "; "));
+        SceneErrors(vec![error((failure.span().unwrap_or(0..0), message, String::new()))])
+    })?;
+    let root = document.as_table();
+    let mut wrong: Vec<Wrong> = Vec::new();
+    let magnitude =
+        root.get("magnitude").map_or(Some(1.0), |item| number(item.as_value()?)).filter(|magnitude| *magnitude > 0.0);
+    if magnitude.is_none() {
+        wrong.push((
+            item_span(root, "magnitude"),
+            "`magnitude` is a number above 0".into(),
+            "1 is as the file says".into(),
+        ));
     }
-    for (Counted { metric, above }, fingers) in report.counted() {
-        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers));
+    let mut parts = Parts { magnitude: magnitude.unwrap_or(1.0), variables: Vec::new(), keys: Vec::new(), wrong };
+    parts.variables(root);
+    parts.keys("", root);
+    let events = parts.events(root);
+    parts.unused(root);
+    let counted = parts.counted(root);
+    for name in OWN {
+        if root.contains_key(name) {
+            let blanks = own_text(root, name);
+            parts.keys.extend(blanks.into_iter().map(|at| Place { at, key: String::new(), whole: false, draw: None }));
+        }
     }
-    let [of_goal, mn] = report.errors();
-    let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);
-    for (spread, unit) in [(of_goal, "% of the goal"), (mn, "mN")] {
-        let _ = writeln!(text, "  {} {unit}", values(&spread).join(", "));
+    let Parts { variables, mut keys, wrong, .. } = parts;
+    if !wrong.is_empty() {
+        let mut errors: Vec<SceneError> = wrong.into_iter().map(error).collect();
+        errors.sort_by_key(|error| (error.line, error.column));
+        return Err(SceneErrors(errors));
     }
-    let worst: Vec<&Ran> = report.worst().into_iter().filter(|ran| !ran.inside).collect();
-    if !worst.is_empty() {
-        text += "\n  outside, the worst first:\n";
-    }
-    worst.iter().take(NAMED).for_each(|ran| text += &format!("  {}\n", judged(ran)));
-    if worst.len() > NAMED {
-        let _ = writeln!(text, "  and {} more: --json FILE has them all", worst.len() - NAMED);
-    }
-    let _ = writeln!(
-        text,
-        "\n{} of {count} fingers inside the envelope ({:.1} %)",
-        report.inside(),
-        percent(report.inside())
-    );
-    text
+    // Draws of events are not in the scene: each event has its own.
+    keys.retain(|place: &Place| !place.key.starts_with("events."));
+    keys.sort_by_key(|place: &Place| place.at.start);
+    let about = root.get("about").and_then(Item::as_str).unwrap_or_default().to_owned();
+    let population = Population {
+        name: stem(file),
+        file: file.into(),
+        about,
+        text: text.into(),
+        variables,
+        places: keys,
+        events,
+        counted,
+    };
+    // Reports mistakes of the scene at their place in the file: its lines are the same.
+    population.finger(1, 0)?;
+    Ok(population)
 }
 
-/// One line for a finger: the promises that it broke, else the promise with the smallest margin.
-pub fn judged(ran: &Ran) -> String {
-    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
-        format!("{metric} {} ({})", shown(*value), asked(*min, *max))
-    };
-    let about = match ran.nearest().filter(|_| ran.inside) {
-        Some(nearest) => format!("broke no promise, nearest to its bound is {}", promise(nearest)),
-        None => ran.broken().map(promise).collect::<Vec<_>>().join("; "),
-    };
-    format!("finger {}: {about}", ran.finger)
+struct Parts {
+    magnitude: f64,
+    variables: Vec<(String, Draw)>,
+    keys: Vec<Place>,
+    wrong: Vec<Wrong>,
 }
 
-fn values(spread: &Spread) -> [String; 3] {
-    [spread.median, spread.most, spread.worst].map(shown)
+impl Parts {
+    fn variables(&mut self, root: &Table) {
+        let Some(item) = root.get("draw") else { return };
+        let Some(table) = item.as_table() else {
+            self.wrong.push((key_span(root, "draw"), "`draw` is a table".into(), "[draw], once".into()));
+            return;
+        };
+        for (name, item) in table.iter() {
+            let Some(value) = item.as_value() else {
+                self.wrong.push((key_span(table, name), format!("`{name}` is no draw"), "a value or a draw".into()));
+                continue;
+            };
+            match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+                Ok(draw) => self.variables.push((name.into(), draw)),
+                Err(wrong) => self.wrong.push(wrong),
+            }
+        }
+    }
+
+    /// Reads the drawn keys of a table and of the tables in it.
+    fn keys(&mut self, path: &str, table: &dyn TableLike) {
+        for (name, item) in table.iter().filter(|(name, _)| !path.is_empty() || !OWN.contains(name)) {
+            let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
+            match item {
+                Item::Table(inner) => self.keys(&key, inner),
+                Item::ArrayOfTables(tables) => {
+                    tables.iter().enumerate().for_each(|(place, table)| self.keys(&format!("{key}.{place}"), table));
+                }
+                Item::Value(value) if value.is_inline_table() && !is_table(&key) => self.key(key, value),
+                Item::Value(value) => {
+                    if let Some(inner) = value.as_inline_table() {
+                        self.keys(&key, inner);
+                    }
+                }
+                Item::None => {}
+            }
+        }
+    }
+
+    fn key(&mut self, key: String, value: &toml_edit::Value) {
+        let at = value.span().unwrap_or(0..0);
+        let draw = match (DrawReader { magnitude: self.magnitude, variables: &self.variables }).draw(value) {
+            Ok(draw) => draw,
+            Err(wrong) => return self.wrong.push(wrong),
+        };
+        let described = described(&key);
+        if let (Some(described), Some([low, high])) = (described, draw.range(&|name| self.range(name)))
+            && let Some([min, max]) = numbers(described)
+            && (low < min || high > max)
+        {
+            let [low, high] =
+                [low, high].map(|end| format!("{end:.6}").trim_end_matches('0').trim_end_matches('.').to_owned());
+            let magnitude =
+                if self.magnitude == 1.0 { String::new() } else { format!(" at a magnitude of {}", self.magnitude) };
+            let message = format!("`{key}` is drawn from {low} to {high}{magnitude}");
+            self.wrong.push((at.clone(), message, described.allowed()));
+        }
+        let whole =
+            described.is_some_and(|key| matches!(key.kind, Kind::Whole { .. } | Kind::Optional { whole: true, .. }));
+        self.keys.push(Place { at, key, whole, draw: Some(draw) });
+    }
+
+    /// Reads the draws of events: `[events]` with `count` and `at_s`, `[events.KIND]` with `weight` and the keys of the
+    /// kind.
+    fn events(&mut self, root: &Table) -> Option<Events> {
+        let table = root.get("events")?.as_table()?;
+        let own = ["count", "at_s"];
+        let (mut kinds, mut all) = (Vec::new(), Vec::new());
+        for (name, item) in table.iter().filter(|(name, _)| !own.contains(name)) {
+            let known = KINDS.iter().find(|kind| kind.name == name);
+            let (Some(kind), Some(given)) = (known, item.as_table()) else {
+                let names = KINDS.iter().map(|kind| kind.name);
+                let meant = did_you_mean(name, names.clone());
+                let allowed = format!("count, at_s, and a table for each of {}", names.collect::<Vec<_>>().join(", "));
+                self.wrong.push((key_span(table, name), format!("`{name}` is no kind of event{meant}"), allowed));
+                continue;
+            };
+            let keys = own_keys(kind);
+            for (name, _) in
+                given.iter().filter(|(name, _)| *name != "weight" && keys.iter().all(|key| key.name != *name))
+            {
+                let allowed = keys.iter().map(|key| key.name).chain(["weight"]).collect::<Vec<_>>().join(", ");
+                let message = format!("unknown key `{name}` in [events.{}]", kind.name);
+                self.wrong.push((key_span(given, name), message, allowed));
+            }
+            for key in keys {
+                let place = self.drawn(given, key.name, &format!("events.{}", kind.name));
+                all.extend(place.map(|place| (kind.name, place)));
+            }
+            let weight = given.get("weight").map_or(Some(1.0), |item| number(item.as_value()?));
+            kinds.push((weight.unwrap_or(0.0), Draw::Always(Drawn::Word(kind.name.into()))));
+        }
+        if kinds.is_empty() {
+            let at = table.span().unwrap_or(0..0);
+            self.wrong.push((at, "[events] names no kind".into(), "[events.tare] and the like".into()));
+        }
+        let [count, at_s] = own.map(|name| self.drawn(table, name, "events"));
+        let kind = Place { at: 0..0, key: "kind".into(), whole: false, draw: Some(Draw::Choice(kinds)) };
+        Some(Events { count: count?, at_s: at_s?, kind, keys: all })
+    }
+
+    /// Reads a required draw.
+    fn drawn(&mut self, table: &Table, name: &str, path: &str) -> Option<Place> {
+        let Some(value) = table.get(name).and_then(Item::as_value) else {
+            let at = table.span().unwrap_or(0..0);
+            self.wrong.push((at, format!("[{path}] lacks `{name}`"), "a value or a draw".into()));
+            return None;
+        };
+        let known = self.keys.len();
+        self.key(format!("{path}.{name}"), value);
+        self.keys.get(known).cloned()
+    }
+
+    /// Refuses variables that nothing uses.
+    fn unused(&mut self, root: &Table) {
+        let draws =
+            self.variables.iter().map(|(_, draw)| draw).chain(self.keys.iter().filter_map(|key| key.draw.as_ref()));
+        let used: Vec<&str> = draws.flat_map(Draw::uses).collect();
+        let unused = self.variables.iter().filter(|(name, _)| !used.contains(&name.as_str()));
+        let table = root.get("draw").and_then(Item::as_table);
+        let unused: Vec<(Range<usize>, String)> =
+            unused.map(|(name, _)| (table.map_or(0..0, |table| key_span(table, name)), name.clone())).collect();
+        // The variables of a wrong draw are unknown.
+        let sound = self.wrong.is_empty();
+        for (at, name) in unused.into_iter().filter(|_| sound) {
+            let allowed = format!("{{ is = \"{name}\" }} or {{ by = \"{name}\", ... }} at a key of the scene");
+            self.wrong.push((at, format!("`{name}` is drawn, and nothing uses it"), allowed));
+        }
+    }
+
+    fn range(&self, name: &str) -> Option<[f64; 2]> {
+        let place = self.variables.iter().position(|(known, _)| known == name)?;
+        // A variable uses only earlier ones, so the recursion ends.
+        self.variables[place].1.range(&|name| self.range(name))
+    }
+
+    fn counted(&mut self, root: &Table) -> Vec<Counted> {
+        let tables = root.get("count").and_then(Item::as_array_of_tables);
+        let mut counted = Vec::new();
+        for table in tables.into_iter().flatten() {
+            let metric = table.get("metric").and_then(Item::as_str).unwrap_or_default();
+            let above = table.get("above").and_then(Item::as_value).and_then(number);
+            let known = metrics::names().contains(&metric);
+            match above.filter(|_| known && table.len() == 2) {
+                Some(above) => counted.push(Counted { metric: metric.into(), above }),
+                None => {
+                    let meant = if known { String::new() } else { did_you_mean(metric, metrics::names()) };
+                    let message = format!("[[count]] is a metric and a number{meant}");
+                    self.wrong.push((
+                        table.span().unwrap_or(0..0),
+                        message,
+                        "metric = \"rest_duty_percent\", above = 2.0".into(),
+                    ));
+                }
+            }
+        }
+        counted
+    }
+}
+
+/// Returns the ranges of the text that only a population has: a key with its value, or tables from head to last value.
+fn own_text(root: &Table, name: &str) -> Vec<Range<usize>> {
+    let whole = |table: &Table| {
+        let head = table.span()?;
+        let ends = table.iter().filter(|(_, item)| !item.is_table()).filter_map(|(_, item)| Some(item.span()?.end));
+        Some(head.start..ends.fold(head.end, usize::max))
+    };
+    match root.get(name) {
+        Some(Item::Table(table)) => {
+            let inner = table.iter().filter_map(|(_, item)| item.as_table());
+            core::iter::once(table).chain(inner).filter_map(whole).collect()
+        }
+        Some(Item::ArrayOfTables(tables)) => tables.iter().filter_map(whole).collect(),
+        Some(Item::Value(value)) => value.span().map(|at| key_span(root, name).start..at.end).into_iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Number of events of a finger.
+const COUNT: Key = Key { name: "count", about: "", kind: Kind::Whole { min: 0, max: 100, default: None } };
+
+fn is_table(key: &str) -> bool {
+    match key.split_once('.') {
+        None => key == "effects" || TABLES.iter().any(|table| table.name == key),
+        Some((table, effect)) => table == "effects" && !effect.contains('.'),
+    }
+}
+
+fn described(path: &str) -> Option<&'static Key> {
+    let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
+    let table = table
+        .split_once('.')
+        .map_or(table, |(first, second)| if ["effects", "events"].contains(&first) { second } else { first });
+    let keys = match table {
+        "" => ROOT.keys,
+        "script" => SCRIPT.keys,
+        "expect" => EXPECT.keys,
+        "events" if name == "count" => return Some(&COUNT),
+        "event" | "events" => EVENT.keys,
+        name => match TABLES.iter().chain(&KINDS).find(|table| table.name == name) {
+            Some(table) => table.keys,
+            None => registry::all().find(|effect| effect.name == name)?.keys,
+        },
+    };
+    keys.iter().find(|key| key.name == name)
+}
+
+fn numbers(key: &Key) -> Option<[f64; 2]> {
+    match key.kind {
+        Kind::Number { min, max, .. } | Kind::Optional { min, max, .. } => Some([min, max]),
+        Kind::Whole { min, max, .. } => Some([min as f64, max as f64]),
+        _ => None,
+    }
 }

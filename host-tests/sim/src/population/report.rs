@@ -1,15 +1,16 @@
-//! What became of a population: every finger's draws and verdicts, and what they come to.
+//! Report of a population: draws and results of every finger, and their summary.
 
 use super::draw::Spread;
 use super::{Counted, Finger, Population};
-use crate::metrics::Hold;
+use crate::metrics::{Hold, shown};
 use crate::part::{cannot_write, check};
-use crate::run::{Outcome, RunError};
+use crate::run::{Outcome, RunError, asked};
 use crate::sweep::first_missing;
 use output::kept;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -18,64 +19,64 @@ use std::path::{Path, PathBuf};
 pub struct Report {
     /// The population's name.
     pub population: String,
-    /// What it is.
+    /// Description of the population.
     pub about: String,
     /// Always true.
     pub simulated: bool,
-    /// On which board.
+    /// Name of the board.
     pub board: String,
-    /// Of the draws.
+    /// Seed of the draws.
     pub seed: u64,
-    /// How many fingers the whole has.
+    /// Number of fingers of the whole.
     pub of_fingers: usize,
-    /// Of the population's text, the seed and the number of fingers: shards of one whole have the same.
+    /// Digest of the text of the population, the seed and the number of fingers: the same for all shards of a whole.
     pub id: String,
-    /// What is counted beside the envelope.
+    /// Counts beside the envelope.
     pub counted: Vec<Counted>,
-    /// What they come to, for scripts.
+    /// Summary for scripts.
     pub summary: Value,
-    /// Each finger.
+    /// Results of the fingers.
     pub fingers: Vec<Ran>,
 }
 
-/// A finger that was run.
+/// Result of a finger.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ran {
-    /// Its number, from 1.
+    /// Number of the finger, from 1.
     pub finger: usize,
-    /// Of its scene.
+    /// Seed of the scene.
     pub seed: u64,
-    /// Whether it kept all promises.
+    /// True if it kept all promises.
     pub inside: bool,
-    /// What was drawn.
+    /// Drawn values.
     pub drawn: Map<String, Value>,
-    /// What it promised, and what became of it.
+    /// Promises with their results.
     pub promises: Vec<Promise>,
-    /// The forces that it held.
+    /// Forces that were held.
     pub holds: Vec<Hold>,
-    /// All metrics; null where the run has none.
+    /// All metrics; null if the run has none.
     pub metrics: Map<String, Value>,
-    /// Of its run.
+    /// Digest of the run.
     pub digest: String,
 }
 
-/// A promise of the envelope.
+/// Promise of the envelope.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Promise {
-    /// What it is about.
+    /// Metric of the promise.
     pub metric: String,
-    /// What was measured: of a metric that has a value for each goal, that which is worst against what is allowed.
+    /// Measured value: for a metric with a value for each goal, the worst against its limit.
     pub value: Option<f64>,
-    /// The least that is allowed.
+    /// Lower bound.
     pub min: Option<f64>,
-    /// The largest that is allowed.
+    /// Upper bound.
     pub max: Option<f64>,
-    /// Whether it is kept.
+    /// True if it is kept.
     pub held: bool,
 }
 
 impl Promise {
-    /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as it must be.
+    /// Distance beyond the bound as a share of the bound, negative within it; -1 for a count that is 0 as required.
     pub fn excess(&self) -> f64 {
         let Some(value) = self.value else { return if self.held { -1.0 } else { f64::INFINITY } };
         let sides = [self.max.map(|max| value - max), self.min.map(|min| min - value)];
@@ -89,7 +90,7 @@ impl Promise {
 }
 
 impl Ran {
-    /// What became of a finger.
+    /// Result of a finger.
     pub fn new(number: usize, finger: &Finger, outcome: &Outcome) -> Self {
         let promises = outcome.verdicts.iter().map(|verdict| Promise {
             metric: verdict.bound.metric.clone(),
@@ -110,30 +111,30 @@ impl Ran {
         }
     }
 
-    /// The promises that it broke.
+    /// Promises that were broken.
     pub fn broken(&self) -> impl Iterator<Item = &Promise> {
         self.promises.iter().filter(|promise| !promise.held)
     }
 
-    /// The promise that is broken by most, or, where none is, nearest to its bound.
+    /// Promise that is broken by most, or else the nearest to its bound.
     pub fn nearest(&self) -> Option<&Promise> {
         self.promises.iter().max_by(|a, b| a.excess().total_cmp(&b.excess()))
     }
 
-    /// A metric; none where the run has none.
+    /// Returns a metric; none if the run has none.
     pub fn metric(&self, name: &str) -> Option<f64> {
         self.metrics.get(name)?.as_f64()
     }
 }
 
-/// Of all that makes a population's fingers what they are.
+/// Digest of everything that determines the fingers of a population.
 pub(super) fn id(population: &Population, board: &str, seed: u64, of_fingers: usize) -> String {
     let said = format!("{} {board} {seed} {of_fingers}\n{}", env!("CARGO_PKG_VERSION"), population.text);
     format!("{}-{}", population.name, check(&said))
 }
 
 impl Report {
-    /// Of these fingers, in any order.
+    /// Report of these fingers, in any order.
     pub fn new(population: &Population, board: &str, seed: u64, of_fingers: usize, fingers: Vec<Ran>) -> Self {
         let id = id(population, board, seed, of_fingers);
         let mut report = Self {
@@ -152,10 +153,10 @@ impl Report {
         report
     }
 
-    /// Shards put together: the same, byte for byte, as the whole.
+    /// Merges shards. The result is the same, byte for byte, as that of the whole.
     ///
     /// # Errors
-    /// They are not of one population, a finger is missing or there twice, or a file cannot be read.
+    /// They are not of one population, a finger is missing or duplicate, or a file cannot be read.
     pub fn merge(files: &[PathBuf]) -> Result<Self, RunError> {
         let mut whole: Option<Self> = None;
         let mut fingers = BTreeMap::new();
@@ -209,12 +210,12 @@ impl Report {
         });
     }
 
-    /// How many kept all promises.
+    /// Number of fingers that kept all promises.
     pub fn inside(&self) -> usize {
         self.fingers.iter().filter(|ran| ran.inside).count()
     }
 
-    /// What is counted beside the envelope, and of how many fingers it is so.
+    /// Counts beside the envelope, with their numbers of fingers.
     pub fn counted(&self) -> impl Iterator<Item = (&Counted, usize)> {
         self.counted.iter().map(|counted| {
             let above = |ran: &&Ran| ran.metric(&counted.metric) > Some(counted.above);
@@ -235,8 +236,7 @@ impl Report {
         names.into_iter().enumerate().map(row).collect()
     }
 
-    /// What the true force is off the goal in holds, in percent of it and in mN; where something was touched, and no
-    /// fault came before.
+    /// Errors of the true force in holds, in percent of it and in mN, where something was touched before any fault.
     pub fn errors(&self) -> [Spread; 2] {
         let holds = || self.fingers.iter().flat_map(|ran| &ran.holds).filter(|hold| !hold.faulty && !hold.missed);
         let off_n = |hold: &Hold| (hold.mean_n - hold.goal_n).abs();
@@ -252,15 +252,15 @@ impl Report {
         fingers
     }
 
-    /// For scripts.
+    /// Returns the report for scripts.
     pub fn json(&self) -> Result<String, RunError> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
-    /// Writes it for scripts.
+    /// Writes the report for scripts.
     ///
     /// # Errors
-    /// The file cannot be written; what was there before still is.
+    /// The file cannot be written. An earlier file remains.
     pub fn write(&self, path: &Path) -> Result<(), RunError> {
         Ok(kept::write(path, self.json()?).map_err(|error| cannot_write(path, &error))?)
     }
@@ -269,11 +269,11 @@ impl Report {
 /// A promise over all fingers.
 #[derive(Clone, Debug)]
 pub struct Row {
-    /// What it is about.
+    /// Metric of the promise.
     pub metric: String,
     /// Fingers that broke it.
     pub broken: usize,
-    /// The values.
+    /// Spread of the values.
     pub spread: Spread,
 }
 
@@ -284,4 +284,67 @@ impl Row {
         row.insert("broken".into(), json!(self.broken));
         Value::Object(row)
     }
+}
+
+/// Most fingers that are listed.
+const NAMED: usize = 30;
+
+/// Returns the table of promises, the errors of the force, and the fingers that broke promises.
+pub fn text(report: &Report) -> String {
+    let Report { population, board, seed, of_fingers, fingers, .. } = report;
+    let count = fingers.len();
+    let percent = |part: usize| 100.0 * part as f64 / count.max(1) as f64;
+    let mut text = format!("{population}: {}\n", report.about);
+    let _ = writeln!(text, "{count} of {of_fingers} fingers, seed {seed}, board {board}; simulated\n");
+    let promises = report.promises();
+    let width = promises.iter().map(|row| row.metric.len()).max().unwrap_or(0);
+    let _ = writeln!(
+        text,
+        "  {:width$} {:>8} {:>8} {:>10} {:>10} {:>10}",
+        "promise", "broken", "%", "median", "95 %", "worst"
+    );
+    for row in &promises {
+        let [median, most, worst] = values(&row.spread);
+        let (broken, share) = (row.broken, percent(row.broken));
+        let _ = writeln!(text, "  {:width$} {broken:>8} {share:>8.1} {median:>10} {most:>10} {worst:>10}", row.metric);
+    }
+    for (Counted { metric, above }, fingers) in report.counted() {
+        let _ = writeln!(text, "  {metric} above {above}: {fingers} fingers ({:.1} %)", percent(fingers));
+    }
+    let [of_goal, mn] = report.errors();
+    let _ = writeln!(text, "\n  true force off the goal in {} holds that touched: median, 95 %, worst", of_goal.count);
+    for (spread, unit) in [(of_goal, "% of the goal"), (mn, "mN")] {
+        let _ = writeln!(text, "  {} {unit}", values(&spread).join(", "));
+    }
+    let worst: Vec<&Ran> = report.worst().into_iter().filter(|ran| !ran.inside).collect();
+    if !worst.is_empty() {
+        text += "\n  outside, the worst first:\n";
+    }
+    worst.iter().take(NAMED).for_each(|ran| text += &format!("  {}\n", judged(ran)));
+    if worst.len() > NAMED {
+        let _ = writeln!(text, "  and {} more: --json FILE has them all", worst.len() - NAMED);
+    }
+    let _ = writeln!(
+        text,
+        "\n{} of {count} fingers inside the envelope ({:.1} %)",
+        report.inside(),
+        percent(report.inside())
+    );
+    text
+}
+
+/// Describes a finger in one line: the promises that it broke, else the promise with the smallest margin.
+pub fn judged(ran: &Ran) -> String {
+    let promise = |Promise { metric, value, min, max, .. }: &Promise| {
+        format!("{metric} {} ({})", shown(*value), asked(*min, *max))
+    };
+    let about = match ran.nearest().filter(|_| ran.inside) {
+        Some(nearest) => format!("broke no promise, nearest to its bound is {}", promise(nearest)),
+        None => ran.broken().map(promise).collect::<Vec<_>>().join("; "),
+    };
+    format!("finger {}: {about}", ran.finger)
+}
+
+fn values(spread: &Spread) -> [String; 3] {
+    [spread.median, spread.most, spread.worst].map(shown)
 }

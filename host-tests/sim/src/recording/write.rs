@@ -1,4 +1,4 @@
-//! Writes a recording while the run goes on.
+//! Writer of recordings.
 
 use super::{END, OF_SCENE, OF_SETUP, SCALARS, SETUP, WHOLE, controller_json, digest, schemas, texts, topic};
 use crate::part::cannot_write;
@@ -7,19 +7,18 @@ use crate::scene::Scene;
 use crate::watch::{Controller, Step, Watch};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};
-use fingertip::units::Duty;
 use images::record::{Digest, Record};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions, Writer};
 use output::kept::Whole;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-/// Between two frames as arrays and pictures.
+/// Time between two frames that are recorded as arrays and images.
 const FRAME_S: f64 = 0.01;
-/// A code's share of a grey level: 2040 codes are white.
+/// Codes per grey level: 2040 codes are white.
 const CODES_PER_GREY: u16 = 8;
 
 /// Records a run.
@@ -31,26 +30,27 @@ pub struct Recorder {
     whole: bool,
     fingers: Vec<Finger>,
     begun: bool,
-    /// The digest of what was said about the controllers.
+    /// Digest of the record of the controllers.
     setup: String,
     start_s: Option<f64>,
-    /// The first failure; nothing is written after it.
+    /// First failure. Nothing is written after it.
     failed: McapResult<()>,
 }
 
 #[derive(Default)]
 struct Finger {
-    /// Scalars, frame, image, core.
+    /// Channels of scalars, frame, image and core.
     channels: [u16; 4],
     steps: u64,
     next_frame_s: f64,
 }
 
 impl Recorder {
-    /// Into a new file, which is in its place once it is finished; the scalars of each `every`-th step.
+    /// Records into a new file, which appears under its name when it is finished, with the scalars of each `every`-th
+    /// step.
     ///
     /// # Errors
-    /// The file cannot be made, or another process is recording there.
+    /// The file cannot be created, or another process records there.
     pub fn new(path: &Path, scene: &Scene, every: u64) -> Result<Self, RunError> {
         let file = Whole::create(path).map_err(|error| cannot_write(path, &error))?;
         let library = concat!("fingertip-sim/", env!("CARGO_PKG_VERSION"));
@@ -69,16 +69,17 @@ impl Recorder {
         })
     }
 
-    /// Says in the file that the steps do not hold all that the core was given: no replay. Before the run begins.
+    /// Notes that the steps do not have all inputs of the core, so a replay is impossible. Call it before the run
+    /// begins.
     pub fn seen_from_outside(mut self) -> Self {
         self.whole = false;
         self
     }
 
-    /// Closes the file after the run, and puts it in its place.
+    /// Closes the file after the run and moves it to its place.
     ///
     /// # Errors
-    /// Something could not be written: what was there before still is.
+    /// Something could not be written. An earlier file remains.
     pub fn finish(mut self, digest: &str) -> Result<(), RunError> {
         let path = std::mem::take(&mut self.path);
         if !self.begun {
@@ -179,35 +180,11 @@ impl Watch for Recorder {
 }
 
 fn scalars(step: &Step) -> Value {
-    let Step { status, truth, .. } = step;
-    let contact = &status.contact;
-    let values = [
-        step.time_s,
-        step.command.goal.0.to_num(),
-        contact.force.0.to_num(),
-        truth.force_n,
-        truth.indentation_mm,
-        truth.travel_mm,
-        truth.speed_mm_per_s,
-        100.0 * f64::from(status.duty.0) / f64::from(Duty::FULL),
-        truth.current_a,
-        truth.supply_v,
-        truth.winding_c,
-        contact.centre_x.0.to_num(),
-        contact.centre_y.0.to_num(),
-        f64::from(contact.confidence) / 2.55,
-        f64::from(status.mode as u8),
-        f64::from(status.fault.map_or(0, |fault| fault as u8)),
-        f64::from(status.limits.0),
-        truth.tangential_n,
-        truth.slip_mm,
-        truth.object_mm[1],
-    ];
-    let names = SCALARS.iter().map(|(name, _)| (*name).to_owned());
-    Value::Object(names.zip(values.map(Value::from)).collect::<Map<_, _>>())
+    let values = SCALARS.iter().map(|(name, _, value)| ((*name).to_owned(), value(step).into()));
+    Value::Object(values.collect())
 }
 
-/// The taxels' codes in grey, the last row on top.
+/// Codes of the taxels in grey, the last row on top.
 fn image(step: &Step, log_time: u64) -> Value {
     let grey = |code: u16| (code / CODES_PER_GREY).min(255) as u8;
     let rows = (0..ROWS).rev();

@@ -1,18 +1,16 @@
-//! A report's plots: what they show, and each as it is drawn where no script runs.
+//! Plots of a report, each also drawn for a page without a script.
 
-use super::states::{Row, Strip};
-use super::trace::{Instant, Kept, Track, Tracks};
 use crate::metrics::shown;
-
+use crate::report::trace::{Instant, Kept, Row, Strip, Track, Tracks};
 use maud::{Markup, html};
 use output::heatmap::Pressures;
 use output::plot::{Curve, Curves, PlotError, curves};
 use serde::Serialize;
 
-/// Width and height of a plot without a script: as wide as leaves its letters to be read on a phone.
+/// Width and height of a plot without a script: its letters stay readable on a phone.
 const SIZE_PX: (u32, u32) = (400, 200);
 
-/// How a line is drawn.
+/// Style of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Style {
@@ -27,26 +25,22 @@ pub enum Style {
 /// A line of a plot.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// What it is.
     pub label: &'static str,
-    /// How it is drawn.
     pub style: Style,
-    /// What it was in each stretch of the finger's time.
+    /// Values in each stretch of the time of the finger.
     pub kept: Vec<Option<Kept>>,
 }
 
-/// A plot.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// What it shows, in a word or two: two runs' plots of the same title lie over each other.
+    /// Title. Plots of two runs with the same title are drawn over each other.
     pub title: &'static str,
-    /// Of its values.
     pub unit: &'static str,
-    /// What it shows, in a line: the caption, and the text for who does not see it.
+    /// Description for the caption, and for readers who do not see the plot.
     pub about: String,
-    /// Lower and upper end of the axis; none where all values are to be seen.
+    /// Lower and upper end of the axis; none if all values are shown.
     pub range: Option<[f64; 2]>,
-    /// The lines; the first is the main one.
+    /// Lines; the first is the main one.
     pub lines: Vec<Line>,
 }
 
@@ -56,7 +50,7 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
     let Tracks { indentation, duty, current, supply, winding, slip, height, .. } = tracks;
     let Tracks { force_difference, travel_difference, .. } = tracks;
     let line = |label, style, track: &Track| Line { label, style, kept: track.along(&tracks.time) };
-    // Within a stretch a goal has no mean: it is what was asked for last.
+    // A goal is not averaged within a stretch: its last value counts.
     let mut goal_line = line("goal", Style::Goal, goal);
     goal_line.kept.iter_mut().flatten().for_each(|kept| kept.mean = kept.last);
     let one = |title, unit, track| Plot {
@@ -93,7 +87,7 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
         smooth("Duty of the bridge", "%", duty),
         smooth("Current in the winding", "A", current),
     ];
-    // What a scene does not move is not drawn.
+    // Constant quantities are not drawn.
     for (title, unit, track) in [
         ("Supply at the bridge", "V", supply),
         ("Temperature of the winding", "C", winding),
@@ -109,7 +103,7 @@ pub fn all(tracks: &Tracks) -> Vec<Plot> {
     plots
 }
 
-/// A plot without a script.
+/// Draws a plot without a script.
 pub fn drawn(plot: &Plot, times: &[f64]) -> Result<String, PlotError> {
     let mut lines: Vec<Curve> = plot.lines.iter().flat_map(|line| curves_of(line, times)).collect();
     let (x_range, all) = ranges(&mut lines);
@@ -130,7 +124,7 @@ fn curves_of(line: &Line, times: &[f64]) -> Vec<Curve> {
     }
 }
 
-/// From 0 to the end, and around all values with a little air; 0 is in sight where it is not far.
+/// Ranges from 0 to the end, and around all values with a margin. The range includes 0 if it is near.
 fn ranges(lines: &mut [Curve]) -> ([f64; 2], [f64; 2]) {
     let points = lines.iter_mut().flat_map(Curve::points_mut);
     let (mut end, mut low, mut high) = (0.0_f64, f64::INFINITY, f64::NEG_INFINITY);
@@ -140,7 +134,7 @@ fn ranges(lines: &mut [Curve]) -> ([f64; 2], [f64; 2]) {
     ([0.0, if end > 0.0 { end } else { 1e-3 }], around(low, high))
 }
 
-/// An axis around values.
+/// Range of an axis around values.
 pub fn around(low: f64, high: f64) -> [f64; 2] {
     if low > high {
         return [0.0, 1.0];
@@ -149,7 +143,7 @@ pub fn around(low: f64, high: f64) -> [f64; 2] {
     let low = if low > 0.0 && near_zero(low) { 0.0 } else { low };
     let high = if high < 0.0 && near_zero(high) { 0.0 } else { high };
     let air = 0.06 * (high - low);
-    // Of less than its numbers can tell apart an axis would have marks without end.
+    // An axis narrower than the resolution of its numbers would have endless marks.
     let air = if air > 1e-9 * low.abs().max(high.abs()) { air } else { (0.1 * high.abs()).max(0.1) };
     [if low == 0.0 { 0.0 } else { low - air }, if high == 0.0 { air } else { high + air }]
 }
@@ -160,13 +154,13 @@ fn steps(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     corners.chain(points.last().copied()).collect()
 }
 
-/// Parts of the whole width.
+/// Units of the whole width.
 const WIDE: f64 = 1000.0;
 
-/// The strip: a line of text and a bar for each that occurred.
+/// Strip with a line of text and a bar for each mode, fault and limit that occurred.
 pub fn strip(Strip(rows): &Strip, times: &[f64]) -> Markup {
     let end = times.last().copied().unwrap_or(0.0).max(1e-9);
-    // What holds in a stretch holds until the next one.
+    // A state of a stretch lasts until the next one.
     let place = |at: usize| times.get(at).map_or(WIDE, |time_s| if at == 0 { 0.0 } else { WIDE * time_s / end });
     html! {
         div.strip {
@@ -188,12 +182,11 @@ pub fn strip(Strip(rows): &Strip, times: &[f64]) -> Markup {
     }
 }
 
-/// How many are shown.
 const MAPS: usize = 10;
 /// Steps of the scale.
 const STEPS: u32 = 20;
 
-/// The maps of a finger.
+/// Maps of a finger.
 pub fn pressures(tracks: &Tracks) -> Markup {
     let all = &tracks.instants;
     let full_kpa = all.iter().flat_map(|at| at.true_kpa.iter().flatten()).copied().fold(1.0, f64::max);
@@ -226,7 +219,6 @@ fn map(time_s: f64, map: &Pressures, full_kpa: f64) -> Markup {
     let peak = format!("{:.1}", map.iter().flatten().copied().fold(0.0, f64::max));
     let time = shown(Some((time_s * 1e3).round() / 1e3));
     let about = format!("Pressure map at {time} s, at most {peak} kPa");
-    // The last row on top, as everywhere.
     let cells =
         map.iter().rev().enumerate().flat_map(|(y, row)| row.iter().enumerate().map(move |(x, kpa)| (x, y, kpa)));
     html! {

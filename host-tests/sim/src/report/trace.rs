@@ -1,17 +1,19 @@
-//! What a report draws, gathered while the run goes on: a bounded number of stretches, whatever the run's length.
+//! Data of a report, collected during the run: a bounded number of stretches at any length of the run, and the modes,
+//! faults and limits that occurred.
 
-use super::states::{States, Strip};
 use crate::agreement::Path;
-use crate::metrics::newtons;
+use crate::metrics::{duty, newtons};
 use crate::watch::{Step, Watch};
+use fingertip::pipeline::Status;
 use fingertip::shipped::{COLUMNS, Frame, ROWS};
-use fingertip::state::Mode;
-use fingertip::units::{Duty, Newtons};
+use fingertip::state::{Fault, Limits, Mode};
+use fingertip::units::Newtons;
 use output::heatmap::Pressures;
+use serde::Serialize;
 
-/// Stretches of time; of each the least, the largest and the mean value are kept.
+/// Number of stretches of time. Each keeps the least, the largest and the mean value.
 const STRETCHES: u64 = 900;
-/// Over how many of them a mean is taken of what changes from step to step.
+/// Number of stretches over which a noisy quantity is averaged.
 const OF_A_MEAN: usize = 9;
 /// Time after which the steady error is judged, as in `metrics::response`.
 const HELD_AFTER_S: f64 = 0.1;
@@ -33,16 +35,16 @@ struct Stretch {
 #[derive(Clone, Debug, Default)]
 pub struct Track(Vec<Stretch>);
 
-/// What a quantity was in a stretch.
+/// Values of a quantity in a stretch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Kept {
-    /// The least.
+    /// Least value.
     pub low: f64,
-    /// The largest.
+    /// Largest value.
     pub high: f64,
-    /// The mean.
+    /// Mean value.
     pub mean: f64,
-    /// The last.
+    /// Last value.
     pub last: f64,
 }
 
@@ -60,7 +62,7 @@ impl Track {
         }
     }
 
-    /// What it was in each stretch that another track has; none where it has none there.
+    /// Returns the values in each stretch of another track; none where this one has none.
     pub fn along(&self, other: &Self) -> Vec<Option<Kept>> {
         let at = |number| self.0.binary_search_by_key(&number, |stretch| stretch.number).ok().map(|at| self.0[at]);
         let kept = |stretch: Stretch| {
@@ -70,12 +72,12 @@ impl Track {
         other.0.iter().map(|stretch| at(stretch.number).map(kept)).collect()
     }
 
-    /// Its mean in each stretch.
+    /// Mean in each stretch.
     pub fn means(&self) -> Vec<f64> {
         self.0.iter().map(|stretch| stretch.sum / stretch.count).collect()
     }
 
-    /// The means over several stretches around each; at the ends over as many, so that none is of a few values.
+    /// Mean over several stretches around each; at the ends over the same number.
     pub fn smooth(&self) -> Vec<f64> {
         let all = self.0.len();
         let wide = OF_A_MEAN.min(all);
@@ -89,13 +91,13 @@ impl Track {
         (0..all).map(mean).collect()
     }
 
-    /// The least and the largest value; none where it has none.
+    /// Least and largest value; none if it is empty.
     pub fn ends(&self) -> Option<[f64; 2]> {
         let wider = |[low, high]: [f64; 2], at: &Stretch| [low.min(at.low), high.max(at.high)];
         self.0.first().map(|first| self.0.iter().fold([first.low, first.high], wider))
     }
 
-    /// Whether it was ever other than it was first.
+    /// True if it has different values.
     pub fn moves(&self) -> bool {
         self.ends().is_some_and(|[low, high]| low < high)
     }
@@ -104,20 +106,20 @@ impl Track {
 /// The array at an instant.
 #[derive(Clone, Debug)]
 pub struct Instant {
-    /// When.
+    /// Time of the map.
     pub time_s: f64,
     /// True mean pressures.
     pub true_kpa: Pressures,
-    /// The taxels' codes, less those of the scene's first frame.
+    /// Codes of the taxels, less those of the first frame of the scene.
     pub codes: [[i32; COLUMNS]; ROWS],
 }
 
-/// What is drawn of a finger.
+/// Quantities of a finger over time.
 #[derive(Clone, Debug, Default)]
 pub struct Tracks {
     /// Time, s.
     pub time: Track,
-    /// The force asked for, N.
+    /// Requested force, N.
     pub goal: Track,
     /// The true force, N.
     pub force: Track,
@@ -143,15 +145,15 @@ pub struct Tracks {
     pub slip: Track,
     /// Height of the object, mm.
     pub height: Track,
-    /// The true force beside the other board's, N, where there is one.
+    /// True force less that of the other board, N, if there is one.
     pub force_difference: Track,
-    /// The travel beside the other board's, mm.
+    /// Travel less that of the other board, mm.
     pub travel_difference: Track,
-    /// The array at instants.
+    /// Pressure maps.
     pub instants: Vec<Instant>,
     states: Vec<States>,
     first: Option<Frame>,
-    /// Mode and goal, and since when.
+    /// Mode and goal, and the time of their last change.
     asked: (Mode, Newtons),
     asked_s: f64,
 }
@@ -168,17 +170,17 @@ impl Tracks {
 pub struct Trace {
     duration_s: f64,
     other: Option<Path>,
-    /// Finger by finger.
+    /// Fingers in order.
     pub fingers: Vec<Tracks>,
 }
 
 impl Trace {
-    /// Of a run of this length.
+    /// Trace of a run of this length.
     pub fn new(duration_s: f64) -> Self {
         Self { duration_s, other: None, fingers: Vec::new() }
     }
 
-    /// Draws the difference from this one too.
+    /// Draws the difference from the path of another board too.
     pub fn compare_with(&mut self, other: Path) {
         self.other = Some(other);
     }
@@ -188,7 +190,7 @@ impl Trace {
         taken < MAPS && time_s >= self.duration_s * taken as f64 / MAPS as f64
     }
 
-    /// Of which stretch a time is: one behind the end is of the last.
+    /// Stretch of a time. The last one includes later times.
     fn stretch(&self, time_s: f64) -> u64 {
         let share = if self.duration_s > 0.0 { time_s / self.duration_s } else { 0.0 };
         ((STRETCHES as f64 * share) as u64).min(STRETCHES - 1)
@@ -219,7 +221,7 @@ impl Watch for Trace {
             (&mut tracks.control_error, 1e3 * (truth.force_n - goal_n)),
             (&mut tracks.sensing_error, 1e3 * (sensed_n - truth.force_n)),
             (&mut tracks.indentation, truth.indentation_mm),
-            (&mut tracks.duty, 100.0 * f64::from(status.duty.0) / f64::from(Duty::FULL)),
+            (&mut tracks.duty, 100.0 * duty(status.duty)),
             (&mut tracks.current, truth.current_a),
             (&mut tracks.supply, truth.supply_v),
             (&mut tracks.winding, truth.winding_c),
@@ -240,7 +242,7 @@ impl Watch for Trace {
             tracks.force_difference.add(stretch, force_n);
             tracks.travel_difference.add(stretch, travel_mm);
         }
-        // As many as there are stretches in the track of times.
+        // One for each stretch of the track of times.
         tracks.states.resize(tracks.time.0.len(), States::default());
         if let Some(states) = tracks.states.last_mut() {
             states.add(status);
@@ -253,6 +255,91 @@ impl Watch for Trace {
         }
     }
 }
+
+/// First bits of faults and limits; modes begin at bit 0.
+const FAULTS: u32 = 8;
+const LIMITS: u32 = 32;
+
+/// First bit of modes, faults and limits, and their names in the order of the bits.
+#[rustfmt::skip]
+const NAMES: [(u32, &str, &[&str]); 3] = [
+    (0, "mode", &["off", "tare", "approach", "force", "release", "fault", "press", "strokes"]),
+    (FAULTS, "fault", &[
+        "", "lost frames", "array broken", "row stuck", "array frozen", "encoder frozen", "over force",
+        "bus silent", "broken parameters", "supply low", "supply high", "bridge", "missed deadline", "crash",
+        "runaway", "reversed", "unseen", "no clock", "brown-out level",
+    ]),
+    (LIMITS, "limit", &[
+        "voltage", "current", "speed", "goal", "travel", "taxels", "not tared", "frame missed", "slew", "fit level",
+        "tared touching", "from below", "guard", "winding", "direction", "torque held",
+    ]),
+];
+
+/// Modes, faults and limits that occurred in a stretch of time, a bit each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct States(u64);
+
+impl States {
+    /// Adds those of a step.
+    pub fn add(&mut self, status: &Status) {
+        let Status { mode, fault, limits, .. } = *status;
+        self.set(0, mode as u32);
+        if let Some(fault) = fault {
+            self.set(FAULTS, fault as u32);
+        }
+        self.0 |= u64::from(limits.0) << LIMITS;
+    }
+
+    fn set(&mut self, first: u32, number: u32) {
+        self.0 |= 1 << (first + number);
+    }
+}
+
+/// A mode, a fault or a limit that occurred.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Row {
+    /// `mode`, `fault` or `limit`.
+    pub kind: &'static str,
+    /// Name, or number without a name.
+    pub name: String,
+    /// Stretches in which it occurred, each range without its end.
+    pub spans: Vec<[usize; 2]>,
+}
+
+/// Modes, faults and limits that occurred, each in the order of their numbers.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Strip(pub Vec<Row>);
+
+impl Strip {
+    /// Strip of consecutive stretches.
+    pub fn of(states: &[States]) -> Self {
+        let row = |bit: u32| {
+            let spans = spans(states, bit);
+            let (first, kind, names) = NAMES.into_iter().rfind(|(first, ..)| *first <= bit)?;
+            let number = bit - first;
+            let name = names.get(number as usize).filter(|name| !name.is_empty());
+            let name = name.map_or_else(|| number.to_string(), |name| (*name).to_owned());
+            (!spans.is_empty()).then_some(Row { kind, name, spans })
+        };
+        Self((0..u64::BITS).filter_map(row).collect())
+    }
+}
+
+fn spans(states: &[States], bit: u32) -> Vec<[usize; 2]> {
+    let mut spans: Vec<[usize; 2]> = Vec::new();
+    for at in (0..states.len()).filter(|at| states[*at].0 >> bit & 1 == 1) {
+        match spans.last_mut() {
+            Some([_, end]) if *end == at => *end = at + 1,
+            _ => spans.push([at, at + 1]),
+        }
+    }
+    spans
+}
+
+// The bits of modes, faults and limits must not overlap.
+const _: () = assert!(Mode::ALL.len() as u32 <= FAULTS && FAULTS + (Fault::ALL.len() as u32) < LIMITS);
+const _: () = assert!(NAMES[0].2.len() == Mode::ALL.len() && NAMES[1].2.len() == 1 + Fault::ALL.len());
+const _: () = assert!(Limits::TORQUE_HELD == 1 << 15);
 
 #[cfg(test)]
 mod tests {
@@ -301,5 +388,30 @@ mod tests {
         let kept = of([(2, 1.0), (2, 3.0)]).along(&of([(0, 0.0), (2, 0.2)]));
         assert_eq!(kept, [None, Some(Kept { low: 1.0, high: 3.0, mean: 2.0, last: 3.0 })]);
         assert!(!of([(0, 1.0), (1, 1.0)]).moves() && of([(0, 1.0), (0, 2.0)]).moves());
+    }
+
+    #[test]
+    fn what_occurred_in_a_stretch_is_kept_however_short_it_was() {
+        let mut states = [States::default(); 5];
+        let status = |mode, fault, limits| Status { mode, fault, limits: Limits(limits), ..Status::default() };
+        states[0].add(&status(Mode::Approach, None, 0));
+        states[1].add(&status(Mode::Approach, None, Limits::GUARD));
+        states[1].add(&status(Mode::Force, None, 0));
+        states[2].add(&status(Mode::Force, None, Limits::VOLTAGE));
+        states[3].add(&status(Mode::Fault, Some(Fault::Unseen), 0));
+        states[4].add(&status(Mode::Approach, None, Limits::TORQUE_HELD));
+        let row = |kind, name: &str, spans: &[[usize; 2]]| Row { kind, name: name.into(), spans: spans.to_vec() };
+        assert_eq!(
+            Strip::of(&states).0,
+            [
+                row("mode", "approach", &[[0, 2], [4, 5]]),
+                row("mode", "force", &[[1, 3]]),
+                row("mode", "fault", &[[3, 4]]),
+                row("fault", "unseen", &[[3, 4]]),
+                row("limit", "voltage", &[[2, 3]]),
+                row("limit", "guard", &[[1, 2]]),
+                row("limit", "torque held", &[[4, 5]]),
+            ]
+        );
     }
 }

@@ -1,21 +1,20 @@
-//! The scenes that come with the project, and where a scene is found.
+//! Scenes of the project, and where a scene is found.
 
-use super::error::alike;
-use std::fs;
-use std::io;
+use crate::scene::reader::did_you_mean;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
-/// Where the library lies.
+/// Folder of the library.
 pub fn folder() -> PathBuf {
     Path::new(env!("FINGERTIP_ROOT")).join("host-tests/sim/scenes")
 }
 
-/// The library's scenes by name, in order.
+/// Names of the scenes of the library, sorted.
 pub fn names() -> io::Result<Vec<String>> {
     names_in(&folder())
 }
 
-/// The names of a folder's TOML files, in order.
+/// Names of the TOML files of a folder, sorted.
 fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
@@ -28,12 +27,12 @@ fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// The path and the text of a scene, by its path or by its name in the library.
+/// Returns path and text of a scene, by its path or its name in the library.
 pub fn text(scene: &str) -> Result<(PathBuf, String), String> {
     find(&folder(), "scene", scene)
 }
 
-/// The path and the text of a file, by its path or by its name in a folder; `what` it is, errors tell.
+/// Returns path and text of a file, by its path or its name in a folder. Errors call the file `what`.
 pub fn find(folder: &Path, what: &str, name: &str) -> Result<(PathBuf, String), String> {
     let named = folder.join(name).with_extension("toml");
     let path = if Path::new(name).is_file() || !named.is_file() { PathBuf::from(name) } else { named };
@@ -41,10 +40,9 @@ pub fn find(folder: &Path, what: &str, name: &str) -> Result<(PathBuf, String), 
     Ok((path, text))
 }
 
-/// Why there is no such file, and which there are in the folder.
+/// Explains that there is no such file, and lists those of the folder.
 pub fn unknown(folder: &Path, what: &str, name: &str, error: &io::Error) -> String {
     let names = names_in(folder).unwrap_or_default();
-    let meant = alike(name, names.iter().map(String::as_str));
-    let meant = meant.map_or(String::new(), |meant| format!("; did you mean `{meant}`?"));
+    let meant = did_you_mean(name, names.iter().map(String::as_str));
     format!("no {what} {name}: {error}{meant}\n  those that come with the project: {}", names.join(", "))
 }

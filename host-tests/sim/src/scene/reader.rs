@@ -1,23 +1,18 @@
-//! From a scene's text to the scene. Strict: whatever is not described is an error, and all errors of a text come
+//! Reader of scenes. It is strict: everything that is not described is an error. It reports all errors of a text
 //! together.
 
-mod values;
-
-pub(crate) use values::{item_span, key_span};
-
-use super::error::{SceneError, SceneErrors, alike};
-use super::tables::{EXPECT, MANY, ROOT, SCRIPT, TABLES, Table};
-use super::{Bound, Goal, Scene, controller};
 use crate::events::{EVENT, Event, KINDS};
-use crate::key::Values;
 use crate::metrics;
 use crate::registry::{self, Named};
+use crate::scene::tables::{EXPECT, Key, Kind, MANY, ROOT, SCRIPT, TABLES, Table, Value, Values};
+use crate::scene::{Bound, Goal, Scene};
 use fingertip::shipped::Config;
+use std::fmt;
 use std::ops::Range;
 use std::path::Path;
-use toml_edit::{Document, TableLike};
+use toml_edit::{Document, Item, TableLike};
 
-/// Reads a scene. `file` names it in errors; `metrics` are those that `[[expect]]` may name.
+/// Reads a scene. Errors name the file `file`; `[[expect]]` may name `metrics`.
 pub fn read(file: &str, text: &str, metrics: &[&str]) -> Result<Scene, SceneErrors> {
     let mut reader = Reader { file, text, errors: Vec::new() };
     let scene = match Document::parse(text) {
@@ -49,14 +44,14 @@ impl Reader<'_> {
         self.errors.last_mut().expect("one was pushed")
     }
 
-    /// Something that is not described, with the described ones.
+    /// Reports an unknown word, with the known ones.
     fn unknown<'w>(&mut self, what: &str, given: &str, at: Range<usize>, words: impl Iterator<Item = &'w str> + Clone) {
         let allowed = words.clone().collect::<Vec<_>>().join(", ");
         let suggestion = alike(given, words).map(str::to_owned);
         self.error(at, format!("unknown {what}"), allowed).suggestion = suggestion;
     }
 
-    /// None where a part is missing without which there is no scene; the error is among the others.
+    /// Returns none if a required part is missing. Its error is among the others.
     fn scene(&mut self, root: &dyn TableLike, metrics: &[&str]) -> Option<Scene> {
         let tables = || TABLES.iter().map(|table| table.name).chain(MANY).chain(["effects"]);
         let known = |name: &str| ROOT.keys.iter().any(|key| key.name == name) || tables().any(|table| table == name);
@@ -90,7 +85,7 @@ impl Reader<'_> {
             bounds,
         };
         if self.errors.is_empty()
-            && let Err(error) = Config::shipped(&controller::params(&scene))
+            && let Err(error) = Config::shipped(&scene.params())
         {
             let at = root.get("controller").map_or(0..0, |_| key_span(root, "controller"));
             self.error(at, format!("the controller refuses its parameters: {error}"), String::new());
@@ -98,7 +93,7 @@ impl Reader<'_> {
         Some(scene)
     }
 
-    /// A table that stands at most once.
+    /// Reads a table that occurs at most once.
     fn table(&mut self, table: &Table, root: &dyn TableLike) -> Values {
         let Some(item) = root.get(table.name) else {
             return Values::defaults(table.keys);
@@ -114,7 +109,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The tables of a `[[name]]`, each with its place.
+    /// Returns the tables of a `[[name]]`, each with its place.
     fn many<'i>(&mut self, table: &Table, root: &'i dyn TableLike) -> Vec<(&'i dyn TableLike, Range<usize>)> {
         let Some(item) = root.get(table.name) else { return Vec::new() };
         let at = key_span(root, table.name);
@@ -132,7 +127,7 @@ impl Reader<'_> {
         })
     }
 
-    /// Refuses a time that is not in order or beyond the scene's end.
+    /// Refuses a time that is out of order or beyond the end of the scene.
     fn time(&mut self, what: &str, given: &dyn TableLike, at_s: f64, before_s: Option<f64>, duration_s: f64) {
         let at = || item_span(given, "at_s");
         if let Some(before_s) = before_s.filter(|before_s| *before_s > at_s) {
@@ -218,7 +213,7 @@ impl Reader<'_> {
             };
             let metric = || item_span(given, "metric");
             if !metrics.contains(&bound.metric.as_str()) {
-                // Those of each finger are the same again.
+                // The metrics of single fingers repeat those of the scene.
                 let words = metrics.iter().copied().filter(|metric| !metric.contains('.'));
                 self.unknown(&format!("metric `{}`", bound.metric), &bound.metric, metric(), words);
             }
@@ -256,4 +251,222 @@ impl Reader<'_> {
         }
         bounds
     }
+}
+
+impl Reader<'_> {
+    /// Returns the checked values of a table; none if one is wrong or missing. `open` accepts keys that are not
+    /// described.
+    fn values(&mut self, table: &Table, given: &dyn TableLike, place: Range<usize>, open: bool) -> Option<Values> {
+        let errors = self.errors.len();
+        let strange = |name: &str| !open && table.keys.iter().all(|key| key.name != name);
+        for (name, _) in given.iter().filter(|(name, _)| strange(name)) {
+            self.unknown_key(table, name, key_span(given, name));
+        }
+        let mut values = Values::default();
+        for key in table.keys {
+            let value = match given.get(key.name) {
+                Some(item) => self.value(key, item, item_span(given, key.name)),
+                None if matches!(key.kind, Kind::Optional { .. }) => continue,
+                None => key.default().or_else(|| {
+                    // A key with a wrong name is reported already.
+                    let mistaken = given.iter().any(|(name, _)| alike(name, [key.name]).is_some() && strange(name));
+                    if !mistaken {
+                        let message = format!("{} lacks `{}`", table.title(), key.name);
+                        self.error(place.clone(), message, format!("{}: {}", key.name, key.allowed()));
+                    }
+                    None
+                }),
+            };
+            if let Some(value) = value {
+                values.insert(key.name, value);
+            }
+        }
+        let complete = table
+            .keys
+            .iter()
+            .all(|key| matches!(key.kind, Kind::Optional { .. }) || values.iter().any(|(name, _)| name == key.name));
+        (complete && self.errors.len() == errors).then_some(values)
+    }
+
+    fn unknown_key(&mut self, table: &Table, name: &str, at: Range<usize>) {
+        let words = table.keys.iter().map(|key| key.name);
+        let suggestion = alike(name, words.clone());
+        let meant = suggestion.and_then(|word| table.keys.iter().find(|key| key.name == word));
+        let message = match meant {
+            Some(Key { name: full, .. }) if full.rsplit_once('_').is_some_and(|(stem, _)| stem == name) => {
+                format!("`{name}` lacks its unit in {}", table.title())
+            }
+            _ => format!("unknown key `{name}` in {}", table.title()),
+        };
+        let allowed = match meant {
+            Some(key) => format!("{}: {}", key.name, key.allowed()),
+            None => words.collect::<Vec<_>>().join(", "),
+        };
+        self.error(at, message, allowed).suggestion = suggestion.map(str::to_owned);
+    }
+
+    fn value(&mut self, key: &Key, item: &Item, at: Range<usize>) -> Option<Value> {
+        let name = key.name;
+        let number = item.as_float().or_else(|| item.as_integer().map(|whole| whole as f64));
+        // Adding 0 turns -0 into 0.
+        let within = |min: f64, max: f64| number.filter(|n| (min..=max).contains(n)).map(|n| n + 0.0);
+        let value = match key.kind {
+            Kind::Number { min, max, .. } => within(min, max).map(Value::Number),
+            Kind::Optional { whole: true, .. } if item.as_integer().is_none() => None,
+            Kind::Optional { min, max, .. } => within(min, max).map(Value::Number),
+            Kind::Whole { min, max, .. } => {
+                item.as_integer().filter(|whole| (min..=max).contains(whole)).map(Value::Whole)
+            }
+            Kind::Text => item.as_str().filter(|text| !text.contains('\n')).map(|text| Value::Text(text.to_owned())),
+            Kind::Word { words, .. } => match item.as_str() {
+                Some(given) if !words.contains(&given) => {
+                    let suggestion = alike(given, words.iter().copied()).map(str::to_owned);
+                    let message = format!("`{name}` does not know \"{given}\"");
+                    self.error(at, message, key.allowed()).suggestion = suggestion;
+                    return None;
+                }
+                given => words.iter().find(|word| Some(**word) == given).map(|word| Value::Word(word)),
+            },
+            Kind::Pairs { below } => pairs(item, below).map(Value::Pairs),
+        };
+        if value.is_none() {
+            let given = self.text.get(at.clone()).unwrap_or("that").to_owned();
+            let given = given.lines().next().unwrap_or("that");
+            let right_type = match key.kind {
+                Kind::Number { .. } | Kind::Optional { whole: false, .. } => number.is_some(),
+                Kind::Whole { .. } | Kind::Optional { .. } => item.as_integer().is_some(),
+                _ => false,
+            };
+            let message = match right_type {
+                true => format!("`{name}` of {given} is out of its range"),
+                false => format!("`{name}` cannot be {given}"),
+            };
+            self.error(at, message, key.allowed());
+        }
+        value
+    }
+}
+
+/// Reads pairs of numbers from 0, each pair once.
+fn pairs(item: &Item, below: i64) -> Option<Vec<[i64; 2]>> {
+    let mut pairs = Vec::new();
+    for pair in item.as_array()? {
+        let pair = pair.as_array()?;
+        let at = |place| pair.get(place)?.as_integer().filter(|number| (0..below).contains(number));
+        let pair = [at(0)?, at(1).filter(|_| pair.len() == 2)?];
+        if pairs.contains(&pair) {
+            return None;
+        }
+        pairs.push(pair);
+    }
+    Some(pairs)
+}
+
+/// Range of a key in the text.
+pub(crate) fn key_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+    table.get_key_value(name).and_then(|(key, _)| key.span()).unwrap_or(0..0)
+}
+
+/// Range of the value of a key in the text.
+pub(crate) fn item_span(table: &dyn TableLike, name: &str) -> Range<usize> {
+    table.get(name).and_then(Item::span).unwrap_or_else(|| key_span(table, name))
+}
+
+/// Mistake in a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneError {
+    /// File as it was named.
+    pub file: String,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column in characters, from 1.
+    pub column: usize,
+    /// Description of the mistake.
+    pub message: String,
+    /// Allowed values.
+    pub allowed: String,
+    /// Word that was probably meant.
+    pub suggestion: Option<String>,
+    /// Line of the mistake.
+    pub source_line: String,
+    /// Number of marked characters.
+    pub width: usize,
+}
+
+impl SceneError {
+    /// Creates an error at a range of bytes of a text.
+    pub fn new(file: &str, text: &str, at: Range<usize>, message: String, allowed: String) -> Self {
+        let start = (0..=at.start.min(text.len())).rev().find(|at| text.is_char_boundary(*at)).unwrap_or(0);
+        let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
+        let source_line = text[line_start..].lines().next().unwrap_or("");
+        let column = text[line_start..start].chars().count() + 1;
+        let meant = text.get(start..at.end).and_then(|meant| meant.lines().next()).unwrap_or("");
+        Self {
+            file: file.into(),
+            line: text[..line_start].matches('\n').count() + 1,
+            column,
+            message,
+            allowed,
+            suggestion: None,
+            source_line: source_line.into(),
+            width: meant.chars().count().max(1),
+        }
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, line, column, message, allowed, source_line, .. } = self;
+        writeln!(f, "{file}:{line}:{column}: {message}")?;
+        let number = line.to_string();
+        let margin = " ".repeat(number.len());
+        // Tabs remain, so that the marks are below the marked text.
+        let before: String = source_line.chars().take(column - 1).map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
+        writeln!(f, "  {number} | {source_line}")?;
+        write!(f, "  {margin} | {before}{}", "^".repeat(self.width))?;
+        if !allowed.is_empty() {
+            write!(f, "\n  allowed: {allowed}")?;
+        }
+        if let Some(suggestion) = &self.suggestion {
+            write!(f, "\n  did you mean `{suggestion}`?")?;
+        }
+        Ok(())
+    }
+}
+
+/// All mistakes, in the order of the text.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SceneErrors(pub Vec<SceneError>);
+
+impl fmt::Display for SceneErrors {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (place, error) in self.0.iter().enumerate() {
+            if place > 0 {
+                f.write_str("\n\n")?;
+            }
+            error.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for SceneErrors {}
+
+/// Returns the word that was probably meant: one that differs only by its unit, else the most similar.
+pub fn alike<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let stem = |word: &str| word.rsplit_once('_').map_or(word.to_owned(), |(stem, _)| stem.to_owned());
+    let score = |word: &str| {
+        if stem(word) == given || (given.contains('_') && stem(word) == stem(given)) {
+            2.0
+        } else {
+            strsim::jaro_winkler(given, word)
+        }
+    };
+    let best = words.into_iter().map(|word| (score(word), word)).max_by(|(a, _), (b, _)| a.total_cmp(b))?;
+    (best.0 > 0.8).then_some(best.1)
+}
+
+/// Returns the question that ends a message about a word that is close to a known one, else nothing.
+pub fn did_you_mean<'a>(given: &str, words: impl IntoIterator<Item = &'a str>) -> String {
+    alike(given, words).map_or(String::new(), |meant| format!("; did you mean `{meant}`?"))
 }

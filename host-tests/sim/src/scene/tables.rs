@@ -1,23 +1,22 @@
-//! The tables of a scene, beside those of the effects. The reader, the errors and the reference page all come from
-//! here.
+//! Tables and keys of a scene beside those of the effects. Reader, errors and reference page use these descriptions.
 
 use crate::events::{EVENT, KINDS};
-use crate::key::{Key, Kind};
 use fingertip::params::Params;
+use std::fmt;
 
-/// A table of a scene.
+/// Table of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Table {
-    /// Its name.
+    /// Name of the table.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Description in one line.
     pub about: &'static str,
-    /// Its keys.
+    /// Keys of the table.
     pub keys: &'static [Key],
 }
 
 impl Table {
-    /// Its head, as it stands in a scene.
+    /// Head of the table in a scene.
     pub fn title(&self) -> String {
         match self.name {
             "" => "the scene".into(),
@@ -29,64 +28,56 @@ impl Table {
     }
 }
 
-/// The tables that may stand many times.
+/// Tables that may occur many times.
 pub const MANY: [&str; 3] = [SCRIPT.name, EVENT.name, EXPECT.name];
 
 const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Key {
     Key::number(name, about, min, max, default)
 }
 
-/// What stands before the first table.
+/// Keys before the first table.
 pub const ROOT: Table = Table {
     name: "",
-    about: "What stands before the first table.",
+    about: "Keys before the first table.",
     keys: &[
-        Key { name: "about", about: "What the scene shows, in a line.", kind: Kind::Text },
-        Key {
-            name: "duration_s",
-            about: "Virtual time, from the moment at which the finger is tared and its torque enabled.",
-            kind: Kind::Number { min: 0.0, max: 1e6, default: None },
-        },
-        Key::whole("seed", "Where all randomness comes from.", 0, i64::MAX, 1),
+        Key { name: "about", about: "Description of the scene in one line.", kind: Kind::Text },
+        Key::required("duration_s", "Virtual time from the end of the tare, when torque is enabled.", 0.0, 1e6),
+        Key::whole("seed", "Seed of all random numbers.", 0, i64::MAX, 1),
     ],
 };
 
 /// An entry of the script.
 pub const SCRIPT: Table = Table {
     name: "script",
-    about: "What the host asks for, in order of time; may stand many times.",
+    about: "Goals of the host, in order of time; may occur many times.",
     keys: &[
-        Key { name: "at_s", about: "When, from the start.", kind: Kind::Number { min: 0.0, max: 1e6, default: None } },
-        Key {
-            name: "goal_n",
-            about: "The force asked for from then on; 0 lets go.",
-            kind: Kind::Number { min: 0.0, max: 150.0, default: None },
-        },
+        Key::required("at_s", "Time from the start.", 0.0, 1e6),
+        Key::required("goal_n", "Requested force from then on; 0 releases the object.", 0.0, 150.0),
     ],
 };
 
-/// What must hold.
+/// Bound on a metric.
 pub const EXPECT: Table = Table {
     name: "expect",
-    about: "What must hold of a metric: `min`, `max` or both; may stand many times.",
+    about: "Bound on a metric by `min`, `max` or both; may occur many times.",
     keys: &[
-        Key { name: "metric", about: "The metric's name.", kind: Kind::Text },
-        Key { name: "min", about: "The least, in the metric's unit.", kind: ANY },
-        Key { name: "max", about: "The largest, in the metric's unit.", kind: ANY },
+        Key { name: "metric", about: "Name of the metric.", kind: Kind::Text },
+        Key { name: "min", about: "Lower limit, in the unit of the metric.", kind: ANY },
+        Key { name: "max", about: "Upper limit, in the unit of the metric.", kind: ANY },
         Key {
             name: "max_per_goal_n",
-            about: "How much larger for each N of the goal, of a metric that has a value for each goal: over_force_mn, over_force_defective_mn, hold_swing_mn, hold_error_mn.",
+            about: "Increase of `max` per N of the goal, for over_force_mn, over_force_defective_mn, hold_swing_mn and hold_error_mn.",
             kind: Kind::Optional { min: 0.0, max: 1e6, whole: false },
         },
     ],
 };
 const ANY: Kind = Kind::Optional { min: -1e12, max: 1e12, whole: false };
 
-/// The tables that stand at most once; one that is left out has its defaults.
+/// Tables that occur at most once. A missing one has its defaults.
 pub const TABLES: &[Table] = &[
     Table {
         name: "tip",
-        about: "The hemispherical soft fingertip.",
+        about: "Hemispherical soft fingertip.",
         keys: &[
             number("radius_mm", "Radius a.", 4.0, 16.0, 10.0),
             number("modulus_kpa", "Young's modulus Y: F = pi Y d^2.", 20.0, 2000.0, 250.0),
@@ -94,34 +85,34 @@ pub const TABLES: &[Table] = &[
     },
     Table {
         name: "array",
-        about: "The tactile array of 10 x 10 taxels.",
+        about: "Tactile array of 10 x 10 taxels.",
         keys: &[
             number("pitch_mm", "Distance from taxel to taxel.", 0.5, 4.0, 1.5),
             number("preload_codes", "Reading of a taxel without pressure.", 0.0, 1000.0, 40.0),
-            number("gain_codes_per_kpa", "What a kPa adds to it.", 1.0, 200.0, 24.0),
+            number("gain_codes_per_kpa", "Increase of the reading per kPa.", 1.0, 200.0, 24.0),
         ],
     },
     Table {
         name: "motor",
-        about: "The brushed motor with its encoder.",
+        about: "Brushed motor with its encoder.",
         keys: &[
             number("resistance_ohm", "Terminal resistance.", 0.05, 200.0, 2.83),
             number("torque_mnm_per_a", "Torque constant; also the back-EMF constant in mV s/rad.", 0.1, 200.0, 5.35),
             number("inertia_g_cm2", "Inertia at the shaft.", 0.01, 200.0, 0.71),
-            Key::whole("encoder_counts_per_turn", "Quadrature counts for one turn.", 16, 65_536, 1600),
+            Key::whole("encoder_counts_per_turn", "Quadrature counts per turn.", 16, 65_536, 1600),
         ],
     },
     Table {
         name: "transmission",
         about: "Gearhead, drum and tendon.",
         keys: &[
-            number("ratio", "Motor turns for one turn of the drum.", 1.0, 1000.0, 43.0),
+            number("ratio", "Turns of the motor per turn of the drum.", 1.0, 1000.0, 43.0),
             number("drum_radius_mm", "Radius on which the tendon winds.", 1.0, 50.0, 12.0),
         ],
     },
     Table {
         name: "supply",
-        about: "What feeds the bridge, and the bridge.",
+        about: "Supply of the bridge, and the bridge.",
         keys: &[
             number("source_v", "Voltage without load.", 1.0, 60.0, 6.0),
             number("bridge_ohm", "Resistance of the bridge's two switches in the motor's path.", 0.0, 10.0, 0.7),
@@ -129,63 +120,62 @@ pub const TABLES: &[Table] = &[
     },
     Table {
         name: "object",
-        about: "What stands in the tip's way: a rigid plane, where no effect says more.",
+        about: "Object in front of the tip: a rigid plane without effects.",
         keys: &[
             number("distance_mm", "Travel at which the tip touches.", 0.0, 100.0, 5.0),
             number("centre_x_mm", "Contact centre from the array's middle, along the columns.", -20.0, 20.0, 0.0),
             number("centre_y_mm", "Contact centre from the array's middle, along the rows.", -20.0, 20.0, 0.0),
-            number("floor_until_s", "Until when a floor carries an object that can move.", 0.0, 1e6, 1e6),
-            number("shake_g", "Acceleration that drives it down for a while, in g.", -1e3, 1e3, 0.0),
-            number("shake_at_s", "From when.", 0.0, 1e6, 0.0),
-            number("shake_ms", "For how long.", 0.0, 1e6, 20.0),
+            number("floor_until_s", "Time until which a floor carries an object that can move.", 0.0, 1e6, 1e6),
+            number("shake_g", "Acceleration of a shaking downwards, in g.", -1e3, 1e3, 0.0),
+            number("shake_at_s", "Start of the shaking.", 0.0, 1e6, 0.0),
+            number("shake_ms", "Duration of the shaking.", 0.0, 1e6, 20.0),
         ],
     },
     Table {
         name: "hand",
-        about: "The fingers: one, or two that press against each other.",
+        about: "Fingers: one, or two that press against each other.",
         keys: &[
-            Key::whole("fingers", "How many.", 1, 2, 1),
-            number("lift_mm", "How far the hand lifts.", 0.0, 1e3, 0.0),
-            number("lift_at_s", "From when.", 0.0, 1e6, 0.0),
-            number("lift_s", "For how long, from rest to rest.", 1e-3, 1e6, 0.5),
+            Key::whole("fingers", "Number of fingers.", 1, 2, 1),
+            number("lift_mm", "Height of the lift.", 0.0, 1e3, 0.0),
+            number("lift_at_s", "Start of the lift.", 0.0, 1e6, 0.0),
+            number("lift_s", "Duration of the lift, from rest to rest.", 1e-3, 1e6, 0.5),
         ],
     },
     Table {
         name: "world",
-        about: "How the world is simulated.",
-        keys: &[number("step_us", "Longest step of the world; it also ends where a duty changes.", 0.1, 1000.0, 100.0)],
+        about: "Simulation of the world.",
+        keys: &[number("step_us", "Longest step; it also ends where a duty changes.", 0.1, 1000.0, 100.0)],
     },
     Table {
         name: "host",
-        about: "The host on the bus: it sends its command when the script changes it, and repeats it. With `read_ms` it also reads \
-                force and centre of pressure, and asks for more before the contact slips, or when it did.",
+        about: "Host on the bus. It sends its command when the script changes it, and repeats it. With `read_ms` it also reads \
+                force and centre of pressure, and increases the goal before the contact slips, or after a slip.",
         keys: &[
             number("period_ms", "Time from a command to its repetition.", 0.1, 10_000.0, 10.0),
-            Key::whole("watchdog_ms", "Bus watchdog that it sets in the controller; 0 is off.", 0, 65_535, 0),
-            number("read_ms", "Time from a reading to the next; 0 reads nothing, and does not grip.", 0.0, 1000.0, 0.0),
-            number("grip_friction", "Share of the force that the host trusts along the surface.", 0.01, 10.0, 0.5),
-            number("grip_n_per_mm", "What it takes for the patch's stiffness along the surface.", 0.001, 1000.0, 1.0),
-            number("grip_drop_mm", "A centre that springs back this far has slipped.", 0.001, 20.0, 0.05),
-            number("grip_most_n", "The largest force that it asks for by itself.", 0.0, 150.0, 4.0),
+            Key::whole("watchdog_ms", "Bus watchdog of the controller; 0 is off.", 0, 65_535, 0),
+            number("read_ms", "Time between readings; 0 reads nothing and does not grip.", 0.0, 1000.0, 0.0),
+            number("grip_friction", "Friction coefficient that the host trusts.", 0.01, 10.0, 0.5),
             number(
-                "centre_n_per_mm",
-                "How much less it asks of a finger that went on from where its force first stood: two fingers keep a free thing in \
-                 its place.",
-                0.0,
-                10.0,
-                0.0,
+                "grip_n_per_mm",
+                "Stiffness of the patch along the surface, as the host assumes.",
+                0.001,
+                1000.0,
+                1.0,
             ),
+            number("grip_drop_mm", "Distance of a returning centre that counts as a slip.", 0.001, 20.0, 0.05),
+            number("grip_most_n", "Largest force that the grip requests.", 0.0, 150.0, 4.0),
+            number("centre_n_per_mm", "Decrease of the goal per travel, to centre a free object.", 0.0, 10.0, 0.0),
         ],
     },
     Table {
         name: "controller",
-        about: "Parameters of the controller. What is left out is what the other tables say, where they say it, or the firmware's \
-                default: a controller that knows its finger.",
+        about: "Parameters of the controller. A missing one follows from the other tables, or has the default of the firmware: the \
+                controller knows its finger.",
         keys: &CONTROLLER,
     },
 ];
 
-/// A key for each parameter of the core.
+/// Keys for the parameters of the core.
 const CONTROLLER: [Key; Params::COUNT] = {
     let mut keys = [number("", "", 0.0, 0.0, 0.0); Params::COUNT];
     let mut place = 0;
@@ -197,3 +187,224 @@ const CONTROLLER: [Key; Params::COUNT] = {
     }
     keys
 };
+
+/// Key of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Name, with its unit as a suffix if it has one: `rms_codes`, `radius_mm`.
+    pub name: &'static str,
+    /// Description in one line.
+    pub about: &'static str,
+    /// Allowed values.
+    pub kind: Kind,
+}
+
+/// Allowed values of a key. A default of `None` makes the key required.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// A number within bounds.
+    Number {
+        /// Lower limit.
+        min: f64,
+        /// Upper limit.
+        max: f64,
+        /// Value of a missing key.
+        default: Option<f64>,
+    },
+    /// A whole number within bounds.
+    Whole {
+        /// Lower limit.
+        min: i64,
+        /// Upper limit.
+        max: i64,
+        /// Value of a missing key.
+        default: Option<i64>,
+    },
+    /// One of these words.
+    Word {
+        /// Allowed words.
+        words: &'static [&'static str],
+        /// Value of a missing key.
+        default: Option<&'static str>,
+    },
+    /// A number within bounds, which may be left out: [`Values::optional`].
+    Optional {
+        /// Lower limit.
+        min: f64,
+        /// Upper limit.
+        max: f64,
+        /// True if only whole numbers are allowed.
+        whole: bool,
+    },
+    /// Text in one line; required.
+    Text,
+    /// Pairs of whole numbers, such as `[[3, 4], [9, 9]]` for taxels by row and column; empty if it is missing.
+    Pairs {
+        /// Limit below which each number lies.
+        below: i64,
+    },
+}
+
+impl Key {
+    /// A number within bounds, required.
+    pub const fn required(name: &'static str, about: &'static str, min: f64, max: f64) -> Self {
+        Self { name, about, kind: Kind::Number { min, max, default: None } }
+    }
+
+    /// A number within bounds, with a default.
+    pub const fn number(name: &'static str, about: &'static str, min: f64, max: f64, default: f64) -> Self {
+        Self { name, about, kind: Kind::Number { min, max, default: Some(default) } }
+    }
+
+    /// A whole number within bounds, with a default.
+    pub const fn whole(name: &'static str, about: &'static str, min: i64, max: i64, default: i64) -> Self {
+        Self { name, about, kind: Kind::Whole { min, max, default: Some(default) } }
+    }
+
+    /// Describes the allowed values: "number, 0 to 5, default 1".
+    pub fn allowed(&self) -> String {
+        let default = |value: Option<String>| value.map_or("required".into(), |value| format!("default {value}"));
+        match self.kind {
+            Kind::Number { min, max, default: value } => {
+                format!("number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
+            }
+            Kind::Whole { min, max, default: value } => {
+                format!("whole number, {min} to {max}, {}", default(value.map(|value| value.to_string())))
+            }
+            Kind::Word { words, default: value } => {
+                format!(
+                    "{}, {}",
+                    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(" or "),
+                    default(value.map(|value| format!("\"{value}\"")))
+                )
+            }
+            Kind::Optional { min, max, whole } => {
+                format!("{}number, {min} to {max}, may be left out", if whole { "whole " } else { "" })
+            }
+            Kind::Text => "text, required".into(),
+            Kind::Pairs { below } => format!("pairs [row, column], each 0 to {}, default none", below - 1),
+        }
+    }
+
+    /// Returns the value of a missing key; none if the key is required or optional.
+    pub fn default(&self) -> Option<Value> {
+        match self.kind {
+            Kind::Number { default, .. } => default.map(Value::Number),
+            Kind::Whole { default, .. } => default.map(Value::Whole),
+            Kind::Word { default, .. } => default.map(Value::Word),
+            Kind::Pairs { .. } => Some(Value::Pairs(Vec::new())),
+            Kind::Optional { .. } | Kind::Text => None,
+        }
+    }
+
+    /// Returns the unit at the end of the name; none for a plain number, a word or a text.
+    pub fn unit(&self) -> Option<String> {
+        output::units::of(self.name)
+    }
+}
+
+/// Checked values of a table, with all defaults.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Values(Vec<(&'static str, Value)>);
+
+/// Checked value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Value of [`Kind::Number`] and [`Kind::Optional`].
+    Number(f64),
+    /// Value of [`Kind::Whole`].
+    Whole(i64),
+    /// Value of [`Kind::Word`].
+    Word(&'static str),
+    /// Value of [`Kind::Text`].
+    Text(String),
+    /// Value of [`Kind::Pairs`].
+    Pairs(Vec<[i64; 2]>),
+}
+
+impl fmt::Display for Value {
+    /// Formats the value as TOML.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            // The shortest text that reads as the same number.
+            Self::Number(value) if value.fract() == 0.0 && value.abs() < 1e15 => write!(f, "{value}"),
+            Self::Number(value) => write!(f, "{value:?}"),
+            Self::Whole(value) => write!(f, "{value}"),
+            Self::Word(word) => toml_edit::Value::from(*word).fmt(f),
+            Self::Text(text) => toml_edit::Value::from(text).fmt(f),
+            Self::Pairs(pairs) => write!(f, "{pairs:?}"),
+        }
+    }
+}
+
+impl Values {
+    /// Values of a missing table, without required and optional keys.
+    pub fn defaults(keys: &[Key]) -> Self {
+        Self(keys.iter().filter_map(|key| Some((key.name, key.default()?))).collect())
+    }
+
+    /// Sets a value. Each key occurs once.
+    pub fn insert(&mut self, name: &'static str, value: Value) {
+        self.0.retain(|(known, _)| *known != name);
+        self.0.push((name, value));
+    }
+
+    /// Returns a number.
+    ///
+    /// # Panics
+    /// The table has no such number: a mistake in the code, not in the scene. The other types panic alike.
+    pub fn number(&self, name: &str) -> f64 {
+        match self.get(name) {
+            Value::Number(number) => *number,
+            Value::Whole(number) => *number as f64,
+            other => panic!("{name} is no number but {other:?}"),
+        }
+    }
+
+    /// Returns a whole number.
+    pub fn whole(&self, name: &str) -> i64 {
+        match self.get(name) {
+            Value::Whole(number) => *number,
+            other => panic!("{name} is no whole number but {other:?}"),
+        }
+    }
+
+    /// Returns a word.
+    pub fn word(&self, name: &str) -> &'static str {
+        match self.get(name) {
+            Value::Word(word) => word,
+            other => panic!("{name} is no word but {other:?}"),
+        }
+    }
+
+    /// Returns pairs.
+    pub fn pairs(&self, name: &str) -> &[[i64; 2]] {
+        match self.get(name) {
+            Value::Pairs(pairs) => pairs,
+            other => panic!("{name} holds no pairs but {other:?}"),
+        }
+    }
+
+    /// Returns a number that may be missing.
+    pub fn optional(&self, name: &str) -> Option<f64> {
+        self.0.iter().any(|(known, _)| *known == name).then(|| self.number(name))
+    }
+
+    /// Returns a text.
+    pub fn text(&self, name: &str) -> &str {
+        match self.get(name) {
+            Value::Text(text) => text,
+            other => panic!("{name} is no text but {other:?}"),
+        }
+    }
+
+    /// Returns all values, in the order of the description.
+    pub fn iter(&self) -> impl Iterator<Item = (&'static str, &Value)> {
+        self.0.iter().map(|(name, value)| (*name, value))
+    }
+
+    fn get(&self, name: &str) -> &Value {
+        let found = self.0.iter().find(|(known, _)| *known == name);
+        &found.unwrap_or_else(|| panic!("no key {name} is described")).1
+    }
+}

@@ -1,12 +1,12 @@
-//! A scene's text, changed in a place or written anew.
+//! Changes to the text of a scene, and the text of a scene that was read.
 
-use super::Scene;
-use crate::key::{Value, Values};
 use crate::registry::Description;
+use crate::scene::Scene;
+use crate::scene::tables::{Value, Values};
 use toml_edit::{DocumentMut, Item, Table, Value as TomlValue};
 
-/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value as TOML writes it;
-/// comments stay. What is set is checked when the text is read.
+/// Sets `table.key` (`effects.noise.rms_codes`, `script.0.goal_n`, `seed`) of a text to a value in TOML. Comments
+/// remain. The reader checks the value later.
 ///
 /// # Errors
 /// The text or the value is not TOML, or there is no such place.
@@ -22,7 +22,9 @@ pub fn set(text: &str, path: &str, value: &str) -> Result<String, String> {
         table = match (item, index) {
             (Item::ArrayOfTables(tables), Some(index)) => {
                 let count = tables.len();
-                tables.get_mut(index).ok_or_else(|| format!("`{path}`: [[{name}]] stands {count} times, from 0"))?
+                tables
+                    .get_mut(index)
+                    .ok_or_else(|| format!("`{path}`: there are {count} [[{name}]], numbered from 0"))?
             }
             (item, None) => item.as_table_like_mut().ok_or_else(|| format!("`{path}`: `{name}` is no table"))?,
             _ => return Err(format!("`{path}`: `{name}` is no list of tables")),
@@ -46,7 +48,7 @@ fn new_table(implicit: bool) -> Table {
     table
 }
 
-/// The scene as a text that reads as the same scene: every key, without comments.
+/// Writes the scene as a text with every key and without comments, which reads as the same scene.
 pub fn write(scene: &Scene) -> String {
     let (about, duration_s) = (Value::Text(scene.about.clone()), Value::Number(scene.duration_s));
     let mut text = format!("about = {about}\nduration_s = {duration_s}\nseed = {}\n", scene.seed);
@@ -79,7 +81,7 @@ fn section(text: &mut String, head: &str, values: &Values) {
     }
 }
 
-/// An effect's table with the magnitudes at which it changes nothing; its other keys at their defaults.
+/// Writes the table of an effect with the values at which it changes nothing. Other keys have their defaults.
 pub fn zero(effect: &Description) -> String {
     let mut text = format!("[effects.{}]\n", effect.name);
     for (name, value) in effect.zero {

@@ -1,12 +1,12 @@
-//! A sweep's files: `runs.csv` with a row for each run, `summary.csv`, and a plot for each metric that is bounded.
+//! Files of a sweep: `runs.csv` with a row for each run, `summary.csv`, and a plot for each bounded metric.
 //!
-//! A shard writes `runs-1-of-4.csv` alone; merging makes the rest. Each row says to which sweep it belongs and of how
-//! many runs.
+//! A shard writes only `runs-1-of-4.csv`; merging writes the other files. Each row names its sweep and the number of
+//! runs.
 
 use super::Plan;
 use super::summary::{self, Table};
 use crate::metrics::METRICS;
-use crate::part::{self, cannot_write};
+use crate::part::{self, cannot_write, make_folder};
 use crate::run::RunError;
 use crate::scene::Scene;
 use csv::{Reader, ReaderBuilder};
@@ -20,22 +20,22 @@ use std::{fmt, fs};
 pub(super) const ID: &str = "sweep";
 pub(super) const RUN: &str = "run";
 pub(super) const RUNS: &str = "of_runs";
-/// The first column after the varied keys; then the verdict, the digest, the metrics, and what is expected.
+/// Columns after the varied keys; then come the metrics and their bounds.
 pub(super) const SEED: &str = "seed";
 pub(super) const PASSED: &str = "passed";
 pub(super) const DIGEST: &str = "digest";
 pub(super) const EXPECT: &str = "expect ";
 
-/// The head, and what stands at the beginning and the end of every row.
+/// Columns, and the values at the beginning and the end of every row.
 pub(super) struct Head {
     columns: Vec<String>,
-    /// Of all that makes the sweep what it is; its folder's name where none is given.
+    /// Digest of the sweep, and the name of its folder without another one.
     pub id: String,
     runs: usize,
     expected: Vec<String>,
 }
 
-/// What the plan's rows look like.
+/// Returns the form of the rows of the plan.
 pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     let mut columns: Vec<String> = [ID, RUN, RUNS].map(String::from).into();
     columns.extend(plan.vary.iter().map(|vary| vary.key.clone()));
@@ -48,7 +48,7 @@ pub(super) fn head(plan: &Plan, scene: &Scene, runs: usize) -> Head {
     Head { columns, id: format!("{}-{}", scene.name, part::check(&said)), runs, expected }
 }
 
-/// The rows so far, also on disk, so that a sweep that is stopped can go on.
+/// Rows so far, also on disk, so that a sweep that is stopped can continue.
 pub(super) struct Rows {
     head: Head,
     rows: BTreeMap<usize, Vec<String>>,
@@ -56,7 +56,7 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    /// Takes up what an earlier try of the same sweep left.
+    /// Resumes from the rows of an earlier try of the same sweep.
     pub fn open(plan: &Plan, out: &Path, head: Head) -> Result<Self, RunError> {
         let file = out.join(runs_name(plan));
         let name = format!("the sweep {} of {} runs", head.id, head.runs);
@@ -67,7 +67,7 @@ impl Rows {
             let mut reader = ReaderBuilder::new().has_headers(false).from_reader(line.as_bytes());
             let row: Vec<String> = reader.deserialize().next().ok_or("an empty row")??;
             let number = row.get(1).and_then(|number| number.parse().ok());
-            // Each line is whole; of another form it is of another version.
+            // Every line is complete, so another form means another version.
             let number = number.filter(|number| row.len() == width && (1..=head.runs).contains(number));
             let number =
                 number.ok_or_else(|| format!("{}.part has a row of another form: remove it", file.display()))?;
@@ -76,17 +76,17 @@ impl Rows {
         Ok(Self { rows, part, head })
     }
 
-    /// Whether a run is done; numbers count from 1.
+    /// True if a run is done. Numbers count from 1.
     pub fn has(&self, number: usize) -> bool {
         self.rows.contains_key(&number)
     }
 
-    /// How many are done.
+    /// Number of runs that are done.
     pub fn count(&self) -> usize {
         self.rows.len()
     }
 
-    /// Takes a run in.
+    /// Adds a run.
     pub fn add(&mut self, number: usize, values: Vec<String>) -> Result<(), RunError> {
         let Head { id, runs, expected, .. } = &self.head;
         let first = [id.clone(), number.to_string(), runs.to_string()];
@@ -97,7 +97,7 @@ impl Rows {
         Ok(())
     }
 
-    /// Writes the files. The rows so far go last.
+    /// Writes the files and then removes the rows so far.
     pub fn finish(self, plan: &Plan, out: &Path) -> Result<Table, RunError> {
         let table = Table { head: self.head.columns, rows: self.rows.into_values().collect() };
         self.part.write(table.csv()?)?;
@@ -114,7 +114,7 @@ fn runs_name(plan: &Plan) -> String {
     if plan.shard.is_whole() { "runs.csv".into() } else { format!("runs-{number}-of-{of}.csv") }
 }
 
-/// A file of runs may be replaced by those of the same sweep only.
+/// Refuses to replace the runs of another sweep.
 fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
     let Ok(bytes) = fs::read(file) else { return Ok(()) };
     let mut reader = ReaderBuilder::new().flexible(true).from_reader(&bytes[..]);
@@ -129,13 +129,13 @@ fn refuse_others(file: &Path, id: &str) -> Result<(), RunError> {
     }
 }
 
-/// Puts shards together.
+/// Merges shards.
 ///
 /// # Errors
-/// They are not of one sweep, a run is missing or there twice, or a file cannot be read or written.
+/// They are not of one sweep, a run is missing or duplicate, or a file cannot be read or written.
 pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     let table = table(files)?;
-    fs::create_dir_all(out).map_err(|error| format!("cannot make {}: {error}", out.display()))?;
+    make_folder(out)?;
     let file = out.join("runs.csv");
     let lock = Lock::take(&file).map_err(|error| cannot_write(&file, &error))?;
     refuse_others(&file, &table.rows[0][0])?;
@@ -144,12 +144,12 @@ pub fn merge(files: &[PathBuf], out: &Path) -> Result<Table, RunError> {
     Ok(table)
 }
 
-/// Every so-manieth of the runs.
+/// Share of the runs: each n-th one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shard {
-    /// Which share, from 1.
+    /// Number of the share, from 1.
     pub number: usize,
-    /// Of how many.
+    /// Number of shares.
     pub of: usize,
 }
 
@@ -157,20 +157,20 @@ impl Shard {
     /// All runs.
     pub const WHOLE: Self = Self { number: 1, of: 1 };
 
-    /// Whether a run, counted from 0, is in it.
+    /// True if a run, counted from 0, is in the share.
     pub const fn has(self, run: usize) -> bool {
         run % self.of == self.number - 1
     }
 
-    /// Whether it is all of them.
+    /// True if the share is the whole.
     pub const fn is_whole(self) -> bool {
         self.of == 1
     }
 }
 
-/// The first number from 1 to `all` that is none of these, which are in order.
+/// Returns the first number from 1 to `all` that is missing among these, which are in order.
 pub(crate) fn first_missing<'a>(numbers: impl Iterator<Item = &'a usize>, all: usize) -> Option<usize> {
-    // In order, the first whose number is not its place; behind the last there is none.
+    // The first place whose number differs is missing.
     let mut numbers = numbers.copied();
     (1..=all).find(|place| numbers.next() != Some(*place))
 }
@@ -184,19 +184,19 @@ impl fmt::Display for Shard {
 impl FromStr for Shard {
     type Err = String;
 
-    /// Reads `i/n`.
+    /// Parses `i/n`.
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}`: I/N is asked for, I from 1 to N");
+        let wrong = || format!("`{text}`: needs I/N, I from 1 to N");
         let (number, of) = text.split_once('/').ok_or_else(wrong)?;
         let shard = Self { number: number.parse().map_err(|_| wrong())?, of: of.parse().map_err(|_| wrong())? };
         if (1..=shard.of).contains(&shard.number) { Ok(shard) } else { Err(wrong()) }
     }
 }
 
-/// No metric and no key comes near; sums and differences of these stay numbers.
+/// Largest number in a file. Metrics and keys are far smaller, and sums and differences of such numbers are finite.
 const LARGEST: f64 = 1e15;
 
-/// All runs of a sweep out of its shards' files.
+/// Reads all runs of a sweep from the files of its shards.
 pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
     let mut known: Option<Columns> = None;
     let mut rows = BTreeMap::new();
@@ -235,7 +235,7 @@ pub fn table(files: &[PathBuf]) -> Result<Table, RunError> {
     Ok(Table { head: known.map(|columns| columns.head).unwrap_or_default(), rows: rows.into_values().collect() })
 }
 
-/// The columns of a sweep, and where they stand.
+/// Columns of a sweep and their places.
 #[derive(PartialEq)]
 struct Columns {
     head: Vec<String>,
@@ -261,7 +261,7 @@ impl Columns {
         Ok(Self { seed, expected, head })
     }
 
-    /// The run's number and the sweep's count of runs, of a row in which everything is what its column says.
+    /// Returns the number of the run and the count of runs of a row, if every value fits its column.
     fn check(&self, row: &[String]) -> Result<(usize, usize), String> {
         let wrong = |column: usize, what: &str| {
             format!("run {}: `{}` under {} is no {what}", row[1], row[column], self.head[column])

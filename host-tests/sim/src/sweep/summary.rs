@@ -1,4 +1,4 @@
-//! Least, median and largest of every metric, point by point and over all.
+//! Least, median and largest value of every metric, point by point and over all points.
 
 use crate::metrics::shown;
 use crate::part::cannot_write;
@@ -13,7 +13,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Least, median and largest; none of nothing.
+/// Least, median and largest value; none without values.
 pub fn spread(mut values: Vec<f64>) -> Option<[f64; 3]> {
     values.sort_by(f64::total_cmp);
     let (low, high) = (*values.first()?, *values.last()?);
@@ -22,12 +22,11 @@ pub fn spread(mut values: Vec<f64>) -> Option<[f64; 3]> {
     Some([low, median, high])
 }
 
-/// The values of a column in rows.
 pub fn values<'a>(rows: impl Iterator<Item = &'a Vec<String>>, column: usize) -> Vec<f64> {
     rows.filter_map(|row| row[column].parse().ok()).filter(|value: &f64| value.is_finite()).collect()
 }
 
-/// The points, in order: the varied keys' values, and their rows.
+/// Points in order: values of the varied keys, and rows.
 pub fn points(table: &Table) -> Vec<(&[String], Vec<&Vec<String>>)> {
     let mut points: Vec<(&[String], Vec<&Vec<String>>)> = Vec::new();
     for row in &table.rows {
@@ -60,14 +59,13 @@ pub fn rows(table: &Table) -> Vec<Vec<String>> {
     lines
 }
 
-/// For people: the pass rate by point, and the spread of each metric over all runs.
+/// Text for people: pass rate by point, and spread of each metric over all runs.
 pub fn text(table: &Table) -> String {
     let mut text = String::new();
     let keys = &table.head[table.varied()];
     if !keys.is_empty() {
         for (at, rows) in points(table) {
             let point: Vec<String> = keys.iter().zip(at).map(|(key, value)| format!("{key} = {value}")).collect();
-            // Writing to a string does not fail.
             let _ = writeln!(
                 text,
                 "  {}: {} of {} runs passed",
@@ -99,13 +97,13 @@ pub fn text(table: &Table) -> String {
 /// All rows of a sweep or of a shard, in order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// The columns' names.
+    /// Names of the columns.
     pub head: Vec<String>,
-    /// A row for each run.
+    /// Rows, one per run.
     pub rows: Vec<Vec<String>>,
 }
 
-/// Rows as CSV.
+/// Formats rows as CSV.
 pub(super) fn csv<'a>(rows: impl IntoIterator<Item = &'a Vec<String>>) -> Result<Vec<u8>, RunError> {
     let mut writer = Writer::from_writer(Vec::new());
     rows.into_iter().try_for_each(|row| writer.write_record(row))?;
@@ -113,12 +111,12 @@ pub(super) fn csv<'a>(rows: impl IntoIterator<Item = &'a Vec<String>>) -> Result
 }
 
 impl Table {
-    /// `runs.csv`, or a shard's.
+    /// Contents of `runs.csv`, or of the file of a shard.
     pub(super) fn csv(&self) -> Result<Vec<u8>, RunError> {
         csv(std::iter::once(&self.head).chain(&self.rows))
     }
 
-    /// Writes what is made of all runs: `summary.csv` and the pictures, under the lock of `runs.csv`.
+    /// Writes `summary.csv` and the pictures under the lock of `runs.csv`.
     pub(super) fn write_rest(&self, out: &Path, lock: &Lock) -> Result<(), RunError> {
         let write = |name: &str, bytes: &[u8]| {
             let path = out.join(name);
@@ -129,12 +127,12 @@ impl Table {
         Ok(())
     }
 
-    /// For people.
+    /// Returns the table for people.
     pub fn text(&self) -> String {
         text(self)
     }
 
-    /// Whether every run held its bounds.
+    /// True if every run held its bounds.
     pub fn passed(&self) -> bool {
         let passed = self.place(PASSED);
         self.rows.iter().all(|row| row[passed] == "1")
@@ -144,18 +142,18 @@ impl Table {
         self.head.iter().position(|name| name == column).unwrap_or(0)
     }
 
-    /// The varied keys' columns.
+    /// Columns of the varied keys.
     pub(super) fn varied(&self) -> core::ops::Range<usize> {
         3..self.place(SEED)
     }
 
-    /// The metrics' columns.
+    /// Columns of the metrics.
     pub(super) fn metrics(&self) -> core::ops::Range<usize> {
         let end = self.head.iter().position(|name| name.starts_with(EXPECT)).unwrap_or(self.head.len());
         self.place(DIGEST) + 1..end
     }
 
-    /// The least and the largest that is expected of a metric.
+    /// Limits of the bound on a metric.
     pub(super) fn expected(&self, metric: &str) -> Option<[Option<f64>; 2]> {
         let place = self.head.iter().position(|name| name.strip_prefix(EXPECT) == Some(metric))?;
         let (min, max) = self.rows.first()?[place].split_once("..")?;
@@ -170,10 +168,10 @@ impl Table {
 }
 
 const PANEL_PX: (u32, u32) = (560, 340);
-/// Runs that are drawn each; of more, only the least, the median and the largest.
+/// Most runs that are drawn each. Beyond them only the least, the median and the largest value are drawn.
 const DRAWN: usize = 2_000;
 
-/// A picture for each metric that is bounded; where none is, for each that varies.
+/// Draws a picture for each bounded metric, or for each that varies if none is bounded.
 pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
     let bounded = table.metrics().any(|column| table.expected(&table.head[column]).is_some());
     let mut pictures = Vec::new();
@@ -194,8 +192,7 @@ pub fn all(table: &Table) -> Result<Vec<(String, String)>, PlotError> {
     Ok(pictures)
 }
 
-/// A metric over a varied key: each run a circle, the medians a line, the least and the largest pale, the bounds
-/// dashed.
+/// Draws a metric over a varied key: runs as circles, medians as a line, least and largest values pale, bounds dashed.
 fn over<'a>(table: &Table, (key, x): (usize, &'a str), (column, y): (usize, &'a str)) -> Curves<'a> {
     let number = |text: &String| text.parse::<f64>().unwrap_or(0.0);
     let at = |row: &Vec<String>| number(&row[key]);
@@ -226,7 +223,7 @@ fn over<'a>(table: &Table, (key, x): (usize, &'a str), (column, y): (usize, &'a 
     }
 }
 
-/// The share of the runs at or below each value.
+/// Draws the share of the runs at or below each value.
 fn spread_over_seeds<'a>(table: &Table, column: usize, x: &'a str) -> Curves<'a> {
     let mut values = values(table.rows.iter(), column);
     values.sort_by(f64::total_cmp);

@@ -8,7 +8,6 @@
 mod goals;
 mod instants;
 mod memory;
-mod motion;
 mod sequences;
 mod signal;
 
@@ -18,7 +17,7 @@ use fingertip::params::Params;
 use fingertip::shipped::Frame;
 use fingertip::state::{Fault, Mode};
 use images::record::Record;
-use sim::effects::set::{Named, Set};
+use sim::effects::{Named, Set};
 use sim::native::bench::Bench;
 use sim::scene::{Scene, read};
 

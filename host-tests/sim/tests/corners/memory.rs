@@ -1,4 +1,4 @@
-//! What was pressed before does not change what comes next: residual readings, pushes, tares while something presses.
+//! Earlier presses do not change later ones: residual readings, pushes, tares under load.
 
 use crate::{
     APPROACH_MM_PER_S, CONTACT_ON_N, Case, Finger, LOSSES, fault, finger, force_n, judge, mode, object, press, scene,

@@ -3,15 +3,22 @@
 //! The first sequences that fail are shortened and printed: 6, or `SHOWN=n`. `SEQUENCES=n` tries n. Without
 //! `--profile host` the core also checks its arithmetic for overflow:
 //! `SEQUENCES=2000 cargo test -p sim --test corners sequences -- --nocapture`
+//!
+//! Sequences, drawn.
+//!
+//! What every sequence must keep.
 
-mod events;
-mod rules;
-
-use crate::{CONTACT_ON_N, Finger, fault, finger, force_n, mode, number, set_goal};
-use events::{Event, Sequence};
+use crate::{
+    CONTACT_ON_N, Finger, fault, finger, force_n, log_uniform, mode, most_n, number, object, set_goal, uniform,
+};
+use core::fmt;
+use fastrand::Rng;
+use fingertip::command::Command;
+use fingertip::measure::Task;
+use fingertip::params::Params;
 use fingertip::state::Mode;
-use rules::{Forces, check_mode, needs_torque};
 use sim::cores;
+use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// The usual number of sequences: about 20 s of one core.
@@ -158,4 +165,219 @@ fn random_sequences_keep_the_force_in_bounds_and_the_table_of_modes() {
         format!("{seed}: {reason}\n{sequence}")
     });
     assert!(failed.is_empty(), "{} of {count} sequences break a rule, such as\n{}", failed.len(), shown.join("\n"));
+}
+
+/// Something that the host or the surroundings do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    /// A goal, N.
+    Goal(f64),
+    Torque(bool),
+    Tare,
+    Clear,
+    /// A motion that measures.
+    Measure(Task),
+    /// The object's surface moves, towards the tip where `by_mm` is below 0.
+    Move {
+        by_mm: f64,
+        mm_per_s: f64,
+    },
+    /// The object is taken away.
+    Remove,
+    /// The object is put in its place again, or in front of the tip.
+    PutBack,
+    Wait,
+}
+
+impl Event {
+    fn drawn(rng: &mut Rng) -> Self {
+        match rng.u32(0..24) {
+            0..6 => Self::Goal(log_uniform(rng, 0.2, 7.0)),
+            6..9 => Self::Goal(0.0),
+            9..11 => Self::Torque(false),
+            11..15 => Self::Torque(true),
+            15 => Self::Tare,
+            16 => Self::Clear,
+            17..19 => Self::Measure(Task::Press),
+            19 => Self::Measure(rng.choice([Task::Jog, Task::Strokes]).expect("there are two")),
+            20..22 => Self::Move { by_mm: uniform(rng, -2.0, 2.0), mm_per_s: uniform(rng, 5.0, 60.0) },
+            22 => Self::Remove,
+            _ => rng.choice([Self::PutBack, Self::Wait]).expect("there are two"),
+        }
+    }
+}
+
+/// A finger, what happens to it, and how long after what was before.
+#[derive(Clone, Debug)]
+struct Sequence {
+    seed: u64,
+    pub distance_mm: f64,
+    yield_mm_per_n: f64,
+    modulus_kpa: f64,
+    friction_mnm: f64,
+    noise: bool,
+    pub events: Vec<(f64, Event)>,
+}
+
+impl Sequence {
+    /// The sequence of a number.
+    fn drawn(seed: u64) -> Self {
+        let mut rng = Rng::with_seed(seed);
+        let count = rng.usize(4..=12);
+        let mut events = Vec::new();
+        // The drive is measured with torque off; all else needs torque.
+        if rng.u32(0..4) != 0 {
+            events.extend([(0.001, Event::Torque(true)), (0.001, Event::Goal(log_uniform(&mut rng, 0.2, 7.0)))]);
+        }
+        events.extend((0..count).map(|_| (log_uniform(&mut rng, 0.001, 0.4), Event::drawn(&mut rng))));
+        events.push((
+            log_uniform(&mut rng, 0.001, 0.4),
+            if rng.bool() { Event::Goal(0.0) } else { Event::Torque(false) },
+        ));
+        Self {
+            seed,
+            distance_mm: uniform(&mut rng, 1.0, 5.0),
+            yield_mm_per_n: if rng.bool() { 0.0 } else { log_uniform(&mut rng, 0.1, 2.0) },
+            modulus_kpa: log_uniform(&mut rng, 150.0, 400.0),
+            friction_mnm: uniform(&mut rng, 0.0, 0.25),
+            noise: rng.bool(),
+            events,
+        }
+    }
+
+    /// The finger.
+    fn tables(&self) -> String {
+        let Self { seed, modulus_kpa, friction_mnm, .. } = self;
+        format!(
+            "seed = {seed}\n[controller]\ndirection_confirmed = 1\n[tip]\nmodulus_kpa = {modulus_kpa:?}\n{}[effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n{}",
+            object(self.distance_mm, self.yield_mm_per_n),
+            if self.noise { "[effects.noise]\nrms_codes = 1.5\n" } else { "" }
+        )
+    }
+
+    /// Time within which pressing ends, and the force that friction may hold without voltage. A driven release of a very
+    /// soft object takes longer, and so does a release by a shorted motor.
+    fn stops(&self, driven: bool) -> (f64, f64) {
+        let soft = self.yield_mm_per_n > 1.0;
+        if driven {
+            return (if soft { 0.8 } else { 0.5 }, 0.0);
+        }
+        // The drum of 12 mm behind 43:1.
+        (if soft { 1.5 } else { 1.0 }, 0.05 + self.friction_mnm * 43.0 / 12.0)
+    }
+}
+
+impl fmt::Display for Sequence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { distance_mm, yield_mm_per_n, modulus_kpa, friction_mnm, noise, .. } = self;
+        writeln!(
+            f,
+            "  object at {distance_mm:.3} mm, {yield_mm_per_n:.3} mm/N; {modulus_kpa:.0} kPa, {friction_mnm:.3} mN m, noise {noise}"
+        )?;
+        let mut time_s = 0.0;
+        for (after_s, event) in &self.events {
+            time_s += after_s;
+            writeln!(f, "  + {after_s:.4} s, {time_s:.4} s at least: {event:?}")?;
+        }
+        Ok(())
+    }
+}
+
+/// A goal that is taken back counts for this long.
+const RECENT_S: f64 = 0.2;
+
+/// The largest force of a press that measures.
+const MEASURING_N: f64 = Params::DEFAULT.force_max_mn as f64 * 1e-3;
+
+/// The largest force allowed, frame by frame.
+#[derive(Default)]
+struct Forces {
+    /// Goals that are over, and until when they were in force.
+    goals: VecDeque<(f64, f64)>,
+    goal_n: f64,
+    /// Largest force since the object last moved towards the tip and is still touched; 0 otherwise.
+    pushed_n: f64,
+    pushed_s: f64,
+    /// Force at the moment at which driving ended; friction may hold it.
+    left_n: f64,
+    driven: bool,
+}
+
+impl Forces {
+    /// Takes in a frame. `approaching`: the object moves towards the tip.
+    fn observe(&mut self, time_s: f64, force_n: f64, command: &Command, mode: Mode, approaching: bool) {
+        let driven = matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Press);
+        let goal_n = match mode {
+            Mode::Press => MEASURING_N,
+            _ if driven => command.goal.0.to_num(),
+            _ => 0.0,
+        };
+        if goal_n != self.goal_n {
+            self.goals.push_back((time_s, self.goal_n));
+            self.goal_n = goal_n;
+        }
+        self.goals.retain(|(until_s, _)| *until_s + RECENT_S > time_s);
+        if !driven && (self.driven || self.left_n > 0.0 && !self.goals.is_empty()) {
+            // The tip may still move for as long as the goal counts.
+            self.left_n = self.left_n.max(force_n);
+        } else if driven || force_n < CONTACT_ON_N {
+            self.left_n = 0.0;
+        }
+        // Driving that begins on a contact may need the time of a goal that is taken back.
+        if driven && !self.driven {
+            self.goals.push_back((time_s, force_n));
+        }
+        self.driven = driven;
+        // A force that the object causes counts until nothing is touched, or the loop has had time to correct it.
+        if approaching && force_n > 0.0 {
+            self.pushed_n = self.pushed_n.max(force_n);
+            self.pushed_s = time_s;
+        } else if self.pushed_n > 0.0 {
+            let corrected = mode == Mode::Force && time_s > self.pushed_s + 0.3;
+            let settling = time_s < self.pushed_s + 0.05;
+            self.pushed_n = if force_n < CONTACT_ON_N || corrected {
+                0.0
+            } else if settling {
+                self.pushed_n.max(force_n)
+            } else {
+                self.pushed_n
+            };
+        }
+    }
+
+    /// The force that the object caused and that may still be there.
+    fn pushed_n(&self) -> f64 {
+        self.pushed_n
+    }
+
+    /// The reason where the force is too large.
+    fn broken(&self, force_n: f64) -> Option<String> {
+        let goal_n = self.goals.iter().map(|(_, goal_n)| *goal_n).fold(self.goal_n, f64::max);
+        let most_n = most_n(goal_n).max(self.left_n + 0.05).max(1.05 * self.pushed_n + 0.05);
+        (force_n > most_n).then(|| format!("{force_n:.3} N, {most_n:.3} N allowed for a goal of {goal_n:.3} N"))
+    }
+}
+
+/// Whether a mode drives the motor for a goal or a measurement, so that torque off ends it.
+fn needs_torque(mode: Mode) -> bool {
+    matches!(mode, Mode::Approach | Mode::Force | Mode::Release | Mode::Press)
+}
+
+/// The table of modes in `src/state.rs`: the reason where a change is not in it.
+fn check_mode(before: Mode, now: Mode, command: &Command) -> Option<String> {
+    let allowed = match (before, now) {
+        (before, now) if before == now => true,
+        (_, Mode::Fault | Mode::Tare) => before != Mode::Fault || now != Mode::Tare || !command.torque,
+        (Mode::Fault, _) => now == Mode::Off && !command.torque,
+        (Mode::Tare, _) => now == Mode::Off,
+        (Mode::Off, _) => command.torque || now == Mode::Strokes,
+        (Mode::Strokes, _) => now == Mode::Off,
+        (Mode::Force, Mode::Off) | (Mode::Approach | Mode::Release | Mode::Press, Mode::Off) => !command.torque,
+        (_, Mode::Strokes) => false,
+        _ => true,
+    };
+    if !command.torque && needs_torque(now) {
+        return Some(format!("torque is off in {now:?}"));
+    }
+    (!allowed).then(|| format!("{before:?} to {now:?} is not in the table of modes"))
 }

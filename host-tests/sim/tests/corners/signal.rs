@@ -1,4 +1,4 @@
-//! The array's signal is lost, stands still or fades while the motor is driven: the force does not run away.
+//! The array's signal is lost, freezes or fades while the motor is driven: the force stays bounded.
 
 use crate::{
     Case, LOSSES, fault, finger, force_n, judge, log_uniform, most_n, object, press, run_with, scene, set_goal, show,

@@ -1,4 +1,4 @@
-//! What is told where something stands in the way, and what is not taken up.
+//! Messages about files that block a run or cannot be resumed.
 
 use crate::{SCENE, SIM, SWEEP, folder};
 use std::fs::{self, File};
@@ -26,13 +26,13 @@ fn told(command: &mut Command) -> (Option<i32>, String) {
     (output.status.code(), String::from_utf8(output.stderr).unwrap())
 }
 
-/// A command that must not be done, and what it says.
+/// Checks that a command is refused with a message.
 fn refused(command: &mut Command, what: &str) {
     let (code, told) = told(command);
     assert!(code == Some(2) && told.contains(what), "{code:?} {told}");
 }
 
-/// What a whole sweep leaves, and what it had in front of its end: the lines so far.
+/// Folder and table of a whole sweep, and its lines before the end.
 fn swept(name: &str) -> (PathBuf, String, String) {
     let out = folder(name);
     assert_eq!(told(&mut sweep(&out)).0, Some(1));
@@ -164,7 +164,7 @@ fn a_lock_of_a_dead_process_stands_in_nobodys_way() {
     assert_eq!(fs::read_to_string(out.join("runs.csv")).unwrap(), runs);
     assert!(!out.join("runs.csv.lock").exists() && !out.join("runs.csv.new").exists());
 
-    // One that is alive is named, and what it does is left alone.
+    // A running process is named, and its file is kept.
     let lock = output::kept::Lock::take(&out.join("runs.csv")).unwrap();
     refused(&mut sweep(&out), &format!("is being written by process {}", std::process::id()));
     drop(lock);
@@ -181,7 +181,7 @@ fn what_cannot_be_shown_is_told_and_the_rest_is_done() {
         assert_eq!(output.status.code(), Some(2), "{told}");
         assert!(told.contains("cannot write to the standard output: No space left"), "{told}");
     }
-    // Nobody hears anything: the exit code still tells.
+    // Without any output, the exit code shows the failure.
     let mut command = Command::new(SIM);
     let status = command.args(["--set", "a.b=1", SCENE]).stdout(full()).stderr(full()).status().unwrap();
     assert_eq!(status.code(), Some(2));

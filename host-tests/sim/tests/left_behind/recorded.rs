@@ -100,7 +100,7 @@ fn a_recording_holds_what_viewers_look_for() {
         assert_eq!((schema.encoding.as_str(), channel.message_encoding.as_str()), ("jsonschema", "json"));
         let shape: serde_json::Value = serde_json::from_slice(&schema.data).unwrap();
         let properties = shape["properties"].as_object().unwrap();
-        // Each message has exactly the fields that its schema tells of.
+        // Each message has exactly the fields of its schema.
         let messages = MessageStream::new(&bytes).unwrap().map(Result::unwrap);
         let mut count = 0;
         for message in messages.filter(|message| message.channel.topic == channel.topic) {
@@ -117,13 +117,13 @@ fn a_recording_holds_what_viewers_look_for() {
     assert_eq!((attachment.name.as_str(), &attachment.data[..]), ("wall.toml", wall().text.as_bytes()));
 }
 
-/// The recording with a message of the core changed, whole and with valid checksums otherwise.
+/// Changes messages of the core in a recording, which stays whole with valid checksums.
 fn rewritten(bytes: &[u8], change: impl Fn(u32, &mut serde_json::Value)) -> Vec<u8> {
-    written_anew(bytes, |_| (), |_| (), change)
+    rewritten_with(bytes, |_| (), |_| (), change)
 }
 
-/// The same, with other metadata and another scene.
-fn written_anew(
+/// Changes metadata, scene and messages of the core.
+fn rewritten_with(
     bytes: &[u8],
     change_metadata: impl Fn(&mut Metadata),
     change_scene: impl Fn(&mut Vec<u8>),
@@ -197,9 +197,9 @@ fn what_was_changed_after_the_run_is_named_and_not_the_core() {
             *finger = finger.replacen("\"params\":{", "\"params\":{\"more\":1,", 1);
         }
     };
-    let error = told(written_anew(&bytes, other, |_| (), |_, _| ()));
+    let error = told(rewritten_with(&bytes, other, |_| (), |_, _| ()));
     assert!(error.contains("fingertip.setup") && error.contains("was changed"), "{error}");
-    let error = told(written_anew(&bytes, |_| (), |scene| scene.push(b'#'), |_, _| ()));
+    let error = told(rewritten_with(&bytes, |_| (), |scene| scene.push(b'#'), |_, _| ()));
     assert!(error.contains("the attached scene was changed"), "{error}");
 }
 
@@ -239,7 +239,7 @@ fn damaged_files_are_told() {
     let mut damaged = bytes.clone();
     damaged[bytes.len() / 2] ^= 1;
     fs::write(&path, damaged).unwrap();
-    assert!(replay(&path).unwrap_err().to_string().contains("CRC is another"));
+    assert!(replay(&path).unwrap_err().to_string().contains("CRC differs"));
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     assert!(replay(&path).is_err());
     fs::write(&path, "no recording").unwrap();

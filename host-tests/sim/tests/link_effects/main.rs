@@ -84,7 +84,7 @@ fn bursts_come_and_last_as_asked() {
         begun += usize::from(is && !was);
         was = is;
     }
-    // 200 s, 10,000 bursts: a Poisson process covers 1 - exp(-rate length) of the time, and begins anew from quiet.
+    // 200 s, 10,000 bursts: a Poisson process covers 1 - exp(-rate length) of the time, and restarts from quiet.
     let (share, exact) = (noisy as f64 / steps as f64, 1.0 - f64::exp(-0.1));
     assert!((share / exact - 1.0).abs() < 0.04, "{share} for {exact}");
     let begins = 50.0 * 200.0 * f64::exp(-0.1);

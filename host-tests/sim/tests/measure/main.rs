@@ -1,5 +1,4 @@
-//! The motions that measure, on simulated fingers as they come: what completes, what ends early, and the bounds of
-//! travel, force and time that always hold.
+//! Measuring motions on drawn fingers: completion, early ends, and bounds of travel, force and time.
 
 mod press;
 mod strokes;

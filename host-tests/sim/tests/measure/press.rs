@@ -1,4 +1,4 @@
-//! Presses on drawn tips: valid ones complete, and whatever moves, yields or vanishes ends them within their limits.
+//! Presses on drawn tips: valid ones complete, and an object that moves, yields or vanishes ends them within limits.
 
 use crate::{drawn, fingers_or, population, print_worst, rows};
 use fingertip::measure::press::ROWS_MAX;
@@ -7,10 +7,9 @@ use fingertip::params::Params;
 use fingertip::shipped::Config;
 use fingertip::state::Fault;
 use sim::cores;
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::native::bench::Bench;
 use sim::population::Finger;
-use sim::scene::controller;
 use sim::setup::Setup;
 use solve::record;
 
@@ -99,7 +98,7 @@ fn solve_all(fingers: &[Finger], made: &[Made]) {
     let (mut errors, mut within) = (Vec::new(), 0);
     for (number, (finger, made)) in fingers.iter().zip(made).enumerate() {
         // A press is read as its own finger is set: its encoder's counts are drawn.
-        let params = controller::params(&finger.scene);
+        let params = finger.scene.params();
         let press = record::press(&made.record, &params).unwrap_or_else(|why| panic!("tip {number}: {why}"));
         let found = solve::modulus(&[press]).unwrap_or_else(|why| panic!("tip {number}: {why}"));
         let truth = drawn(finger, "modulus_kpa");
@@ -211,7 +210,7 @@ fn drawn_or(finger: &Finger, name: &str, otherwise: f64) -> f64 {
     found.and_then(|(_, value)| value.number()).unwrap_or(otherwise)
 }
 
-/// An end stop ahead of the object: the tip stands, and the motor is not driven against it for longer than a second.
+/// An end stop before the object: the motor is driven against it for at most 1 s.
 #[test]
 fn a_stuck_finger_ends_a_press() {
     let config = Config::shipped(&images::CONFIRMED).expect("the defaults are allowed");

@@ -5,7 +5,7 @@ use fingertip::measure::{Ended, MeasureStatus, State, Task};
 use fingertip::params::Params;
 use fingertip::shipped::Config;
 use sim::cores;
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::native::bench::Bench;
 use sim::plant::Faults;
 use sim::population::{Finger, Population};

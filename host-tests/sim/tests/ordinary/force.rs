@@ -1,6 +1,14 @@
-//! What the array does not see is never pressed: contacts off the middle, saturated taxels, gains of their own.
+//! Force limits where the array measures too little: contacts off the middle, saturated taxels, unequal gains.
+//!
+//! The fit takes hold of every contact that reaches over the array's edge, however quickly its force rises from frame
+//! to frame: with a scan that settles slowly, and with stiff tips. Until it does, the force is the sum of what the
+//! array sees, and the tip presses harder.
 
 use crate::{Ran, asks, holds};
+use fingertip::contact::CONFIDENCE_LEAST;
+use sim::native::simulate;
+use sim::scene::read;
+use sim::watch::{Step, Watch};
 
 fn off(centre_mm: [f64; 2], spread_percent: f64, more: &str) -> String {
     let [x, y] = centre_mm;
@@ -36,7 +44,7 @@ fn the_fit_begins_with_a_slow_scan() {
     }
 }
 
-/// Asks for more than the converter sees: what it sees whole is held, and told, so taxels never saturate.
+/// Requests more than the converter can measure: the force is limited and reported, so that no taxel saturates.
 fn is_cut_to(range_n: core::ops::Range<f64>, goal_n: f64, tables: &str) -> Ran {
     let finger = format!("{goal_n} N of {tables}");
     let ran = holds(goal_n, &format!("{tables}[effects.noise]\nrms_codes = 1\n"));
@@ -116,8 +124,7 @@ fn the_motor_feels_a_touch_that_the_array_sees_late() {
     }
 }
 
-/// Still farther out the array sees nothing of the first newton, and loses what it saw: 4.8 N were pressed at goal 0.5,
-/// 2.4 N at goal 1.
+/// Farther out the array does not measure the first newton: once 4.8 N were pressed at goal 0.5 N, and 2.4 N at 1 N.
 #[test]
 fn a_touch_that_the_array_hardly_sees_is_pressed_no_harder() {
     for (goal_n, spread_percent) in [(0.5, 0.0), (0.5, 6.0), (1.0, 0.0), (1.0, 6.0)] {
@@ -193,5 +200,56 @@ fn a_clipped_amplifier_gives_no_over_force() {
         );
         let over = asks(&[(0.0, goal_n)], 0.7, &finger).of("over_force_mn");
         assert!(over < 150.0 + 300.0 * goal_n, "{headroom_mv} mV, {curvature_per_mm}/mm, {goal_n} N: {over} mN");
+    }
+}
+
+/// What a finger ends with.
+#[derive(Debug, Default)]
+struct Held {
+    true_n: f64,
+    confidence: u8,
+    faults: usize,
+}
+
+impl Watch for Held {
+    fn step(&mut self, step: &Step) {
+        self.true_n = step.truth.force_n;
+        self.confidence = step.status.contact.confidence;
+        self.faults += usize::from(step.status.fault.is_some());
+    }
+}
+
+/// Touches an object so far away at the default speed, with the contact's centre so far from the array's middle, and
+/// holds.
+fn is_held(keys: &str, distance_mm: f64, centre_mm: f64, goal_n: f64) {
+    let text = format!(
+        "about = \"a touch off the middle\"\nduration_s = 1.0\n{keys}\n\
+        [object]\ndistance_mm = {distance_mm:?}\ncentre_x_mm = {centre_mm:?}\n\
+        [[script]]\nat_s = 0.0\ngoal_n = {goal_n:?}\n"
+    );
+    let scene = read("test.toml", &text, &[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut held = Held::default();
+    simulate(&scene, &mut held).expect("it runs");
+    let error_n = (held.true_n - goal_n).abs();
+    let found = held.confidence >= CONFIDENCE_LEAST && held.faults == 0;
+    assert!(found && error_n <= 0.01 * goal_n + 0.005, "{keys}, {distance_mm}, {centre_mm} mm, {goal_n} N: {held:?}");
+}
+
+/// The distance decides where within a frame the touch comes.
+#[test]
+fn a_slow_scan_finds_the_contact() {
+    for distance_mm in [2.0, 3.0, 4.0, 5.0, 5.2, 6.0] {
+        for goal_n in [1.0, 2.0] {
+            is_held("[controller]\nsettle_ns = 40000", distance_mm, 6.0, goal_n);
+        }
+    }
+}
+
+#[test]
+fn stiff_tips_are_found() {
+    for modulus_kpa in [750, 1_000, 1_500] {
+        for (centre_mm, goal_n) in [(5.0, 2.0), (6.0, 1.0), (6.0, 2.0), (7.0, 2.0)] {
+            is_held(&format!("[tip]\nmodulus_kpa = {modulus_kpa}"), 5.0, centre_mm, goal_n);
+        }
     }
 }

@@ -1,17 +1,16 @@
-//! Ordinary fingers: noise, warmth, coarse encoders, contacts off the middle, weak sources. What each once did wrong is
-//! asked for here, by what is true of the simulated finger, and so are its neighbours. Every run is held to the
-//! envelope of the population `ordinary`.
+//! Ordinary fingers: noise, temperature, coarse encoders, contacts off the middle, weak sources. Each test repeats a
+//! past defect and cases near it, and judges by the true state. Every run must keep the envelope of the population
+//! `ordinary`.
+//!
+//! After a release the tip stays at its clearance, for any reading in the air, and finds the next touch.
 
 mod force;
-mod letting_go;
-mod motor;
 
 use sim::metrics::Hold;
-use sim::native;
-use sim::population;
 use sim::run::{Outcome, run};
 use sim::scene::{Bound, Scene, read};
 use sim::watch::{Step, Truth, Watch};
+use sim::{native, population};
 use std::sync::OnceLock;
 
 /// How a finger went.
@@ -47,7 +46,7 @@ fn asks(script: &[(f64, f64)], duration_s: f64, tables: &str) -> Ran {
     Ran { outcome, end: last.end, touch_mm: last.touch_mm }
 }
 
-/// Touches, holds, and lets go.
+/// Touches, holds and releases.
 fn holds(goal_n: f64, tables: &str) -> Ran {
     asks(&[(0.0, goal_n), (0.7, 0.0)], 1.3, tables)
 }
@@ -76,7 +75,7 @@ impl Ran {
         self.outcome.holds[0]
     }
 
-    /// It let go, and stands so far behind where it touched.
+    /// Checks that the tip rests at the clearance behind its touch.
     fn stands_clear(&self, clearance_mm: f64, finger: &str) {
         let behind_mm = self.touch_mm.expect("it touched") - self.end.travel_mm;
         assert_eq!(self.end.force_n, 0.0, "{finger}: lets go");
@@ -96,5 +95,229 @@ impl Watch for Last {
         if step.truth.force_n > 0.0 {
             self.touch_mm.get_or_insert(step.truth.travel_mm);
         }
+    }
+}
+
+/// Touches, releases at 0.5 s and waits 3 s, in which the tip once retracted by 27 mm.
+fn lets_go(goal_n: f64, tables: &str) -> Ran {
+    asks(&[(0.0, goal_n), (0.5, 0.0)], 3.5, tables)
+}
+
+/// Codes of noise that the array reads with, or friction as if there were none.
+fn noise(rms_codes: f64, friction_mnm: f64) -> String {
+    format!("[effects.noise]\nrms_codes = {rms_codes:?}\n[effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n")
+}
+
+#[test]
+fn noise_does_not_walk_a_released_tip_back() {
+    for rms_codes in [1.5, 3.0, 4.0, 6.0] {
+        for (goal_n, friction_mnm) in [(1.0, 0.12), (1.0, 0.0), (5.0, 0.12), (0.2, 0.12)] {
+            let finger = format!("{rms_codes} codes, {goal_n} N, friction {friction_mnm} mN m");
+            let ran = lets_go(goal_n, &noise(rms_codes, friction_mnm)).keeps_all(&finger);
+            ran.stands_clear(1.0, &finger);
+            // The noise is there: a sum of 100 taxels and 10 levels.
+            let error_mn = ran.of("force_error_rms_mn");
+            assert!((1.5 * rms_codes..5.0 * rms_codes).contains(&error_mn), "{finger}: {error_mn} mN");
+        }
+    }
+}
+
+#[test]
+fn warmth_does_not_drive_a_released_tip_away() {
+    for warming_k in [20.0, 40.0, -20.0, -40.0] {
+        for time_constant_s in [600.0, 20.0, 1.0] {
+            for friction_mnm in [0.12, 0.0] {
+                let finger = format!("{warming_k} K, {time_constant_s} s, friction {friction_mnm} mN m");
+                let warming = format!("warming_k = {warming_k:?}\ntime_constant_s = {time_constant_s:?}");
+                let noise = noise(0.0, friction_mnm);
+                let ran = lets_go(1.0, &format!("[effects.temperature_drift]\n{warming}\n{noise}")).keeps_all(&finger);
+                ran.stands_clear(1.0, &finger);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_released_tip_goes_back_no_faster_than_it_came() {
+    // The same with the tip deep in: a soft one, a hard one, and 5 N.
+    for (modulus_kpa, goal_n) in [(60.0, 1.0), (60.0, 5.0), (1_000.0, 2.0)] {
+        let finger = format!("{modulus_kpa} kPa, {goal_n} N");
+        let tables = format!("[tip]\nmodulus_kpa = {modulus_kpa:?}\n{}", noise(1.5, 0.12));
+        let ran = lets_go(goal_n, &tables).keeps_all(&finger);
+        ran.stands_clear(1.0, &finger);
+        let air_percent = ran.of("air_speed_percent");
+        assert!((95.0..130.0).contains(&air_percent), "{finger}: {air_percent} % of the approach");
+    }
+}
+
+/// Effects that leave more than `contact_off_mn` after a release: creep, hysteresis and temperature.
+fn remembering(warming_k: f64) -> String {
+    format!(
+        "[effects.creep]\nrate_percent_per_decade = 4\n[effects.hysteresis]\nwidth_percent = 10\n\
+        [effects.temperature_drift]\nwarming_k = {warming_k:?}\ntime_constant_s = 5\n"
+    )
+}
+
+/// Two touches, and again.
+const AGAIN: [(f64, f64); 5] = [(0.0, 1.0), (0.7, 0.0), (1.5, 2.0), (2.2, 0.0), (3.2, 1.0)];
+
+#[test]
+fn every_touch_is_found_again() {
+    for rms_codes in [0.0, 2.0, 4.0] {
+        let finger = format!("{rms_codes} codes");
+        let ran = asks(&AGAIN, 4.0, &noise(rms_codes, 0.12)).keeps_all(&finger);
+        let held: Vec<_> = ran.outcome.holds.iter().map(|hold| hold.mean_n).collect();
+        assert!(
+            held.iter().zip([1.0, 2.0, 1.0]).all(|(mean_n, goal_n)| (mean_n / goal_n - 1.0).abs() < 0.02),
+            "{held:?}"
+        );
+        assert!(ran.of("force_error_rms_mn") > 0.1, "{finger}: too good");
+    }
+}
+
+#[test]
+fn what_an_array_remembers_is_learnt_anew_after_each_touch() {
+    for rms_codes in [0.0, 2.0, 4.0] {
+        for warming_k in [20.0, -20.0] {
+            let finger = format!("{rms_codes} codes, {warming_k} K");
+            let tables = remembering(warming_k) + &noise(rms_codes, 0.12);
+            // What such an array reads of 2 N is off by more than the envelope.
+            let ran = asks(&AGAIN, 4.0, &tables).keeps_all_but(&["hold_error_mn"], &finger);
+            assert_eq!(ran.outcome.holds.len(), 3);
+            assert!(ran.of("hold_error_mn") < 450.0 && ran.of("force_error_rms_mn") > 5.0, "{finger}");
+        }
+    }
+}
+
+/// The array reads more than a contact in the air, and the same code all the way, but it is not frozen. An offset
+/// beyond `contact_off_mn` once ended in fault 4 or 1.
+#[test]
+fn an_offset_in_the_air_is_no_fault() {
+    for (zero_kpa_per_k, time_constant_s) in [(0.01, 1.0), (0.01, 0.5), (0.02, 1.0), (0.04, 2.0), (-0.02, 1.0)] {
+        for goal_n in [0.5, 1.0, 4.0] {
+            let finger = format!("{zero_kpa_per_k} kPa/K, {time_constant_s} s, {goal_n} N");
+            let zero = format!("zero_kpa_per_k = {zero_kpa_per_k:?}\ngain_percent_per_k = 0");
+            let warming = format!("[effects.temperature_drift]\n{zero}\ntime_constant_s = {time_constant_s:?}\n");
+            // Of a force that is a hundred of such readings, the offset is not to be told.
+            let ran = asks(&[(0.0, goal_n), (0.4, 0.0), (1.2, goal_n), (1.7, 0.0)], 2.4, &warming);
+            let ran = ran.keeps_all_but(&["hold_error_mn"], &finger);
+            ran.stands_clear(1.0, &finger);
+        }
+    }
+}
+
+/// Fingers that hold one force each. Noise, friction, encoder and place are those of `ordinary`.
+const HOLDS: &str = r#"
+about = "A force is held"
+duration_s = 0.9
+[motor]
+encoder_counts_per_turn = { log_uniform = [256, 4096] }
+[object]
+distance_mm = { uniform = [1, 5] }
+centre_x_mm = { uniform = [-3.5, 3.5] }
+centre_y_mm = { uniform = [-3.5, 3.5] }
+[tip]
+modulus_kpa = { log_uniform = [150, 400] }
+[effects.noise]
+rms_codes = { log_uniform = [0.3, 3] }
+[effects.dry_friction]
+torque_mnm = { uniform = [0, 0.25] }
+[effects.gain_spread]
+rms_percent = { uniform = [0, 10] }
+[[script]]
+at_s = 0.0
+goal_n = { log_uniform = [0.3, 5] }
+[[expect]]
+metric = "rest_duty_percent"
+max = 2.0
+"#;
+
+/// 99 of 100 hunted with 30 to 50 % of the duty.
+#[test]
+fn the_duty_rests_in_a_hundred_of_a_hundred_holds() {
+    let population = population::read("holds.toml", HOLDS).unwrap_or_else(|errors| panic!("{errors}"));
+    let mut quiet = 0;
+    for number in 0..100 {
+        let finger = population.finger(1, number).unwrap_or_else(|errors| panic!("{errors}"));
+        let outcome = run(&finger.scene, &native::board, &mut []).expect("it runs");
+        let [duty, error_mn] =
+            ["rest_duty_percent", "hold_error_mn"].map(|metric| outcome.measured.get(metric).expect("it holds"));
+        assert!(outcome.passed(), "finger {number} deviates by {duty} %: {:?}", finger.drawn);
+        let hold = outcome.holds[0];
+        assert!(!hold.faulty && error_mn < 0.15 * 1e3 * hold.goal_n, "finger {number}: {error_mn} mN off {hold:?}");
+        quiet += usize::from(duty < 0.5);
+    }
+    assert!((50..100).contains(&quiet), "{quiet} are quite quiet: with noise and counts not all are");
+}
+
+/// A coarse encoder makes a slower loop, never a swinging one. 256 counts swung by 33 mN, 128 by 158, 48 by 817; 16
+/// held 3 N at goal 1.
+#[test]
+fn coarse_encoders_do_not_swing() {
+    for counts in [256, 128, 64, 48, 24, 16] {
+        for goal_n in [0.3, 1.0, 3.0] {
+            for friction_mnm in [0.12, 0.0] {
+                let finger = format!("{counts} counts, {goal_n} N, friction {friction_mnm} mN m");
+                let tables = format!(
+                    "[motor]\nencoder_counts_per_turn = {counts}\n[effects.noise]\nrms_codes = 1\n\
+                    [effects.dry_friction]\ntorque_mnm = {friction_mnm:?}\n"
+                );
+                // Nobody sees a drift within a count: where that is more than the envelope's 50 um, it is what counts.
+                let count_mm = 2.0 * core::f64::consts::PI / (f64::from(counts) * 43.0 / 12.0);
+                let unseen: &[&str] = if count_mm > 0.05 { &["rest_travel_um"] } else { &[] };
+                // Half a second is what the coarsest take to settle.
+                let ran = asks(&[(0.0, goal_n), (1.2, 0.0)], 2.4, &tables).keeps_all_but(unseen, &finger);
+                ran.stands_clear(1.0, &finger);
+                assert!(ran.of("rest_travel_um") < 1e3 * count_mm, "{finger}: {} um", ran.of("rest_travel_um"));
+            }
+        }
+    }
+}
+
+#[test]
+fn noise_and_bursts_are_no_fault() {
+    for (rms_codes, goal_n) in [(4.0, 1.0), (6.0, 0.5), (6.0, 1.0), (6.0, 3.0)] {
+        let finger = format!("{rms_codes} codes of noise, {goal_n} N");
+        let ran = holds(goal_n, &format!("[effects.noise]\nrms_codes = {rms_codes:?}\n")).keeps_all(&finger);
+        ran.stands_clear(1.0, &finger);
+        assert!(ran.of("force_error_rms_mn") > 5.0, "{finger}: too good");
+    }
+    for (amplitude_codes, rate_per_s) in [(20, 10), (20, 100), (10, 1_000)] {
+        for goal_n in [0.5, 1.0, 3.0] {
+            let finger = format!("bursts of {amplitude_codes} codes, {rate_per_s} a second, {goal_n} N");
+            let bursts = format!("amplitude_codes = {amplitude_codes}\nrate_per_s = {rate_per_s}");
+            let ran = holds(goal_n, &format!("[effects.burst]\n{bursts}\n")).keeps_all(&finger);
+            ran.stands_clear(1.0, &finger);
+        }
+    }
+}
+
+/// The current is limited before the supply goes under, so it was no fault 9.
+#[test]
+fn a_weak_source_is_spared() {
+    for source_ohm in [0.5, 1.0, 2.0] {
+        for goal_n in [1.0, 5.0, 7.0] {
+            let finger = format!("{source_ohm} Ohm, {goal_n} N");
+            let script = [(0.0, goal_n), (0.6, 0.3), (1.1, goal_n), (1.7, 0.0)];
+            let ran = asks(&script, 2.3, &format!("[effects.supply_sag]\nsource_ohm = {source_ohm:?}\n"));
+            ran.keeps_all(&finger).stands_clear(1.0, &finger);
+        }
+    }
+}
+
+/// A tip that the motor drives almost directly goes far for each count, and friction counts for much: that was fault 5,
+/// at three times the speed of the approach.
+#[test]
+fn a_small_reduction_is_no_fault() {
+    for (ratio, counts) in [(1.2, 1_600), (2.4, 1_600), (6.0, 256), (12.0, 256)] {
+        let finger = format!("ratio {ratio}, {counts} counts");
+        let tables = format!(
+            "[transmission]\nratio = {ratio:?}\n[motor]\nencoder_counts_per_turn = {counts}\n\
+            [effects.dry_friction]\ntorque_mnm = 0.12\n"
+        );
+        // At 40 um a count no force is held to 15 %.
+        let ran = holds(1.0, &tables).keeps_all_but(&["hold_error_mn"], &finger);
+        let held = ran.first_hold().mean_n;
+        assert!((0.5..1.1).contains(&held), "{finger}: holds {held} N");
     }
 }

@@ -1,14 +1,19 @@
 //! The simulated board against the paper, the data sheet and closed forms.
+//!
+//! The plant is the finger of a scene that names what the plant holds.
 
-mod cells;
+mod array;
 mod drive;
-mod electrics;
-mod optimal;
-mod same;
 
+use fingertip::config::newtons;
+use fingertip::shipped;
+use fingertip::state::Mode;
 use proptest::test_runner::{Config, RngSeed};
 use sim::bridge::Bridge;
+use sim::effects::Named;
+use sim::native::bench::Bench;
 use sim::plant::{Plant, Setup};
+use sim::scene::read;
 
 /// The step that the tests vouch for.
 const STEP_S: f64 = 10e-6;
@@ -37,4 +42,32 @@ fn run(world: &mut Plant, seconds: f64, bridge: Bridge) {
 /// So many cases of a property, the same on every run.
 fn cases(cases: u32) -> Config {
     Config { cases, rng_seed: RngSeed::Fixed(2003), failure_persistence: None, ..Config::default() }
+}
+
+const SCENE: &str = "about = \"the reference finger\"\nduration_s = 1.0\n[world]\nstep_us = 10.0\n\
+    [object]\ndistance_mm = 0.5\n[effects.dry_friction]\ntorque_mnm = 0.12\n\
+    [effects.gear_efficiency]\nefficiency = 0.7\n[effects.supply_sag]\nsource_ohm = 0.1\n\
+    [effects.row_sag]\nswitch_ohm = 30.0\n[effects.settling]\ntau_us = 0.2\nafter_us = 2.4\n";
+
+/// To the bit, from a tare over a touch to a change of the force and back off the object.
+#[test]
+fn a_scene_that_names_what_the_plant_holds_is_the_same_to_the_bit() {
+    let scene = read("test.toml", SCENE, &[]).unwrap_or_else(|errors| panic!("{errors}"));
+    let mut setup = Setup::default();
+    setup.wall.distance_mm = 0.5;
+    // As the scene has it: in g cm^2, which rounds otherwise.
+    setup.motor.inertia_kg_m2 = 0.71 * 1e-7;
+    let mut named = Bench::<Named>::new(&scene).expect("it runs");
+    let mut plant = Bench::of(&setup, &shipped::Config::shipped(&scene.params()).unwrap());
+    named.tare();
+    plant.tare();
+    for goal_mn in [1_000, 4_000, 500, 0] {
+        (named.command().goal, plant.command().goal) = (newtons(goal_mn), newtons(goal_mn));
+        for frame in 0..1_000 {
+            assert_eq!(named.step(), plant.step(), "{goal_mn} mN, frame {frame}");
+            assert_eq!(named.frame(), plant.frame(), "{goal_mn} mN, frame {frame}");
+            assert_eq!(named.truth().force_n, plant.truth().force_n, "{goal_mn} mN, frame {frame}");
+        }
+        assert_eq!(plant.status().mode, if goal_mn > 0 { Mode::Force } else { Mode::Release });
+    }
 }

@@ -1,4 +1,4 @@
-//! Each promise of the envelope, by a finger made by hand: kept by a little, and broken by a little.
+//! Each promise of the envelope on a constructed finger: just kept and just broken.
 
 use fingertip::command::Command;
 use fingertip::config::newtons;
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 /// Where the finger touches, and how deep it goes for a force.
 const TOUCH_MM: f64 = 5.0;
 const MM_PER_N: f64 = 0.5;
-/// Of the script: three forces, let go, wait, touch again, let go.
+/// Times, s, and goals, N: three forces, a release, and a second touch and release.
 const SCRIPT: [(f64, f64); 6] = [(0.0, 1.0), (0.9, 4.0), (1.5, 2.0), (2.1, 0.0), (3.1, 1.0), (3.8, 0.0)];
 
 /// What is true at a time.

@@ -1,4 +1,4 @@
-//! What a mistake looks like to the person who made it.
+//! Messages about mistakes in scenes.
 
 use crate::read_it;
 

@@ -1,11 +1,18 @@
-//! The reader of scenes: what it takes, what it says of what it does not take, and that nothing makes it fall over.
+//! Reader of scenes: accepted texts, messages about others, and no panic on any text.
+//!
+//! Whatever the text, the reader answers: with a scene, or with errors that lie in it.
+//!
+//! What the keys of the tables and of the effects keep to.
 
-mod any_text;
 mod errors;
-mod keys;
 
-use sim::metrics;
+use fastrand::Rng;
+use sim::cli::load;
+use sim::events::{EVENT, KINDS};
+use sim::scene::tables::{EXPECT, Key, Kind, ROOT, SCRIPT, TABLES};
+use sim::scene::text::{self, set};
 use sim::scene::{self, Scene, SceneErrors, read};
+use sim::{metrics, registry};
 
 fn library() -> Vec<(String, String)> {
     let names = scene::library::names().unwrap();
@@ -61,7 +68,7 @@ fn the_controller_knows_the_finger_unless_told_otherwise() {
     let params = |tables: &str| {
         let scene =
             read_it(&format!("about = \"\"\nduration_s = 1\n{tables}")).unwrap_or_else(|errors| panic!("{errors}"));
-        scene::controller::params(&scene)
+        scene.params()
     };
     // The reference finger, but for what only effects bring, and with its direction confirmed.
     assert_eq!(
@@ -71,4 +78,208 @@ fn the_controller_knows_the_finger_unless_told_otherwise() {
     assert_eq!(params("[effects.row_sag]").row_sag_ppb_per_code, Params::DEFAULT.row_sag_ppb_per_code);
     assert_eq!(params("[tip]\nmodulus_kpa = 400.5").modulus_pa, 400_500);
     assert_eq!(params("[tip]\nmodulus_kpa = 400\n[controller]\nmodulus_pa = 250000").modulus_pa, 250_000);
+}
+
+#[rustfmt::skip]
+const TOKENS: &[&str] = &[
+    "about", "duration_s", "seed", "tip", "effects", "effects.noise", "script", "expect", "controller", "object",
+    "rms_codes", "at_s", "goal_n", "metric", "min", "max", "radius_mm", "dead", "[", "]", "[[", "]]", "{", "}", "=",
+    ".", ",", "\n", "\n", "\n", " ", "\t", "\"", "'", "\"\"\"", "#", "1", "-1", "0.5", "1e308", "1e400", "nan",
+    "-inf", "0x10", "true", "1979-05-27", "\"x\"", "peak_force_n", "\u{feff}", "\r\n", "\0", "ü", "\u{1F600}",
+    "\\u12", "9223372036854775808",
+];
+
+fn answers(text: &str) {
+    if let Err(errors) = read_it(text) {
+        assert!(!errors.0.is_empty(), "refused without a reason:\n{text}");
+        for error in &errors.0 {
+            assert!(error.line >= 1 && error.line <= text.lines().count().max(1) + 1, "{error}");
+            assert!(error.column >= 1);
+        }
+        let _ = errors.to_string();
+    }
+}
+
+#[test]
+fn any_tokens_are_answered() {
+    let mut rng = Rng::with_seed(1);
+    for _ in 0..20_000 {
+        let text: String = (0..rng.usize(0..30)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect();
+        answers(&text);
+    }
+}
+
+#[test]
+fn any_change_to_a_scene_is_answered() {
+    let mut rng = Rng::with_seed(2);
+    let scenes = library();
+    for _ in 0..10_000 {
+        let mut text: Vec<char> = scenes[rng.usize(0..scenes.len())].1.chars().collect();
+        for _ in 0..rng.usize(1..4) {
+            let at = rng.usize(0..text.len());
+            match rng.u8(0..3) {
+                0 => drop(text.drain(at..(at + rng.usize(1..10)).min(text.len()))),
+                1 => {
+                    let token = TOKENS[rng.usize(0..TOKENS.len())].chars();
+                    text.splice(at..at, token).for_each(drop);
+                }
+                _ => text[at] = char::from(rng.u8(0..128)),
+            }
+        }
+        answers(&text.into_iter().collect::<String>());
+    }
+}
+
+#[test]
+fn any_setting_is_answered() {
+    let mut rng = Rng::with_seed(3);
+    let scenes = library();
+    for _ in 0..5_000 {
+        let mut some = |most| (0..rng.usize(0..most)).map(|_| TOKENS[rng.usize(0..TOKENS.len())]).collect::<String>();
+        let (place, value) = (some(5), some(3));
+        if let Ok(changed) = text::set(&scenes[0].1, &place, &value) {
+            answers(&changed);
+        }
+    }
+}
+
+/// Plain numbers that have no unit.
+#[rustfmt::skip]
+const PLAIN: &[&str] = &[
+    "seed", "ratio", "efficiency", "bits", "min", "max", "fingers", "share", "chip_share", "left", "still",
+    "slipping", "teeth", "grip_friction", "row", "column", "factor",
+];
+
+fn described() -> Vec<(&'static str, &'static Key)> {
+    let tables =
+        TABLES.iter().chain([&ROOT, &SCRIPT, &EVENT, &EXPECT]).chain(&KINDS).map(|table| (table.name, table.keys));
+    let effects = registry::all().map(|effect| (effect.name, effect.keys));
+    tables.chain(effects).flat_map(|(name, keys)| keys.iter().map(move |key| (name, key))).collect()
+}
+
+#[test]
+fn every_quantity_ends_with_its_unit() {
+    let mut without = Vec::new();
+    for (table, key) in described() {
+        // Those of the controller are the firmware's, which has its own.
+        let quantity = matches!(key.kind, Kind::Number { .. } | Kind::Whole { .. } | Kind::Optional { .. });
+        let plain = !quantity || PLAIN.contains(&key.name) || table == "controller";
+        without.extend((!plain && key.unit().is_none()).then_some((table, key.name)));
+    }
+    assert!(without.is_empty(), "these have no unit: {without:?}");
+}
+
+/// The shown unit is the whole unit at the end of the key's name.
+#[test]
+fn the_unit_shown_is_the_one_that_the_name_ends_with() {
+    const WORDS: [(&str, &str); 7] = [
+        ("0.001 codes/kPa", "codes/kPa milli"),
+        ("degrees Celsius", "c"),
+        ("degrees", "deg"),
+        (" a decade of time", "/decade"),
+        (" a ", "/"),
+        ("%", "percent"),
+        ("^", ""),
+    ];
+    const SHORT: [&str; 36] = [
+        "at", "axis", "by", "dead", "drop", "fast", "for", "from", "gain", "gear", "goal", "grip", "hold", "inl",
+        "lift", "lost", "mass", "max", "min", "most", "off", "on", "play", "rate", "read", "rms", "rows", "sag",
+        "slew", "step", "tau", "time", "to", "x", "y", "zero",
+    ];
+    const RATES: [&str; 4] = ["curvature", "magnet", "max", "rate"];
+    let mut compound = 0;
+    for (table, key) in described() {
+        let Some(unit) = key.unit() else {
+            assert!(!key.name.contains("_per_"), "{table}: {} has no unit", key.name);
+            continue;
+        };
+        let plain = WORDS.iter().fold(unit.clone(), |text, (shown, word)| text.replace(shown, word));
+        // "N m" is one word of a name, "N s" is two.
+        let plain = plain.replace("N m", "Nm").replace("1/N", "per goal N").replace("1/", "per ").replace('/', " per ");
+        let ending = plain.to_lowercase().replace(' ', "_");
+        let before = key.name.strip_suffix(&ending).unwrap_or_else(|| panic!("{table}: {} in {unit}", key.name));
+        assert!(before.is_empty() || before.ends_with('_'), "{table}: {} in {unit}", key.name);
+        let left = before.trim_end_matches('_').rsplit('_').next().unwrap_or_default();
+        // What is left is a word: one as short as a unit's is known to be none.
+        let divided = unit.starts_with("1/");
+        let word = left.is_empty() || left.len() > 4 || SHORT.contains(&left);
+        assert!(if divided { RATES.contains(&left) } else { word }, "{table}: {} in {unit}", key.name);
+        compound += usize::from(unit.contains(['/', ' ']));
+    }
+    assert!(compound > 20, "{compound}");
+}
+
+#[test]
+fn every_default_lies_within_its_range_and_every_key_says_what_it_is() {
+    for (table, key) in described() {
+        assert!(key.about.trim().len() > 3 && key.about.trim().ends_with('.'), "{table}: {}", key.name);
+        let fits = match key.kind {
+            Kind::Number { min, max, default } => {
+                min <= max && default.is_none_or(|default| (min..=max).contains(&default))
+            }
+            Kind::Whole { min, max, default } => {
+                min <= max && default.is_none_or(|default| (min..=max).contains(&default))
+            }
+            Kind::Word { words, default } => default.is_none_or(|default| words.contains(&default)),
+            Kind::Optional { min, max, .. } => min <= max,
+            Kind::Text | Kind::Pairs { .. } => true,
+        };
+        assert!(fits, "{table}: {}", key.name);
+    }
+}
+
+#[test]
+fn no_name_comes_twice() {
+    let mut names: Vec<&str> = registry::all().map(|effect| effect.name).collect();
+    names.sort();
+    names.dedup();
+    assert_eq!(names.len(), registry::all().count());
+    for effect in registry::all() {
+        let mut keys: Vec<&str> = effect.keys.iter().map(|key| key.name).collect();
+        keys.sort();
+        keys.dedup();
+        assert_eq!(keys.len(), effect.keys.len(), "{}", effect.name);
+    }
+}
+
+#[test]
+fn every_effect_may_be_named_with_an_empty_table_and_without_magnitude() {
+    let head = "about = \"\"\nduration_s = 1\n";
+    for effect in registry::all() {
+        for table in [format!("[effects.{}]\n", effect.name), text::zero(effect)] {
+            let scene = read_it(&format!("{head}{table}")).unwrap_or_else(|errors| panic!("{errors}"));
+            assert_eq!(scene.effects.len(), 1);
+        }
+        assert!(!effect.equations.is_empty() && !effect.state.is_empty() && !effect.reference.is_empty());
+    }
+}
+
+const SCENE: &str = "about = \"a\" # kept\nduration_s = 1.0\n[[script]]\nat_s = 0 # kept too\ngoal_n = 1\n[[script]]\nat_s = 0.5\ngoal_n = 2\n";
+
+#[test]
+fn what_is_set_is_read_and_comments_stay() {
+    let text = set(SCENE, "script.1.goal_n", "3.5").unwrap();
+    let text = set(&text, "seed", "9").unwrap();
+    let text = set(&text, "duration_s", "2").unwrap();
+    let text = set(&text, "effects.noise.rms_codes", "4").unwrap();
+    let text = set(&text, "tip.modulus_kpa", "300").unwrap();
+    assert!(text.contains("about = \"a\" # kept\n") && text.contains("at_s = 0 # kept too\n"), "{text}");
+    let scene = read_it(&text).unwrap_or_else(|errors| panic!("{errors}"));
+    assert_eq!((scene.seed, scene.duration_s, scene.script[1].goal_n), (9, 2.0, 3.5));
+    assert_eq!(scene.effects[0].values.number("rms_codes"), 4.0);
+    assert_eq!(scene.table("tip").number("modulus_kpa"), 300.0);
+}
+
+#[test]
+fn what_cannot_be_set_is_told() {
+    for (place, value) in
+        [("script.2.goal_n", "1"), ("tip.1.x", "1"), ("about.x", "1"), ("", "1"), ("seed", "1 2"), ("seed", "")]
+    {
+        assert!(set(SCENE, place, value).is_err(), "{place} = {value}");
+    }
+    let error = |set: &str| load("wall", &[set.into()], None).expect_err("a mistake");
+    assert!(error("tip.radius = 3").contains("did you mean `radius_mm`?"));
+    assert!(error("tip.radius_mm").contains("TABLE.KEY=VALUE"));
+    assert!(load("wal", &[], None).expect_err("no scene").contains("did you mean `wall`?"));
+    assert_eq!(load("wall", &[], Some(12)).unwrap().seed, 12);
 }

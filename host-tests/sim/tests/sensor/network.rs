@@ -1,4 +1,4 @@
-//! Ghosting and sag: what a column sees of the network. Settling and saturation: what its amplifier makes of it.
+//! Ghosting and sag in the resistor network; settling and saturation of a column's amplifier.
 
 use crate::{all, codes, network, volts};
 use fingertip::shipped::{COLUMNS, ROWS, SLOTS};

@@ -1,8 +1,8 @@
-//! Time.
+//! Effects and the clock.
 
-use crate::bench::{Last, run, scene, world};
+use crate::{Last, run, scene, world};
 use sim::bridge::Bridge;
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::host::Host;
 use sim::native::{Begun, Clock, simulate_from};
 use sim::watch::{Step, Truth, Watch};
@@ -69,7 +69,7 @@ impl Watch for Truths {
     }
 }
 
-/// What tells by the time what it does, or how long ago something was.
+/// Effects that depend on the time.
 const BY_TIME: &str = "[effects.settling]\n[effects.creep]\n[effects.relaxation]\n[effects.thermal_derating]\n[effects.object_mass]\n\
     [effects.tangential]\n[effects.dry_friction]\n";
 

@@ -1,10 +1,10 @@
-//! Motor and gear.
+//! Effects of motor and gear.
 
-use crate::bench::{close, run, world};
+use crate::{close, run, world};
 use core::f64::consts::TAU;
 use sim::bridge::Bridge;
 use sim::effects::drive::{Circuit, Friction};
-use sim::effects::{Part, set::Named};
+use sim::effects::{Named, Part};
 use sim::registry;
 use sim::world::World;
 
@@ -17,7 +17,7 @@ fn speed(world: &World<Named>) -> f64 {
 }
 
 fn part(text: &str) -> Part {
-    let scene = crate::bench::scene(&format!("duration_s = 1.0\n{text}"));
+    let scene = crate::scene(&format!("duration_s = 1.0\n{text}"));
     registry::build(&scene.effects, 1, 0).next().unwrap().1
 }
 

@@ -1,8 +1,8 @@
 //! No passive effect creates energy: a million random steps of each.
 
-use crate::bench::world;
+use crate::world;
 use sim::bridge::Bridge;
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::world::World;
 
 const WALL_MM: f64 = 0.3;

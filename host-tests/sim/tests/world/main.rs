@@ -1,11 +1,248 @@
 //! The moving world and the effects on it, against closed forms.
+//!
+//! A world moved by hand.
+//!
+//! Numbers that are hard to handle.
+//!
+//! What a scene does not name costs nothing, and what has no magnitude changes nothing.
+//!
+//! What the tests of the world share.
 
-mod bench;
 mod clock;
-#[path = "../common/mod.rs"]
-mod common;
 mod contact;
 mod drive;
 mod energy;
-mod hard;
-mod object;
+
+use fingertip::state::Mode;
+use sim::bridge::Bridge;
+use sim::effects::{Named, Set};
+use sim::native::simulate_with;
+use sim::registry;
+use sim::scene::{Scene, read, text};
+use sim::watch::{Step, Summary, Truth, Watch};
+use sim::world::{Surroundings, World};
+
+/// The world of a scene, to be moved by hand.
+fn world(text: &str) -> World<Named> {
+    let scene = scene(&format!("duration_s = 1.0\n{text}"));
+    let fingers = 0..scene.table("hand").whole("fingers") as usize;
+    let effects = fingers.map(|finger| Named::of(&scene, finger)).map(|parts| (parts.drive, parts.contact)).collect();
+    World::new(&scene.setup(), &Surroundings::of(&scene), effects)
+}
+
+/// Moves it on under one duty.
+fn run(world: &mut World<Named>, step_s: f64, steps: u64, bridge: Bridge) {
+    for step in 0..steps {
+        world.advance(step as f64 * step_s, step_s, &[bridge; 2]);
+    }
+}
+
+/// Asserts that two numbers are within a share of the second, and not both 0.
+#[track_caller]
+fn close(value: f64, expected: f64, share: f64) {
+    assert!((value - expected).abs() <= share * expected.abs() && expected != 0.0, "{value} for {expected}");
+}
+
+/// Against the wall, out again and back, at rest in between; duties change at whole steps of every length tried.
+fn scenario(text: &str, step_s: f64, until_s: f64) -> f64 {
+    let mut world = world(&format!("[object]\ndistance_mm = 0.5\n{text}"));
+    let steps = (until_s / step_s).round() as u64;
+    for step in 0..steps {
+        let duty = match (step as f64 + 0.5) * step_s {
+            t if t < 0.016 => 0.6,
+            t if t < 0.032 => -0.5,
+            _ => 0.4,
+        };
+        world.advance(0.0, step_s, &[Bridge::Driven { duty }]);
+    }
+    world.fingers()[0].flank_mm()
+}
+
+#[test]
+fn the_error_falls_with_the_square_of_the_step_from_200_us_to_1_us() {
+    for text in [
+        "[effects.dry_friction]\n",
+        "[effects.dry_friction]\n[effects.gear_efficiency]\n",
+        // Where the load of a stuck shaft fades, it creeps: each start then counts from a step's border. So no dry
+        // friction here.
+        "[effects.viscous_friction]\n[effects.relaxation]\nshare = 0.3\ntau_s = 0.01\n",
+        "[effects.viscous_friction]\n[effects.object_stiffness]\n",
+        "[effects.object_mass]\nmass_g = 400.0\n",
+        "[effects.winding_inductance]\ninductance_uh = 5000.0\n",
+    ] {
+        let truth = scenario(text, 0.5e-6, 0.048);
+        let errors =
+            [200e-6, 100e-6, 50e-6, 20e-6, 10e-6, 5e-6, 2e-6].map(|s| (scenario(text, s, 0.048) - truth).abs());
+        // Two decades in all, a hundredfold of the step: 10^4 at second order.
+        let slope = (errors[0] / errors[6]).ln() / 100_f64.ln();
+        println!("{text}: slope {slope}, {errors:?}");
+        assert!((1.8..2.2).contains(&slope), "{text}: slope {slope}: {errors:?}");
+        assert!(errors[4] < 1e-6 || !text.contains("gear"), "{:e} mm at 10 us", errors[4]);
+    }
+}
+
+#[test]
+fn too_long_a_step_is_refused_and_says_what_is_allowed() {
+    let stiff = "duration_s = 0.1\n[effects.object_mass]\nmass_g = 1.0\n[world]\nstep_us = 1000.0\n";
+    let error = sim::simulate(&scene(stiff), &mut Last::default()).unwrap_err().to_string();
+    assert!(error.starts_with("step_us of 1000: at most ") && error.contains(" are allowed"), "{error}");
+    let allowed: f64 = error.split("at most ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    let fits = stiff.replace("1000.0", &format!("{:?}", allowed - 0.1));
+    sim::simulate(&scene(&fits), &mut Last::default()).unwrap();
+}
+
+#[test]
+fn a_contact_a_thousand_times_as_stiff_stays_sound() {
+    // Y = 250 MPa: through the world, as no scene allows it.
+    let scene = scene("duration_s = 0.1\n[object]\ndistance_mm = 0.5\n");
+    let mut setup = scene.setup();
+    setup.tip.modulus_kpa *= 1000.0;
+    let parts = <Named as sim::effects::Set>::of(&scene, 0);
+    let around = sim::world::Surroundings::of(&scene);
+    let mut world = sim::world::World::<Named>::new(&setup, &around, vec![(parts.drive, parts.contact)]);
+    assert!(world.check_step(200e-6).is_err());
+    world.check_step(100e-6).unwrap();
+    world.fingers_mut()[0].launch(200.0);
+    let start = world.fingers()[0].energy_mj();
+    let mut highest = 0.0_f64;
+    for _ in 0..1_000 {
+        run(&mut world, 100e-6, 1, Bridge::Coast);
+        close(world.fingers()[0].energy_mj() + world.contact_mj(0), start, 1e-9);
+        highest = highest.max(world.force_n(0));
+    }
+    assert!(highest > 50.0, "{highest} N");
+    close(world.fingers()[0].speed_mm_per_s(), -200.0, 1e-9);
+}
+
+#[test]
+fn scenes_of_no_time_and_of_one_frame_end() {
+    for (duration, frames) in [("0.0", 0), ("1e-9", 1), ("9e-5", 1)] {
+        let mut last = Last::default();
+        let text = format!("duration_s = {duration}\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n");
+        let summary = sim::simulate(&scene(&text), &mut last).unwrap();
+        assert_eq!(last.steps, u64::from(fingertip::shipped::TARE_FRAMES) + 2 + frames, "{duration} s");
+        assert_eq!(summary.digest.len(), 32);
+    }
+}
+
+#[test]
+fn of_events_at_the_same_instant_the_last_counts() {
+    let text = |goals: &[&str]| {
+        let events = goals.iter().map(|goal| format!("[[script]]\nat_s = 0.01\ngoal_n = {goal}\n"));
+        format!("duration_s = 0.3\n{}", events.collect::<String>())
+    };
+    let run = |goals: &[&str]| sim::simulate(&scene(&text(goals)), &mut Last::default()).unwrap().digest;
+    assert_eq!(run(&["2.0", "0.5", "1.0"]), run(&["1.0"]));
+    assert_ne!(run(&["2.0"]), run(&["1.0"]));
+}
+
+#[test]
+fn denormal_and_zero_steps_change_nothing_that_counts() {
+    let mut world = world(
+        "[object]\ndistance_mm = 0.5\n[effects.relaxation]\n[effects.winding_inductance]\n[effects.object_mass]\n[effects.thermal_derating]\n",
+    );
+    world.fingers_mut()[0].launch(f64::MIN_POSITIVE / 8.0);
+    for step_s in [0.0, f64::MIN_POSITIVE / 4.0, 1e-300, 1e-30, 10e-6] {
+        run(&mut world, step_s, 100, Bridge::Driven { duty: f64::MIN_POSITIVE / 2.0 });
+        let truth = world.truth(0, true);
+        assert!(
+            truth.travel_mm.abs() < 1e-3 && truth.current_a.is_finite() && truth.winding_c.is_finite(),
+            "{truth:?}"
+        );
+    }
+    run(&mut world, 10e-6, 2_000, Bridge::Driven { duty: 0.5 });
+    assert!(world.fingers()[0].tip_mm() > 0.1);
+}
+
+#[test]
+fn the_finger_touches_and_holds() {
+    let mut last = Last::default();
+    let summary = sim::simulate(&scene("duration_s = 0.5\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n"), &mut last).unwrap();
+    println!("{} times real time, {last:?}", summary.virtual_s / summary.wall_s);
+    assert_eq!(last.mode, Some(Mode::Force));
+    assert!((0.995..=1.005).contains(&last.truth.force_n), "{} N", last.truth.force_n);
+    assert!((0.995..=1.05).contains(&last.peak_n), "{} N", last.peak_n);
+}
+
+#[test]
+fn without_effects_and_with_none_compiled_it_is_the_same_to_the_bit() {
+    let scene = scene("duration_s = 0.3\n[[script]]\nat_s = 0.0\ngoal_n = 1.0\n");
+    let with = simulate_with::<Named>(&scene, &mut Last::default()).unwrap();
+    let without = simulate_with::<()>(&scene, &mut Last::default()).unwrap();
+    assert_eq!(with.digest, without.digest);
+}
+
+/// Touches, changes the goal and releases, with tables of effects.
+fn run_script<E: Set>(tables: &str) -> Summary {
+    let script = [(0.0, 1.0), (0.2, 2.0), (0.3, 0.0)]
+        .map(|(at_s, goal_n)| format!("[[script]]\nat_s = {at_s}\ngoal_n = {goal_n}\n"));
+    let text = format!("duration_s = 0.35\n[object]\ndistance_mm = 2\n{}{tables}", script.concat());
+    simulate_with::<E>(&scene(&text), &mut Last::default()).unwrap()
+}
+
+#[test]
+fn compiled_in_but_not_named_changes_no_bit_and_is_never_called() {
+    let unnamed = run_script::<Named>("");
+    assert_eq!(unnamed.digest, run_script::<()>("").digest);
+    assert_eq!(unnamed.ledger, []);
+    // The digest sees what changes.
+    assert_ne!(unnamed.digest, run_script::<Named>("[effects.noise]\n").digest);
+}
+
+#[test]
+fn each_effect_without_magnitude_changes_no_bit() {
+    let plain = run_script::<()>("").digest;
+    let mut changed = Vec::new();
+    for effect in registry::all() {
+        let zero = run_script::<Named>(&text::zero(effect));
+        changed.extend((zero.digest != plain).then_some(effect.name));
+        assert_eq!(zero.ledger.len(), 1);
+        assert!(zero.ledger[0].evaluations > 0, "{} was not called", effect.name);
+    }
+    assert!(changed.is_empty(), "these change bits: {changed:?}");
+}
+
+#[test]
+fn all_effects_without_magnitude_change_no_bit_and_cost_the_sum_of_each() {
+    let all: String = registry::all().map(text::zero).collect();
+    let all = run_script::<Named>(&all);
+    assert_eq!(all.digest, run_script::<()>("").digest);
+    assert_eq!(all.ledger.len(), registry::all().count());
+    // Calls of one do not depend on which others are named: cost is linear in their number, to the call.
+    for cost in &all.ledger {
+        let effect = registry::all().find(|effect| effect.name == cost.effect).unwrap();
+        assert_eq!(run_script::<Named>(&text::zero(effect)).ledger[0].evaluations, cost.evaluations, "{}", effect.name);
+    }
+}
+
+#[test]
+fn every_effect_by_its_default_runs_to_the_end_and_alike_each_time() {
+    for effect in registry::all() {
+        let table = format!("[effects.{}]\n", effect.name);
+        let once = run_script::<Named>(&table);
+        assert_eq!(once.digest, run_script::<Named>(&table).digest, "{}", effect.name);
+    }
+}
+
+/// Reads a scene from its text without `about`.
+fn scene(text: &str) -> Scene {
+    read("test.toml", &format!("about = \"a test\"\n{text}"), &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Keeps the last step and the highest force.
+#[derive(Debug, Default)]
+struct Last {
+    steps: u64,
+    truth: Truth,
+    mode: Option<Mode>,
+    peak_n: f64,
+}
+
+impl Watch for Last {
+    fn step(&mut self, step: &Step) {
+        self.steps += 1;
+        self.truth = *step.truth;
+        self.mode = Some(step.status.mode);
+        self.peak_n = self.peak_n.max(step.truth.force_n);
+    }
+}

@@ -1,7 +1,7 @@
 //! `virtual-board demo`.
 
 use output::{kept, say};
-use sim::demo::{figures, pictures, table};
+use sim::demo::figures;
 use std::path::PathBuf;
 use virtual_board::demo::{self, DemoError, Plan};
 
@@ -26,14 +26,14 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<(), DemoError> {
     let (figures, run) = demo::run(&Plan { image: arguments.image.clone(), quick: arguments.quick })?;
     // The files first: who reads the output may go away.
-    let drawn = pictures::draw(&run, &figures.forces, &arguments.out);
+    let drawn = figures::draw(&run, &figures.forces, &arguments.out);
     if let Some(path) = &arguments.json {
         let written = serde_json::to_string_pretty(&figures).map_err(std::io::Error::from);
         let written = written.and_then(|text| kept::write(path, text + "\n"));
         written.map_err(|source| DemoError::Write { path: path.clone(), source })?;
     }
     say::line(format_args!("sha-256  {} ({} bytes, as flashed)\n", figures.image_sha256, figures.image_bytes));
-    say::text(table::table(&figures.checks, &figures.forces));
+    say::text(figures::table(&figures.checks, &figures.forces));
     say::line(format_args!("\ntrace    {}", figures.trace_sha256));
     if let Some(repeated) = &figures.repeated_trace_sha256 {
         say::line(format_args!("repeated {repeated}"));

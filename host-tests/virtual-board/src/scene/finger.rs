@@ -8,11 +8,11 @@ use sim::SimError;
 use sim::bridge::Bridge;
 use sim::effects::link;
 use sim::effects::sensor::{self, Readout, Stages as _};
-use sim::effects::set::{Named, Parts, Set};
-use sim::mechanics::body::Surroundings;
-use sim::scene::{Scene, controller};
+use sim::effects::{Named, Parts, Set};
+use sim::scene::Scene;
 use sim::setup::Array;
 use sim::watch::{Cost, Truth};
+use sim::world::Surroundings;
 use sim::world::World;
 use std::collections::VecDeque;
 
@@ -97,7 +97,7 @@ impl Finger {
     /// # Errors
     /// The world cannot be simulated.
     pub fn all(scene: &Scene, clock: Clock, moves_from_s: f64) -> Result<Vec<Self>, SimError> {
-        let setup = controller::setup(scene);
+        let setup = scene.setup();
         let fingers = scene.table("hand").whole("fingers") as usize;
         let (mut sensors, mut effects) = (Vec::new(), Vec::new());
         for finger in 0..fingers {

@@ -13,7 +13,7 @@ use fingertip::command::Command;
 use fingertip::pipeline::Status;
 use fingertip::state::Limits;
 use sim::effects::link::Named;
-use sim::host::grip::Reading;
+use sim::host::Reading;
 use sim::scene::Scene;
 use sim::watch::{Cost, Step};
 use std::collections::VecDeque;

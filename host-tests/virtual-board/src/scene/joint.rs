@@ -10,7 +10,7 @@ use fingertip::frame::Sense;
 use fingertip::shipped::COLUMNS;
 use sim::SimError;
 use sim::bridge::Bridge;
-use sim::effects::set::Named;
+use sim::effects::Named;
 use sim::scene::Scene;
 use sim::watch::{Cost, Truth};
 use sim::world::World;
@@ -222,9 +222,8 @@ impl State {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::effects::set::{Parts, Set};
-    use sim::mechanics::body::Surroundings;
-    use sim::scene::controller;
+    use sim::effects::{Parts, Set};
+    use sim::world::Surroundings;
 
     const DRIVEN: fn(f64) -> Bridge = |duty| Bridge::Driven { duty };
 
@@ -233,7 +232,7 @@ mod tests {
         let scene = sim::scene::read("test.toml", text, &[]).unwrap_or_else(|errors| panic!("{errors}"));
         let effects = (0..2).map(|finger| Named::of(&scene, finger));
         let effects = effects.map(|Parts { drive, contact, .. }| (drive, contact)).collect();
-        let world = World::new(&controller::setup(&scene), &Surroundings::of(&scene), effects);
+        let world = World::new(&scene.setup(), &Surroundings::of(&scene), effects);
         Joint::all(&scene, world, 0.0).expect("the world is sound")
     }
 

@@ -6,7 +6,6 @@ use crate::{cores, host, image, model, paths};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// Generated files: path, and the example that prints the text for that path.
 const GENERATED: &[(&str, &str)] = &[
@@ -44,10 +43,6 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
         renew(path, &print(example, Some(Path::new(path)))?, args.check, &mut stale, console)?;
     }
     renew(cores::PAGE.0, &cores::page(choice, console)?, args.check, &mut stale, console)?;
-    for package in PACKAGES {
-        let items = public_items(package, console)?;
-        renew(&format!("docs/api/{package}.txt"), &items, args.check, &mut stale, console)?;
-    }
     let drawn = paths::target().join("docs").join("figures");
     model::draw(&drawn, console)?;
     for path in PAPER {
@@ -150,8 +145,6 @@ pub struct Tool {
 
 /// Checks licences and sources.
 pub const DENY: Tool = Tool { name: "cargo-deny", version: "0.20.2", does: "checks the licences" };
-/// Lists public items. This version reads what rustdoc of Rust 1.95 writes; another Rust may need another one.
-const PUBLIC_API: Tool = Tool { name: "cargo-public-api", version: "0.52.0", does: "lists what the packages offer" };
 
 impl Tool {
     /// Finds or installs it.
@@ -169,23 +162,4 @@ impl Tool {
         }
         Ok(program)
     }
-}
-
-/// Installs all of them.
-pub fn ensure_all(console: &mut Console) -> Result<()> {
-    [DENY, PUBLIC_API].iter().try_for_each(|tool| tool.ensure(console).map(drop))
-}
-
-/// The public items of a package, a line each.
-pub fn public_items(package: &str, console: &mut Console) -> Result<String> {
-    let mut command = Command::new(PUBLIC_API.ensure(console)?);
-    command.args(["public-api", "-sss", "--package", package, "--target-dir"]).arg(paths::target().join("api"));
-    // What rustdoc writes for programs is not stable: this lets a stable compiler write it.
-    command.env("RUSTC_BOOTSTRAP", "1").current_dir(paths::root());
-    let output = command.output().with_context(|| console::show(&command))?;
-    if !output.status.success() {
-        let said = String::from_utf8_lossy(&output.stderr);
-        bail!("{said}{} {} cannot list {package}", PUBLIC_API.name, PUBLIC_API.version);
-    }
-    Ok(String::from_utf8(output.stdout)?)
 }

@@ -41,7 +41,7 @@ fn a_capture_is_taken_and_replays() {
     // A tare alone, ended early.
     let file = finger.file("tare.mcap");
     let told = finger.done(&["capture", "--frames", "30", "--out", &file]);
-    assert!(told.contains("ended: asked to; replays here to the bit"), "{told}");
+    assert!(told.contains("ended: the host ended it; replays here to the bit"), "{told}");
 }
 
 #[test]

@@ -14,7 +14,7 @@
 //! | 4 | rows, columns, why it ended, 0 |
 //! | 8 | a number for the names and the order of the parameters |
 //! | 12 | frames, bits of all frames, digest after the last one, check sum of the bits, missed frames before the first one |
-//! | 32 | numbers of the requests taken up before, as in [`Taken`](crate::pipeline::Taken); 0 |
+//! | 32 | numbers of the requests taken up before, as in [`Taken`]; 0 |
 //! | 36 | from frame to frame, ns |
 //! | 40 | what is known of the motor's winding, as [`Winding`](crate::control::Winding) tells it |
 //! | 68 | the parameters, 4 bytes each; the gains, 2 bytes each, of an odd number another two |

@@ -19,7 +19,7 @@
 //! ```
 //!
 //! Functions of a point of the contact name it by its distance `r` from the contact's centre. Arithmetic is of 32 and
-//! 64 bits only, except where a [`Gain`] is made.
+//! 64 bits only, except where a `Gain` is made.
 
 mod pressure;
 

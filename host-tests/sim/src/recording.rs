@@ -79,8 +79,11 @@ pub fn schemas() -> [(&'static str, &'static str, String); 4] {
     ]
 }
 
-/// Scalars in the order in which they are written: name, description and value.
-pub const SCALARS: [(&str, &str, fn(&Step) -> f64); 20] = [
+/// A scalar of a recording: name, description and value.
+type Scalar = (&'static str, &'static str, fn(&Step) -> f64);
+
+/// Scalars in the order in which they are written.
+pub const SCALARS: [Scalar; 20] = [
     ("time_s", "Virtual time from the scene's start", |s| s.time_s),
     ("goal_n", "Requested force", |s| s.command.goal.0.to_num()),
     ("sensed_force_n", "Normal force as the controller senses it", |s| s.status.contact.force.0.to_num()),

@@ -167,7 +167,7 @@ impl Kind {
 /// A register as its documentation has it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
-    /// The constant in [`address`](super::address), or the field of [`Params`](crate::params::Params).
+    /// The constant in [`address`](super::address), or the field of [`Params`].
     pub name: &'static str,
     /// Of its first byte.
     pub address: u16,

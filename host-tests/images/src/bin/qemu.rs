@@ -5,7 +5,7 @@
 //!
 //! - `FILE [panic|hardfault|hang]`: replays the recording, counts instructions, and fails half way on request;
 //! - `same-bits INPUTS [FUNCTION]`: gives that number of inputs to every function, and changes the digest of the one
-//! named.
+//!   named.
 //!
 //! Each failure prints a line that begins with `FAILED:` and ends the emulator with an error.
 //!

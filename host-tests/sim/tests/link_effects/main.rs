@@ -138,7 +138,7 @@ fn the_last_of_simultaneous_events_counts_and_late_packets_keep_their_order() {
 
 #[test]
 fn without_magnitude_nothing_changes() {
-    let tables: String = sim::effects::link::EFFECTS.iter().map(|effect| text::zero(effect)).collect();
+    let tables: String = sim::effects::link::EFFECTS.iter().map(text::zero).collect();
     let scene = scene(&tables);
     let mut stages = Named::default();
     for (name, part) in registry::build(&scene.effects, 1, 0) {

@@ -173,7 +173,8 @@ pub fn run_m4(args: &QemuArgs, choice: Choice, console: &mut Console) -> Result<
 /// The image does not build, or a test fails.
 pub fn test_m4(choice: Choice, console: &mut Console) -> Result<()> {
     let image = prepare(choice, console)?;
-    let mut command = host::plain("test");
+    // Of all packages, like `cargo test`: so nothing is compiled again with other features.
+    let mut command = console::cargo("test");
     command.args(["--test", "qemu", "--", "--ignored"]).env("FINGERTIP_QEMU_IMAGE", image);
     host::test(&mut command, console)
 }

@@ -72,7 +72,7 @@ pub fn run(args: &Args, choice: Choice, console: &mut Console) -> Result<()> {
 
 /// The text that a program prints.
 fn print(example: &str, argument: Option<&Path>) -> Result<String> {
-    let mut command = host::plain("run");
+    let mut command = console::cargo("run");
     command.args(["--quiet", "--example", example, "--"]).args(argument);
     console::output(&mut command)
 }

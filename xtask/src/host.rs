@@ -57,13 +57,6 @@ fn slow(package: &str) -> Slow {
     if package == BOARD.package { EMULATOR } else { HOST }
 }
 
-/// `cargo <subcommand>` for the packages that a plain `cargo test` takes: nothing is compiled again with other features.
-pub fn plain(subcommand: &str) -> Command {
-    let mut command = console::cargo(subcommand);
-    command.args(["--profile", PROFILE]);
-    command
-}
-
 /// `cargo <subcommand>` for a package of this machine. The emulator's crate asks for a newer compiler than it needs.
 pub fn cargo(subcommand: &str, package: &str) -> Command {
     let mut command = console::cargo(subcommand);

@@ -19,7 +19,7 @@ pub struct Args {}
 /// Names the stages that failed.
 pub fn run(_args: &Args, choice: Choice) -> Result<()> {
     let mut stages = Stages::default();
-    stages.stage("core and host tests", |console| host::test(host::plain("test").arg("--no-fail-fast"), console));
+    stages.stage("core and host tests", |console| host::test(console::cargo("test").arg("--no-fail-fast"), console));
     stages.stage("fit of a sensor to recordings", |console| {
         let mut command = python::script("test_fit.py", console)?;
         console.run(&mut command)

@@ -94,7 +94,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
     ensure(console)?;
     let plugin = plugin(console)?;
     let image = image::build(toolchain::ensure(choice, console)?, "timing-check", "timing", console)?;
-    let mut command = host::plain("test");
+    let mut command = console::cargo("test");
     command.args(["--test", "silicon", "--", "--ignored", "--nocapture", "--test-threads=1"]);
     host::test(command.env("M4_TIMING_PLUGIN", plugin).env("M4_TIMING_IMAGE", image), console)
 }
@@ -106,7 +106,7 @@ pub fn check(choice: Choice, console: &mut Console) -> Result<()> {
 pub fn kernels(choice: Choice, console: &mut Console) -> Result<Run> {
     let image = image::build(toolchain::ensure(choice, console)?, "timing", "timing", console)?;
     let recording = paths::made("timing")?.join("recording.bin");
-    let mut command = host::plain("run");
+    let mut command = console::cargo("run");
     command.args(["--quiet", "--example", "recording", "--"]);
     console.run(command.arg(&recording))?;
     measure(&image, Some(&recording), console)

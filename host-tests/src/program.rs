@@ -70,7 +70,7 @@ pub fn run(image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dy
 /// Runs an image on an emulator: its program and its options for the board, separated by spaces.
 ///
 /// # Errors
-/// As [`run`].
+/// The emulator does not start, the image reports a failure, or hangs.
 pub fn run_on(emulator: &str, image: &Path, folder: &Path, words: &[&str]) -> Result<String, Box<dyn Error>> {
     let mut options = emulator.split(' ');
     let program = options.next().unwrap_or_default();

@@ -107,7 +107,7 @@ pub struct Out<'a> {
     room: &'a mut [u8],
     /// Check sum so far.
     pub check: u32,
-    /// Number of bytes that were put.
+    /// Number of bytes written so far.
     pub count: usize,
     /// True if some bytes did not fit.
     pub full: bool,

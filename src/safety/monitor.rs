@@ -80,14 +80,13 @@ impl Monitor {
     ) {
         let Observer { travel, disturbance, .. } = motion.observer;
         let before = (picture.sum, picture.sum, picture.bad_count);
-        let supply_frames = self.supply_frames;
         *self = Self {
             sums: sums(picture),
             travel,
             disturbance,
             mean: disturbance,
             before,
-            supply_frames,
+            supply_frames: self.supply_frames,
             ..Self::default()
         };
     }

@@ -302,12 +302,10 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     }
     child.wait().expect("it ends");
     // A controller that had no power for a moment releases nothing: the tip pushes the shorted motor back.
-    // With less and less force: the last tenth of a newton takes seconds.
-    let (within_s, left_n) = if matches!(end, End::Power) { (3.0, 2.0 * RESIDUAL_N) } else { (1.0, RESIDUAL_N) };
+    // With less and less force: the last newton takes seconds.
+    let (within_s, left_n) = if matches!(end, End::Power) { (10.0, 2.0 * RESIDUAL_N) } else { (1.0, RESIDUAL_N) };
     let ended_s = finger.now_s();
-    while finger.now_s() < ended_s + within_s {
-        finger.command("state");
-    }
+    while finger.now_s() < ended_s + within_s && finger.true_force_n() >= left_n {}
     assert!(finger.true_force_n() < left_n, "{what}: {}", finger.command("state"));
     finger.command("deaf no more");
     for command in ["recover", "stop"] {

@@ -91,12 +91,11 @@ fn the_package_passes_its_tests() {
     let files: Vec<_> = names.filter(|name| name.to_string_lossy().starts_with("test_")).collect();
     assert!(files.len() >= 5, "{files:?}");
     std::thread::scope(|scope| {
-        for file in &files {
-            scope.spawn(|| {
-                let mut command = python();
-                command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
-                said(command.args(["-m", "unittest", "discover"]).arg(&tests).arg("--pattern").arg(file));
-            });
+        for file in files {
+            let mut command = python();
+            command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve")).args(["-m", "unittest", "discover"]);
+            command.arg(&tests).arg("--pattern").arg(file);
+            scope.spawn(move || said(&mut command));
         }
     });
 }

@@ -82,20 +82,11 @@ fn the_examples_stream_show_set_and_recover() {
     assert!(recovered.ends_with("times\n"), "{recovered}");
 }
 
-/// Each file of tests on its own, side by side: a served finger goes at the pace of real time, and mostly waits.
 #[test]
 #[ignore = "needs a Python with dynamixel-sdk: `cargo xtask test` runs it"]
 fn the_package_passes_its_tests() {
     let tests = Path::new(env!("FINGERTIP_ROOT")).join("python/tests");
-    let names = tests.read_dir().expect("it is there").map(|entry| entry.expect("it can be read").file_name());
-    let files: Vec<_> = names.filter(|name| name.to_string_lossy().starts_with("test_")).collect();
-    assert!(files.len() >= 5, "{files:?}");
-    std::thread::scope(|scope| {
-        for file in files {
-            let mut command = python();
-            command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve")).args(["-m", "unittest", "discover"]);
-            command.arg(&tests).arg("--pattern").arg(file);
-            scope.spawn(move || said(&mut command));
-        }
-    });
+    let mut command = python();
+    command.env("FINGERTIP_SERVE", env!("CARGO_BIN_EXE_serve"));
+    said(command.args(["-m", "unittest", "discover"]).arg(tests));
 }

@@ -128,7 +128,7 @@ fn the_bus_tells_how_the_board_is() {
         let deepest = rig.stack_use().expect("it runs").expect("the image tells where its stack lies").used;
         let told = u64::from(read_u16(rig, address::STACK_BYTES));
         assert!(told > 2_000 && told <= deepest, "{told} of {deepest} bytes");
-        // A packet that arrives at a frame's end delays it: an idle bus delays none.
+        // A packet that arrives at the end of a frame delays its processing; an idle bus delays no frame.
         for _ in 0..50 {
             read_u8(rig, address::PRESENT_MODE);
         }

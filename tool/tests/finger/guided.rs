@@ -301,12 +301,11 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         }
     }
     child.wait().expect("it ends");
-    // A controller that had no power for a moment releases nothing: the tip pushes the shorted motor back.
-    // With less and less force: the last newton takes seconds.
-    let (ended_s, power) = (finger.now_s(), matches!(end, End::Power));
-    let (least_s, most_s, left_n) = if power { (3.0, 10.0, 2.0 * RESIDUAL_N) } else { (1.0, 1.0, RESIDUAL_N) };
-    let waits = |passed_s: f64| passed_s < least_s || passed_s < most_s && finger.true_force_n() >= left_n;
-    while waits(finger.now_s() - ended_s) {
+    // After a loss of power nothing drives the finger away: only the elastic tip pushes the shorted motor back, more slowly as
+    // its force falls.
+    let (within_s, left_n) = if matches!(end, End::Power) { (10.0, 2.0 * RESIDUAL_N) } else { (1.0, RESIDUAL_N) };
+    let ended_s = finger.now_s();
+    while finger.now_s() < ended_s + within_s {
         finger.command("state");
     }
     assert!(finger.true_force_n() < left_n, "{what}: {}", finger.command("state"));

@@ -49,7 +49,7 @@ pub struct Args {
 }
 
 impl Args {
-    /// Goals to hold, smallest first, mN.
+    /// Goals to hold, mN.
     fn goals_mn(&self) -> Vec<i64> {
         match (self.no_scale, self.scale_n.is_empty()) {
             (true, _) => Vec::new(),
@@ -62,9 +62,6 @@ impl Args {
     fn check(&self, json: bool) -> Result<(), Error> {
         self.how.check(json)?;
         let (goals, shown) = (self.goals_mn(), self.shown_n.len());
-        if !goals.is_sorted() {
-            return Err(Error::NotUnderstood("--scale-n: the smallest force comes first".into()));
-        }
         if json && shown == 0 && !goals.is_empty() {
             return Err(Error::NotUnderstood("--json asks no questions: give --shown-n, or --no-scale".into()));
         }

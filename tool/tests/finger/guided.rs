@@ -207,7 +207,6 @@ fn a_program_is_asked_nothing() {
         (&["identify"], "--no-wait"),
         (&["calibrate", "--no-wait"], "--shown-n"),
         (&["calibrate", "--no-wait", "--scale-n", "1,2", "--shown-n", "1"], "has 1 numbers for 2"),
-        (&["calibrate", "--no-wait", "--scale-n", "2,1", "--shown-n", "1,2"], "the smallest force comes first"),
     ] {
         let (code, found, why) = output(&finger, arguments);
         assert!(code == Some(2) && found.is_null() && why.contains(option), "{arguments:?}: {why}");
@@ -230,6 +229,9 @@ const ENDS: [End; 6] = [
     End::Cable,
     End::Power,
 ];
+
+/// Force at the tip that the dry friction of the scene's motor holds, N: 0.12 mN m, a gear of 43, a drum of 12 mm.
+const FRICTION_N: f64 = 0.12e-3 * 43.0 / 12e-3;
 
 /// Fingers that are served side by side where many instants are tried.
 const FINGERS: usize = 12;
@@ -301,14 +303,21 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
         }
     }
     child.wait().expect("it ends");
-    // After a loss of power nothing drives the finger away: only the elastic tip pushes the shorted motor back, more slowly as
-    // its force falls.
-    let (within_s, left_n) = if matches!(end, End::Power) { (10.0, 2.0 * RESIDUAL_N) } else { (1.0, RESIDUAL_N) };
+    // After a loss of power nothing drives the finger away: the motor's friction holds the tip where it stands.
+    let left_n = if matches!(end, End::Power) { FRICTION_N } else { RESIDUAL_N };
     let ended_s = finger.now_s();
-    while finger.now_s() < ended_s + within_s {
+    while finger.now_s() < ended_s + 1.0 {
         finger.command("state");
     }
-    assert!(finger.true_force_n() < left_n, "{what}: {}", finger.command("state"));
+    let state = finger.command("state");
+    assert!(finger.true_force_n() < left_n, "{what}: {state}");
+    if matches!(end, End::Power) {
+        let stands = finger.command("state");
+        assert_eq!(stands, state, "{what}: it stands");
+        // The report of a tare asks for this: free the tip.
+        finger.command("remove");
+        finger.command("put");
+    }
     finger.command("deaf no more");
     for command in ["recover", "stop"] {
         finger.fingertip(&[command]).output().expect("it starts");
@@ -327,11 +336,7 @@ fn resumes(procedure: &[&str], end: End, packets: u64, reference: &Value) -> (bo
     let kept = now == old;
     // A motion that was repeated gives another result of the same uncertainty: 6 % of the friction.
     assert!(kept || off(&now) < 0.1, "{what}: {now} of {old} and {new}");
-    let (_, mut resumed, why) = output(&finger, &arguments);
-    if matches!(end, End::Power) && why.contains("seemed to touch the tip") {
-        // A tip that still creeps back spoils the first tare, which reports it.
-        resumed = finger.json(&arguments);
-    }
+    let resumed = finger.json(&arguments);
     let off = off(&resumed["after"]);
     assert!(off < 0.1 && resumed["applied"] == true, "{what}: {resumed} of {reference}");
     if !kept {

@@ -25,7 +25,7 @@ use fingertip::state::Mode;
 use solve::gains::Condition;
 use solve::modulus::Modulus;
 use solve::record;
-use solve::scale::Held;
+use solve::scale::{Held, SWINGS};
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
@@ -46,8 +46,10 @@ const PLACES: [Place; 3] = [
 ];
 /// Pause after a press, s: creep and relaxation recover.
 const PAUSE_S: f64 = 10.0;
-/// Forces held on the scale, in rising order: hysteresis then has one sign.
+/// Forces held on the scale.
 const HOLDS_N: [f64; 3] = [1.0, 2.5, 4.0];
+/// Duration of a swing around a force, s.
+const SWING_S: f64 = 0.25;
 /// Duration of a hold, and the last part of it, in which scale and array are read, s.
 const HOLD_S: f64 = 0.7;
 const READ_S: f64 = 0.2;
@@ -128,6 +130,9 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
     bench.tare();
     let mut held = Vec::new();
     for goal_n in HOLDS_N {
+        for share in SWINGS {
+            hold(bench, goal_n * share, SWING_S);
+        }
         let Hold { true_n, read_n } = hold(bench, goal_n, HOLD_S);
         let Status { mode, fault, .. } = *bench.status();
         if mode == Mode::Force {

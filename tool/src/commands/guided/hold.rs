@@ -4,16 +4,17 @@ use super::{Run, Session};
 use crate::commands::moving::Moving;
 use crate::commands::{press, stopped};
 use crate::state::State;
-use crate::{Client, Error, numbers};
+use crate::{Client, Error, numbers, table};
 use fingertip::shipped::address;
 use fingertip::state::Mode;
 use serde_json::{Value, json};
 use solve::drift::HeldSeries;
-use solve::scale::Held;
+use solve::scale::{Held, SWINGS};
 use std::time::{Duration, Instant};
 
-/// Time for a force to be reached, and within its tolerance before the scale is read.
+/// Time for a force to be reached, and within its tolerance before the next swing and before the scale is read.
 const REACHED_S: f64 = 30.0;
+const SWUNG: Duration = Duration::from_millis(200);
 const SETTLED: Duration = Duration::from_secs(1);
 /// Time over which readings are averaged.
 const AVERAGED: Duration = Duration::from_millis(500);
@@ -49,8 +50,7 @@ impl Reading {
     }
 }
 
-/// Holds each force in turn, each larger than the one before: an array with hysteresis reads more on the way back. The tip
-/// is at rest and clear of the plate afterwards.
+/// Holds each force in turn, after [`SWINGS`] around it. The tip is at rest and clear of the plate afterwards.
 pub fn all(
     goals_mn: &[i64],
     shown_n: &[f64],
@@ -69,11 +69,17 @@ pub fn all(
 
 fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -> Result<Vec<Value>, Error> {
     let mut held = Vec::new();
+    let most_mn = client.number(table::find("force_max_mn")?.address)?;
     for (index, goal_mn) in goals_mn.iter().enumerate() {
         let goal_n = *goal_mn as f64 * 1e-3;
-        run.report(format_args!("holding {goal_n} N"));
+        run.report(format_args!("swinging around {goal_n} N, then holding it"));
+        for share in SWINGS {
+            let swing_mn = ((goal_n * 1e3 * share) as i64).clamp(1, most_mn.max(*goal_mn));
+            press::begin(swing_mn, client)?;
+            reach(swing_mn, SWUNG, run, client)?;
+        }
         press::begin(*goal_mn, client)?;
-        reach(*goal_mn, run, client)?;
+        reach(*goal_mn, SETTLED, run, client)?;
         let shown = match shown_n.get(index) {
             Some(shown) => *shown,
             None => {
@@ -102,8 +108,8 @@ pub fn newtons(text: &str) -> Result<f64, String> {
     numbers::shown_mn(text).map(|shown_mn| shown_mn as f64 * 1e-3)
 }
 
-/// Waits until the force has been held for a second.
-fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+/// Waits until the force has been held for a time.
+fn reach(goal_mn: i64, settled: Duration, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
     let (begun, mut near_since) = (Instant::now(), None);
     loop {
         run.interrupt.check()?;
@@ -111,7 +117,7 @@ fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> 
         let tolerance_mn = (NEAR * goal_mn as f64).max(NEAR_MN);
         let near = state.mode == Mode::Force as i64 && ((state.force_mn - goal_mn) as f64).abs() <= tolerance_mn;
         near_since = if near { near_since.or(Some(Instant::now())) } else { None };
-        if near_since.is_some_and(|since| since.elapsed() >= SETTLED) {
+        if near_since.is_some_and(|since| since.elapsed() >= settled) {
             return Ok(());
         }
         if begun.elapsed().as_secs_f64() > REACHED_S {

@@ -9,7 +9,7 @@
 //! The chip fits nothing, and judges only if a motion may continue: each motion has limits of travel, force, speed
 //! and time, besides those of guard and monitor. [`crate::capture`] keeps the rows in the memory of a capture, and a
 //! host reads them in the same way; [`series`] has the layout. `docs/solve.md` describes what a host computes from
-//! them.
+//! them. A product that never measures builds the library without its feature `measure`.
 
 pub mod press;
 pub mod series;
@@ -20,6 +20,26 @@ pub use strokes::Strokes;
 
 use crate::units::Newtons;
 use press::Step;
+
+/// Proof that the library was built with the feature `measure`, which every motion holds. Without the feature there is no
+/// such value: no motion can begin, and the compiler leaves the code of all of them out.
+#[cfg(feature = "measure")]
+#[derive(Clone, Copy, Debug)]
+pub struct BuiltIn(());
+
+/// Proof that the library was built with the feature `measure`; it was not.
+#[cfg(not(feature = "measure"))]
+#[derive(Clone, Copy, Debug)]
+pub enum BuiltIn {}
+
+impl BuiltIn {
+    /// The proof, if there is one.
+    #[cfg(feature = "measure")]
+    pub const PROOF: Option<Self> = Some(Self(()));
+    /// The proof, if there is one.
+    #[cfg(not(feature = "measure"))]
+    pub const PROOF: Option<Self> = None;
+}
 
 /// Task of a measurement. The numbers are stable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,8 +82,8 @@ pub enum Ended {
     Complete = 0,
     /// A stop, torque, a fault, a tare or new parameters ended the motion.
     Interrupted = 1,
-    /// A tare is missing, something touches the tip, torque is not as the task needs it, or an encoder count is above
-    /// 0.1 mm.
+    /// A tare is missing, something touches the tip, torque is not as the task needs it, an encoder count is above
+    /// 0.1 mm, or the library was built without its feature `measure`.
     NotReady = 2,
     /// The direction is not confirmed.
     Unconfirmed = 3,

@@ -78,7 +78,7 @@ pub struct Status {
 pub enum Bridge {
     /// Its driver sleeps: it reported a fault.
     Asleep,
-    /// Both outputs low: the motor coasts.
+    /// Both outputs in high impedance: the motor coasts.
     Open,
     /// The motor is shorted: it resists what turns it.
     Brakes,

@@ -1,5 +1,6 @@
 //! Reasons to refuse parameters, and warnings about parameters with which the loop runs worse than its user may expect.
 
+use super::motor::{GAIN_SETS, POSITION_TO_SPEED};
 use super::{Config, SEEN_LEAST, newtons};
 use crate::params::ParamError;
 use crate::scan::ScanError;
@@ -59,6 +60,11 @@ const PART: i32 = 8;
 const PITCHES: i64 = 2;
 /// The slowest frames for which the gains follow the frame time, ns: 5 frames of them take 1/60 s.
 const FRAME_NS: u32 = 3_333_333;
+/// Lag of the observed disturbance over the speed loop's: 3 / 2.5, from three poles at 2.5 times its speed gain. A contact
+/// of stiffness s brakes a tip at speed v by s v times that lag.
+const CONTACT_SLOWS: f32 = 1.2;
+/// Longest [`Warning::LightDrive::settle_ms`] that is not warned of.
+const SETTLE_MS: f32 = 500.0;
 /// Length of an encoder count above which the motions that measure the drive are refused, um.
 const COUNT_UM: i32 = 100;
 
@@ -92,6 +98,22 @@ pub enum Warning {
         /// Travel of the tip for a count, um.
         count_um: i32,
     },
+    /// The drive is so light beside the tip's stiffness that the last part of a force error stays for long.
+    LightDrive {
+        /// Inertia of the motor as a mass at the tip, g.
+        mass_g: i32,
+        /// An eighth of the largest force, mN.
+        force_mn: i32,
+        /// Time in which the slowest gain set reduces an error of that force to 37 %, ms.
+        settle_ms: i32,
+    },
+    /// The motor at its largest current or voltage presses less than the largest goal.
+    WeakDrive {
+        /// [`Params::force_max_mn`](crate::params::Params::force_max_mn).
+        force_max_mn: i32,
+        /// Largest force of the motor at rest, without friction, mN.
+        stall_mn: i32,
+    },
 }
 
 impl core::fmt::Display for Warning {
@@ -117,6 +139,17 @@ impl core::fmt::Display for Warning {
                 "encoder_counts_per_turn: a count is {count_um} um of travel; jog and strokes are refused above \
                  {COUNT_UM}"
             ),
+            Self::LightDrive { mass_g, force_mn, settle_ms } => write!(
+                f,
+                "reduction_mrad_per_mm: the motor is a mass of {mass_g} g at the tip, too little for its stiffness: \
+                 the last tenths of a force of {force_mn} mN take {settle_ms} ms and more; use a larger reduction or \
+                 quicker frames"
+            ),
+            Self::WeakDrive { force_max_mn, stall_mn } => write!(
+                f,
+                "force_max_mn of {force_max_mn}: the motor presses {stall_mn} mN at most, by current_max_ma or \
+                 voltage_max_mv; larger goals are not reached"
+            ),
         }
     }
 }
@@ -126,11 +159,22 @@ impl Config {
     pub fn warnings(&self) -> impl Iterator<Item = Warning> {
         let p = &self.params;
         let force_mn = p.force_max_mn / PART;
-        let radius = self.tip.contact_radius(self.tip.indentation(newtons(force_mn)));
+        let depth = self.tip.indentation(newtons(force_mn));
+        let radius = self.tip.contact_radius(depth);
         let radius_um = (i64::from(radius.to_bits()) * 1_000) >> 24;
         let seen_mn = ((i64::from(self.force_seen.to_bits()) * 1_000) >> 16) as i32;
         let count_um = ((i64::from(self.count.to_bits()) * 1_000) >> 24) as i32;
         let frame_ns = self.timing.frame_ns;
+        let rad_per_m = p.reduction_mrad_per_mm as f32;
+        let mass_kg = p.inertia_ug_m2 as f32 * 1e-9 * rad_per_m * rad_per_m;
+        // dF/dd = 2 pi Y d over the mass, 1/s^2. The loop takes the contact's force for a disturbance, which slows it.
+        let depth_m = depth.to_bits() as f32 / 16_777_216e3;
+        let stiffness = 2.0 * core::f32::consts::PI * p.modulus_pa as f32 * depth_m / mass_kg;
+        let slope = self.gain_sets[GAIN_SETS - 1].slope_per_s.max(1) as f32;
+        let speed_gain = POSITION_TO_SPEED * slope;
+        let settle_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
+        let amperes = (p.current_max_ma as f32 * 1e-3).min(p.voltage_max_mv as f32 / p.resistance_mohm.max(1) as f32);
+        let stall_mn = (amperes * p.torque_constant_unm_per_a as f32 * 1e-3 * rad_per_m) as i32;
         [
             (radius_um < PITCHES * i64::from(p.pitch_um)).then_some(Warning::CoarsePitch {
                 pitch_um: p.pitch_um,
@@ -140,6 +184,12 @@ impl Config {
             (seen_mn < p.force_max_mn).then_some(Warning::ForceUnseen { force_max_mn: p.force_max_mn, seen_mn }),
             (frame_ns > FRAME_NS).then_some(Warning::SlowFrames { frame_ns }),
             (count_um >= COUNT_UM).then_some(Warning::CoarseEncoder { count_um }),
+            (settle_ms > SETTLE_MS).then_some(Warning::LightDrive {
+                mass_g: (1e3 * mass_kg) as i32,
+                force_mn,
+                settle_ms: settle_ms as i32,
+            }),
+            (stall_mn < p.force_max_mn).then_some(Warning::WeakDrive { force_max_mn: p.force_max_mn, stall_mn }),
         ]
         .into_iter()
         .flatten()

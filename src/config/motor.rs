@@ -27,7 +27,7 @@ pub const GAIN_SETS: usize = 4;
 const SPEED_GAIN_FRAMES: f32 = 5.0;
 /// Ratio of the speed loop's bandwidth to the position's slope: k = k_v / 3. The feed-forward a_ref puts the poles of
 /// the linear zone at exactly -k_v and -k, so they need no further distance.
-const POSITION_TO_SPEED: f32 = 3.0;
+pub(crate) const POSITION_TO_SPEED: f32 = 3.0;
 /// Ratio of the observer's poles to the bandwidth of the speed loop.
 const OBSERVER_TO_SPEED: f32 = 2.5;
 /// Change of g V by a count of q, in k_v^2 q.

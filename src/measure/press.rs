@@ -9,7 +9,7 @@
 //! of 0.3 a (the range of the paper's measurement), at 7/8 of the largest force, at the travel's end, or when one
 //! more taxel than in the air is dead or saturated.
 
-use super::{Ended, MeasureStatus};
+use super::{BuiltIn, Ended, MeasureStatus};
 use crate::config::Config;
 use crate::contact::Contact;
 use crate::control::{Reference, SpeedLoop};
@@ -54,6 +54,7 @@ const FRAMES_MAX: u16 = 16_383;
 /// State of a press.
 #[derive(Clone, Copy, Debug)]
 pub struct Press {
+    _built_in: BuiltIn,
     phase: Phase,
     /// Travel at which the tip touched, by the force and the configured modulus.
     touch: Millimetres,
@@ -189,8 +190,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Step<ROWS, COLUMNS> {
 
 impl Press {
     /// Begins a press. The tip may touch or not.
-    pub fn begin(motion: &SpeedLoop) -> Self {
+    pub fn begin(motion: &SpeedLoop, built_in: BuiltIn) -> Self {
         Self {
+            _built_in: built_in,
             phase: Phase::Retreat,
             touch: Millimetres::ZERO,
             deepest: Millimetres::ZERO,

@@ -14,7 +14,7 @@
 //! the pulse is shorted 40 um after it began to move: a force of 0.17 N stops it whatever the array sees. Strokes
 //! stay within the range of the pulses. In any other case the motor is shorted at once until the tip rests.
 
-use super::{Ended, MeasureStatus, Task};
+use super::{BuiltIn, Ended, MeasureStatus, Task};
 use crate::config::{Config, Motions, SPAN_PARTS};
 use crate::units::Newtons;
 
@@ -74,6 +74,7 @@ enum Phase {
 /// State of a jog, or of all strokes.
 #[derive(Clone, Copy, Debug)]
 pub struct Strokes {
+    _built_in: BuiltIn,
     task: Task,
     phase: Phase,
     part: Part,
@@ -124,8 +125,9 @@ const UNKNOWN: i32 = i32::MAX;
 
 impl Strokes {
     /// Begins a jog or the strokes, at rest at this count.
-    pub fn begin(task: Task, encoder: i32) -> Self {
+    pub fn begin(task: Task, encoder: i32, built_in: BuiltIn) -> Self {
         Self {
+            _built_in: built_in,
             task,
             phase: Phase::Moving,
             part: Part::Pulse { quick: true },

@@ -16,7 +16,7 @@ use crate::command::Command;
 use crate::contact::Contact;
 use crate::frame::Sense;
 use crate::grip::Grip;
-use crate::measure::{Ended, MeasureStatus, Press, State, Strokes, Task};
+use crate::measure::{BuiltIn, Ended, MeasureStatus, Press, State, Strokes, Task};
 use crate::safety::guard::Guard;
 use crate::state::Fault;
 use crate::status::{Taken, Taring};
@@ -151,22 +151,22 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
         }
         self.status.taken.measure = command.measure_request;
         let runs = self.status.measure.state == State::Running;
-        let refusal = match (task, &mut self.activity) {
-            (Task::Stop, Activity::Strokes(run)) => return run.halt(encoder),
-            (Task::Stop, Activity::Press(_)) => {
+        let refusal = match (task, &mut self.activity, BuiltIn::PROOF) {
+            (Task::Stop, Activity::Strokes(run), _) => return run.halt(encoder),
+            (Task::Stop, Activity::Press(_), _) => {
                 self.leave(Halt::BRAKES);
                 self.activity = Activity::Grip(Grip::default());
                 return;
             }
-            (Task::Stop, _) => return,
-            (Task::Press, Activity::Grip(_)) => {
+            (Task::Stop, ..) => return,
+            (Task::Press, Activity::Grip(_), Some(built_in)) => {
                 self.status.measure = MeasureStatus::running(task);
-                self.activity = Activity::Press(Press::begin(&self.motion));
+                self.activity = Activity::Press(Press::begin(&self.motion, built_in));
                 return;
             }
             // The motion under way answers both requests.
             _ if runs => return,
-            (Task::Jog | Task::Strokes, Activity::Off(_))
+            (Task::Jog | Task::Strokes, Activity::Off(_), Some(built_in))
                 if !command.torque
                     && may_drive
                     && contact.force < self.config.contact_on
@@ -175,7 +175,7 @@ impl<const ROWS: usize, const COLUMNS: usize> Pipeline<ROWS, COLUMNS> {
                 if task == Task::Jog || self.config.params.direction_confirmed != 0 {
                     self.start(encoder);
                     self.status.measure = MeasureStatus::running(task);
-                    self.activity = Activity::Strokes(Strokes::begin(task, encoder));
+                    self.activity = Activity::Strokes(Strokes::begin(task, encoder, built_in));
                     return;
                 }
                 Ended::Unconfirmed

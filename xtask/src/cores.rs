@@ -114,12 +114,18 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
 pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
-    let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
-    console.build(command.arg("--release"), EXAMPLE, crate::console::IMAGE)?;
-    let bytes = Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len();
+    let mut size = |features: &[&str]| {
+        let mut command = image::apart(toolchain, "build", EXAMPLE, target, &[]);
+        console.build(command.arg("--release").args(features), EXAMPLE, crate::console::IMAGE)?;
+        Ok::<_, anyhow::Error>(Image::read(&toolchain.images_for(target, &[]).join("rp2040"))?.bytes.len())
+    };
+    let measures = size(&["--features", "fingertip/measure"])?;
+    let bytes = size(&[])?;
     // Without the loop a few kilobytes would be left: its configuration would always be refused.
     ensure!(bytes > 40_000, "{EXAMPLE} has {bytes} bytes: the loop is not in it");
-    console.print(&format!("{EXAMPLE}: {bytes} bytes of flash"));
+    // A product does not pay for the motions that it leaves out.
+    ensure!(measures > bytes + 7_000, "{EXAMPLE} has {bytes} bytes, and {measures} with the feature `measure`");
+    console.print(&format!("{EXAMPLE}: {bytes} bytes of flash, {measures} with the motions that measure"));
     Ok(())
 }
 

@@ -210,7 +210,7 @@ fn a_press_has_no_more_rows_than_stated() {
         let (mut step, mut picture) = (Step::<ROWS, COLUMNS>::NONE, Picture::EMPTY);
         let mut contact = Contact::default();
         motion.observe(0, &config);
-        let mut press = Press::begin(&motion);
+        let mut press = Press::begin(&motion, fingertip::measure::BuiltIn::PROOF.expect("it is built in"));
         let (mut encoder, mut rows, mut sequence) = (0_i32, 0, 0_u32);
         let stride = [3, 60, 600, 40_000][random.usize(0..4)];
         while press.running() && sequence < 40_000 {

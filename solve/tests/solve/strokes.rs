@@ -329,7 +329,8 @@ fn measure(rig: &mut Rig, strokes: usize) -> Record {
     let params = params(rig);
     let config = Config::shipped(&params).expect("a sheet that is allowed");
     let first = rig.view();
-    let mut run = Strokes::begin(Task::Strokes, first.count);
+    let mut run =
+        Strokes::begin(Task::Strokes, first.count, fingertip::measure::BuiltIn::PROOF.expect("it is built in"));
     let mut standing = MeasureStatus::running(Task::Strokes);
     let mut bytes = vec![0; 4 * ROWS];
     let (mut check, mut length, mut begun, mut applied, mut full) = (CHECK, 0, 0, 0.0, false);

@@ -1,6 +1,7 @@
 //! Arrays of other shapes than the shipped one, through the whole core: closed loops, and the worst that a frame can
 //! bring.
 
+mod drawn;
 mod rates;
 mod worst;
 
@@ -25,6 +26,11 @@ use sim::setup::Setup;
 // A finger with an array of any shape: an ideal hemisphere on a plane by the paper's model, the reference front end
 // and motor.
 
+/// A draw with mean 0 and deviation 1: twelve uniform ones.
+fn normal(random: &mut fastrand::Rng) -> f64 {
+    (0..12).map(|_| random.f64()).sum::<f64>() - 6.0
+}
+
 /// The finger with its controller.
 struct Finger<const ROWS: usize, const COLUMNS: usize> {
     setup: Setup,
@@ -37,6 +43,10 @@ struct Finger<const ROWS: usize, const COLUMNS: usize> {
     slot_s: f64,
     idle_s: f64,
     bridge: Bridge,
+    /// Noise of a code, rms, gains of the taxels, and where they are drawn from.
+    noise_codes: f64,
+    gains: [[f64; COLUMNS]; ROWS],
+    random: fastrand::Rng,
 }
 
 impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
@@ -62,6 +72,9 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
             slot_s: f64::from(config.timing.slot.0) / f64::from(clocks.timer_hz),
             idle_s: f64::from(config.timing.idle.0) / f64::from(clocks.timer_hz),
             bridge: Bridge::Coast,
+            noise_codes: 0.0,
+            gains: [[1.0; COLUMNS]; ROWS],
+            random: fastrand::Rng::with_seed(31),
         }
     }
 
@@ -102,13 +115,15 @@ impl<const ROWS: usize, const COLUMNS: usize> Finger<ROWS, COLUMNS> {
         };
         let siemens: [f64; COLUMNS] = core::array::from_fn(|column| {
             let cell = Cell { x_mm: side(column, COLUMNS, centre_x), y_mm: side(slot, ROWS, centre_y) };
-            array.preload_siemens + array.siemens_per_kpa * cell.mean_kpa(&tip)
+            let gain = self.gains.get(slot).map_or(1.0, |row| row[column]);
+            array.preload_siemens + gain * array.siemens_per_kpa * cell.mean_kpa(&tip)
         });
         let driven = if slot < ROWS { array.feedback_ohm * array.drive_v } else { 0.0 };
         let scale = driven / (1.0 + array.row_ohm * siemens.iter().sum::<f64>());
         for (column, siemens) in siemens.into_iter().enumerate() {
             let volts = (array.ground_v + siemens * scale).min(array.reference_v);
-            self.frame.set_code(slot, column, array.code(volts));
+            let code = f64::from(array.code(volts)) + self.noise_codes * normal(&mut self.random);
+            self.frame.set_code(slot, column, code.round().clamp(0.0, 4095.0) as u16);
         }
     }
 

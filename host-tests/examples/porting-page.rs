@@ -5,6 +5,7 @@
 
 use host_tests::{page::Page, program};
 use images::closed_loop;
+use sim::cores;
 use std::{collections::BTreeMap, env, error::Error, fmt::Write as _, fs, path::Path};
 
 const PAGE: Page = Page { name: "docs/porting.md", tables: "cores", command: "cargo xtask docs" };
@@ -16,12 +17,19 @@ fn main() -> Result<(), Box<dyn Error>> {
         "| core | target | flags | DSP | FPU | instructions per frame, mean | largest | flash of the program |\n\
         | --- | --- | --- | --- | --- | --- | --- | --- |\n"
             .to_owned();
+    let mut lines = Vec::new();
     for line in list.lines() {
         let [name, target, flags, bytes, emulator, image] = line.split('\t').collect::<Vec<_>>()[..] else {
             return Err(format!("not a line of six columns: {line}").into());
         };
-        let text = program::run_on(emulator, Path::new(image), Path::new("."), &[])
-            .map_err(|error| format!("{name}, {target}: {error}"))?;
+        lines.push([name, target, flags, bytes, emulator, image]);
+    }
+    let texts = cores::map(&lines, |[name, target, _, _, emulator, image]| {
+        program::run_on(emulator, Path::new(image), Path::new("."), &[])
+            .map_err(|error| format!("{name}, {target}: {error}"))
+    });
+    for ([name, target, flags, bytes, ..], text) in lines.into_iter().zip(texts) {
+        let text = text?;
         let report: BTreeMap<_, _> = text.lines().filter_map(|line| line.split_once(' ')).collect();
         let figure = |name| report.get(name).copied().ok_or_else(|| format!("{target} reported no {name}:\n{text}"));
         let emulated = figure("digest")?;

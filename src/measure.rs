@@ -21,8 +21,8 @@ pub use strokes::Strokes;
 use crate::units::Newtons;
 use press::Step;
 
-/// Proof that the library was built with the feature `measure`, which every motion holds. Without the feature there is no
-/// such value: no motion can begin, and the compiler leaves the code of all of them out.
+/// Proof that the library was built with the feature `measure`. Every motion holds this proof. Without the feature there is
+/// no such value: no motion can begin, and the compiler leaves the code of all of them out.
 #[cfg(feature = "measure")]
 #[derive(Clone, Copy, Debug)]
 pub struct BuiltIn(());

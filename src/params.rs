@@ -86,8 +86,8 @@ params! {
     pitch_um = 1_500 in 500..=4_000;
     /// Settle time of a row before its conversions.
     settle_ns = 2_400 in 500..=100_000;
-    /// Sampling time of a conversion, in converter cycles: one of [`crate::scan::Clocks::sample_cycles`], which on the
-    /// STM32F446 are 3, 15, 28, 56, 84, 112, 144 and 480. A half cycle of a converter's list is rounded up.
+    /// Sampling time of a conversion, in converter cycles: one of `Clocks::sample_cycles`, which on the STM32F446
+    /// are 3, 15, 28, 56, 84, 112, 144 and 480. A half cycle of a converter's list is rounded up.
     sample_cycles = 15 in 3..=480;
     /// Converter codes for each kPa on a taxel, thousandths.
     codes_per_kpa_milli = 24_000 in 1_000..=200_000;

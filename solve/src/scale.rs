@@ -15,9 +15,9 @@ use crate::Value;
 use crate::robust::{Fit, minimise};
 use nalgebra::DVector;
 
-/// Shares of a force that are held before it, above and below in turn and ever closer: an array with hysteresis reads less
-/// on the way up than on the way down, and comes to the middle of both by this.
-pub const SWINGS: [f64; 6] = [1.25, 0.8, 1.15, 0.9, 1.06, 0.97];
+/// Goals before a held force, as shares of it: one above, then one below. An array with hysteresis reads less on the way up
+/// than on the way down; these bring the reading between the two.
+pub const SWINGS: [f64; 2] = [1.06, 0.98];
 
 /// A force that was held on a scale.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -141,9 +141,9 @@ impl core::fmt::Display for Warning {
             ),
             Self::LightDrive { mass_g, force_mn, settle_ms } => write!(
                 f,
-                "reduction_mrad_per_mm: the motor is a mass of {mass_g} g at the tip, too little for its stiffness: \
-                 the last tenths of a force of {force_mn} mN take {settle_ms} ms and more; use a larger reduction or \
-                 quicker frames"
+                "reduction_mrad_per_mm: the motor is a mass of {mass_g} g at the tip, too light for the tip's \
+                 stiffness: the last part of an error at {force_mn} mN falls to 37 % in {settle_ms} ms; use a larger \
+                 reduction, quicker frames or a finer encoder"
             ),
             Self::WeakDrive { force_max_mn, stall_mn } => write!(
                 f,
@@ -173,7 +173,8 @@ impl Config {
         let slope = self.gain_sets[GAIN_SETS - 1].slope_per_s.max(1) as f32;
         let speed_gain = POSITION_TO_SPEED * slope;
         let settle_ms = 1e3 * (1.0 + CONTACT_SLOWS * stiffness / (speed_gain * speed_gain)) / slope;
-        let amperes = (p.current_max_ma as f32 * 1e-3).min(p.voltage_max_mv as f32 / p.resistance_mohm.max(1) as f32);
+        let volts_mv = p.voltage_max_mv.min(p.supply_max_mv) as f32;
+        let amperes = (p.current_max_ma as f32 * 1e-3).min(volts_mv / p.resistance_mohm.max(1) as f32);
         let stall_mn = (amperes * p.torque_constant_unm_per_a as f32 * 1e-3 * rad_per_m) as i32;
         [
             (radius_um < PITCHES * i64::from(p.pitch_um)).then_some(Warning::CoarsePitch {

@@ -140,5 +140,5 @@ fn ordinary_fingers_hold_closer_once_they_are_calibrated() {
     };
     let [before, after] = [shares(&native::board), shares(&native::calibrated::board)];
     println!("median, 95 % and worst: {before:.2?} as they come, {after:.2?} calibrated");
-    assert!(after[0] < 0.5 && after[1] < 0.47 && after[2] < 0.9 && after[0] < before[0], "{before:?} {after:?}");
+    assert!(after[0] < 0.4 && after[1] < 0.47 && after[2] < 0.9 && after[0] < before[0], "{before:?} {after:?}");
 }

@@ -1,5 +1,5 @@
-//! Drawn fingers with arrays of other shapes and other frame rates: the envelope of `ordinary` holds, as far as this finger
-//! has its effects. It has no friction, play, hysteresis or creep, and its object is a plane.
+//! Drawn fingers with arrays of other shapes and other frame rates: four promises of `ordinary` hold, and no finger stops
+//! with a fault. These fingers have no friction, play, hysteresis or creep, and their object is a plane.
 
 use super::{Finger, normal};
 use fingertip::config::{Shaped, newtons};

@@ -130,6 +130,7 @@ pub fn calibrate(bench: &mut Bench<Named>, scene: &Scene) -> Result<Calibrated, 
     bench.tare();
     let mut held = Vec::new();
     for goal_n in HOLDS_N {
+        hold(bench, goal_n, SWING_S);
         for share in SWINGS {
             hold(bench, goal_n * share, SWING_S);
         }
@@ -195,7 +196,8 @@ fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
     while bench.time_s() < until_s {
         let status = bench.step();
         true_n += bench.truth().force_n;
-        read_n += f64::from(status.contact.force.0);
+        // As the host's program does: creep and temperature drift are taken off.
+        read_n += f64::from(status.contact.force.0) - f64::from(status.creep.0) - f64::from(status.drift.0);
         count += 1.0;
     }
     Hold { true_n: true_n / count, read_n: read_n / count }

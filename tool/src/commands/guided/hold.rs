@@ -12,10 +12,11 @@ use solve::drift::HeldSeries;
 use solve::scale::{Held, SWINGS};
 use std::time::{Duration, Instant};
 
-/// Time for a force to be reached, and within its tolerance before the next swing and before the scale is read.
+/// Longest time for a force to be reached.
 const REACHED_S: f64 = 30.0;
-const SWUNG: Duration = Duration::from_millis(200);
+/// Time within its tolerance after which a force counts as reached, and time of a swing before it.
 const SETTLED: Duration = Duration::from_secs(1);
+const SWING: Duration = Duration::from_millis(500);
 /// Time over which readings are averaged.
 const AVERAGED: Duration = Duration::from_millis(500);
 /// Largest difference between goal and settled force: this share, at least this.
@@ -69,17 +70,26 @@ pub fn all(
 
 fn hold(goals_mn: &[i64], shown_n: &[f64], run: &Run<'_>, client: &mut Client) -> Result<Vec<Value>, Error> {
     let mut held = Vec::new();
-    let most_mn = client.number(table::find("force_max_mn")?.address)?;
+    let [least_mn, most_mn] = ["contact_on_mn", "force_max_mn"].map(table::find);
+    let [least_mn, most_mn] = [client.number(least_mn?.address)?, client.number(most_mn?.address)?];
     for (index, goal_mn) in goals_mn.iter().enumerate() {
         let goal_n = *goal_mn as f64 * 1e-3;
-        run.report(format_args!("swinging around {goal_n} N, then holding it"));
-        for share in SWINGS {
-            let swing_mn = ((goal_n * 1e3 * share) as i64).clamp(1, most_mn.max(*goal_mn));
-            press::begin(swing_mn, client)?;
-            reach(swing_mn, SWUNG, run, client)?;
-        }
+        run.report(format_args!("holding {goal_n} N"));
         press::begin(*goal_mn, client)?;
-        reach(*goal_mn, SETTLED, run, client)?;
+        reach(*goal_mn, run, client)?;
+        for share in SWINGS {
+            // Near the largest goal there is no room above: then the reading stays on one side of the hysteresis.
+            let swing_mn = ((goal_n * 1e3 * share) as i64).min(most_mn.max(*goal_mn)).max(least_mn);
+            client.set(address::GOAL_FORCE_MN, swing_mn)?;
+            let until = Instant::now() + SWING;
+            while Instant::now() < until {
+                run.interrupt.check()?;
+                same_goal(swing_mn, client)?;
+                std::thread::sleep(LOOK);
+            }
+        }
+        client.set(address::GOAL_FORCE_MN, *goal_mn)?;
+        reach(*goal_mn, run, client)?;
         let shown = match shown_n.get(index) {
             Some(shown) => *shown,
             None => {
@@ -108,8 +118,8 @@ pub fn newtons(text: &str) -> Result<f64, String> {
     numbers::shown_mn(text).map(|shown_mn| shown_mn as f64 * 1e-3)
 }
 
-/// Waits until the force has been held for a time.
-fn reach(goal_mn: i64, settled: Duration, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
+/// Waits until the force has been held for a second.
+fn reach(goal_mn: i64, run: &Run<'_>, client: &mut Client) -> Result<(), Error> {
     let (begun, mut near_since) = (Instant::now(), None);
     loop {
         run.interrupt.check()?;
@@ -117,7 +127,7 @@ fn reach(goal_mn: i64, settled: Duration, run: &Run<'_>, client: &mut Client) ->
         let tolerance_mn = (NEAR * goal_mn as f64).max(NEAR_MN);
         let near = state.mode == Mode::Force as i64 && ((state.force_mn - goal_mn) as f64).abs() <= tolerance_mn;
         near_since = if near { near_since.or(Some(Instant::now())) } else { None };
-        if near_since.is_some_and(|since| since.elapsed() >= settled) {
+        if near_since.is_some_and(|since| since.elapsed() >= SETTLED) {
             return Ok(());
         }
         if begun.elapsed().as_secs_f64() > REACHED_S {

@@ -5,7 +5,7 @@ use fingertip::config::newtons;
 use fingertip::fixed::types::I8F24;
 use fingertip::measure::press::{PARTS, Press as Motion, Step, View};
 use fingertip::measure::series::{CHECK, Out, step_bytes};
-use fingertip::measure::{MeasureStatus, Row, Task};
+use fingertip::measure::{BuiltIn, MeasureStatus, Row, Task};
 use fingertip::shipped::{COLUMNS, ROWS};
 use fingertip::units::Millimetres;
 
@@ -31,7 +31,7 @@ impl Press {
 pub extern "C" fn add(bench: &mut Bench) {
     let Bench { press, picture, contact, motion, record, config, .. } = bench;
     let Press { motion: press, step, standing, frames, .. } = &mut **press;
-    let press = press.get_or_insert_with(|| Motion::begin(motion));
+    let press = press.get_or_insert_with(|| Motion::begin(motion, BuiltIn::PROOF.expect("it is built in")));
     *frames += 1;
     contact.force = newtons(if *frames == 1 { 0 } else { 1_000 });
     motion.observer.travel = Millimetres(I8F24::from_num(if *frames == 3 { -3 } else { 0 }));

@@ -29,8 +29,8 @@ pub struct Command {
     /// True if a tare is made, and torque may be enabled after it, although something touches the tip: every force
     /// then reads less by what presses.
     pub tare_forced: bool,
-    /// Request number of a clear: a change clears a fault. It is refused, and used up, while torque is on: turn torque
-    /// off, then change the number again.
+    /// Request number of a clear: a change clears a fault. A clear with torque on is refused: turn torque off, then change
+    /// the number again.
     pub clear_request: u8,
     /// Request number of a measurement: a change requests the [`crate::measure::Task`] in its lowest bits.
     pub measure_request: u8,

@@ -27,7 +27,7 @@ use press::Step;
 #[derive(Clone, Copy, Debug)]
 pub struct BuiltIn(());
 
-/// Proof that the library was built with the feature `measure`; it was not.
+/// Without the feature `measure` this type has no value, so no motion can begin.
 #[cfg(not(feature = "measure"))]
 #[derive(Clone, Copy, Debug)]
 pub enum BuiltIn {}

@@ -60,8 +60,8 @@ const PART: i32 = 8;
 const PITCHES: i64 = 2;
 /// The slowest frames for which the gains follow the frame time, ns: 5 frames of them take 1/60 s.
 const FRAME_NS: u32 = 3_333_333;
-/// Lag of the observed disturbance over the speed loop's: 3 / 2.5, from three poles at 2.5 times its speed gain. A contact
-/// of stiffness s brakes a tip at speed v by s v times that lag.
+/// Lag of the observer's disturbance, times the speed gain: 3 / 2.5, because its three poles are at 2.5 times that gain.
+/// Meanwhile the force of a contact grows with the travel, and brakes the tip.
 const CONTACT_SLOWS: f32 = 1.2;
 /// Longest [`Warning::LightDrive::settle_ms`] that is not warned of.
 const SETTLE_MS: f32 = 500.0;

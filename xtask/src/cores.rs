@@ -110,7 +110,7 @@ pub fn page(choice: Choice, console: &mut Console) -> Result<String> {
 /// Builds the example for another board, which links for its chip.
 ///
 /// # Errors
-/// No compiler, or it does not build.
+/// No compiler, it does not build, or its size shows that the loop is missing or the motions are not left out.
 pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let target = TARGET_OF_EXAMPLE;
     let toolchain = toolchain::ensure_for(choice, &[target], "the example for another board is built for it", console)?;
@@ -123,7 +123,7 @@ pub fn example(choice: Choice, console: &mut Console) -> Result<()> {
     let bytes = size(&[])?;
     // Without the loop a few kilobytes would be left: its configuration would always be refused.
     ensure!(bytes > 40_000, "{EXAMPLE} has {bytes} bytes: the loop is not in it");
-    // A product does not pay for the motions that it leaves out.
+    // Without the feature the code of the motions must not be in the image.
     ensure!(measures > bytes + 7_000, "{EXAMPLE} has {bytes} bytes, and {measures} with the feature `measure`");
     console.print(&format!("{EXAMPLE}: {bytes} bytes of flash, {measures} with the motions that measure"));
     Ok(())

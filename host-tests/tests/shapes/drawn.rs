@@ -11,10 +11,10 @@ use fingertip::shipped::CLOCKS;
 use fingertip::state::Mode;
 
 /// Worst of a population: force above 1.3 times the goal and 0.15 N, distance from the goal beyond 15 % and 0.1 N, swing
-/// beyond 10 % and 50 mN, and force that is left 0.5 s after a release, N. A promise is kept up to 0.
+/// beyond 10 % and 50 mN, and force that is left 0.5 s after a release, N. 0 or less keeps a promise.
 type Worst = [f64; 4];
 
-/// Draws a finger, asks it for three forces and lets it go.
+/// Draws a finger, which holds three forces and then releases the object.
 fn finger<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u32, seed: u64) -> Worst {
     let mut random = fastrand::Rng::with_seed(seed);
     let mut off = |share: f64| 1.0 + share * normal(&mut random);
@@ -69,7 +69,7 @@ fn finger<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: 
     worst
 }
 
-/// Draws fingers, and returns how many keep all promises, and the worst.
+/// Runs drawn fingers. Returns how many kept all promises, and the worst value of each promise.
 fn fingers<const ROWS: usize, const COLUMNS: usize>(pitch_um: i32, frames_per_s: u32, count: u64) -> (usize, Worst) {
     let all: Vec<Worst> = (1..=count).map(|seed| finger::<ROWS, COLUMNS>(pitch_um, frames_per_s, seed)).collect();
     let inside = all.iter().filter(|worst| worst.iter().all(|beyond| *beyond <= 0.0)).count();

@@ -196,7 +196,7 @@ fn hold(bench: &mut Bench<Named>, goal_n: f64, seconds: f64) -> Hold {
     while bench.time_s() < until_s {
         let status = bench.step();
         true_n += bench.truth().force_n;
-        // As the host's program does: creep and temperature drift are taken off.
+        // The reading without creep and temperature drift, as `fingertip calibrate` takes it.
         read_n += f64::from(status.contact.force.0) - f64::from(status.creep.0) - f64::from(status.drift.0);
         count += 1.0;
     }

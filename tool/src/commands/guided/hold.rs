@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 
 /// Longest time for a force to be reached.
 const REACHED_S: f64 = 30.0;
-/// Time within its tolerance after which a force counts as reached, and time of a swing before it.
+/// Time within its tolerance after which a force counts as reached.
 const SETTLED: Duration = Duration::from_secs(1);
+/// Time for each goal of [`SWINGS`].
 const SWING: Duration = Duration::from_millis(500);
 /// Time over which readings are averaged.
 const AVERAGED: Duration = Duration::from_millis(500);
@@ -51,7 +52,7 @@ impl Reading {
     }
 }
 
-/// Holds each force in turn, after [`SWINGS`] around it. The tip is at rest and clear of the plate afterwards.
+/// Holds each force in turn. Before its reading the finger goes to the goals of [`SWINGS`] around it. The tip is at rest and clear of the plate afterwards.
 pub fn all(
     goals_mn: &[i64],
     shown_n: &[f64],

@@ -39,7 +39,7 @@ pub enum WorldError {
 
 /// Most iterations of the common solution of fingers and object, and the displacement below whose change they end.
 const ROUNDS: usize = 60;
-const ALIKE_MM: f64 = 1e-15;
+const ALIKE_MM: f64 = 1e-12;
 
 /// Distance of an object that was taken away, mm.
 const GONE_MM: f64 = 1e3;

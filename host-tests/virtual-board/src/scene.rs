@@ -24,6 +24,7 @@ use crate::bench::Bench;
 use crate::surroundings::Surroundings;
 use crate::{Error, Options, Rig, flash};
 use finger::{Clock, Finger};
+use fingertip::contact::FitLevel;
 use fingertip::params::Params;
 use fingertip::shipped::{Config, Record, TARE_FRAMES, address};
 use host::{Host, Shown};
@@ -157,6 +158,7 @@ impl Boards {
             set_up_s: self.set_up.as_secs_f64(),
             wall_s: begun.elapsed().as_secs_f64(),
             ledger: sim::run::by_effect(scene, &costs),
+            stages: Vec::new(),
             digest: digests.join(" "),
         })
     }
@@ -199,6 +201,10 @@ fn set_up(rig: &mut Rig, scene: &Scene, start_ns: u64) -> Result<(), Error> {
     if watchdog_ms > 0 {
         let code = (watchdog_ms + WATCHDOG_MS - 1) / WATCHDOG_MS;
         write_u8(rig, "bus watchdog", address::BUS_WATCHDOG, code.min(127) as u8)?;
+    }
+    let fit_level = scene.table("host").whole("fit_level") as u8;
+    if fit_level != FitLevel::default() as u8 {
+        write_u8(rig, "fit level", address::FIT_LEVEL, fit_level)?;
     }
     write_u8(rig, "torque enable", address::TORQUE_ENABLE, 1)?;
     // Goals are not answered, so that the line is free for reads.

@@ -21,6 +21,7 @@ pub struct Contact<C> {
     /// Stiffness along the surface; 0 without friction.
     pub n_per_mm_along: f64,
     forgotten_n: f64,
+    free_mm: f64,
     left: f64,
 }
 
@@ -70,13 +71,15 @@ impl<C: Stages> Contact<C> {
             pressures,
             mm_per_n,
             forgotten_n: 0.0,
+            free_mm: 0.0,
             left: 1.0,
         }
     }
 
     /// Returns the law of the force for the next step.
     pub fn law(&self) -> Law<'_> {
-        Law { elastic: &self.elastic, forgotten_n: self.forgotten_n, mm_per_n: self.mm_per_n, left: self.left }
+        let Self { elastic, forgotten_n, free_mm, mm_per_n, left, .. } = self;
+        Law { elastic, forgotten_n: *forgotten_n, free_mm: *free_mm, mm_per_n: *mm_per_n, left: *left }
     }
 
     /// Lets the tip relax for a time at an overlap.
@@ -87,6 +90,7 @@ impl<C: Stages> Contact<C> {
         let elastic_n = self.elastic.force_n(self.law().depth_mm(x_mm));
         self.effects.relax(dt_s, (elastic_n >= self.forgotten_n).then_some(elastic_n));
         self.forgotten_n = self.effects.forgotten_n();
+        self.free_mm = self.elastic.depth_mm(self.forgotten_n);
     }
 
     /// Loads the object with the force of an overlap.

@@ -17,6 +17,8 @@ use crate::mechanics::rotor::mean_square;
 pub struct Law<'a> {
     pub elastic: &'a Elastic,
     pub forgotten_n: f64,
+    /// Indentation at which the elastic force is `forgotten_n`.
+    pub free_mm: f64,
     pub mm_per_n: f64,
     pub left: f64,
 }
@@ -29,34 +31,17 @@ impl Law<'_> {
     }
 
     fn yielding_mm(&self, x_mm: f64) -> f64 {
-        // d + c N(d) - x changes its sign between these two. It rises and is convex, so Newton's method from above stays
-        // between them.
-        let free_mm = self.elastic.depth_mm(self.forgotten_n);
-        if x_mm <= free_mm {
+        if x_mm <= self.free_mm {
             return x_mm;
         }
-        if let Elastic::Plane { n_per_mm2 } = self.elastic {
-            let steep = self.mm_per_n * n_per_mm2;
-            let ahead = x_mm + self.mm_per_n * self.forgotten_n;
-            return 2.0 * ahead / (1.0 + (1.0 + 4.0 * steep * ahead).sqrt());
-        }
-        let (mut low, mut high) = (free_mm, x_mm);
-        let mut d_mm = x_mm;
-        for _ in 0..60 {
-            let excess = d_mm + self.mm_per_n * self.net_n(d_mm) - x_mm;
-            if excess > 0.0 {
-                high = d_mm
-            } else {
-                low = d_mm
+        match self.elastic {
+            Elastic::Plane { n_per_mm2 } => {
+                let steep = self.mm_per_n * n_per_mm2;
+                let ahead = x_mm + self.mm_per_n * self.forgotten_n;
+                2.0 * ahead / (1.0 + (1.0 + 4.0 * steep * ahead).sqrt())
             }
-            let newton = d_mm - excess / (1.0 + self.mm_per_n * self.elastic.n_per_mm(d_mm));
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - d_mm).abs() <= 1e-16 * x_mm || excess == 0.0 {
-                break;
-            }
-            d_mm = next;
+            Elastic::Table(table) => table.yielding_mm(x_mm, self.mm_per_n, self.forgotten_n),
         }
-        d_mm
     }
 
     /// Force at an overlap.
@@ -71,8 +56,7 @@ impl Law<'_> {
 
     /// Energy at an overlap, mJ.
     pub fn energy_mj(&self, x_mm: f64) -> f64 {
-        let d_mm = self.depth_mm(x_mm);
-        let free_mm = self.elastic.depth_mm(self.forgotten_n);
+        let (d_mm, free_mm) = (self.depth_mm(x_mm), self.free_mm);
         if d_mm <= free_mm {
             return 0.0;
         }
@@ -109,9 +93,8 @@ impl Law<'_> {
         if self.forgotten_n == 0.0 {
             return self.elastic.mean_n(d0, d1);
         }
-        let free_mm = self.elastic.depth_mm(self.forgotten_n);
-        let (from, to) = (d0.max(free_mm), d1.max(free_mm));
-        let share = if d0 == d1 { f64::from(d0 > free_mm) } else { (to - from) / (d1 - d0) };
+        let (from, to) = (d0.max(self.free_mm), d1.max(self.free_mm));
+        let share = if d0 == d1 { f64::from(d0 > self.free_mm) } else { (to - from) / (d1 - d0) };
         (self.elastic.mean_n(from, to) - self.forgotten_n).max(0.0) * share
     }
 }
@@ -128,9 +111,11 @@ pub enum Elastic {
     Table(Table),
 }
 
-/// Knots of a force that never falls, from 0 at 0.
+/// Knots of a force that rises ever more steeply, from 0 at 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
+    /// Knots per square root of the indentation, in which they are evenly spaced.
+    per_root: f64,
     /// Indentation, mm; rising.
     d_mm: Vec<f64>,
     force_n: Vec<f64>,
@@ -138,19 +123,46 @@ pub struct Table {
 }
 
 impl Table {
-    /// Creates a table of knots from d = 0 on: at least two, d rising, force not falling.
+    /// Creates a table of knots from d = 0 on: at least two, evenly spaced in the root of d, force not falling.
     pub fn new(d_mm: Vec<f64>, force_n: Vec<f64>) -> Self {
+        let last = d_mm.len() - 1;
         let mut energy_mj = vec![0.0; d_mm.len()];
         for knot in 1..d_mm.len() {
             let mean = 0.5 * (force_n[knot] + force_n[knot - 1]);
             energy_mj[knot] = energy_mj[knot - 1] + mean * (d_mm[knot] - d_mm[knot - 1]);
         }
-        Self { d_mm, force_n, energy_mj }
+        Self { per_root: last as f64 / d_mm[last].sqrt(), d_mm, force_n, energy_mj }
     }
 
-    /// Returns the segment of a value, by its lower knot.
-    fn below(&self, knots: &[f64], value: f64) -> usize {
-        knots.partition_point(|knot| *knot <= value).clamp(1, knots.len() - 1) - 1
+    /// Returns the segment of an indentation, by its lower knot.
+    fn line(&self, d_mm: f64) -> usize {
+        let last = self.d_mm.len() - 2;
+        let mut line = ((d_mm.max(0.0).sqrt() * self.per_root) as usize).min(last);
+        // The root may round to the segment beside it.
+        while line > 0 && self.d_mm[line] > d_mm {
+            line -= 1;
+        }
+        while line < last && self.d_mm[line + 1] <= d_mm {
+            line += 1;
+        }
+        line
+    }
+
+    /// Solves d + c (F(d) - S) = x for d, where d > 0 and F(d) > S. The left side is convex, so each segment's solution
+    /// is at most the one before, and the search ends in the segment that contains its own.
+    fn yielding_mm(&self, x_mm: f64, mm_per_n: f64, forgotten_n: f64) -> f64 {
+        let mut line = self.line(x_mm);
+        loop {
+            let rise = mm_per_n * self.slope(line);
+            let from_mm = self.d_mm[line];
+            let over_mm = (x_mm - from_mm - mm_per_n * (self.force_n[line] - forgotten_n)) / (1.0 + rise);
+            let d_mm = from_mm + over_mm;
+            let next = self.line(d_mm);
+            if next >= line {
+                return d_mm;
+            }
+            line = next;
+        }
     }
 
     fn slope(&self, line: usize) -> f64 {
@@ -162,14 +174,14 @@ impl Table {
     }
 
     fn force_n(&self, d_mm: f64) -> f64 {
-        if d_mm <= 0.0 { 0.0 } else { self.on_line(self.below(&self.d_mm, d_mm), d_mm) }
+        if d_mm <= 0.0 { 0.0 } else { self.on_line(self.line(d_mm), d_mm) }
     }
 
     fn energy_mj(&self, d_mm: f64) -> f64 {
         if d_mm <= 0.0 {
             return 0.0;
         }
-        let line = self.below(&self.d_mm, d_mm);
+        let line = self.line(d_mm);
         let over = d_mm - self.d_mm[line];
         self.energy_mj[line] + over * (self.force_n[line] + 0.5 * over * self.slope(line))
     }
@@ -180,7 +192,7 @@ impl Table {
             return self.force_n(d0);
         }
         let (low, high) = (d0.min(d1), d0.max(d1));
-        let (first, last) = (self.below(&self.d_mm, low), self.below(&self.d_mm, high));
+        let (first, last) = (self.line(low), self.line(high));
         let part = |line: usize, from: f64, to: f64| {
             let (from, to) = (from.max(0.0), to.max(0.0));
             0.5 * (self.on_line(line, from) + self.on_line(line, to)) * (to - from)
@@ -196,7 +208,8 @@ impl Table {
         if force_n <= 0.0 {
             return 0.0;
         }
-        let line = self.below(&self.force_n, force_n);
+        let knots = self.force_n.partition_point(|knot_n| *knot_n <= force_n);
+        let line = knots.clamp(1, self.force_n.len() - 1) - 1;
         self.d_mm[line] + (force_n - self.force_n[line]) / self.slope(line)
     }
 }
@@ -237,7 +250,7 @@ impl Elastic {
     pub fn n_per_mm(&self, d_mm: f64) -> f64 {
         match self {
             Self::Plane { n_per_mm2 } => 2.0 * n_per_mm2 * d_mm.max(0.0),
-            Self::Table(table) => table.slope(table.below(&table.d_mm, d_mm)),
+            Self::Table(table) => table.slope(table.line(d_mm)),
         }
     }
 }

@@ -38,6 +38,8 @@ pub struct Pressures {
     /// Knots by place of the centre and root of the indentation. The first root is the knot before 0: the shares are
     /// even in the root.
     knots: Vec<Vec<Knot>>,
+    /// Points of a shaped surface by place of the centre, from the first contact there on.
+    points: Vec<Option<shape::Points>>,
 }
 
 /// Mean pressures on all taxels as shares of the peak, once they are computed.
@@ -70,7 +72,8 @@ impl Pressures {
         let roots = (deepest_mm.sqrt() / ROOT) as usize + 4;
         let knots = (0..=2 * PLACES).map(|_| vec![None; roots]).collect();
         let peak_per_mm = tip.modulus_kpa / tip.radius_mm;
-        Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots }
+        let points = (0..=2 * PLACES).map(|_| None).collect();
+        Self { tip, pitch_mm, centre_mm, deepest_mm, peak_per_mm, knots, points }
     }
 
     /// Returns the place of an indentation, with the centre shifted along the rows.
@@ -133,28 +136,32 @@ impl Pressures {
     fn work_out(&mut self, stages: &impl Stages, around: Around) {
         let shift_mm = (around.place as f64 - PLACES as f64) * PLACE_MM;
         let centre_mm = [self.centre_mm[0], self.centre_mm[1] + shift_mm];
+        let (tip, pitch_mm, points) = (&self.tip, self.pitch_mm, &mut self.points[around.place]);
+        let cells = move || {
+            let taxels = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+            taxels.map(move |(row, column)| Cell::at(pitch_mm, centre_mm, row, column))
+        };
         for (at, knot) in self.knots[around.place].iter_mut().enumerate().skip(around.root).take(4) {
             let root = (at as f64 - 1.0) * ROOT;
-            knot.get_or_insert_with(|| Box::new(shares(stages, &self.tip, self.pitch_mm, centre_mm, root * root)));
+            let d_mm = root * root;
+            knot.get_or_insert_with(|| {
+                if d_mm == 0.0 {
+                    Box::new([[0.0; COLUMNS]; ROWS])
+                } else if stages.shaped() {
+                    let points = points.get_or_insert_with(|| shape::Points::of(stages, tip, cells()));
+                    by_row(points.means(d_mm).map(|share| share * tip.radius_mm / d_mm))
+                } else {
+                    let (flattened, peak_kpa) = (tip.flattened(d_mm), tip.modulus_kpa * d_mm / tip.radius_mm);
+                    by_row(cells().map(|cell| cell.mean_kpa(&flattened) / peak_kpa))
+                }
+            });
         }
     }
 }
 
-/// Mean pressures as shares of the peak.
-fn shares(stages: &impl Stages, tip: &Tip, pitch_mm: f64, centre_mm: [f64; 2], d_mm: f64) -> [Row; ROWS] {
-    if d_mm == 0.0 {
-        return [[0.0; COLUMNS]; ROWS];
-    }
-    let peak_kpa = tip.modulus_kpa * d_mm / tip.radius_mm;
-    let flattened = tip.flattened(d_mm);
-    let shaped = stages.shaped();
-    core::array::from_fn(|row| {
-        core::array::from_fn(|column| {
-            let cell = Cell::at(pitch_mm, centre_mm, row, column);
-            let mean = if shaped { shape::mean_kpa(stages, tip, d_mm, &cell) } else { cell.mean_kpa(&flattened) };
-            mean / peak_kpa
-        })
-    })
+/// Numbers of the taxels, row by row.
+fn by_row(mut numbers: impl Iterator<Item = f64>) -> Box<[Row; ROWS]> {
+    Box::new(core::array::from_fn(|_| core::array::from_fn(|_| numbers.next().unwrap_or(0.0))))
 }
 
 /// Cuts negative values: the interpolation overshoots where a taxel first touches the rim.

@@ -73,20 +73,44 @@ fn samples(stages: &impl Stages, tip: &Tip) -> Vec<Sample> {
     samples
 }
 
-/// Mean pressure on a taxel, by its midpoints.
-pub fn mean_kpa(stages: &impl Stages, tip: &Tip, d_mm: f64, cell: &Cell) -> f64 {
-    let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / ALONG as f64;
-    let mut sum = 0.0;
-    for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
-        let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
-        let length2_mm2 = tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm;
-        // At the rim of the tip nothing is left to compress.
-        if length2_mm2 <= 0.0 {
-            continue;
+/// Places on the taxels, by the midpoints of their squares: the indentation at which the tip touches there, mm, and 1/L.
+pub struct Points {
+    clearance_mm: Vec<f64>,
+    per_length: Vec<f64>,
+}
+
+impl Points {
+    /// Points of the taxels of these squares.
+    pub fn of(stages: &impl Stages, tip: &Tip, cells: impl Iterator<Item = Cell>) -> Self {
+        let at = |side: [f64; 2], n: usize| side[0] + (side[1] - side[0]) * (n as f64 + 0.5) / ALONG as f64;
+        let (mut clearance_mm, mut per_length) = (Vec::new(), Vec::new());
+        for cell in cells {
+            for (i, j) in (0..ALONG).flat_map(|i| (0..ALONG).map(move |j| (i, j))) {
+                let (x_mm, y_mm) = (at(cell.x_mm, i), at(cell.y_mm, j));
+                let length_mm = (tip.radius_mm * tip.radius_mm - x_mm * x_mm - y_mm * y_mm).max(0.0).sqrt();
+                let reached_mm = length_mm + stages.height_mm(x_mm, y_mm, tip.radius_mm);
+                clearance_mm.push(tip.radius_mm - reached_mm);
+                // At the rim of the tip nothing is left to compress.
+                per_length.push(if length_mm > 0.0 { 1.0 / length_mm } else { 0.0 });
+            }
         }
-        let length_mm = length2_mm2.sqrt();
-        let compressed_mm = length_mm - (tip.radius_mm - d_mm) + stages.height_mm(x_mm, y_mm, tip.radius_mm);
-        sum += tip.modulus_kpa * compressed_mm.clamp(0.0, Tip::DEEPEST * length_mm) / length_mm;
+        Self { clearance_mm, per_length }
     }
-    sum / (ALONG * ALONG) as f64
+
+    /// Mean pressure on each taxel at an indentation, as shares of Y, in the order of the squares.
+    pub fn means(&self, d_mm: f64) -> impl Iterator<Item = f64> {
+        /// Sums side by side, which the processor adds at once.
+        const LANES: usize = 8;
+        let taxels = self.clearance_mm.chunks_exact(ALONG * ALONG).zip(self.per_length.chunks_exact(ALONG * ALONG));
+        taxels.map(move |(clearance_mm, per_length)| {
+            let mut sums = [0.0; LANES];
+            for (clearances, lengths) in clearance_mm.chunks_exact(LANES).zip(per_length.chunks_exact(LANES)) {
+                for lane in 0..LANES {
+                    let compressed = (d_mm - clearances[lane]).max(0.0) * lengths[lane];
+                    sums[lane] += compressed.min(Tip::DEEPEST);
+                }
+            }
+            sums.iter().sum::<f64>() / (ALONG * ALONG) as f64
+        })
+    }
 }

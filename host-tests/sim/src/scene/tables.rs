@@ -153,6 +153,7 @@ pub const TABLES: &[Table] = &[
         keys: &[
             number("period_ms", "Time from a command to its repetition.", 0.1, 10_000.0, 10.0),
             Key::whole("watchdog_ms", "Bus watchdog of the controller; 0 is off.", 0, 65_535, 0),
+            Key::whole("fit_level", "Requested fit level, 0 to 5.", 0, 5, 2),
             number("read_ms", "Time between readings; 0 reads nothing and does not grip.", 0.0, 1000.0, 0.0),
             number("grip_friction", "Friction coefficient that the host trusts.", 0.01, 10.0, 0.5),
             number(

@@ -302,41 +302,47 @@ pub const EFFECTS: &[Description] = &[
     },
 ];
 
+/// Conductances seen from the columns, where all rows but the driven one float.
+///
+/// With the floating rows eliminated the columns form a network A = D - sum g g' / line, symmetric and positive definite.
+/// Column j alone at the virtual ground sees (A^-1 g)_j / (A^-1)_jj, g the driven row. By A = L L' (Cholesky) and M =
+/// L^-1, A^-1 = M' M.
 fn short_circuit(driven: usize, array: &[Row; ROWS], hold: f64) -> Row {
     let mut a = [[0.0; COLUMNS]; COLUMNS];
     for (row, siemens) in array.iter().enumerate() {
-        let line = hold + siemens.iter().sum::<f64>();
+        let per_line = if row == driven { 0.0 } else { 1.0 / (hold + siemens.iter().sum::<f64>()) };
         for (c, g) in siemens.iter().enumerate() {
+            let share = g * per_line;
+            a[c].iter_mut().zip(&siemens[..=c]).for_each(|(a, other)| *a -= share * other);
             a[c][c] += g;
-            if row != driven {
-                let share = g / line;
-                a[c].iter_mut().zip(siemens).for_each(|(a, other)| *a -= share * other);
-            }
         }
     }
-    for (c, line) in a.iter_mut().enumerate() {
-        line[c] += hold;
+    // L replaces the lower half of A and M that of the identity, line by line.
+    let mut m = [[0.0; COLUMNS]; COLUMNS];
+    for i in 0..COLUMNS {
+        a[i][i] += hold;
+        let mut line = [0.0; COLUMNS];
+        line[i] = 1.0;
+        for j in 0..i {
+            let (above, below) = a.split_at_mut(i);
+            let known: f64 = above[j][..j].iter().zip(&below[0][..j]).map(|(a, b)| a * b).sum();
+            let share = (below[0][j] - known) / above[j][j];
+            below[0][j] = share;
+            line.iter_mut().zip(&m[j]).for_each(|(entry, part)| *entry -= share * part);
+        }
+        let length = (a[i][i] - a[i][..i].iter().map(|l| l * l).sum::<f64>()).sqrt();
+        a[i][i] = length;
+        m[i] = line.map(|entry| entry / length);
     }
-    let inverse = inverse(a);
-    core::array::from_fn(|j| {
-        let open: f64 = inverse[j].iter().zip(&array[driven]).map(|(a, b)| a * b).sum();
-        (open / inverse[j][j]).max(0.0)
-    })
-}
-
-/// Inverts a symmetric positive definite matrix by Gauss and Jordan. Such a matrix needs no pivots.
-fn inverse(mut a: [Row; COLUMNS]) -> [Row; COLUMNS] {
-    for p in 0..COLUMNS {
-        let pivot = 1.0 / a[p][p];
-        a[p][p] = 1.0;
-        a[p].iter_mut().for_each(|entry| *entry *= pivot);
-        let line = a[p];
-        for (_, other) in a.iter_mut().enumerate().filter(|(row, _)| *row != p) {
-            let factor = core::mem::replace(&mut other[p], 0.0);
-            other.iter_mut().zip(line).for_each(|(entry, part)| *entry -= factor * part);
+    let (mut open, mut diagonal) = ([0.0; COLUMNS], [0.0; COLUMNS]);
+    for line in &m {
+        let along: f64 = line.iter().zip(&array[driven]).map(|(m, g)| m * g).sum();
+        for (j, m) in line.iter().enumerate() {
+            open[j] += m * along;
+            diagonal[j] += m * m;
         }
     }
-    a
+    core::array::from_fn(|j| (open[j] / diagonal[j]).max(0.0))
 }
 
 /// Settling of the columns.
@@ -389,9 +395,18 @@ impl Since {
 const TERMS: usize = 9;
 const TAUS_S: [f64; TERMS] = [1e-3, 1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4, 1e5];
 
-/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term.
+/// 1 - exp(-x) without cancellation at small x: a frame is 1e-8 of the slowest term. The series end at 4e-15 of the
+/// result.
 fn gone(x: f64) -> f64 {
-    if x < 1e-4 { x - 0.5 * x * x + x * x * x / 6.0 } else { 1.0 - decay(x) }
+    const THIRD: [f64; 2] = [1.0 / 3.0, 1.0 / 2.0];
+    const TENTH: [f64; 9] =
+        [1.0 / 10.0, 1.0 / 9.0, 1.0 / 8.0, 1.0 / 7.0, 1.0 / 6.0, 1.0 / 5.0, 1.0 / 4.0, 1.0 / 3.0, 1.0 / 2.0];
+    let series = |shares: &[f64]| x * shares.iter().fold(1.0, |sum, share| 1.0 - x * share * sum);
+    match x {
+        ..1e-4 => series(&THIRD),
+        ..0.125 => series(&TENTH),
+        _ => 1.0 - decay(x),
+    }
 }
 
 struct TemperatureDrift {
@@ -405,11 +420,11 @@ struct TemperatureDrift {
 
 impl Pressure for TemperatureDrift {
     fn chip_c(&self, time_s: f64) -> Option<f64> {
-        Some(25.0 + self.chip_k * (1.0 - decay(time_s.max(0.0) / self.chip_time_constant_s)))
+        Some(25.0 + self.chip_k * gone(time_s.max(0.0) / self.chip_time_constant_s))
     }
 
     fn apply(&mut self, _row: usize, time_s: f64, kpa: &mut Row) {
-        let warmer_k = self.warming_k * (1.0 - decay(time_s.max(0.0) / self.time_constant_s));
+        let warmer_k = self.warming_k * gone(time_s.max(0.0) / self.time_constant_s);
         let (gain, zero_kpa) = (1.0 + self.gain_per_k * warmer_k, self.zero_kpa_per_k * warmer_k);
         kpa.iter_mut().for_each(|kpa| *kpa = *kpa * gain + zero_kpa);
     }

@@ -71,7 +71,17 @@ fn the_creep_term_is_the_best_of_those_tried_on_other_arrays() {
 
 #[test]
 fn calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
-    for seed in 1..=SEEDS {
+    leave_a_third(1..2);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_calibration_and_the_creep_term_leave_a_third_of_a_worn_sensors_error() {
+    leave_a_third(2..SEEDS + 1);
+}
+
+fn leave_a_third(seeds: std::ops::Range<u64>) {
+    for seed in seeds {
         let raw = error_mn(&scene(seed, OFF), &native::board);
         let [plain, crept] = [OFF, CREEP].map(|creep| calibrated_mn(&scene(seed, creep)));
         println!("seed {seed}: {raw:.0} mN, calibrated {plain:.0}, with the creep term too {crept:.0}");
@@ -108,7 +118,17 @@ fn dead_taxels_under_the_contact_do_not_keep_the_scale_from_being_found() {
 /// `population unlike --fingers 40` prints the figures of more fingers.
 #[test]
 fn calibration_leaves_a_few_percent_of_the_force() {
-    let fingers = fingers(1, 4).unwrap_or_else(|error| panic!("{error}"));
+    leaves_a_few_percent(1);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_calibration_leaves_a_few_percent_of_the_force() {
+    leaves_a_few_percent(4);
+}
+
+fn leaves_a_few_percent(count: usize) {
+    let fingers = fingers(1, count).unwrap_or_else(|error| panic!("{error}"));
     println!("{}", errors_text(&fingers));
     let [before, after] = percentiles(&fingers);
     for (test, most) in [9.0, 8.0, 12.0].into_iter().enumerate() {
@@ -121,7 +141,8 @@ fn calibration_leaves_a_few_percent_of_the_force() {
 /// Ordinary fingers as they come, and calibrated first: what a hold is off, as shares of 3 % and 20 mN, and of 8 % and
 /// 50 mN. More with `FINGERS=20 cargo test -p sim --profile host --test unlike ordinary -- --nocapture`.
 #[test]
-fn ordinary_fingers_hold_closer_once_they_are_calibrated() {
+#[ignore = "long: cargo xtask test --long"]
+fn long_ordinary_fingers_hold_closer_once_they_are_calibrated() {
     let count = std::env::var("FINGERS").map_or(4, |count| count.parse().expect("a number"));
     let ordinary = population::load("ordinary").unwrap_or_else(|error| panic!("{error}"));
     let shares = |board: Run<'_>| {

@@ -41,10 +41,20 @@ fn frames(task: Task) -> u32 {
 
 #[test]
 fn a_motion_ends_at_any_moment_and_the_next_one_works() {
+    end_and_go_on(&[0, 4]);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_a_motion_ends_at_any_moment_and_the_next_one_works() {
+    end_and_go_on(&[1, 2, 3, 5, 6]);
+}
+
+fn end_and_go_on(parts: &[u32]) {
     for task in [Task::Jog, Task::Strokes, Task::Press] {
         let frames = frames(task);
         for (number, (name, act)) in ENDS.into_iter().enumerate() {
-            for part in 0..7 {
+            for part in parts {
                 let at = 1 + (frames - 40) * part / 6 + number as u32;
                 let mut finger = Made::begun(task);
                 (0..at).for_each(|_| _ = finger.frame());

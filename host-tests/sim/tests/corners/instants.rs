@@ -95,7 +95,16 @@ fn press(goal_n: f64, yield_mm_per_n: f64, first: u64, every: u64) -> [(f64, f64
 
 #[test]
 fn an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
-    let every = number("INSTANTS_STEP", 20).clamp(1, INSTANTS);
+    keep_the_force(100);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_an_event_at_any_instant_of_a_press_does_not_let_the_force_rise() {
+    keep_the_force(number("INSTANTS_STEP", 20).clamp(1, INSTANTS));
+}
+
+fn keep_the_force(every: u64) {
     let presses: Vec<_> =
         GOALS_N.into_iter().flat_map(|goal_n| OBJECTS_MM_PER_N.map(|object| (goal_n, object))).collect();
     // Each press tries other instants, so that few of them cover the time more densely.

@@ -2,7 +2,7 @@
 //!
 //! The first sequences that fail are shortened and printed: 6, or `SHOWN=n`. `SEQUENCES=n` tries n. Without
 //! `--profile host` the core also checks its arithmetic for overflow:
-//! `SEQUENCES=2000 cargo test -p sim --test corners sequences -- --nocapture`
+//! `SEQUENCES=2000 cargo test -p sim --test corners sequences -- --ignored --nocapture`
 //!
 //! Sequences, drawn.
 //!
@@ -12,6 +12,7 @@ use crate::{
     CONTACT_ON_N, Finger, fault, finger, force_n, log_uniform, mode, most_n, number, object, set_goal, uniform,
 };
 use core::fmt;
+use core::ops::Range;
 use fastrand::Rng;
 use fingertip::command::Command;
 use fingertip::measure::Task;
@@ -152,8 +153,18 @@ fn shortened(mut sequence: Sequence, mut reason: String) -> (Sequence, String) {
 
 #[test]
 fn random_sequences_keep_the_force_in_bounds_and_the_table_of_modes() {
-    let count = number("SEQUENCES", USUAL);
-    let failed: Vec<_> = cores::map(0..count, |seed| broken(&Sequence::drawn(seed)).map(|reason| (seed, reason)));
+    keep_the_rules(0..USUAL / 8);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_random_sequences_keep_the_force_in_bounds_and_the_table_of_modes() {
+    keep_the_rules(USUAL / 8..number("SEQUENCES", USUAL));
+}
+
+fn keep_the_rules(seeds: Range<u64>) {
+    let count = seeds.end - seeds.start;
+    let failed: Vec<_> = cores::map(seeds, |seed| broken(&Sequence::drawn(seed)).map(|reason| (seed, reason)));
     let failed: Vec<_> = failed.into_iter().flatten().collect();
     println!("{} of {count} sequences break a rule", failed.len());
     for (seed, reason) in &failed {

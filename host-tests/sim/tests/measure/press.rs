@@ -75,7 +75,17 @@ fn told(finger: &Finger, made: &Made) -> String {
 
 #[test]
 fn valid_presses_complete() {
-    let fingers = tips(fingers_or(30), &[]);
+    complete(10);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_valid_presses_complete() {
+    complete(fingers_or(30));
+}
+
+fn complete(count: usize) {
+    let fingers = tips(count, &[]);
     let made = cores::map(0..fingers.len(), |number| make(&fingers[number], |_, _| {}));
     let all = |of: fn(&Made) -> f64| made.iter().enumerate().map(|(number, made)| (of(made), number)).collect();
     for (number, (finger, made)) in fingers.iter().zip(&made).enumerate() {
@@ -185,9 +195,19 @@ const TROUBLES: [Trouble; 7] = [
 
 #[test]
 fn what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
+    end_within_limits(3);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_what_moves_yields_or_vanishes_ends_a_press_within_its_limits() {
+    end_within_limits(fingers_or(12));
+}
+
+fn end_within_limits(count: usize) {
     let mut broken = Vec::new();
     for Trouble { name, changes, happens, ends } in TROUBLES {
-        let fingers = tips(fingers_or(12), changes);
+        let fingers = tips(count, changes);
         let made = cores::map(0..fingers.len(), |number| {
             let finger = &fingers[number];
             let distance_mm = drawn_or(finger, "object.distance_mm", 50.0);

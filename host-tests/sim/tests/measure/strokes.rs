@@ -82,7 +82,17 @@ fn judge(name: &str, made: &[(Finger, Made)]) -> usize {
 
 #[test]
 fn strokes_in_free_air_stay_near_the_origin_and_complete() {
-    let made = drives(fingers_or(40), Task::Strokes, &[]);
+    complete_in_free_air(8);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_strokes_in_free_air_stay_near_the_origin_and_complete() {
+    complete_in_free_air(fingers_or(40));
+}
+
+fn complete_in_free_air(count: usize) {
+    let made = drives(count, Task::Strokes, &[]);
     let done = judge("free air", &made);
     assert!(10 * done >= 9 * made.len(), "{done}");
 }
@@ -97,10 +107,20 @@ fn jogs_complete() {
 /// An object from 0.1 to 1.2 mm ahead, seen by the array or off it.
 #[test]
 fn an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
+    stop_at_an_object(4);
+}
+
+#[test]
+#[ignore = "long: cargo xtask test --long"]
+fn long_an_object_in_the_way_is_pressed_with_no_more_than_300_mn() {
+    stop_at_an_object(fingers_or(20));
+}
+
+fn stop_at_an_object(count: usize) {
     let near = ("distance_mm = { uniform = [2, 8] }", "distance_mm = { uniform = [0.1, 1.2] }");
     let off = ("centre_x_mm = { uniform = [-3.5, 3.5] }", "centre_x_mm = 20");
-    judge("an object ahead", &drives(fingers_or(20), Task::Strokes, &[near]));
-    judge("an object ahead, off the array", &drives(fingers_or(20), Task::Strokes, &[near, off]));
+    judge("an object ahead", &drives(count, Task::Strokes, &[near]));
+    judge("an object ahead, off the array", &drives(count, Task::Strokes, &[near, off]));
 }
 
 /// The tip must not go far before the strokes end.
